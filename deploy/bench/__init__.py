@@ -1,0 +1,1 @@
+"""Measurements: one file a bench name, each row beside its bar or its baseline."""

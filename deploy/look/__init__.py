@@ -1,0 +1,1 @@
+"""From a run folder or a live fleet to something that a person reads."""

@@ -1,0 +1,73 @@
+"""SE(2): poses, twists and exact motion along arcs. SI units, radians, counter-clockwise (REP-103)."""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, pi, sin
+
+from msgspec import Struct
+
+TAU = 2.0 * pi
+
+
+class Pose2D(Struct, frozen=True, array_like=True, gc=False):
+    """Position [m] and yaw [rad] of one frame in another; the frame is in the variable's name."""
+
+    x: float = 0.0
+    y: float = 0.0
+    theta: float = 0.0
+
+
+class Twist(Struct, frozen=True, array_like=True, gc=False):
+    """Velocity of `base_link` in itself: forward [m/s] and yaw rate [rad/s]."""
+
+    linear_x: float = 0.0
+    angular_z: float = 0.0
+
+
+STILL = Twist(0.0, 0.0)
+
+
+def wrap(angle: float) -> float:
+    """`angle` [rad] brought into (-pi, pi]."""
+    wrapped = (angle + pi) % TAU - pi
+    return pi if wrapped == -pi else wrapped
+
+
+def compose(a_b: Pose2D, b_c: Pose2D) -> Pose2D:
+    """Pose of c in a, from b in a and c in b."""
+    c, s = cos(a_b.theta), sin(a_b.theta)
+    return Pose2D(a_b.x + c * b_c.x - s * b_c.y, a_b.y + s * b_c.x + c * b_c.y, wrap(a_b.theta + b_c.theta))
+
+
+def inverse(a_b: Pose2D) -> Pose2D:
+    """Pose of a in b, from b in a."""
+    c, s = cos(a_b.theta), sin(a_b.theta)
+    return Pose2D(-c * a_b.x - s * a_b.y, s * a_b.x - c * a_b.y, wrap(-a_b.theta))
+
+
+def between(a_b: Pose2D, a_c: Pose2D) -> Pose2D:
+    """Pose of c in b, from both in a."""
+    return compose(inverse(a_b), a_c)
+
+
+def along_arc(pose: Pose2D, twist: Twist, duration_s: float) -> Pose2D:
+    """Where a unicycle is after `duration_s` of constant `twist`: equation (1) integrated exactly as an arc."""
+    turn = twist.angular_z * duration_s
+    chord = twist.linear_x * duration_s * sinc(0.5 * turn)
+    middle = pose.theta + 0.5 * turn
+    return Pose2D(pose.x + chord * cos(middle), pose.y + chord * sin(middle), wrap(pose.theta + turn))
+
+
+def sinc(x: float) -> float:
+    """sin(x)/x, exact at zero."""
+    return sin(x) / x if abs(x) > 1e-6 else 1.0 - x * x / 6.0
+
+
+def distance(a: Pose2D, b: Pose2D) -> float:
+    """Straight-line distance [m] between two positions."""
+    return hypot(a.x - b.x, a.y - b.y)
+
+
+def bearing(origin: Pose2D, target: Pose2D) -> float:
+    """Direction [rad] from `origin` to `target` in the frame that both are given in."""
+    return atan2(target.y - origin.y, target.x - origin.x)

@@ -1,0 +1,469 @@
+"""All that travels between processes, as frozen structs, and the codec (msgpack, one array a message).
+
+Every message begins with a `Header`: Zenoh samples carry no sender, and a stamp of the sender's own monotonic
+clock is the only time that means anything. Between machines only differences of stamps do.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from math import isfinite
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from protocol.geometry import Pose2D, Twist
+from protocol.mission import Mission
+
+WIRE_VERSION = 1
+MESSAGE_BYTES_MAX = 64 * 1024
+
+
+class Header(Struct, frozen=True, array_like=True, gc=False):
+    """Who says it, in which of its lives, as how manieth on this topic, and when by its own clock [s]."""
+
+    sender: str
+    incarnation: int
+    seq: int
+    stamp: float
+
+
+# --- terms, members and configs: what the lease protocol agrees on (lease.md 3.1, 3.3) -------------------------
+
+
+class Term(Struct, frozen=True, array_like=True, order=True, gc=False):
+    """An election epoch, totally ordered and never used twice: number, issuer's id and issuer's incarnation."""
+
+    n: int = 0
+    issuer: int = 0
+    incarnation: int = 0
+
+
+NO_TERM = Term()
+
+
+class Member(Struct, frozen=True, array_like=True, order=True, gc=False):
+    """One life of one id. Id 0 is the witness: a voter without a robot."""
+
+    id: int
+    incarnation: int
+
+
+class Version(Struct, frozen=True, array_like=True, order=True, gc=False):
+    """Of a config: the term whose holder wrote it, and a number within that term."""
+
+    term: Term = NO_TERM
+    seq: int = 0
+
+
+class Electorate(Struct, frozen=True, array_like=True):
+    """A set of voters and its tie-breaker: the previous one counts too while a change is joint."""
+
+    voters: tuple[Member, ...]
+    tie: Member | None = None
+    rule: str = "half"
+    """`half` (majority, or one half with the tie-breaker) or `all` (after a full house, lease.md 3.9)."""
+
+
+class Config(Struct, frozen=True, array_like=True):
+    """The one versioned record of a term: who votes and who follows whom. `chain[0]` leads."""
+
+    version: Version
+    voters: tuple[Member, ...]
+    tie: Member | None
+    previous: Electorate | None
+    chain: tuple[Member, ...]
+
+
+class GatewayStamp(Struct, frozen=True, array_like=True, gc=False):
+    """A moment of a gateway's own clock, echoed in commands so that their age is judged on one clock only."""
+
+    incarnation: int
+    time: float
+
+
+# --- the lease protocol's own messages (lease.md 3.3); the header of `LeaseNote` says who speaks -----------------
+
+
+class Prepare(Struct, frozen=True, array_like=True, tag="prepare"):
+    term: Term
+    version: Version
+
+
+class Grantee(Struct, frozen=True, array_like=True):
+    """Whom a voter is still bound to: the exact term, its holder and the holder's incarnation."""
+
+    term: Term
+    holder: Member
+
+
+class Promise(Struct, frozen=True, array_like=True, tag="promise"):
+    term: Term
+    config: Config
+    needs_fence: Grantee | None
+    blank: bool
+
+
+class Nack(Struct, frozen=True, array_like=True, tag="nack"):
+    term: Term
+    promised: Term
+    holder: Member | None
+    remaining_s: float
+    config: Config
+
+
+class Propose(Struct, frozen=True, array_like=True, tag="propose"):
+    """Lease request, renewal, config write and hand-over: the heartbeat."""
+
+    term: Term
+    config: Config
+    round: int
+    holder: Member
+    fenced: tuple[Term, ...] = ()
+    nonce: float | None = None
+
+
+class Grant(Struct, frozen=True, array_like=True, tag="grant"):
+    term: Term
+    round: int
+    version: Version
+    nonce: float
+
+
+class Release(Struct, frozen=True, array_like=True, tag="release"):
+    """The holder's own gateway refuses every term up to `term`, or its residual motion has run out."""
+
+    term: Term
+
+
+class Hello(Struct, frozen=True, array_like=True, tag="hello"):
+    """From anyone who holds no live grant; `version` is None for a blank process."""
+
+    version: Version | None
+
+
+class Fence(Struct, frozen=True, array_like=True, tag="fence"):
+    """To the gateway of the robot whose term `old` is to end: refuse everything below `term`."""
+
+    old: Term
+    term: Term
+
+
+class Fenced(Struct, frozen=True, array_like=True, tag="fenced"):
+    """From that gateway: `old` can act no more here; nothing below `term` will."""
+
+    old: Term
+    term: Term
+
+
+LeaseBody = Prepare | Promise | Nack | Propose | Grant | Release | Hello | Fence | Fenced
+
+
+class LeaseNote(Struct, frozen=True, array_like=True, tag="lease"):
+    header: Header
+    body: LeaseBody
+
+
+# --- what a robot's hardware says and hears ------------------------------------------------------------------
+
+
+class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
+    """Wheel odometry and the gateway's state, as of `header.stamp` on the driver's clock."""
+
+    header: Header
+    pose_odom: Pose2D
+    twist: Twist
+    odometer_m: float
+    gateway: GatewayStamp
+    term_max: Term
+    latched: bool = False
+    refused: int = 0
+
+
+class Localization(Struct, frozen=True, array_like=True, tag="localization"):
+    header: Header
+    pose_map: Pose2D
+
+
+class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):
+    """REP-117: beyond `range_max_m` is +inf, below `range_min_m` is -inf, a bad reading is nan."""
+
+    header: Header
+    angle_min: float
+    angle_increment: float
+    range_min_m: float
+    range_max_m: float
+    ranges_m: tuple[float, ...]
+
+
+class Contact(Struct, frozen=True, array_like=True, tag="contact"):
+    """The bumper: direction of the touch in `base_link` [rad]."""
+
+    header: Header
+    bearing: float
+
+
+class CmdVel(Struct, frozen=True, array_like=True, tag="cmd_vel"):
+    """A velocity command. `as_leader` tells whether it is one of the lease's holder."""
+
+    header: Header
+    twist: Twist
+    term: Term
+    holder: int
+    as_leader: bool
+    gateway: GatewayStamp
+
+
+# --- what robots tell each other ----------------------------------------------------------------------------
+
+
+class Role(StrEnum):
+    LEADER = "leader"
+    FOLLOWER = "follower"
+    WAITING = "waiting"
+
+
+class PoseStamped(Struct, frozen=True, array_like=True, tag="pose"):
+    """A robot's own pose in `map`, as of `header.stamp` on its clock; only its successor listens."""
+
+    header: Header
+    x: float
+    y: float
+    z: float
+    theta: float
+    twist: Twist
+    odometer_m: float
+    role: Role
+    term: Term
+
+
+class Delay(Struct, frozen=True, array_like=True, gc=False):
+    """Least (receive - send) seen from a peer [s]: one half of a round trip, for the clock offset."""
+
+    robot: int
+    least_s: float
+
+
+class TableRow(Struct, frozen=True, array_like=True, tag="table"):
+    """The paper's table (X, Y, Z, theta), kept by all of all."""
+
+    header: Header
+    x: float
+    y: float
+    z: float
+    theta: float
+    odometer_m: float
+    role: Role
+    delays: tuple[Delay, ...] = ()
+
+
+class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):
+    """What a follower is commanded to keep and how it stands to it, for recorder and views."""
+
+    header: Header
+    predecessor: int
+    separation_m: float
+    phi: float
+    chi: float
+    heading: float
+    """psi_r, the feasible heading [rad]."""
+    slot_map: Pose2D
+    error_m: float
+    avoiding: bool
+    state: str
+
+
+class Slot(Struct, frozen=True, array_like=True, gc=False):
+    """Commanded place of one follower: k^d [m] and phi^d [rad] in its predecessor's formation frame."""
+
+    robot: int
+    separation_m: float
+    phi: float
+
+
+class FormationNote(Struct, frozen=True, array_like=True, tag="formation"):
+    """The orientation request of the leader of `term`; the highest (term, number) counts."""
+
+    header: Header
+    term: Term
+    number: int
+    slots: tuple[Slot, ...]
+    trace: bool = False
+
+
+class ObstacleNote(Struct, frozen=True, array_like=True, tag="obstacles"):
+    """What one robot met or tracks, shared with all; position in `map`."""
+
+    header: Header
+    kind: str
+    x: float
+    y: float
+    radius_m: float
+    twist_map: tuple[float, float] = (0.0, 0.0)
+
+
+class MissionNote(Struct, frozen=True, array_like=True, tag="mission"):
+    header: Header
+    mission: Mission
+
+
+class Ask(Struct, frozen=True, array_like=True, tag="ask"):
+    """`what` names a topic whose last message the sender would like to have again."""
+
+    header: Header
+    what: str
+
+
+class OperatorNote(Struct, frozen=True, array_like=True, tag="operator"):
+    header: Header
+    command: str
+    arguments: dict[str, Any] = {}
+
+
+class Level(StrEnum):
+    OK = "OK"
+    WARN = "WARN"
+    ERROR = "ERROR"
+    STALE = "STALE"
+
+
+class Status(Struct, frozen=True, array_like=True, tag="status"):
+    """Diagnostics in the sense of ROS: a level, a sentence, and counters."""
+
+    header: Header
+    level: Level
+    text: str
+    role: Role
+    term: Term
+    counters: dict[str, float]
+
+
+class Event(Struct, frozen=True, array_like=True, tag="event"):
+    """Something worth a line in `events.jsonl`: a decision, a change of role, a lease event, a contact, a fault."""
+
+    header: Header
+    kind: str
+    term: Term | None
+    data: dict[str, Any]
+
+
+# --- ground truth, for recorder and checkers only -------------------------------------------------------------
+
+
+class TrueRobot(Struct, frozen=True, array_like=True, gc=False):
+    id: int
+    x: float
+    y: float
+    theta: float
+    linear_x: float
+    angular_z: float
+
+
+class TrueObstacle(Struct, frozen=True, array_like=True, gc=False):
+    """A body that moves, by its place in the scenario's list."""
+
+    index: int
+    x: float
+    y: float
+
+
+class Truth(Struct, frozen=True, array_like=True, tag="truth"):
+    """All bodies at one moment `time_s` of the world's own time (0 at its start)."""
+
+    header: Header
+    time_s: float
+    robots: tuple[TrueRobot, ...]
+    obstacles: tuple[TrueObstacle, ...] = ()
+
+
+class Clock(Struct, frozen=True, array_like=True, tag="clock"):
+    header: Header
+    time_s: float
+
+
+Message = (
+    LeaseNote
+    | Sensors
+    | Localization
+    | LaserScan
+    | Contact
+    | CmdVel
+    | PoseStamped
+    | TableRow
+    | Tracking
+    | FormationNote
+    | ObstacleNote
+    | MissionNote
+    | Ask
+    | OperatorNote
+    | Status
+    | Event
+    | Truth
+    | Clock
+)
+
+_encoder = msgspec.msgpack.Encoder()
+_decoder = msgspec.msgpack.Decoder(Message)
+
+
+class BadMessage(ValueError):
+    """Bytes from the network that are no message of ours: too long, truncated, foreign, or with absurd numbers."""
+
+
+def encode(message: Message) -> bytes:
+    return _encoder.encode(message)
+
+
+def decode(payload: bytes, expected: type) -> Message:
+    """The message in `payload`. Raises BadMessage when it is not a finite, well-formed one of type `expected`."""
+    if len(payload) > MESSAGE_BYTES_MAX:
+        raise BadMessage(f"{len(payload)} bytes, more than {MESSAGE_BYTES_MAX}")
+    try:
+        message = _decoder.decode(payload)
+    except (msgspec.DecodeError, msgspec.ValidationError, RecursionError, UnicodeDecodeError) as error:
+        raise BadMessage(str(error)) from None
+    if type(message) is not expected:
+        raise BadMessage(f"{type(message).__name__} where {expected.__name__} belongs")
+    if not _sane(message):
+        raise BadMessage(f"{type(message).__name__} with a number that is not finite")
+    return message
+
+
+def _sane(message: Message) -> bool:
+    """Numbers that a core computes with are finite; a scan's ranges alone may be infinite or nan (REP-117)."""
+    if not isfinite(message.header.stamp):
+        return False
+    match message:
+        case PoseStamped():
+            return _finite(message.x, message.y, message.z, message.theta, message.odometer_m, *_of(message.twist))
+        case TableRow():
+            return _finite(message.x, message.y, message.z, message.theta, message.odometer_m)
+        case CmdVel():
+            return _finite(*_of(message.twist), message.gateway.time)
+        case Sensors():
+            pose, twist = message.pose_odom, message.twist
+            return _finite(pose.x, pose.y, pose.theta, *_of(twist), message.odometer_m, message.gateway.time)
+        case Localization():
+            return _finite(message.pose_map.x, message.pose_map.y, message.pose_map.theta)
+        case LaserScan():
+            return _finite(message.angle_min, message.angle_increment, message.range_min_m, message.range_max_m)
+        case FormationNote():
+            return all(_finite(slot.separation_m, slot.phi) for slot in message.slots)
+        case ObstacleNote():
+            return _finite(message.x, message.y, message.radius_m, *message.twist_map)
+        case LeaseNote(body=Grant(nonce=nonce)):
+            return isfinite(nonce)
+        case LeaseNote(body=Nack(remaining_s=remaining_s)):
+            return isfinite(remaining_s)
+        case LeaseNote(body=Propose(nonce=nonce)):
+            return nonce is None or isfinite(nonce)
+    return True
+
+
+def _of(twist: Twist) -> tuple[float, float]:
+    return twist.linear_x, twist.angular_z
+
+
+def _finite(*numbers: float) -> bool:
+    return isfinite(sum(numbers))

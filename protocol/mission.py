@@ -1,0 +1,137 @@
+"""What a team is told: who belongs to it, how it stands, where it goes and how fast. Part of a scenario.
+
+A `Mission` reaches an agent over Zenoh (topic `mission`) or from `--mission FILE`. Field names carry their
+units; a value that no robot could obey is refused with one line that names the field.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite, pi
+from typing import Literal
+
+from msgspec import Struct
+
+WITNESS_ID = 0
+WITNESS_NAME = "witness"
+
+Side = Literal["left", "right", "column", "zigzag"]
+Motion = Literal["path_following", "point_to_point"]
+Profile = Literal["fast", "std", "wifi"]
+
+
+class Refused(ValueError):
+    """A value given by a person that cannot be obeyed; the text is one line: what, where, what would be right."""
+
+
+class FormationSpec(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where each follower stands behind its predecessor (control.md section 4)."""
+
+    separation_m: float = 1.2
+    """k^d, the distance to the predecessor."""
+    angle_rad: float = pi / 3
+    """alpha, the angle off the predecessor's rear axis, in [0, pi/2]; the paper's phi."""
+    side: Side = "left"
+    heading_filter_m: float = 0.0
+    """L_chi: the travelled distance over which the formation's heading follows the predecessor's."""
+
+
+class Limits(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a robot's drive can do; the follower law keeps v/omega when it saturates."""
+
+    v_max_mps: float = 1.0
+    v_reverse_max_mps: float = 0.3
+    omega_max_radps: float = 2.0
+    a_max_mps2: float = 1.0
+    alpha_max_radps2: float = 4.0
+
+
+class Leading(Struct, frozen=True, forbid_unknown_fields=True):
+    """How a leader drives."""
+
+    motion: Motion = "path_following"
+    route_m: tuple[tuple[float, float], ...] = ()
+    """Way-points in `map`; the last is the goal."""
+    cruise_mps: float = 0.5
+    acceleration_mps2: float = 0.5
+    goal_tolerance_m: float = 0.10
+
+
+class Mission(Struct, frozen=True, forbid_unknown_fields=True):
+    """Everything that a team is told. `version` grows with each change; a higher one replaces a lower."""
+
+    robots: tuple[int, ...] = (1, 2, 3, 4)
+    """Ids in the order of the first chain; the first leads."""
+    witness: bool = True
+    profile: Profile = "std"
+    can_lead: tuple[int, ...] | None = None
+    """Ids that may lead; all when not given."""
+    formation: FormationSpec = FormationSpec()
+    leading: Leading = Leading()
+    limits: Limits = Limits()
+    radius_m: float = 0.15
+    version: int = 1
+
+    @property
+    def goal_m(self) -> tuple[float, float]:
+        return self.leading.route_m[-1]
+
+    def may_lead(self, robot_id: int) -> bool:
+        return self.can_lead is None or robot_id in self.can_lead
+
+
+def robot_name(robot_id: int) -> str:
+    """The name of an id in keys and messages: `robot2`, or `witness` for the voter without a robot."""
+    return WITNESS_NAME if robot_id == WITNESS_ID else f"robot{robot_id}"
+
+
+def robot_id_of(name: str) -> int | None:
+    """The id behind a name, None when it names no robot and no witness."""
+    if name == WITNESS_NAME:
+        return WITNESS_ID
+    digits = name.removeprefix("robot")
+    if name.startswith("robot") and digits.isdecimal() and not digits.startswith("0"):
+        return int(digits)
+    return None
+
+
+def check_mission(mission: Mission) -> Mission:
+    """`mission`, or `Refused` with the first field that cannot be obeyed."""
+    ids = mission.robots
+    repeated = next((i for n, i in enumerate(ids) if i in ids[:n]), None)
+    _require(len(ids) >= 1, "mission.robots", list(ids), "at least one robot id")
+    _require(all(i >= 1 for i in ids), "mission.robots", list(ids), "ids from 1 upwards")
+    _require(repeated is None, "mission.robots", list(ids), f"each id once (id {repeated} is given twice)")
+    if mission.can_lead is not None:
+        known = [i for i in mission.can_lead if i in ids]
+        right = "a non-empty part of mission.robots"
+        _require(bool(known) and len(known) == len(mission.can_lead), "mission.can_lead", mission.can_lead, right)
+    for name, value, low, high in _ranges(mission):
+        fine = isfinite(value) and low <= value <= high
+        _require(fine, f"mission.{name}", value, f"a number from {low:g} to {high:g}" if high < inf else f">= {low:g}")
+    _require(len(mission.leading.route_m) >= 1, "mission.leading.route_m", "[]", "at least one way-point [x, y]")
+    for point in mission.leading.route_m:
+        _require(all(isfinite(c) for c in point), "mission.leading.route_m", point, "finite coordinates [m]")
+    return mission
+
+
+def _ranges(mission: Mission) -> list[tuple[str, float, float, float]]:
+    formation, limits, leading = mission.formation, mission.limits, mission.leading
+    return [
+        ("radius_m", mission.radius_m, 0.01, 5.0),
+        ("formation.separation_m", formation.separation_m, 2.0 * mission.radius_m + 0.1, 100.0),
+        ("formation.angle_rad", formation.angle_rad, 0.0, pi / 2),
+        ("formation.heading_filter_m", formation.heading_filter_m, 0.0, 100.0),
+        ("limits.v_max_mps", limits.v_max_mps, 0.01, inf),
+        ("limits.v_reverse_max_mps", limits.v_reverse_max_mps, 0.0, inf),
+        ("limits.omega_max_radps", limits.omega_max_radps, 0.01, inf),
+        ("limits.a_max_mps2", limits.a_max_mps2, 0.01, inf),
+        ("limits.alpha_max_radps2", limits.alpha_max_radps2, 0.01, inf),
+        ("leading.cruise_mps", leading.cruise_mps, 0.01, limits.v_max_mps),
+        ("leading.acceleration_mps2", leading.acceleration_mps2, 0.01, limits.a_max_mps2),
+        ("leading.goal_tolerance_m", leading.goal_tolerance_m, 0.01, 10.0),
+    ]
+
+
+def _require(fine: bool, where: str, value: object, right: str) -> None:
+    if not fine:
+        raise Refused(f"{where} = {value}: must be {right}")

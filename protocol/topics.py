@@ -1,0 +1,94 @@
+"""The table of topics. Keys, QoS, freshness, the recorder's channels and the access rules are all read from it.
+
+A key is `lfa/<fleet>/<owner>/<topic>`, and `lease` and `alive` carry one more part: to whom, and which incarnation.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Literal
+
+from msgspec import Struct
+
+from protocol import messages as m
+
+Priority = Literal["real_time", "interactive_high", "data", "background"]
+
+TO_ALL = "all"
+WORLD_NAME = "world"
+OPERATOR_NAME = "operator"
+
+
+class Topic(Struct, frozen=True):
+    """One row: what travels under a name, how often, how urgently, how long it stays true, and who may say it."""
+
+    name: str
+    type: type
+    publishers: tuple[str, ...]
+    rate_hz: float | None
+    """None: on events."""
+    state: bool
+    """Only the newest value counts: a receiver keeps one slot a key. False: each message counts."""
+    wakes: bool
+    """Acted on at arrival; otherwise read at the receiver's next deadline."""
+    priority: Priority
+    timeout_s: float | None
+    """Older than this is stale."""
+
+
+#           name            type             publishers                       rate   state  wakes  priority            timeout
+TOPICS: tuple[Topic, ...] = (
+    Topic("mission",        m.MissionNote,   ("operator", "world"),           None,  False, True,  "interactive_high", None),
+    Topic("ask",            m.Ask,           ("agent", "witness"),            None,  False, True,  "interactive_high", None),
+    Topic("pose",           m.PoseStamped,   ("agent",),                      50.0,  True,  False, "real_time",        0.5),
+    Topic("table",          m.TableRow,      ("agent",),                      2.0,   True,  False, "data",             3.0),
+    Topic("tracking",       m.Tracking,      ("agent",),                      25.0,  True,  False, "background",       1.0),
+    Topic("cmd_vel",        m.CmdVel,        ("agent",),                      50.0,  False, False, "real_time",        0.06),
+    Topic("lease",          m.LeaseNote,     ("agent", "witness", "driver"),  None,  False, True,  "real_time",        None),
+    Topic("formation",      m.FormationNote, ("agent",),                      1.0,   True,  True,  "interactive_high", 3.0),
+    Topic("obstacles",      m.ObstacleNote,  ("agent",),                      None,  False, False, "data",             None),
+    Topic("operator",       m.OperatorNote,  ("operator",),                   None,  False, True,  "interactive_high", None),
+    Topic("status",         m.Status,        ("agent", "witness", "driver"),  1.0,   True,  False, "background",       3.0),
+    Topic("event",          m.Event,         ("agent", "witness", "driver", "operator"), None, False, False, "background", None),
+    Topic("sensors",        m.Sensors,       ("driver",),                     50.0,  True,  False, "real_time",        0.2),
+    Topic("localization",   m.Localization,  ("driver",),                     10.0,  True,  False, "real_time",        1.0),
+    Topic("scan",           m.LaserScan,     ("driver",),                     10.0,  True,  False, "data",             0.35),
+    Topic("contact",        m.Contact,       ("driver",),                     None,  False, False, "data",             None),
+    Topic("truth",          m.Truth,         ("world",),                      50.0,  False, False, "background",       None),
+    Topic("clock",          m.Clock,         ("world",),                      1.0,   True,  False, "background",       None),
+)  # fmt: skip
+
+TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
+TRUTH_OWNER = "sim"
+HARDWARE = ("sensors", "localization", "scan", "contact")
+
+
+def key(fleet: str, owner: str, topic: str, to: str | None = None) -> str:
+    """`lfa/<fleet>/<owner>/<topic>[/<to>]`. Raises KeyError for a topic that the table does not hold."""
+    base = f"lfa/{fleet}/{owner}/{TOPIC[topic].name}"
+    return base if to is None else f"{base}/{to}"
+
+
+def alive_key(fleet: str, owner: str, incarnation: int | str) -> str:
+    """The liveliness token of one start of one process; `*` for any."""
+    return f"lfa/{fleet}/{owner}/alive/{incarnation}"
+
+
+class Address(Struct, frozen=True):
+    """What a key says: whose it is, which topic, and to whom when the topic names a receiver."""
+
+    fleet: str
+    owner: str
+    topic: str
+    to: str | None
+
+
+@lru_cache(maxsize=4096)
+def address(key: str) -> Address | None:
+    """The parts of a key, None when it is not one of ours. Cached, with a bound: strangers may send any key."""
+    parts = key.split("/")
+    if len(parts) not in (4, 5) or parts[0] != "lfa":
+        return None
+    if parts[3] not in TOPIC and parts[3] != "alive":
+        return None
+    return Address(parts[1], parts[2], parts[3], parts[4] if len(parts) == 5 else None)
