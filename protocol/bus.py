@@ -39,14 +39,15 @@ class Bus(Protocol):
 
 
 class Inbox:
-    """One for a process: newest value for state topics, a bounded queue for everything else, one wake-up."""
+    """Newest value for state topics, a bounded queue for everything else, one wake-up."""
 
-    def __init__(self, size_max: int = INBOX_SIZE_MAX) -> None:
+    def __init__(self, wake: threading.Event | None = None, size_max: int = INBOX_SIZE_MAX) -> None:
+        """`wake` is set when something urgent came; several inboxes of one loop share it."""
         self._queue: deque[Arrival] = deque()
         self._newest: dict[str, Arrival] = {}
         self._size_max = size_max
         self._lock = threading.Lock()
-        self._wake = threading.Event()
+        self._wake = wake or threading.Event()
         self.dropped = 0
 
     def put(self, arrival: Arrival) -> None:
@@ -65,20 +66,14 @@ class Inbox:
 
     def take(self) -> list[Arrival]:
         """All that has come since the last call, oldest first."""
-        self._wake.clear()
         with self._lock:
+            if not self._queue and not self._newest:
+                return []
             arrivals = [*self._queue, *self._newest.values()]
             self._queue.clear()
             self._newest.clear()
         arrivals.sort(key=_at)
         return arrivals
-
-    def wait(self, timeout_s: float) -> bool:
-        """Until something urgent came (True) or `timeout_s` passed (False)."""
-        return self._wake.wait(timeout_s) if timeout_s > 0.0 else self._wake.is_set()
-
-    def wake(self) -> None:
-        self._wake.set()
 
 
 def _at(arrival: Arrival) -> float:

@@ -107,7 +107,12 @@ def check_mission(mission: Mission) -> Mission:
         _require(bool(known) and len(known) == len(mission.can_lead), "mission.can_lead", mission.can_lead, right)
     for name, value, low, high in _ranges(mission):
         fine = isfinite(value) and low <= value <= high
-        _require(fine, f"mission.{name}", value, f"a number from {low:g} to {high:g}" if high < inf else f">= {low:g}")
+        _require(
+            fine,
+            f"mission.{name}",
+            value,
+            f"a number from {low:g} to {high:g}" if high < inf else f">= {low:g}",
+        )
     _require(len(mission.leading.route_m) >= 1, "mission.leading.route_m", "[]", "at least one way-point [x, y]")
     for point in mission.leading.route_m:
         _require(all(isfinite(c) for c in point), "mission.leading.route_m", point, "finite coordinates [m]")

@@ -83,6 +83,10 @@ class Node(Protocol):
     def finished(self) -> bool:
         """True when the last words are spoken; the shell then ends the process."""
 
+    @property
+    def refusal(self) -> str | None:
+        """One line that says why it cannot take part at all (the process then exits 2), or None."""
+
     def receive(self, received: Received) -> list[Envelope]:
         """Something came."""
 

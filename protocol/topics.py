@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from protocol import messages as m
 
-Priority = Literal["real_time", "interactive_high", "data", "background"]
+Priority = Literal["real_time", "prompt", "data", "background"]
 
 TO_ALL = "all"
 WORLD_NAME = "world"
@@ -36,26 +36,29 @@ class Topic(Struct, frozen=True):
     """Older than this is stale."""
 
 
-#           name            type             publishers                       rate   state  wakes  priority            timeout
+TEAM = ("agent", "witness", "driver")
+ANYONE = (*TEAM, "operator")
+
+#         name            type             publishers             rate  state  wakes  priority      timeout
 TOPICS: tuple[Topic, ...] = (
-    Topic("mission",        m.MissionNote,   ("operator", "world"),           None,  False, True,  "interactive_high", None),
-    Topic("ask",            m.Ask,           ("agent", "witness"),            None,  False, True,  "interactive_high", None),
-    Topic("pose",           m.PoseStamped,   ("agent",),                      50.0,  True,  False, "real_time",        0.5),
-    Topic("table",          m.TableRow,      ("agent",),                      2.0,   True,  False, "data",             3.0),
-    Topic("tracking",       m.Tracking,      ("agent",),                      25.0,  True,  False, "background",       1.0),
-    Topic("cmd_vel",        m.CmdVel,        ("agent",),                      50.0,  False, False, "real_time",        0.06),
-    Topic("lease",          m.LeaseNote,     ("agent", "witness", "driver"),  None,  False, True,  "real_time",        None),
-    Topic("formation",      m.FormationNote, ("agent",),                      1.0,   True,  True,  "interactive_high", 3.0),
-    Topic("obstacles",      m.ObstacleNote,  ("agent",),                      None,  False, False, "data",             None),
-    Topic("operator",       m.OperatorNote,  ("operator",),                   None,  False, True,  "interactive_high", None),
-    Topic("status",         m.Status,        ("agent", "witness", "driver"),  1.0,   True,  False, "background",       3.0),
-    Topic("event",          m.Event,         ("agent", "witness", "driver", "operator"), None, False, False, "background", None),
-    Topic("sensors",        m.Sensors,       ("driver",),                     50.0,  True,  False, "real_time",        0.2),
-    Topic("localization",   m.Localization,  ("driver",),                     10.0,  True,  False, "real_time",        1.0),
-    Topic("scan",           m.LaserScan,     ("driver",),                     10.0,  True,  False, "data",             0.35),
-    Topic("contact",        m.Contact,       ("driver",),                     None,  False, False, "data",             None),
-    Topic("truth",          m.Truth,         ("world",),                      50.0,  False, False, "background",       None),
-    Topic("clock",          m.Clock,         ("world",),                      1.0,   True,  False, "background",       None),
+    Topic("mission",      m.MissionNote,   ("operator", "world"), None, False, True,  "prompt",     None),
+    Topic("ask",          m.Ask,           ("agent", "witness"),  None, False, True,  "prompt",     None),
+    Topic("pose",         m.PoseStamped,   ("agent",),            50.0, True,  False, "real_time",  0.5),
+    Topic("table",        m.TableRow,      ("agent",),            2.0,  True,  False, "data",       3.0),
+    Topic("tracking",     m.Tracking,      ("agent",),            25.0, True,  False, "background", 1.0),
+    Topic("cmd_vel",      m.CmdVel,        ("agent",),            50.0, False, False, "real_time",  0.06),
+    Topic("lease",        m.LeaseNote,     TEAM,                  None, False, True,  "real_time",  None),
+    Topic("formation",    m.FormationNote, ("agent",),            1.0,  True,  True,  "prompt",     3.0),
+    Topic("obstacles",    m.ObstacleNote,  ("agent",),            None, False, False, "data",       None),
+    Topic("operator",     m.OperatorNote,  ("operator",),         None, False, True,  "prompt",     None),
+    Topic("status",       m.Status,        TEAM,                  1.0,  True,  False, "background", 3.0),
+    Topic("event",        m.Event,         ANYONE,                None, False, False, "background", None),
+    Topic("sensors",      m.Sensors,       ("driver",),           50.0, True,  False, "real_time",  0.2),
+    Topic("localization", m.Localization,  ("driver",),           10.0, True,  False, "real_time",  1.0),
+    Topic("scan",         m.LaserScan,     ("driver",),           10.0, True,  False, "data",       0.35),
+    Topic("contact",      m.Contact,       ("driver",),           None, False, False, "data",       None),
+    Topic("truth",        m.Truth,         ("world",),            50.0, False, False, "background", None),
+    Topic("clock",        m.Clock,         ("world",),            1.0,  True,  False, "background", None),
 )  # fmt: skip
 
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}

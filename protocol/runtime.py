@@ -1,0 +1,226 @@
+"""The real-time loop around any Nodes: bus, clock, signals, journal. Agent, world, witness and drivers all run in it.
+
+Wait for something urgent or for the next deadline, whichever is first; feed what came, tick what is due, publish what
+the cores answer, write the journals once. Nothing else decides here.
+"""
+
+from __future__ import annotations
+
+import gc
+import resource
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+
+from msgspec import Struct
+
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.host import Host, Sent
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import BadMessage, decode
+from protocol.mission import Refused
+from protocol.node import Node, Stop, Vitals
+from protocol.topics import TOPIC, address
+from protocol.zenoh_bus import LINK_LEASE_MS, RouterAbsent, ZenohBus
+
+CONNECT_RETRY_S = 0.2
+STOP_GRACE_S = 0.7  # last words: a fence round trip or the residual motion, whatever the profile
+VITALS_S = 1.0
+WAIT_S_MAX = 0.5
+
+
+class Options(Struct, frozen=True):
+    """How a process joins its fleet."""
+
+    fleet: str
+    endpoint: str
+    journal: Path | None = None
+
+
+class _Seat:
+    """One node in the loop: its session, its inbox, its host, and what it has followed so far."""
+
+    def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal) -> None:
+        self.host = Host(node, journal)
+        self.bus = bus
+        self.inbox = inbox
+        self._followed: frozenset[str] | None = None
+
+    def step(self, now: float) -> float:
+        """Feed what came, tick if due; how late the tick was [s]."""
+        host, node = self.host, self.host.node
+        for arrival in self.inbox.take():
+            if isinstance(arrival.payload, bytes):
+                self._publish(host.message(arrival.at, arrival.key, arrival.payload))
+            else:
+                self._publish(host.local(arrival.at, arrival.payload))
+        late = now - node.next_deadline()
+        if late >= 0.0:
+            self._publish(host.tick(clock.now()))
+        if node.interests is not self._followed:
+            self._followed = node.interests
+            self.bus.follow(node.interests)
+        host.journal.flush()
+        return late
+
+    def say(self, sent: Sent) -> None:
+        self._publish(sent)
+
+    def _publish(self, sent: Sent) -> None:
+        for key, payload in sent:
+            self.bus.publish(key, payload)
+
+
+def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
+    """Run `nodes` in this process until all are finished; the exit code (0 ended well, 2 refused).
+
+    Waits for a router as long as it takes. Raises Refused when a node's name already lives in the fleet.
+    """
+    wake = threading.Event()
+    stop = _on_signals(wake)
+    seats: list[_Seat] = []
+    try:
+        for node in nodes:
+            inbox = Inbox(wake)
+            bus = connect(options.endpoint, inbox, stop)
+            if bus is None:
+                return 0
+            _refuse_double(bus, inbox, options.fleet, node)
+            heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, {"fleet": options.fleet})
+            seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading)))
+            bus.announce(options.fleet, node.name, node.incarnation)
+        gc.collect()
+        gc.freeze()
+        return _loop(seats, wake, stop)
+    finally:
+        for seat in seats:
+            seat.bus.close()
+            seat.host.journal.close()
+
+
+def connect(endpoint: str, inbox: Inbox, stop: threading.Event) -> ZenohBus | None:
+    """A session with the router at `endpoint`, waiting for it; None when told to stop meanwhile."""
+    told = False
+    while not stop.is_set():
+        try:
+            return ZenohBus(endpoint, inbox)
+        except RouterAbsent:
+            if not told:
+                print(
+                    f"no router at {endpoint}: waiting for one (start it with: lfa-router)",
+                    file=sys.stderr,
+                    flush=True,
+                )
+                told = True
+            stop.wait(CONNECT_RETRY_S)
+    return None
+
+
+def _loop(seats: Sequence[_Seat], wake: threading.Event, stop: threading.Event) -> int:
+    now = clock.now()
+    stop_by = None
+    vitals = _VitalSigns(now)
+    while True:
+        deadline = min(seat.host.node.next_deadline() for seat in seats)
+        wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
+        wake.clear()
+        now = clock.now()
+        for seat in seats:
+            vitals.lag(seat.step(now))
+        if vitals.due(now):
+            for seat in seats:
+                seat.say(seat.host.local(now, vitals.of(seat.inbox.dropped, seat.host.undecodable)))
+        if stop.is_set() and stop_by is None:
+            stop_by = now + STOP_GRACE_S
+            for seat in seats:
+                seat.say(seat.host.local(now, Stop()))
+        refusals = [node.refusal for node in (seat.host.node for seat in seats) if node.refusal is not None]
+        if refusals:
+            raise Refused(refusals[0])
+        if all(seat.host.node.finished for seat in seats) or (stop_by is not None and now > stop_by):
+            return 0
+
+
+def _on_signals(wake: threading.Event) -> threading.Event:
+    stop = threading.Event()
+
+    def order(_signum: int, _frame: FrameType | None) -> None:
+        stop.set()
+        wake.set()
+
+    signal.signal(signal.SIGTERM, order)
+    signal.signal(signal.SIGINT, order)
+    return stop
+
+
+def _refuse_double(bus: ZenohBus, inbox: Inbox, fleet: str, node: Node) -> None:
+    """A restarted name waits two link leases for its predecessor's token; only if that one still speaks, refuse."""
+    if not bus.living(fleet, node.name):
+        return
+    bus.follow(frozenset({f"lfa/{fleet}/{node.name}/**"}))
+    heard: dict[int, float] = {}
+    patience_until = clock.now() + 2.0 * LINK_LEASE_MS / 1000.0
+    while clock.now() < patience_until:
+        clock.sleep(0.05)
+        heard.update(_speakers(inbox))
+        if not bus.living(fleet, node.name):
+            break
+    else:
+        speaking = [life for life, at in heard.items() if at > clock.now() - LINK_LEASE_MS / 1000.0]
+        if speaking:
+            raise Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another --id")
+    bus.follow(frozenset())
+    inbox.take()
+
+
+def _speakers(inbox: Inbox) -> dict[int, float]:
+    """Incarnations that sent a well-formed message, and when the last came."""
+    heard: dict[int, float] = {}
+    for arrival in inbox.take():
+        where = address(arrival.key)
+        if where is None or where.topic not in TOPIC or not isinstance(arrival.payload, bytes):
+            continue
+        try:
+            message = decode(arrival.payload, TOPIC[where.topic].type)
+        except BadMessage:
+            continue
+        if message.header.sender == where.owner:
+            heard[message.header.incarnation] = arrival.at
+    return heard
+
+
+class _VitalSigns:
+    """The process's own lag, processor share and memory, once a second."""
+
+    def __init__(self, now: float) -> None:
+        self._since = now
+        self._cpu_s = clock.cpu_s()
+        self._lag_s = 0.0
+        self._cpu_percent = 0.0
+
+    def lag(self, late_s: float) -> None:
+        self._lag_s = max(self._lag_s, late_s)
+
+    def due(self, now: float) -> bool:
+        if now < self._since + VITALS_S:
+            return False
+        cpu_s = clock.cpu_s()
+        self._cpu_percent = 100.0 * (cpu_s - self._cpu_s) / (now - self._since)
+        self._since, self._cpu_s = now, cpu_s
+        return True
+
+    def of(self, dropped: int, undecodable: int) -> Vitals:
+        lag_s, self._lag_s = self._lag_s, 0.0
+        return Vitals(lag_s, dropped, undecodable, self._cpu_percent, _resident_mib())
+
+
+def _resident_mib() -> float:
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except (OSError, IndexError, ValueError):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return pages * resource.getpagesize() / 2**20

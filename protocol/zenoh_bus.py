@@ -1,0 +1,212 @@
+"""Zenoh behind the three methods of `Bus`, and the router: the only import of `zenoh` (zenoh.md section 0).
+
+Every process is a client of its machine's router, over a unix socket or loopback; no multicast, no gossip. Callbacks
+run on Zenoh's receiver threads and do nothing but append to the inbox.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from protocol import clock
+from protocol.bus import Arrival, Inbox
+from protocol.mission import Refused
+from protocol.node import PeerDown, PeerUp, RouterLost
+from protocol.topics import TOPIC, Topic, address, alive_key
+
+LINK_LEASE_MS = 1000
+ROUTER_RX_THREADS = 32  # more than the tcp links that can die at once: each blocks one for 10 s (zenoh.md section 2)
+UNIX_PATH_BYTES_MAX = 107
+
+_PRIORITY = {
+    "real_time": zenoh.Priority.REAL_TIME,
+    "prompt": zenoh.Priority.INTERACTIVE_HIGH,
+    "data": zenoh.Priority.DATA,
+    "background": zenoh.Priority.BACKGROUND,
+}
+
+logging.getLogger("zenoh.handlers").setLevel(logging.ERROR)
+
+
+def default_endpoint() -> str:
+    """Where `lfa-router` listens and everybody else connects when nothing is said."""
+    base = Path(os.environ.get("XDG_RUNTIME_DIR") or f"/tmp/lfa-{os.getuid()}")
+    return f"unixsock-stream/{base / 'lfa-router.sock'}"
+
+
+def socket_path(endpoint: str) -> Path | None:
+    """The file behind a unix-socket endpoint, None for other transports."""
+    kind, _, rest = endpoint.partition("/")
+    return Path(rest) if kind == "unixsock-stream" else None
+
+
+class RouterAbsent(ConnectionError):
+    """Nobody answers at the endpoint."""
+
+
+class ZenohBus:
+    """A client session with declared publishers, followed subscriptions and one liveliness token."""
+
+    def __init__(self, endpoint: str, inbox: Inbox, lease_ms: int = LINK_LEASE_MS) -> None:
+        """Raises RouterAbsent when no router answers, Refused for an endpoint that is none."""
+        self._inbox = inbox
+        try:
+            self._session = zenoh.open(_config("client", [], [endpoint], lease_ms))
+        except zenoh.ZError as error:
+            raise _open_error(endpoint, error) from None
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._followed: dict[str, Any] = {}
+        self._token: zenoh.LivelinessToken | None = None
+        self._links = self._session.info.declare_transport_events_listener(
+            zenoh.handlers.Callback(self._on_transport, indirect=False), history=False
+        )
+
+    def announce(self, fleet: str, owner: str, incarnation: int) -> None:
+        """Declare the liveliness token that tells the others of this process's life."""
+        self._token = self._session.liveliness().declare_token(alive_key(fleet, owner, incarnation))
+
+    def living(self, fleet: str, owner: str, timeout_s: float = 1.0) -> list[int]:
+        """Incarnations of `owner` whose tokens stand at the moment."""
+        replies = self._session.liveliness().get(alive_key(fleet, owner, "*"), timeout=timeout_s)
+        keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+        return sorted(peer.incarnation for key in keys if (peer := _peer(key, PeerUp)) is not None)
+
+    def publish(self, key: str, payload: bytes) -> None:
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            publisher = self._publishers[key] = self._declare(key)
+        publisher.put(payload)
+
+    def follow(self, interests: frozenset[str]) -> None:
+        for key in sorted(self._followed.keys() - interests):
+            self._followed.pop(key).undeclare()
+        for key in sorted(interests - self._followed.keys()):
+            self._followed[key] = self._subscribe(key)
+
+    def close(self) -> None:
+        """Undeclare all and leave: without it a callback subscriber would keep the interpreter alive."""
+        self._session.close()  # type: ignore[no-untyped-call]
+
+    def _declare(self, key: str) -> zenoh.Publisher:
+        where = address(key)
+        topic: Topic = TOPIC[where.topic] if where is not None else TOPIC["event"]
+        return self._session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=_PRIORITY[topic.priority],
+            express=topic.priority == "real_time",
+        )
+
+    def _subscribe(self, key: str) -> Any:
+        parts = key.split("/")
+        if len(parts) == 5 and parts[3] == "alive":
+            callback = zenoh.handlers.Callback(self._on_token, indirect=False)
+            return self._session.liveliness().declare_subscriber(key, callback, history=True)
+        return self._session.declare_subscriber(key, zenoh.handlers.Callback(self._on_sample, indirect=False))
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        self._inbox.put(Arrival(clock.now(), str(sample.key_expr), sample.payload.to_bytes()))
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        key = str(sample.key_expr)
+        peer = _peer(key, PeerUp if sample.kind == zenoh.SampleKind.PUT else PeerDown)
+        if peer is not None:
+            self._inbox.put(Arrival(clock.now(), key, peer))
+
+    def _on_transport(self, event: Any) -> None:
+        if event.kind == zenoh.SampleKind.DELETE:
+            self._inbox.put(Arrival(clock.now(), "", RouterLost()))
+
+
+def open_router(
+    listen: Sequence[str], connect: Sequence[str] = (), lease_ms: int = LINK_LEASE_MS
+) -> Callable[[], None]:
+    """Start a router in this process; the returned function closes it.
+
+    Raises Refused when an endpoint cannot be listened on: taken, not permitted, or a path that is too long.
+    """
+    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {ROUTER_RX_THREADS}))")
+    for endpoint in listen:
+        _check_listen(endpoint)
+    try:
+        session = zenoh.open(_config("router", listen, connect, lease_ms))
+    except zenoh.ZError as error:
+        raise Refused(f"listen {' '.join(listen)}: {_reason(error)}") from None
+
+    def close() -> None:
+        session.close()  # type: ignore[no-untyped-call]
+        for endpoint in listen:
+            path = socket_path(endpoint)
+            if path is not None:
+                path.unlink(missing_ok=True)
+                Path(f"{path}.lock").unlink(missing_ok=True)
+
+    return close
+
+
+def answers(endpoint: str) -> bool:
+    """True when a router can be opened at `endpoint` at the moment."""
+    try:
+        zenoh.open(_config("client", [], [endpoint], LINK_LEASE_MS)).close()  # type: ignore[no-untyped-call]
+    except zenoh.ZError:
+        return False
+    return True
+
+
+def _check_listen(endpoint: str) -> None:
+    path = socket_path(endpoint)
+    if path is None:
+        return
+    if len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
+        raise Refused(f"listen {endpoint}: the path has more than {UNIX_PATH_BYTES_MAX} bytes, give a shorter one")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError as error:
+        raise Refused(f"listen {endpoint}: {error.strerror}") from None
+    if path.exists() and answers(endpoint):
+        raise Refused(f"listen {endpoint}: another router answers there, stop it or give another --listen")
+
+
+def _config(mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: int) -> zenoh.Config:
+    settings: dict[str, object] = {
+        "mode": mode,
+        "listen/endpoints": list(listen),
+        "connect/endpoints": list(connect),
+        "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5},
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 0,
+        "transport/link/tx/lease": lease_ms,
+        "transport/shared_memory/enabled": False,
+    }
+    config = zenoh.Config()
+    for name, value in settings.items():
+        config.insert_json5(name, json.dumps(value))
+    return config
+
+
+def _open_error(endpoint: str, error: zenoh.ZError) -> Exception:
+    known = ("unixsock-stream/", "tcp/", "udp/", "tls/", "quic/", "ws/")
+    if not endpoint.startswith(known):
+        return Refused(f"connect {endpoint}: must be like tcp/127.0.0.1:7447 or unixsock-stream//run/lfa.sock")
+    return RouterAbsent(_reason(error))
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """The last cause of Zenoh's nested error text, on one line."""
+    text = " ".join(str(error).split())
+    return text.split(" at ")[0] if len(text) > 200 else text
+
+
+def _peer(key: str, kind: type[PeerUp] | type[PeerDown]) -> PeerUp | PeerDown | None:
+    where = address(key)
+    if where is None or where.topic != "alive" or where.to is None or not where.to.isdecimal():
+        return None
+    return kind(where.owner, int(where.to))
