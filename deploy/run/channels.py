@@ -1,0 +1,76 @@
+"""Wire types as plain JSON for people's tools: objects with field names, and JSON schemas that say the same.
+
+On the wire a struct is an array without names. Here it becomes an object, with its tag as `type`. JSON has no
+infinity: a number that is not finite is written as the string "inf", "-inf" or "nan", and the schema says so
+(a scan's +inf, nothing within range, would otherwise be lost as null).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Struct
+
+NonFinite = Literal["inf", "-inf", "nan"]
+Number = float | NonFinite
+"""A JSON number, or the name of one that JSON does not have; `float()` reads both."""
+
+_encoder = msgspec.json.Encoder()
+_PLAIN = frozenset({int, str, bool, type(None)})
+
+
+def encode(message: Struct) -> bytes:
+    """`message` as a JSON object with field names."""
+    return _encoder.encode(plain(message))
+
+
+def plain(value: Any) -> Any:
+    """`value` with structs as dicts and non-finite floats as strings."""
+    kind = type(value)
+    if kind is float:
+        return value if value - value == 0.0 else str(value)
+    if kind in _PLAIN:
+        return value
+    if kind is tuple or kind is list:
+        return [plain(item) for item in value]
+    if kind is dict:
+        return {str(name): plain(item) for name, item in value.items()}
+    if not issubclass(kind, Struct):
+        return str(value)
+    tag, names = _fields(kind)
+    fields = {name: plain(getattr(value, name)) for name in names}
+    return fields if tag is None else {"type": tag, **fields}
+
+
+@cache  # bounded by the number of types in the program
+def _fields(kind: type[Struct]) -> tuple[str | None, tuple[str, ...]]:
+    return kind.__struct_config__.tag, kind.__struct_fields__  # type: ignore[return-value]
+
+
+@cache  # bounded by the number of types in the program
+def shape(kind: type[Struct]) -> type[Struct]:
+    """The type of what `encode` writes for `kind`: same fields by name, floats as `Number`."""
+    hints = get_type_hints(kind)
+    config = kind.__struct_config__
+    fields = [(name, _shape_of(hints[name])) for name in kind.__struct_fields__]
+    return msgspec.defstruct(kind.__name__, fields, tag=config.tag, namespace={"__doc__": kind.__doc__})
+
+
+def schema(kind: type[Struct]) -> bytes:
+    """JSON schema of what `encode` writes for `kind`."""
+    return msgspec.json.encode(msgspec.json.schema(shape(kind)))
+
+
+def _shape_of(annotation: Any) -> Any:
+    if annotation is float:
+        return Number
+    if isinstance(annotation, type) and issubclass(annotation, Struct):
+        return shape(annotation)
+    arguments = tuple(_shape_of(argument) for argument in get_args(annotation))
+    origin = get_origin(annotation)
+    if origin in (Union, UnionType):
+        return Union[arguments]  # noqa: UP007 (made at run time from a tuple)
+    return origin[arguments] if origin in (tuple, dict) else annotation

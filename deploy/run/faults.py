@@ -1,0 +1,107 @@
+"""What can be done to a running fleet, said as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'.
+
+One grammar for a scenario's `faults`, `--fault` and `lfa fault`; what a fault then is, a signal or a node taken out
+of virtual time, is the business of whoever runs the fleet.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Literal, cast
+
+from msgspec import Struct
+
+from protocol.mission import Mission, Refused
+
+Deed = Literal["kill", "stop", "continue", "terminate", "restart"]
+
+#            deed          what it is
+DEEDS: dict[str, str] = {
+    "kill":      "SIGKILL: gone without a word",
+    "stop":      "SIGSTOP: frozen, with its messages waiting",
+    "continue":  "SIGCONT: wakes up with old beliefs",
+    "terminate": "SIGTERM: leaves in good order",
+    "restart":   "starts again after a kill or terminate, with a new incarnation",
+}  # fmt: skip
+
+LEADER = "leader"
+RIGHT = "'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' (kill, stop, continue, terminate, restart)"
+_SENTENCE = re.compile(
+    r"(?P<deed>\w+) +(?P<target>\w+)"
+    r"(?: +at +(?P<at>\d+(?:\.\d+)?) *s)?"
+    r"(?: +for +(?P<duration>\d+(?:\.\d+)?) *s)?",
+    re.ASCII,
+)
+
+
+class Fault(Struct, frozen=True):
+    """`target` is a robot's id, or `leader` for whoever leads at that moment; `at_s` is world time."""
+
+    deed: Deed
+    target: int | Literal["leader"]
+    at_s: float
+    for_s: float | None = None
+
+    def __str__(self) -> str:
+        lasting = "" if self.for_s is None else f" for {self.for_s:g} s"
+        return f"{self.deed} {self.target} at {self.at_s:g} s{lasting}"
+
+
+def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
+    """The fault that `text` says. Raises Refused when it is none, or speaks of a robot that is not in the mission."""
+    match = _SENTENCE.fullmatch(text.strip())
+    if match is None or match["deed"] not in DEEDS or match["at"] is None:
+        raise Refused(f"{where} {text!r}: must be like {RIGHT}")
+    target = _target(match["target"], text, mission, where)
+    for_s = None if match["duration"] is None else float(match["duration"])
+    if for_s is not None and match["deed"] != "stop":
+        raise Refused(f"{where} {text!r}: only 'stop' can be 'for' a while")
+    if match["deed"] in ("restart", "continue") and target == LEADER:
+        raise Refused(f"{where} {text!r}: {match['deed']} needs an id, one of {_ids(mission)}")
+    return Fault(cast(Deed, match["deed"]), target, float(match["at"]), for_s)
+
+
+def parse_all(mission: Mission, from_scenario: Sequence[str], from_operator: Sequence[str]) -> list[Fault]:
+    """The faults of a run, the scenario's own and those given by hand. Raises Refused."""
+    faults = [parse(text, mission, "scenario.faults") for text in from_scenario]
+    return faults + [parse(text, mission) for text in from_operator]
+
+
+class Schedule:
+    """Faults that are still to come, in the order of their times."""
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        self.pending = sorted(faults, key=_at_s)
+
+    def due(self, now: float, leader: int | None) -> list[tuple[Deed, int]]:
+        """What to do to whom at world time `now` [s]. One that means the leader waits until somebody leads."""
+        deeds: list[tuple[Deed, int]] = []
+        while self.pending and self.pending[0].at_s <= now:
+            fault = self.pending[0]
+            victim = leader if fault.target == LEADER else fault.target
+            if not isinstance(victim, int):
+                break
+            self.pending.pop(0)
+            deeds.append((fault.deed, victim))
+            if fault.for_s is not None:
+                self.pending.append(Fault("continue", victim, now + fault.for_s))
+                self.pending.sort(key=_at_s)
+        return deeds
+
+
+def _at_s(fault: Fault) -> float:
+    return fault.at_s
+
+
+def _target(word: str, text: str, mission: Mission, where: str) -> int | Literal["leader"]:
+    if word == LEADER:
+        return "leader"
+    digits = word.removeprefix("robot")
+    if not digits.isdecimal() or int(digits) not in mission.robots:
+        raise Refused(f"{where} {text!r}: no robot {word!r}, must be 'leader' or one of {_ids(mission)}")
+    return int(digits)
+
+
+def _ids(mission: Mission) -> str:
+    return ", ".join(str(robot_id) for robot_id in mission.robots)

@@ -1,0 +1,81 @@
+"""When a run is over, and how: watches what travels, decides once. Pure: time comes with the messages.
+
+A run has reached its goal when the leader of the present chain stands within the goal's tolerance and all robots of
+that chain have been at rest for `REST_S`. It has failed when an agent says so, and has run out of time when the
+world's clock passes the scenario's limit.
+"""
+
+from __future__ import annotations
+
+from math import hypot
+
+from msgspec import Struct
+
+from protocol.messages import NO_TERM, Event, Message, Term, TrueRobot, Truth
+from protocol.mission import robot_id_of
+from world.scenario import Outcome, Scenario
+
+REST_S = 0.5
+REST_SPEED = 1e-3  # [m/s] and [rad/s]
+
+
+class Verdict(Struct, frozen=True):
+    outcome: Outcome
+    reason: str | None = None
+
+
+class Referee:
+    """Feed it every truth and event; `verdict` stays None until the run is over.
+
+    `chain` is the present chain, `leader` the robot whose leader command of the highest term was accepted last.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._term = NO_TERM
+        self._led = NO_TERM
+        self.chain: tuple[int, ...] = scenario.mission.robots
+        self.leader: int | None = None
+        self._resting_since: float | None = None
+        self.verdict: Verdict | None = None
+
+    def see(self, message: Message) -> Verdict | None:
+        if self.verdict is None:
+            match message:
+                case Truth():
+                    self.verdict = self._judge(message)
+                case Event(kind="failed"):
+                    who = robot_id_of(message.header.sender)
+                    self.verdict = Verdict("failed", f"robot {who}: {message.data.get('reason', 'gives up')}")
+                case Event(kind="chain", term=Term() as term) if term >= self._term:
+                    self._term = term
+                    self.chain = tuple(message.data["chain"])
+                case Event(kind="leader_command", term=Term() as term) if term >= self._led:
+                    self._led = term
+                    self.leader = message.data["robot"]
+        return self.verdict
+
+    def _judge(self, truth: Truth) -> Verdict | None:
+        if not self._arrived(truth.robots):
+            self._resting_since = None
+        elif self._resting_since is None:
+            self._resting_since = truth.time_s
+        elif truth.time_s >= self._resting_since + REST_S:
+            return Verdict("goal_reached")
+        if truth.time_s >= self._scenario.time_limit_s:
+            return Verdict("time_limit", f"not at the goal after {self._scenario.time_limit_s:g} s")
+        return None
+
+    def _arrived(self, robots: tuple[TrueRobot, ...]) -> bool:
+        mission = self._scenario.mission
+        present = {robot.id: robot for robot in robots if robot.id in self.chain}
+        leader = present.get(self.chain[0]) if self.chain else None
+        if leader is None:
+            return False
+        goal_x, goal_y = mission.goal_m
+        near = hypot(leader.x - goal_x, leader.y - goal_y) <= mission.leading.goal_tolerance_m
+        return near and all(_at_rest(robot) for robot in present.values())
+
+
+def _at_rest(robot: TrueRobot) -> bool:
+    return abs(robot.linear_x) < REST_SPEED and abs(robot.angular_z) < REST_SPEED
