@@ -1,107 +1,225 @@
-"""The scenario type: a mission, a world, radio weather, faults and a time limit, read from TOML.
+"""Scenarios from TOML files: shipped ones by name, others by path, any field overridden by `--set a.b=value`.
 
-Names carry their units. An unknown key, a wrong type or an impossible value is refused with one line that says the
-file, the key, the value and what would be right. `load` finds shipped scenarios by name and others by path;
-`--set a.b=value` overrides any field.
+An unknown key, a wrong type or an impossible value is refused with one line that says where (the file, `--set` or
+`--robots`), the key, the value and what would be right.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+from math import isfinite
+from pathlib import Path
+from typing import Any
 
-from msgspec import Struct
+import msgspec
+from msgspec.structs import replace
 
-from protocol.mission import Mission
+from protocol.mission import Refused
+from world.course import check_course, draw, starts_of
+from world.spec import (
+    Body,
+    Lidar,
+    Noise,
+    Obstacle,
+    Outcome,
+    Point,
+    Radio,
+    Scenario,
+    Vary,
+    WorldSpec,
+    check_scenario,
+)
 
-Point = tuple[float, float]
+__all__ = [
+    "Body",
+    "Lidar",
+    "Noise",
+    "Obstacle",
+    "Outcome",
+    "Point",
+    "Radio",
+    "Scenario",
+    "Vary",
+    "WorldSpec",
+    "draw",
+    "load",
+    "shipped",
+    "starts_of",
+]
 
-
-class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
-    """A body that robots see and bump into: `radius_m` makes it round, `corners_m` a convex polygon."""
-
-    center_m: Point
-    radius_m: float | None = None
-    corners_m: tuple[Point, ...] | None = None
-    """Relative to `center_m`, counter-clockwise."""
-    mass_kg: float | None = None
-    """None: nailed to the floor; otherwise robots can push it."""
-    waypoints_m: tuple[Point, ...] = ()
-    """A moving obstacle goes to and fro along center_m -> waypoints_m at `speed_mps`, whatever it meets."""
-    speed_mps: float = 0.0
-
-
-class Body(Struct, frozen=True, forbid_unknown_fields=True):
-    """The simulated robots' bodies; the radius is the mission's."""
-
-    mass_kg: float = 5.0
-    push_n: float = 40.0
-    """Largest force of the wheels on the ground: what a robot can push."""
-
-
-class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
-    beams: int = 180
-    range_min_m: float = 0.05
-    range_max_m: float = 8.0
-    rate_hz: float = 10.0
-
-
-class Noise(Struct, frozen=True, forbid_unknown_fields=True):
-    """Standard deviations; all zero is a clean world."""
-
-    localization_m: float = 0.0
-    localization_rad: float = 0.0
-    localization_dropout: float = 0.0
-    """Probability that one fix is missing."""
-    odometry: float = 0.0
-    """Of the wheels' speed, as a fraction."""
-    range_m: float = 0.0
-    range_dropout: float = 0.0
+SCENARIOS = Path(__file__).parent / "scenarios"
+FILE_BYTES_MAX = 4 * 1024 * 1024
 
 
-class Vary(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the seed draws about the course, uniformly within plus or minus these bounds."""
-
-    obstacles_m: float = 0.0
-    starts_m: float = 0.0
-    starts_rad: float = 0.0
-    moving_phase: bool = False
-    """A moving obstacle's start along its way, and its speed within 20 %."""
+def shipped() -> dict[str, Scenario]:
+    """The scenarios of this package, by name."""
+    return {name: load(name) for name in _names()}
 
 
-class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
-    starts: tuple[tuple[float, float, float], ...] | None = None
-    """x [m], y [m], theta [rad] of each robot in `map`; None: the leader at (0, 0, 0), the others in their slots."""
-    walls_m: tuple[tuple[float, float, float, float], ...] = ()
-    """Segments x1, y1, x2, y2."""
-    obstacles: tuple[Obstacle, ...] = ()
-    body: Body = Body()
-    lidar: Lidar = Lidar()
-    noise: Noise = Noise()
-    vary: Vary = Vary()
-    physics_hz: float = 100.0
+def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
+    """The shipped scenario of that name or the one in that file, with fields overridden, checked.
+
+    `overrides` are texts `a.b=value` with a TOML value (bare words are text); `robots` renumbers the team to 1..N.
+    Raises Refused with one line: file, key, value, what would be right.
+    """
+    path = _path_of(name_or_path)
+    document = _read(path)
+    keys = [_override(document, override) for override in overrides]
+    if robots is not None:
+        _renumber(document, robots)
+        keys.append("mission.robots")
+    try:
+        _refuse_unknown(document)
+        _refuse_endless(document)
+        scenario = replace(_convert(document), name=path.stem)
+        return check_course(check_scenario(scenario))
+    except Refused as refused:
+        raise Refused(f"{_source(str(refused), keys, robots, path)}: {refused}") from None
 
 
-class Radio(Struct, frozen=True, forbid_unknown_fields=True):
-    """Weather between robots, in virtual time and (through `protocol/radio.py`) on a live bus."""
-
-    delay_s: float = 0.0005
-    jitter_s: float = 0.001
-    """Uniform, on top of `delay_s`."""
-    loss: float = 0.0
+def _names() -> list[str]:
+    return sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 
 
-class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
-    """`mission` is what the team is told; the rest is what the world does to it."""
-
-    title: str
-    mission: Mission
-    time_limit_s: float
-    world: WorldSpec = WorldSpec()
-    radio: Radio = Radio()
-    faults: tuple[str, ...] = ()
-    """Each as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'."""
-    name: str = ""
-    """Set by `load` from the file's name."""
+def _path_of(name_or_path: str) -> Path:
+    if name_or_path in _names():
+        return SCENARIOS / f"{name_or_path}.toml"
+    path = Path(name_or_path)
+    if path.suffix == ".toml" or len(path.parts) > 1:
+        return path
+    close = get_close_matches(name_or_path, _names(), n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(_names())}; a file ends in .toml"
+    raise Refused(f"no scenario {name_or_path!r}: {hint}")
 
 
-Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted"]
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            text = file.read(FILE_BYTES_MAX + 1)
+    except OSError as error:
+        raise Refused(f"{path}: cannot be read ({error.strerror or error}): must be a scenario file in TOML") from None
+    if len(text) > FILE_BYTES_MAX:
+        raise Refused(f"{path}: longer than {FILE_BYTES_MAX} bytes: must be a scenario file in TOML")
+    try:
+        return tomllib.loads(text.decode())
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise Refused(f"{path}: no TOML ({_one_line(error)}): must be a scenario file in TOML") from None
+
+
+def _override(document: dict[str, Any], override: str) -> str:
+    """Put `a.b=value` into `document`; the key that it sets."""
+    key, equals, text = override.partition("=")
+    key, text = key.strip(), text.strip()
+    parts = key.split(".")
+    if not equals or not all(parts):
+        raise Refused(f"--set {override!r}: must be key=value, such as world.lidar.beams=360")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, KeyError, RecursionError):
+        if not re.fullmatch(r"[\w./ -]+", text):
+            raise Refused(f"--set {key} = {text}: must be a TOML value (a number, text, true, [1, 2])") from None
+        value = text
+    table = document
+    for depth, part in enumerate(parts[:-1]):
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            raise Refused(f"--set {key} = {text}: must name a field ({'.'.join(parts[: depth + 1])} has no parts)")
+        table = inner
+    table[parts[-1]] = value
+    return key
+
+
+def _renumber(document: dict[str, Any], robots: int) -> None:
+    """A team of 1..N; a longer list of starts is cut, a shorter one is refused later."""
+    mission, world = document.setdefault("mission", {}), document.get("world", {})
+    if isinstance(mission, dict):
+        mission["robots"] = list(range(1, robots + 1))
+    starts = world.get("starts") if isinstance(world, dict) else None
+    if isinstance(starts, list):
+        world["starts"] = starts[:robots]
+
+
+def _convert(document: dict[str, Any]) -> Scenario:
+    try:
+        return msgspec.convert(document, Scenario)
+    except msgspec.ValidationError as error:
+        text, _, place = str(error).partition(" - at `$")
+        key = place.removesuffix("`").removeprefix(".").replace("[...]", "[]")
+        right = text.replace("`", "").replace("Expected ", "").replace(", got ", ", not ")
+        missing = re.fullmatch(r"Object missing required field `(\w+)`", text)
+        if missing:
+            name = ".".join(part for part in (key, missing[1]) if part)
+            raise Refused(f"{name} is missing: must be given") from None
+        raise Refused(f"{key} = {_value_at(document, key)}: must be {right}") from None
+
+
+def _value_at(document: Any, key: str) -> object:
+    """The value that a key of msgspec's error names, as far as the key says it."""
+    for part in re.findall(r"\w+|\[\d*\]", key):
+        index = part.strip("[]")
+        if isinstance(document, dict):
+            document = document.get(index, "...")
+        elif isinstance(document, list) and index.isdecimal() and int(index) < len(document):
+            document = document[int(index)]
+        else:
+            break
+    text = str(document)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _refuse_unknown(document: dict[str, Any]) -> None:
+    for where, known, given in _tables(document, Scenario, ""):
+        for key in given:
+            if key not in known:
+                close = get_close_matches(key, known, n=1)
+                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
+                raise Refused(f"{where}{key} = {_value_at(given, key)}: no such key: {hint}")
+
+
+def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str, ...], dict[str, Any]]]:
+    """Every TOML table in `value` that stands for a Struct: its place, the keys that it may hold, and itself."""
+    if isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _tables(item, type_, f"{where.removesuffix('.')}[{index}].")
+        return
+    struct = next((t for t in _structs_in(type_)), None)
+    if struct is None or not isinstance(value, dict):
+        return
+    fields = {field.encode_name: field.type for field in msgspec.structs.fields(struct)}
+    yield where, tuple(name for name in fields if where or name != "name"), value
+    for key, item in value.items():
+        if key in fields:
+            yield from _tables(item, fields[key], f"{where}{key}.")
+
+
+def _structs_in(type_: Any) -> Iterator[type[msgspec.Struct]]:
+    """The Structs that an annotation speaks of: `Lidar`, `tuple[Obstacle, ...]`."""
+    if isinstance(type_, type) and issubclass(type_, msgspec.Struct):
+        yield type_
+    for argument in getattr(type_, "__args__", ()):
+        yield from _structs_in(argument)
+
+
+def _refuse_endless(value: Any, where: str = "") -> None:
+    """TOML knows nan and inf; no field of a scenario does."""
+    if isinstance(value, float) and not isfinite(value):
+        raise Refused(f"{where} = {value}: must be a finite number")
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        part = f"[{key}]" if isinstance(value, list) else f".{key}" if where else str(key)
+        _refuse_endless(item, f"{where}{part}")
+
+
+def _source(refusal: str, keys: list[str], robots: int | None, path: Path) -> str:
+    """Who gave the refused value: the command line, when it set that very key, or the file."""
+    if robots is not None and refusal.startswith(("mission.robots", "world.starts")):
+        return f"--robots {robots}"
+    given = any(re.match(rf"{re.escape(key)}\b", refusal) for key in keys)
+    return f"{path.name} with --set" if given else str(path if path.parent != SCENARIOS else path.name)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,150 @@
+"""A scenario's course in the plane: where robots start, what stands in their way, and what a seed draws of it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import cos, hypot, pi, sin, sqrt
+from random import Random
+
+from msgspec.structs import replace
+
+from protocol.geometry import TAU, Pose2D, compose
+from protocol.mission import Mission, Refused
+from world.spec import Obstacle, Point, Scenario
+
+DRAW_MARGIN_M = 0.5
+"""What is drawn stays this far from the robots' starts and from the goal."""
+DRAWS_MAX = 50
+"""An obstacle or a start for which so many draws find no room stays where the scenario puts it."""
+
+
+def starts_of(scenario: Scenario) -> tuple[Pose2D, ...]:
+    """Where each robot of `mission.robots` starts, in `map`: as given, or the leader at (0, 0, 0), others in slots."""
+    given = scenario.world.starts
+    if given is not None:
+        return tuple(Pose2D(*pose) for pose in given)
+    poses = [Pose2D()]
+    for hop in range(len(scenario.mission.robots) - 1):
+        poses.append(compose(poses[-1], _slot(scenario.mission, hop)))
+    return tuple(poses)
+
+
+def _slot(mission: Mission, hop: int) -> Pose2D:
+    """The place of the follower number `hop` in its predecessor's `base_link` (control.md section 4)."""
+    formation = mission.formation
+    left = pi - formation.angle_rad
+    sides = {"left": left, "right": -left, "column": pi, "zigzag": left if hop % 2 == 0 else -left}
+    phi = sides[formation.side]
+    return Pose2D(formation.separation_m * cos(phi), formation.separation_m * sin(phi), 0.0)
+
+
+def check_course(scenario: Scenario) -> Scenario:
+    """`scenario`, or `Refused` when a start or the goal cannot be stood on."""
+    mission, world = scenario.mission, scenario.world
+    if world.starts is not None and len(world.starts) != len(mission.robots):
+        right = f"one pose for each of the {len(mission.robots)} robots"
+        raise Refused(f"world.starts = {len(world.starts)} poses: must be {right}")
+    poses = starts_of(scenario)
+    for robot_id, pose in zip(mission.robots, poses, strict=True):
+        place = f"the start of robot {robot_id} at ({pose.x:.2f}, {pose.y:.2f})"
+        _check_place(scenario, (pose.x, pose.y), place)
+    for n, (robot_id, pose) in enumerate(zip(mission.robots, poses, strict=True)):
+        for other_id, other in zip(mission.robots[:n], poses[:n], strict=True):
+            if hypot(pose.x - other.x, pose.y - other.y) < 2.0 * mission.radius_m:
+                right = f"starts at least {2.0 * mission.radius_m:g} m apart (two radii)"
+                value = f"robots {other_id} and {robot_id} both near ({pose.x:.2f}, {pose.y:.2f})"
+                raise Refused(f"world.starts = {value}: must be {right}")
+    goal = mission.goal_m
+    _check_place(scenario, goal, f"the goal at ({goal[0]:.2f}, {goal[1]:.2f})")
+    return scenario
+
+
+def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
+    radius_m = scenario.mission.radius_m
+    for index, obstacle in enumerate(scenario.world.obstacles):
+        if _gap(place, obstacle, obstacle.center_m) < radius_m:
+            raise Refused(f"world.obstacles[{index}] = at {list(obstacle.center_m)}: must be clear of {whose}")
+    for index, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
+        if _to_segment(place, (x1, y1), (x2, y2)) < radius_m:
+            raise Refused(f"world.walls_m[{index}] = {[x1, y1, x2, y2]}: must be clear of {whose}")
+
+
+def draw(scenario: Scenario, seed: int) -> Scenario:
+    """What `seed` makes of `scenario`: a concrete one, with starts given and nothing left to vary.
+
+    Each start and each obstacle has its own generator, so an obstacle more does not move the others.
+    """
+    vary, world = scenario.world.vary, scenario.world
+    goal = scenario.mission.goal_m
+    anchors = [*((pose.x, pose.y) for pose in starts_of(scenario)), goal]
+    margin_m = scenario.mission.radius_m + vary.starts_m + DRAW_MARGIN_M
+    obstacles = tuple(
+        _draw_obstacle(obstacle, vary.obstacles_m, vary.moving_phase, anchors, margin_m, Random(f"{seed}/obstacle{n}"))
+        for n, obstacle in enumerate(world.obstacles)
+    )
+    drawn = replace(scenario, world=replace(world, obstacles=obstacles, vary=type(vary)()))
+    starts: list[Pose2D] = []
+    for robot_id, pose in zip(scenario.mission.robots, starts_of(scenario), strict=True):
+        starts.append(
+            _draw_start(drawn, pose, vary.starts_m, vary.starts_rad, starts, Random(f"{seed}/start{robot_id}"))
+        )
+    poses = tuple((pose.x, pose.y, pose.theta) for pose in starts)
+    return replace(drawn, world=replace(drawn.world, starts=poses))
+
+
+def _draw_obstacle(
+    obstacle: Obstacle, within_m: float, phased: bool, anchors: list[Point], margin_m: float, chance: Random
+) -> Obstacle:
+    if phased and obstacle.waypoints_m:
+        speed_mps = obstacle.speed_mps * chance.uniform(0.8, 1.2)
+        obstacle = replace(obstacle, phase=chance.random(), speed_mps=speed_mps)
+    if within_m == 0.0:
+        return obstacle
+    for _ in range(DRAWS_MAX):
+        dx, dy = _in_disc(within_m, chance)
+        moved = replace(
+            obstacle,
+            center_m=(obstacle.center_m[0] + dx, obstacle.center_m[1] + dy),
+            waypoints_m=tuple((x + dx, y + dy) for x, y in obstacle.waypoints_m),
+        )
+        if all(
+            _gap(anchor, moved, stop) >= margin_m for anchor in anchors for stop in (moved.center_m, *moved.waypoints_m)
+        ):
+            return moved
+    return obstacle
+
+
+def _draw_start(
+    scenario: Scenario, pose: Pose2D, within_m: float, within_rad: float, placed: list[Pose2D], chance: Random
+) -> Pose2D:
+    radius_m = scenario.mission.radius_m
+    for _ in range(DRAWS_MAX):
+        dx, dy = _in_disc(within_m, chance)
+        drawn = Pose2D(pose.x + dx, pose.y + dy, pose.theta + chance.uniform(-within_rad, within_rad))
+        free = all(hypot(drawn.x - other.x, drawn.y - other.y) > 2.0 * radius_m for other in placed)
+        if free and all(_to_segment((drawn.x, drawn.y), w[:2], w[2:]) > radius_m for w in scenario.world.walls_m):
+            return drawn
+    return pose
+
+
+def _in_disc(radius_m: float, chance: Random) -> Point:
+    r, angle = radius_m * sqrt(chance.random()), TAU * chance.random()
+    return r * cos(angle), r * sin(angle)
+
+
+def _gap(place: Point, obstacle: Obstacle, center_m: Point) -> float:
+    """Distance [m] from `place` to the surface of `obstacle` standing at `center_m`; negative or zero inside."""
+    x, y = place[0] - center_m[0], place[1] - center_m[1]
+    if obstacle.radius_m is not None:
+        return hypot(x, y) - obstacle.radius_m
+    assert obstacle.corners_m is not None, obstacle
+    ring = (*obstacle.corners_m, obstacle.corners_m[0])
+    inside = all((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0 for (ax, ay), (bx, by) in pairwise(ring))
+    return 0.0 if inside else min(_to_segment((x, y), a, b) for a, b in pairwise(ring))
+
+
+def _to_segment(p: Point, a: Point, b: Point) -> float:
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    along = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)
+    along = min(1.0, max(0.0, along))
+    return hypot(p[0] - a[0] - along * dx, p[1] - a[1] - along * dy)

@@ -1,0 +1,192 @@
+"""The scenario type: a mission, a world, radio weather, faults and a time limit; and what no world can be built from.
+
+Names carry their units. `world/scenario.py` reads it from TOML, `world/course.py` says what a seed draws of it.
+Nothing here imports the engine: a launcher, a test or an editor reads a scenario in milliseconds.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite, pi
+from typing import Literal
+
+from msgspec import Struct
+
+from protocol.mission import Mission, Refused, check_mission
+
+Point = tuple[float, float]
+ROBOTS_MAX = 500
+PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
+
+
+class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
+    """A body that robots see and bump into: `radius_m` makes it round, `corners_m` a convex polygon."""
+
+    center_m: Point
+    radius_m: float | None = None
+    corners_m: tuple[Point, ...] | None = None
+    """Relative to `center_m`, counter-clockwise."""
+    mass_kg: float | None = None
+    """None: nailed to the floor; otherwise robots can push it."""
+    waypoints_m: tuple[Point, ...] = ()
+    """A moving obstacle goes to and fro along center_m -> waypoints_m at `speed_mps`, whatever it meets."""
+    speed_mps: float = 0.0
+    phase: float = 0.0
+    """Where on its way there and back it starts: 0 at `center_m`, 0.5 at the last way-point."""
+
+
+class Body(Struct, frozen=True, forbid_unknown_fields=True):
+    """The simulated robots' bodies; the radius is the mission's."""
+
+    mass_kg: float = 5.0
+    push_n: float = 40.0
+    """Largest force of the wheels on the ground: what a robot can push."""
+
+
+class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
+    beams: int = 180
+    range_min_m: float = 0.05
+    range_max_m: float = 8.0
+    rate_hz: float = 10.0
+
+
+class Noise(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations; all zero is a clean world."""
+
+    localization_m: float = 0.0
+    localization_rad: float = 0.0
+    localization_dropout: float = 0.0
+    """Probability that one fix is missing."""
+    odometry: float = 0.0
+    """Of the wheels' speed, as a fraction."""
+    range_m: float = 0.0
+    range_dropout: float = 0.0
+
+
+class Vary(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the seed draws about the course, uniformly within plus or minus these bounds."""
+
+    obstacles_m: float = 0.0
+    starts_m: float = 0.0
+    starts_rad: float = 0.0
+    moving_phase: bool = False
+    """A moving obstacle's start along its way, and its speed within 20 %."""
+
+
+class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
+    starts: tuple[tuple[float, float, float], ...] | None = None
+    """x [m], y [m], theta [rad] of each robot in `map`; None: the leader at (0, 0, 0), the others in their slots."""
+    walls_m: tuple[tuple[float, float, float, float], ...] = ()
+    """Segments x1, y1, x2, y2."""
+    obstacles: tuple[Obstacle, ...] = ()
+    body: Body = Body()
+    lidar: Lidar = Lidar()
+    noise: Noise = Noise()
+    vary: Vary = Vary()
+    physics_hz: float = 100.0
+
+
+class Radio(Struct, frozen=True, forbid_unknown_fields=True):
+    """Weather between robots, in virtual time and (through `protocol/radio.py`) on a live bus."""
+
+    delay_s: float = 0.0005
+    jitter_s: float = 0.001
+    """Uniform, on top of `delay_s`."""
+    loss: float = 0.0
+
+
+class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
+    """`mission` is what the team is told; the rest is what the world does to it."""
+
+    title: str
+    mission: Mission
+    time_limit_s: float
+    world: WorldSpec = WorldSpec()
+    radio: Radio = Radio()
+    faults: tuple[str, ...] = ()
+    """Each as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'."""
+    name: str = ""
+    """Set by `load` from the file's name."""
+
+
+Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted"]
+
+
+def check_scenario(scenario: Scenario) -> Scenario:
+    """`scenario`, or `Refused` with the first field of it that no world could be built from."""
+    robots = scenario.mission.robots
+    _require(len(robots) <= ROBOTS_MAX, "mission.robots", f"{len(robots)} ids", f"at most {ROBOTS_MAX} ids")
+    check_mission(scenario.mission)
+    for where, value, low, high in _ranges(scenario):
+        right = f"a number from {low:g} to {high:g}" if high < inf else f"a finite number, at least {low:g}"
+        _require(isfinite(value) and low <= value <= high, where, value, right)
+    for index, obstacle in enumerate(scenario.world.obstacles):
+        _check_obstacle(f"world.obstacles[{index}]", obstacle)
+    for index, wall in enumerate(scenario.world.walls_m):
+        where = f"world.walls_m[{index}]"
+        _require(wall[:2] != wall[2:], where, list(wall), "two different ends x1, y1, x2, y2")
+    return scenario
+
+
+def _ranges(scenario: Scenario) -> list[tuple[str, float, float, float]]:
+    world, radio = scenario.world, scenario.radio
+    noise, vary, lidar = world.noise, world.vary, world.lidar
+    return [
+        ("time_limit_s", scenario.time_limit_s, 1.0, 1e6),
+        ("world.physics_hz", world.physics_hz, PHYSICS_HZ_MIN, PHYSICS_HZ_MAX),
+        ("world.body.mass_kg", world.body.mass_kg, 0.1, 1e4),
+        ("world.body.push_n", world.body.push_n, 0.1, 1e6),
+        ("world.lidar.beams", lidar.beams, 4, 4096),
+        ("world.lidar.range_min_m", lidar.range_min_m, 0.0, lidar.range_max_m),
+        ("world.lidar.range_max_m", lidar.range_max_m, 0.1, 1e3),
+        ("world.lidar.rate_hz", lidar.rate_hz, 0.1, world.physics_hz),
+        ("world.noise.localization_m", noise.localization_m, 0.0, 10.0),
+        ("world.noise.localization_rad", noise.localization_rad, 0.0, 3.0),
+        ("world.noise.localization_dropout", noise.localization_dropout, 0.0, 1.0),
+        ("world.noise.odometry", noise.odometry, 0.0, 1.0),
+        ("world.noise.range_m", noise.range_m, 0.0, 10.0),
+        ("world.noise.range_dropout", noise.range_dropout, 0.0, 1.0),
+        ("world.vary.obstacles_m", vary.obstacles_m, 0.0, 10.0),
+        ("world.vary.starts_m", vary.starts_m, 0.0, 10.0),
+        ("world.vary.starts_rad", vary.starts_rad, 0.0, pi),
+        ("radio.delay_s", radio.delay_s, 0.0, 10.0),
+        ("radio.jitter_s", radio.jitter_s, 0.0, 10.0),
+        ("radio.loss", radio.loss, 0.0, 1.0),
+    ]
+
+
+def _check_obstacle(where: str, obstacle: Obstacle) -> None:
+    """One shape, and at most one way of moving."""
+    radius_m, corners_m, mass_kg = obstacle.radius_m, obstacle.corners_m, obstacle.mass_kg
+    shaped = (radius_m is None) != (corners_m is None)
+    _require(shaped, where, "radius_m and corners_m", "exactly one of the two")
+    if radius_m is not None:
+        _require(0.01 <= radius_m <= 100.0, f"{where}.radius_m", radius_m, "a number from 0.01 to 100")
+    if corners_m is not None:
+        right = "at least three corners of a convex polygon, counter-clockwise"
+        _require(_convex(corners_m), f"{where}.corners_m", [list(corner) for corner in corners_m], right)
+    if mass_kg is not None:
+        _require(0.01 <= mass_kg <= 1e4, f"{where}.mass_kg", mass_kg, "a number from 0.01 to 10000")
+    _require(0.0 <= obstacle.phase < 1.0, f"{where}.phase", obstacle.phase, "from 0 up to, not including, 1")
+    moving = bool(obstacle.waypoints_m)
+    low = 0.001 if moving else 0.0
+    right = "above 0 with waypoints_m, and 0 without"
+    _require(low <= obstacle.speed_mps <= (10.0 if moving else 0.0), f"{where}.speed_mps", obstacle.speed_mps, right)
+    _require(not (moving and mass_kg is not None), f"{where}.mass_kg", mass_kg, "left out with waypoints_m")
+    still = moving and all(point == obstacle.center_m for point in obstacle.waypoints_m)
+    _require(not still, f"{where}.waypoints_m", list(obstacle.center_m), "a place other than center_m")
+
+
+def _convex(corners_m: tuple[Point, ...]) -> bool:
+    if len(corners_m) < 3:
+        return False
+    following = corners_m[1:] + corners_m[:1]
+    after = corners_m[2:] + corners_m[:2]
+    return all(
+        (bx - ax) * (cy - by) - (by - ay) * (cx - bx) > 0.0
+        for (ax, ay), (bx, by), (cx, cy) in zip(corners_m, following, after, strict=True)
+    )
+
+
+def _require(fine: bool, where: str, value: object, right: str) -> None:
+    if not fine:
+        raise Refused(f"{where} = {value}: must be {right}")
