@@ -1,0 +1,209 @@
+"""Rigid bodies in the plane (pymunk): robots on two wheels, walls, obstacles nailed down, pushable or on their way.
+
+A robot that touches nothing follows equation (1) exactly: the engine moves a body along a straight line for one
+step, so it is given the chord of the arc, which has the arc's ends. A robot in touch with something is driven by
+what its wheels can push at most; where that is not enough the wheels slip, and odometry goes astray as it should.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, hypot, sin
+
+import pymunk
+
+from protocol.geometry import STILL, Pose2D, Twist, sinc, wrap
+from protocol.mission import robot_name
+from world.course import starts_of
+from world.kinematic import Drive, Touch, Way
+from world.spec import Obstacle, Scenario
+
+GRAVITY_MPS2 = 9.81
+GROUND_FRICTION = 0.4
+"""Of a pushable obstacle on the floor: 40 N of push move up to 10 kg."""
+SIDE_FRICTION = 0.2
+"""Between bodies that touch."""
+OVERLAP_M = 0.0005
+"""How deep bodies may stay in each other, so that a lasting touch is one touch."""
+OVERLAP_KEPT = 0.8
+"""Of a deeper overlap, the part that is left after one step."""
+RETOUCH_S = 0.25
+"""A touch given up for less than this is still the same touch."""
+
+_ROBOT, _THING = 1, 2
+
+
+class Physics:
+    """All bodies of a drawn scenario, stepped together; equal calls give equal bits."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        world, mission = scenario.world, scenario.mission
+        self._dt_s = 1.0 / world.physics_hz
+        self._steps = 0
+        self._space = pymunk.Space()
+        self._space.collision_slop = OVERLAP_M
+        self._space.collision_bias = OVERLAP_KEPT**world.physics_hz
+        self._names: dict[pymunk.Shape, tuple[int, str]] = {}
+        """Of each shape: the robot's place in the list (-1 for a thing), and what it is called."""
+        self._drives = [Drive(mission.limits) for _ in mission.robots]
+        self.poses: list[Pose2D] = list(starts_of(scenario))
+        """Of each robot's `base_link` in `map`."""
+        self.twists: list[Twist] = [STILL] * len(self.poses)
+        """Of each robot's body in its `base_link`."""
+        self.wheels: list[Twist] = [STILL] * len(self.poses)
+        """What each robot's wheels turn for; differs from `twists` where they slip."""
+        mass_kg, radius_m = world.body.mass_kg, mission.radius_m
+        self._inertia = pymunk.moment_for_circle(mass_kg, 0.0, radius_m)
+        self._mass_kg, self._push_n, self._torque_nm = mass_kg, world.body.push_n, world.body.push_n * radius_m
+        self._robots = [self._add_robot(n, robot_name(robot_id), radius_m) for n, robot_id in enumerate(mission.robots)]
+        self._velocity = [(0.0, 0.0, 0.0)] * len(self._robots)
+        self._touching = [0] * len(self._robots)
+        self._parted_at: dict[tuple[int, str], int] = {}
+        self._touches: list[Touch] = []
+        for n, (x1, y1, x2, y2) in enumerate(world.walls_m):
+            self._add_shape(pymunk.Segment(self._space.static_body, (x1, y1), (x2, y2), 0.0), _THING, -1, f"wall{n}")
+        self._pushable: dict[int, pymunk.Body] = {}
+        self._moving: list[tuple[int, pymunk.Body, Way]] = []
+        for n, obstacle in enumerate(world.obstacles):
+            self._add_obstacle(n, obstacle)
+        for other in (_ROBOT, _THING):
+            self._space.on_collision(_ROBOT, other, begin=self._on_begin, separate=self._on_separate)
+
+    def step(self, wanted: Sequence[Twist]) -> list[Touch]:
+        """One step of 1/physics_hz with these commanded twists, one a robot; the touches that began in it."""
+        dt_s = self._dt_s
+        self._steps += 1
+        for n, drive in enumerate(self._drives):
+            self._push(n, drive.step(wanted[n], dt_s))
+        for _, body, way in self._moving:
+            (x, y), (to_x, to_y) = body.position, way.at(self._steps * dt_s)
+            body.velocity = ((to_x - x) / dt_s, (to_y - y) / dt_s)
+        held = [touching > 0 for touching in self._touching]
+        self._space.step(dt_s)
+        for n, body in enumerate(self._robots):
+            self._read(n, body, held[n] or self._touching[n] > 0)
+        touches, self._touches = self._touches, []
+        touches.sort(key=lambda touch: (touch.robot, touch.other))
+        return touches
+
+    def moved(self) -> dict[int, Pose2D]:
+        """The pose in `map` of each obstacle that is not nailed down, by its place in the scenario's list."""
+        poses = {n: Pose2D(*body.position, 0.0) for n, body, _ in self._moving}
+        poses.update((n, Pose2D(*body.position, wrap(body.angle))) for n, body in self._pushable.items())
+        return dict(sorted(poses.items()))
+
+    def _push(self, n: int, twist: Twist) -> None:
+        """Bring robot `n` to what its wheels turn for, as far as their grip on the floor allows."""
+        self.wheels[n] = twist
+        touching = self._touching[n] > 0
+        now = self._velocity[n]
+        if twist is STILL and not touching and now == (0.0, 0.0, 0.0):
+            return
+        turn = twist.angular_z * self._dt_s
+        chord = twist.linear_x * sinc(0.5 * turn)
+        middle = self.poses[n].theta + 0.5 * turn
+        dx, dy, dw = chord * cos(middle) - now[0], chord * sin(middle) - now[1], twist.angular_z - now[2]
+        dv_max, dw_max = self._push_n / self._mass_kg * self._dt_s, self._torque_nm / self._inertia * self._dt_s
+        grip = min(1.0, dv_max / max(hypot(dx, dy), 1e-12))
+        dx, dy, dw = grip * dx, grip * dy, max(-dw_max, min(dw_max, dw))
+        body = self._robots[n]
+        if touching:
+            # As a force, so that the contact answers it within the step: a speed given now would first be a way
+            # into the other body.
+            body.force = (self._mass_kg * dx / self._dt_s, self._mass_kg * dy / self._dt_s)
+            body.torque = self._inertia * dw / self._dt_s
+        else:
+            self._velocity[n] = now[0] + dx, now[1] + dy, now[2] + dw
+            body.velocity = self._velocity[n][:2]
+            body.angular_velocity = self._velocity[n][2]
+
+    def _read(self, n: int, body: pymunk.Body, touched: bool) -> None:
+        if not touched and self._velocity[n] == (0.0, 0.0, 0.0):
+            self.twists[n] = STILL
+            return
+        x, y = body.position
+        self.poses[n] = Pose2D(x, y, wrap(body.angle))
+        if not touched:
+            self.twists[n] = self.wheels[n]
+            return
+        (vx, vy), w, theta = body.velocity, body.angular_velocity, self.poses[n].theta
+        self._velocity[n] = (vx, vy, w)
+        self.twists[n] = Twist(vx * cos(theta) + vy * sin(theta), w)
+
+    def _add_robot(self, n: int, name: str, radius_m: float) -> pymunk.Body:
+        body = pymunk.Body(self._mass_kg, self._inertia)
+        body.position, body.angle = (self.poses[n].x, self.poses[n].y), self.poses[n].theta
+        self._space.add(body)
+        self._add_shape(pymunk.Circle(body, radius_m), _ROBOT, n, name)
+        return body
+
+    def _add_shape(self, shape: pymunk.Shape, kind: int, robot: int, name: str) -> None:
+        shape.friction = SIDE_FRICTION
+        shape.collision_type = kind
+        self._names[shape] = (robot, name)
+        self._space.add(shape)
+
+    def _add_obstacle(self, n: int, obstacle: Obstacle) -> None:
+        body = pymunk.Body(body_type=pymunk.Body.STATIC)
+        if obstacle.waypoints_m:
+            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+            way = Way(obstacle)
+            body.position = way.at(0.0)
+            self._moving.append((n, body, way))
+        else:
+            if obstacle.mass_kg is not None:
+                body = self._pushable[n] = pymunk.Body(obstacle.mass_kg, _inertia_of(obstacle, obstacle.mass_kg))
+            body.position = obstacle.center_m
+        self._space.add(body)
+        shape: pymunk.Shape
+        if obstacle.radius_m is not None:
+            shape = pymunk.Circle(body, obstacle.radius_m)
+        else:
+            shape = pymunk.Poly(body, obstacle.corners_m or ())
+            body.center_of_gravity = shape.center_of_gravity
+        self._add_shape(shape, _THING, -1, f"obstacle{n}")
+        if obstacle.mass_kg is not None:
+            self._brake_on_ground(body, obstacle)
+
+    def _brake_on_ground(self, body: pymunk.Body, obstacle: Obstacle) -> None:
+        """Coulomb friction with the floor: joints that hold against speed with a bounded force, and never pull back."""
+        center = body.center_of_gravity
+        slide = pymunk.PivotJoint(self._space.static_body, body, body.local_to_world(center), center)
+        turn = pymunk.GearJoint(self._space.static_body, body, 0.0, 1.0)
+        slide.max_bias = turn.max_bias = 0.0
+        slide.max_force = GROUND_FRICTION * body.mass * GRAVITY_MPS2
+        turn.max_force = slide.max_force * 2.0 / 3.0 * _reach_of(obstacle)
+        self._space.add(slide, turn)
+
+    def _on_begin(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: object) -> None:
+        x, y = arbiter.contact_point_set.points[0].point_a
+        for shape, against in (arbiter.shapes, arbiter.shapes[::-1]):
+            robot, _ = self._names[shape]
+            if robot >= 0:
+                self._touching[robot] += 1
+                other = self._names[against][1]
+                parted_at = self._parted_at.pop((robot, other), None)
+                if parted_at is None or (self._steps - parted_at) * self._dt_s > RETOUCH_S:
+                    self._touches.append(Touch(robot, other, x, y))
+
+    def _on_separate(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: object) -> None:
+        for shape, against in (arbiter.shapes, arbiter.shapes[::-1]):
+            robot, _ = self._names[shape]
+            if robot >= 0:
+                self._touching[robot] -= 1
+                self._parted_at[robot, self._names[against][1]] = self._steps
+
+
+def _inertia_of(obstacle: Obstacle, mass_kg: float) -> float:
+    if obstacle.radius_m is not None:
+        return float(pymunk.moment_for_circle(mass_kg, 0.0, obstacle.radius_m))
+    corners = obstacle.corners_m or ()
+    center = pymunk.Poly(None, corners).center_of_gravity
+    return float(pymunk.moment_for_poly(mass_kg, corners, (-center.x, -center.y)))
+
+
+def _reach_of(obstacle: Obstacle) -> float:
+    """Distance [m] of the outermost part from the centre."""
+    if obstacle.radius_m is not None:
+        return obstacle.radius_m
+    return max(hypot(x, y) for x, y in obstacle.corners_m or ())
