@@ -1,0 +1,142 @@
+"""All robots' beams against all shapes in one batch call: numpy over (robot, shape) pairs, no loop over beams.
+
+A shape is seen under an interval of angles, so only the few beams in it are tested at all: the work grows with what
+there is to see, not with beams times shapes. Beams start behind the robot and go round counter-clockwise:
+beam j looks to `ANGLE_MIN` + j TAU/beams in `base_link`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from math import cos, pi, sin
+
+import numpy as np
+import numpy.typing as npt
+
+from protocol.geometry import TAU, Pose2D
+from world.spec import Lidar, Obstacle, Scenario
+
+ANGLE_MIN = -pi
+ROUNDING = 1e-9
+"""Of a beam's width: beams through a corner meet at least one of its edges."""
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Circle = tuple[float, float, float]
+Segment = tuple[float, float, float, float]
+
+
+class Scanner:
+    """The laser scanners of all robots of one scenario, each at the centre of a round robot."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._lidar = scenario.world.lidar
+        self._radius_m = scenario.mission.radius_m
+        self._obstacles = scenario.world.obstacles
+        fixed = [o for o in self._obstacles if o.mass_kg is None and not o.waypoints_m]
+        circles, segments = outline((obstacle, Pose2D(*obstacle.center_m)) for obstacle in fixed)
+        self._circles = np.array(circles, dtype=float).reshape(-1, 3)
+        self._segments = np.array([*scenario.world.walls_m, *segments], dtype=float).reshape(-1, 4)
+
+    def scan(self, robots: Sequence[Pose2D], moved: Mapping[int, Pose2D]) -> Floats:
+        """Ranges [m], one row of beams a robot, without noise; `moved` holds the obstacles that are not nailed down.
+
+        Beyond `range_max_m` is +inf, below `range_min_m` is -inf (REP-117).
+        """
+        poses = np.array([(pose.x, pose.y, pose.theta) for pose in robots])
+        circles, segments = self._circles, self._segments
+        if moved:
+            more_circles, more_segments = outline((self._obstacles[n], pose) for n, pose in moved.items())
+            circles = np.concatenate((circles, np.array(more_circles, dtype=float).reshape(-1, 3)))
+            segments = np.concatenate((segments, np.array(more_segments, dtype=float).reshape(-1, 4)))
+        return cast(poses, self._radius_m, circles, segments, self._lidar)
+
+
+def outline(placed: Iterable[tuple[Obstacle, Pose2D]]) -> tuple[list[Circle], list[Segment]]:
+    """Circles (x, y, radius) and segments (x1, y1, x2, y2) in `map` of obstacles at their poses."""
+    circles: list[Circle] = []
+    segments: list[Segment] = []
+    for obstacle, pose in placed:
+        if obstacle.radius_m is not None:
+            circles.append((pose.x, pose.y, obstacle.radius_m))
+            continue
+        c, s = cos(pose.theta), sin(pose.theta)
+        corners = [(pose.x + c * x - s * y, pose.y + s * x + c * y) for x, y in obstacle.corners_m or ()]
+        segments.extend((*a, *b) for a, b in pairwise((*corners, corners[0])))
+    return circles, segments
+
+
+def cast(poses: Floats, radius_m: float, circles: Floats, segments: Floats, lidar: Lidar) -> Floats:
+    """Ranges [m] of shape (n, beams) from n `poses` (x, y, theta) in `map`; the robots themselves are circles too."""
+    ranges = np.full((len(poses), lidar.beams), np.inf)
+    flat = ranges.reshape(-1)
+    robots = np.column_stack((poses[:, :2], np.full(len(poses), radius_m)))
+    _cast_at_circles(flat, poses, np.concatenate((robots, circles)), lidar)
+    if len(segments):
+        _cast_at_segments(flat, poses, segments, lidar)
+    flat[flat > lidar.range_max_m] = np.inf
+    flat[flat < lidar.range_min_m] = -np.inf
+    return ranges
+
+
+def _cast_at_circles(flat: Floats, poses: Floats, circles: Floats, lidar: Lidar) -> None:
+    """The first n circles are the robots, each unseen by itself."""
+    dx = circles[:, 0] - poses[:, 0:1]
+    dy = circles[:, 1] - poses[:, 1:2]
+    away = np.sqrt(dx * dx + dy * dy)
+    seen = away < lidar.range_max_m + circles[:, 2]
+    np.fill_diagonal(seen, False)
+    robot, shape = np.nonzero(seen)
+    if not len(robot):
+        return
+    away, radius = away[robot, shape], circles[shape, 2]
+    toward = np.arctan2(dy[robot, shape], dx[robot, shape]) - poses[robot, 2] - ANGLE_MIN
+    half = np.where(away > radius, np.arcsin(np.minimum(radius / np.maximum(away, 1e-12), 1.0)), pi)
+    pair, turn, beam = _beams_within(toward - half, toward + half, robot, lidar.beams)
+    offset = turn - toward[pair]
+    away, radius = away[pair], radius[pair]
+    across = away * np.sin(offset)
+    ranges = away * np.cos(offset) - np.sqrt(np.maximum(radius * radius - across * across, 0.0))
+    np.minimum.at(flat, beam, ranges)
+
+
+def _cast_at_segments(flat: Floats, poses: Floats, segments: Floats, lidar: Lidar) -> None:
+    ax, ay = segments[:, 0] - poses[:, 0:1], segments[:, 1] - poses[:, 1:2]
+    ex, ey = segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1]
+    along = np.clip(-(ax * ex + ay * ey) / (ex * ex + ey * ey), 0.0, 1.0)
+    nx, ny = ax + along * ex, ay + along * ey
+    nearest = np.sqrt(nx * nx + ny * ny)
+    robot, shape = np.nonzero(nearest < lidar.range_max_m)
+    if not len(robot):
+        return
+    ax, ay, nearest = ax[robot, shape], ay[robot, shape], nearest[robot, shape]
+    ex, ey = ex[shape], ey[shape]
+    bx, by = ax + ex, ay + ey
+    heading = poses[robot, 2] + ANGLE_MIN
+    first = np.arctan2(ay, ax)
+    swept = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    start = np.where(swept < 0.0, first + swept, first) - heading
+    # Distance to the line, with its normal's direction: the range is the one over the cosine of the angle between.
+    area = ax * ey - ay * ex
+    height = area / np.sqrt(ex * ex + ey * ey)
+    normal = np.arctan2(-ex, ey) - heading
+    farthest = np.sqrt(np.maximum(ax * ax + ay * ay, bx * bx + by * by))
+    pair, turn, beam = _beams_within(start, start + np.abs(swept), robot, lidar.beams)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ranges = height[pair] / np.cos(turn - normal[pair])
+    # Seen edge-on the quotient is 0/0 or anything: the nearest point is then the answer (fmax passes nan over).
+    ranges = np.minimum(np.fmax(ranges, nearest[pair]), farthest[pair])
+    np.minimum.at(flat, beam, ranges)
+
+
+def _beams_within(low: Floats, high: Floats, robot: Ints, beams: int) -> tuple[Ints, Floats, Ints]:
+    """Every beam with low <= angle <= high, angles [rad] from beam 0: its pair, its angle, its place in all beams."""
+    width = TAU / beams
+    first = np.ceil(low / width - ROUNDING).astype(np.int64)
+    count = np.minimum(np.floor(high / width + ROUNDING).astype(np.int64) - first + 1, beams)
+    np.maximum(count, 0, out=count)
+    ends = np.cumsum(count)
+    pair = np.repeat(np.arange(len(count)), count)
+    number = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
+    return pair, number * width, np.repeat(robot * beams, count) + number % beams
