@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 from deploy.run import channels
 from protocol.messages import Event, Message
 from protocol.mission import robot_id_of
-from protocol.topics import WORLD_NAME, address
+from protocol.topics import OPERATOR_NAME, WORLD_NAME, address
 
 RECORDING = "recording.mcap"
 EVENTS = "events.jsonl"
@@ -72,18 +72,19 @@ class Recorder:
 
 
 def event_line(t: float, event: Event) -> bytes:
-    """One line of events.jsonl: when [s], about which robot, in which term, who says it, what, and its data.
+    """One line of events.jsonl: when [s], about which robot, in which term, what, who says it, and its data.
 
-    The world tells the time and the robot itself: it speaks about others, and knows when.
+    World and operator speak about others, and know when: they say `robot` and `t` themselves.
     """
     data = channels.plain(event.data)
-    by_world = event.header.sender == WORLD_NAME
+    sender = event.header.sender
+    said = data if sender in (WORLD_NAME, OPERATOR_NAME) else {}
     head = {
-        "t": round(data.pop("t") if by_world and "t" in data else t, 6),
-        "robot": data.pop("robot") if by_world and "robot" in data else robot_id_of(event.header.sender),
-        "term": channels.plain(event.term and list(msgspec.structs.astuple(event.term))),
+        "t": round(said.get("t", t), 6),
+        "robot": said.get("robot", robot_id_of(sender)),
+        "term": None if event.term is None else msgspec.structs.astuple(event.term),
         "kind": event.kind,
-        "from": event.header.sender,
+        "from": sender,
     }
     rest = {name: value for name, value in data.items() if name not in head}
     tail = b"," + _line_encoder.encode(rest)[1:] if rest else b"}"

@@ -49,10 +49,10 @@ class Referee:
                     self.verdict = Verdict("failed", f"robot {who}: {message.data.get('reason', 'gives up')}")
                 case Event(kind="chain", term=Term() as term) if term >= self._term:
                     self._term = term
-                    self.chain = tuple(message.data["chain"])
+                    self.chain = _ids(message.data.get("chain")) or self.chain
                 case Event(kind="leader_command", term=Term() as term) if term >= self._led:
                     self._led = term
-                    self.leader = message.data["robot"]
+                    self.leader = next(iter(_ids([message.data.get("robot")])), self.leader)
         return self.verdict
 
     def _judge(self, truth: Truth) -> Verdict | None:
@@ -75,6 +75,11 @@ class Referee:
         goal_x, goal_y = mission.goal_m
         near = hypot(leader.x - goal_x, leader.y - goal_y) <= mission.leading.goal_tolerance_m
         return near and all(_at_rest(robot) for robot in present.values())
+
+
+def _ids(said: object) -> tuple[int, ...]:
+    """The robot ids in an event's data, which may come from anybody."""
+    return tuple(i for i in said if isinstance(i, int)) if isinstance(said, list | tuple) else ()
 
 
 def _at_rest(robot: TrueRobot) -> bool:

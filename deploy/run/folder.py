@@ -1,0 +1,80 @@
+"""The run folder: where it is, what it is about, and its scenario as a file that can be run again."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from protocol.mission import Refused
+from world.scenario import Scenario, load
+
+SCENARIO = "scenario.toml"
+RUNS = Path("runs")
+
+
+class About(Struct, frozen=True):
+    """Which run this is: goes into the recording and the summary."""
+
+    scenario: str
+    mode: str
+    seed: int
+    fleet: str
+
+    def metadata(self) -> dict[str, str]:
+        return {"scenario": self.scenario, "mode": self.mode, "seed": str(self.seed), "fleet": self.fleet}
+
+
+def make(out: Path | None, scenario: Scenario) -> Path:
+    """A new folder with the scenario in it: `out` or `runs/<scenario>-<time>`, suffixed -2, -3 ... when taken.
+
+    Raises Refused when it cannot be made.
+    """
+    path = _free(out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        (path / SCENARIO).write_text(toml(scenario))
+    except OSError as error:
+        raise Refused(f"--out {path}: cannot be made ({error.strerror}), give a place to write to") from None
+    return path
+
+
+def scenario_of(folder: Path) -> Scenario:
+    """The scenario that was run, as drawn."""
+    return load(str(folder / SCENARIO))
+
+
+def toml(scenario: Scenario) -> str:
+    """`scenario` in TOML, every field said; `world.scenario.load` reads it back."""
+    fields: dict[str, Any] = msgspec.to_builtins(scenario)
+    fields.pop("name")
+    tables = {name: value for name, value in fields.items() if isinstance(value, dict)}
+    plain = {name: value for name, value in fields.items() if name not in tables}
+    return "\n".join([_lines(plain), *(f"[{name}]\n{_lines(table)}" for name, table in tables.items())])
+
+
+def _lines(fields: dict[str, Any]) -> str:
+    return "".join(f"{name} = {_value(value)}\n" for name, value in fields.items() if value is not None)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k} = {_value(v)}" for k, v in value.items() if v is not None) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    return msgspec.json.encode(value).decode()
+
+
+def _free(path: Path) -> Path:
+    suffix, candidate = 1, path
+    while candidate.exists() and not _empty(candidate):
+        suffix += 1
+        candidate = path.with_name(f"{path.name}-{suffix}")
+    return candidate
+
+
+def _empty(path: Path) -> bool:
+    return path.is_dir() and not any(path.iterdir())
