@@ -8,7 +8,7 @@ from __future__ import annotations
 import msgspec
 
 from protocol.journal import Journal
-from protocol.messages import BadMessage, decode, encode
+from protocol.messages import BadMessage, Message, decode, encode
 from protocol.node import Envelope, Local, Node, Received
 from protocol.topics import TOPIC, address
 
@@ -25,25 +25,31 @@ class Host:
         self.journal = journal
         self.undecodable = 0
 
-    def message(self, at: float, key: str, payload: bytes) -> Sent:
-        """Bytes came on `key`."""
+    def decoded(self, key: str, payload: bytes) -> Message | None:
+        """The message in bytes that came on `key`; None, counted, when they are none of ours."""
         where = address(key)
         topic = TOPIC.get(where.topic) if where is not None else None
+        if topic is None:
+            self.undecodable += 1
+            return None
         try:
-            if topic is None:
-                raise BadMessage(f"no topic of ours: {key}")
-            message = decode(payload, topic.type)
+            return decode(payload, topic.type)
         except BadMessage:
             self.undecodable += 1
-            return []
-        sent = _encoded(self.node.receive(Received(at, key, message)))
-        self.journal.add("message", at, key, payload, sent)
-        return sent
+            return None
 
-    def local(self, at: float, event: Local) -> Sent:
-        """A liveliness change, vitals or the order to stop."""
-        sent = _encoded(self.node.receive(Received(at, "", event)))
-        self.journal.add("local", at, "", _local_encoder.encode(event), sent)
+    def message(self, at: float, key: str, payload: bytes) -> Sent:
+        """Bytes came on `key`."""
+        message = self.decoded(key, payload)
+        return [] if message is None else self.deliver(at, key, message, payload)
+
+    def deliver(self, at: float, key: str, message: Message | Local, payload: bytes) -> Sent:
+        """A decoded message, with the bytes that it came in; or a local event (`key` and `payload` empty)."""
+        sent = _encoded(self.node.receive(Received(at, key, message)))
+        if key:
+            self.journal.add("message", at, key, payload, sent)
+        else:
+            self.journal.add("local", at, "", _local_encoder.encode(message), sent)
         return sent
 
     def tick(self, now: float) -> Sent:

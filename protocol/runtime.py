@@ -23,7 +23,7 @@ from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, decode
 from protocol.mission import Refused
-from protocol.node import Node, Stop, Vitals
+from protocol.node import Local, Node, Stop, Vitals
 from protocol.topics import TOPIC, address
 from protocol.zenoh_bus import LINK_LEASE_MS, RouterAbsent, ZenohBus
 
@@ -57,7 +57,7 @@ class _Seat:
             if isinstance(arrival.payload, bytes):
                 self._publish(host.message(arrival.at, arrival.key, arrival.payload))
             else:
-                self._publish(host.local(arrival.at, arrival.payload))
+                self._publish(host.deliver(arrival.at, "", arrival.payload, b""))
         late = now - node.next_deadline()
         if late >= 0.0:
             self._publish(host.tick(clock.now()))
@@ -67,8 +67,9 @@ class _Seat:
         host.journal.flush()
         return late
 
-    def say(self, sent: Sent) -> None:
-        self._publish(sent)
+    def tell(self, event: Local, now: float) -> None:
+        """Give the node a local event."""
+        self._publish(self.host.deliver(now, "", event, b""))
 
     def _publish(self, sent: Sent) -> None:
         for key, payload in sent:
@@ -133,11 +134,11 @@ def _loop(seats: Sequence[_Seat], wake: threading.Event, stop: threading.Event) 
             vitals.lag(seat.step(now))
         if vitals.due(now):
             for seat in seats:
-                seat.say(seat.host.local(now, vitals.of(seat.inbox.dropped, seat.host.undecodable)))
+                seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable), now)
         if stop.is_set() and stop_by is None:
             stop_by = now + STOP_GRACE_S
             for seat in seats:
-                seat.say(seat.host.local(now, Stop()))
+                seat.tell(Stop(), now)
         refusals = [node.refusal for node in (seat.host.node for seat in seats) if node.refusal is not None]
         if refusals:
             raise Refused(refusals[0])

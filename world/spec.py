@@ -12,6 +12,7 @@ from typing import Literal
 from msgspec import Struct
 
 from protocol.mission import Mission, Refused, check_mission
+from protocol.radio import Radio
 
 Point = tuple[float, float]
 ROBOTS_MAX = 500
@@ -83,15 +84,6 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     noise: Noise = Noise()
     vary: Vary = Vary()
     physics_hz: float = 100.0
-
-
-class Radio(Struct, frozen=True, forbid_unknown_fields=True):
-    """Weather between robots, in virtual time and (through `protocol/radio.py`) on a live bus."""
-
-    delay_s: float = 0.0005
-    jitter_s: float = 0.001
-    """Uniform, on top of `delay_s`."""
-    loss: float = 0.0
 
 
 class Scenario(Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,0 +1,260 @@
+"""Virtual time: a heap of deliveries and deadlines over any Nodes, with the codec and the journals of the real thing.
+
+The same seed gives the same run: chance comes from one generator, ties are broken by order of arrival, and nothing
+reads a clock. Each node has its own monotonic clock (offset and rate), as processes on several machines do.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from random import Random
+
+from msgspec import Struct
+
+from protocol.host import Host, Sent
+from protocol.journal import Journal
+from protocol.messages import Message
+from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
+from protocol.radio import Air, Radio
+from protocol.topics import HARDWARE, TOPIC, Address, address, alive_key
+
+LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
+HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
+VITALS_S = 1.0
+FINISH_S_MAX = 1.0
+
+Tap = Callable[[float, str, bytes, Message], None]
+
+
+class LocalClock(Struct, frozen=True):
+    """A node's own clock against true time: local = offset + rate * true."""
+
+    offset_s: float = 0.0
+    rate: float = 1.0
+
+    def local(self, true_s: float) -> float:
+        return self.offset_s + self.rate * true_s
+
+    def true(self, local_s: float) -> float:
+        return (local_s - self.offset_s) / self.rate
+
+
+class _Seat:
+    """One living process: its host, its clock, what it follows, and what waits for it while it is stopped."""
+
+    def __init__(self, host: Host, clock: LocalClock) -> None:
+        self.host = host
+        self.clock = clock
+        self.deadline: float | None = None
+        self.interests: frozenset[str] = frozenset()
+        self.paused = False
+        self.waiting: list[tuple[str, Message | Local, bytes]] = []
+        self.stop_by: float | None = None
+
+    @property
+    def node(self) -> Node:
+        return self.host.node
+
+
+class Simulator:
+    """Runs Nodes in true time from 0. `now` is true time [s]; taps see every message as it is published."""
+
+    def __init__(self, radio: Radio, seed: int) -> None:
+        self.now = 0.0
+        self.taps: list[Tap] = []
+        self._random = Random(f"air-{seed}")
+        self._air = Air(radio, self._random)
+        self._seats: dict[str, _Seat] = {}
+        self._heap: list[tuple[float, int, Callable[[], None]]] = []
+        self._order = 0
+        self._routes: dict[str, list[_Seat]] = {}
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._seats)
+
+    def add(self, node: Node, journal: Journal, clock: LocalClock | None = None) -> None:
+        """A process starts now. Its token is told to the others, and theirs to it."""
+        seat = _Seat(Host(node, journal), clock or LocalClock())
+        self._seats[node.name] = seat
+        self._refresh(seat)
+        self._announce(PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)
+        self._plan(seat)
+        self.at(self.now + VITALS_S, lambda: self._vitals(seat))
+
+    def kill(self, name: str) -> None:
+        """SIGKILL: nothing more comes from it; the others' hints come within milliseconds."""
+        seat = self._seats.pop(name)
+        seat.host.journal.close()
+        self._routes.clear()
+        low, high = HINT_DELAY_S
+        self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
+
+    def pause(self, name: str) -> None:
+        """SIGSTOP: it does nothing, and what comes for it waits."""
+        self._seats[name].paused = True
+
+    def resume(self, name: str) -> None:
+        """SIGCONT: what waited comes at once; of states only the newest, as in a real inbox."""
+        seat = self._seats[name]
+        seat.paused = False
+        waiting, seat.waiting = seat.waiting, []
+        newest = {key: index for index, (key, _, _) in enumerate(waiting) if key}
+        for index, (key, message, payload) in enumerate(waiting):
+            where = address(key) if key else None
+            if where is not None and TOPIC[where.topic].state and newest[key] != index:
+                continue
+            self._give(seat, key, message, payload)
+        self._tick(seat)
+
+    def terminate(self, name: str) -> None:
+        """SIGTERM: the node says its last words and goes."""
+        seat = self._seats[name]
+        seat.stop_by = self.now + FINISH_S_MAX
+        self._give(seat, "", Stop(), b"")
+
+    def at(self, when: float, action: Callable[[], None]) -> None:
+        """Do `action` at true time `when`."""
+        self._order += 1
+        heapq.heappush(self._heap, (when, self._order, action))
+
+    def run(self, until: float, over: Callable[[], bool] | None = None) -> None:
+        """Advance to true time `until`, or until `over()` holds."""
+        heap = self._heap
+        while heap and heap[0][0] <= until:
+            when, _, action = heapq.heappop(heap)
+            self.now = max(self.now, when)
+            action()
+            if over is not None and over():
+                return
+        self.now = max(self.now, until)
+
+    # --- one call of one node ---------------------------------------------------------------------------------
+
+    def _give(self, seat: _Seat, key: str, message: Message | Local, payload: bytes) -> None:
+        if self._seats.get(seat.node.name) is not seat:
+            return
+        if seat.paused:
+            seat.waiting.append((key, message, payload))
+            return
+        self._after(seat, seat.host.deliver(seat.clock.local(self.now), key, message, payload))
+
+    def _tick(self, seat: _Seat) -> None:
+        if self._seats.get(seat.node.name) is not seat or seat.paused:
+            return
+        now = seat.clock.local(self.now)
+        if now >= seat.node.next_deadline() - 1e-9:
+            self._after(seat, seat.host.tick(max(now, seat.node.next_deadline())))
+        else:
+            self._plan(seat)
+
+    def _after(self, seat: _Seat, sent: Sent) -> None:
+        node = seat.node
+        for key, payload in sent:
+            self._publish(seat, key, payload)
+        if node.interests is not seat.interests:
+            self._refresh(seat)
+        if node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
+            self._leave(seat)
+        else:
+            self._plan(seat)
+
+    def _plan(self, seat: _Seat) -> None:
+        deadline = seat.node.next_deadline()
+        if deadline == seat.deadline:
+            return
+        seat.deadline = deadline
+
+        def due() -> None:
+            if seat.deadline == deadline:
+                seat.deadline = None
+                self._tick(seat)
+
+        self.at(max(seat.clock.true(deadline), self.now), due)
+
+    def _leave(self, seat: _Seat) -> None:
+        if self._seats.pop(seat.node.name, None) is None:
+            return
+        seat.host.journal.close()
+        self._routes.clear()
+        self._announce(PeerDown(seat.node.name, seat.node.incarnation), LOCAL_DELAY_S)
+
+    def _vitals(self, seat: _Seat) -> None:
+        if self._seats.get(seat.node.name) is seat:
+            if not seat.paused:
+                self._give(seat, "", Vitals(0.0, 0, seat.host.undecodable, 0.0, 0.0), b"")
+            self.at(self.now + VITALS_S, lambda: self._vitals(seat))
+
+    # --- between nodes ------------------------------------------------------------------------------------------
+
+    def _publish(self, sender: _Seat, key: str, payload: bytes) -> None:
+        message = sender.host.decoded(key, payload)
+        if message is None:
+            return
+        for tap in self.taps:
+            tap(self.now, key, payload, message)
+        where = address(key)
+        for seat in self._routes.get(key) or self._route(key):
+            delays = (
+                [LOCAL_DELAY_S] if _local(where, sender, seat) else self._air.delays(sender.node.name, seat.node.name)
+            )
+            for delay_s in delays:
+                self._deliver_later(seat, key, message, payload, delay_s)
+
+    def _deliver_later(self, seat: _Seat, key: str, message: Message, payload: bytes, delay_s: float) -> None:
+        self.at(self.now + delay_s, lambda: self._give(seat, key, message, payload))
+
+    def _route(self, key: str) -> list[_Seat]:
+        seats = [seat for seat in self._seats.values() if any(_matches(e, key) for e in seat.interests)]
+        self._routes[key] = seats
+        return seats
+
+    def _refresh(self, seat: _Seat) -> None:
+        """The node's interests changed: it also hears of the tokens that already stand."""
+        new = seat.node.interests
+        added = sorted(new - seat.interests)
+        seat.interests = new
+        self._routes.clear()
+        for other in list(self._seats.values()):
+            token = _token(other.node)
+            if other is not seat and any(_matches(e, token) for e in added):
+                self._hint_later(seat, PeerUp(other.node.name, other.node.incarnation), LOCAL_DELAY_S)
+
+    def _announce(self, event: PeerUp | PeerDown, delay_s: float) -> None:
+        for seat in list(self._seats.values()):
+            token = alive_key(_fleet(seat.node), event.name, event.incarnation)
+            if seat.node.name != event.name and any(_matches(e, token) for e in seat.interests):
+                self._hint_later(seat, event, delay_s)
+
+    def _hint_later(self, seat: _Seat, event: PeerUp | PeerDown, delay_s: float) -> None:
+        self.at(self.now + delay_s, lambda: self._give(seat, "", event, b""))
+
+
+def _local(where: Address | None, sender: _Seat, receiver: _Seat) -> bool:
+    """A robot and its own hardware (sensors, commands, its gateway's fence) do not speak through the air."""
+    if where is None:
+        return False
+    if where.topic == "lease":
+        return where.to == where.owner.replace("robot", "gateway")
+    return where.topic in HARDWARE or where.topic == "cmd_vel"
+
+
+def _matches(expression: str, key: str) -> bool:
+    """Zenoh's key expressions as far as this project uses them: `*` for one part, a last `**` for any rest."""
+    if expression == key:
+        return True
+    wanted, parts = expression.split("/"), key.split("/")
+    if wanted[-1] == "**":
+        wanted = wanted[:-1]
+        parts = parts[: len(wanted)]
+    return len(wanted) == len(parts) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))
+
+
+def _token(node: Node) -> str:
+    return alive_key(_fleet(node), node.name, node.incarnation)
+
+
+def _fleet(node: Node) -> str:
+    """The fleet that a node's interests speak of."""
+    return min(node.interests).split("/")[1]
