@@ -1,0 +1,90 @@
+"""`lfa`: a table of commands. The module of a command is imported when it is called, so `lfa --help` stays quick.
+
+Every command module has a function `command`. Bad input, ours or the parser's, is one line on stderr and exit code 2.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import typer
+
+from protocol.mission import Refused
+
+
+class Entry(NamedTuple):
+    name: str
+    module: str
+    help: str
+    example: str
+
+
+COMMANDS = (
+    Entry("run", "deploy.run.launch", "Start router, world and agents as processes here; write a run folder.",
+          "lfa run paper_path1 --robots 4 --fault 'kill leader at 20 s'"),
+    Entry("sim", "deploy.run.simulate", "The same in one process, in virtual time; the same run folder.",
+          "lfa sim paper_path1 --seed 7 --set world.lidar.beams=90"),
+    Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",
+          "lfa fault kill leader"),
+    Entry("list", "deploy.look.scenarios", "The shipped scenarios.",
+          "lfa list --json"),
+    Entry("validate", "deploy.look.validate", "Check a scenario file, and say what a seed makes of it.",
+          "lfa validate my_course.toml --set mission.leading.cruise_mps=0.3"),
+    Entry("plot", "deploy.look.plots", "Draw the figures of a run folder.",
+          "lfa plot runs/paper_path1-20260101-120000"),
+    Entry("bench", "deploy.bench.command", "Measure, beside the bar to be reached.",
+          "lfa bench lidar --json"),
+)  # fmt: skip
+
+
+def main() -> None:
+    """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
+    sys.exit(run_cli("lfa", build(sys.argv[1:2])))
+
+
+def build(called: list[str]) -> typer.Typer:
+    """All commands; only the one that is `called` is imported, the others are known by name and help."""
+    app = typer.Typer(name="lfa", help=_ABOUT, add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+    for entry in COMMANDS:
+        function = import_module(entry.module).command if [entry.name] == called else _absent
+        app.command(entry.name, help=entry.help, epilog=f"Example: {entry.example}", no_args_is_help=False)(function)
+    return app
+
+
+def run_cli(name: str, app: typer.Typer) -> int:
+    """Run `app` on the command line; the exit code. Used by all scripts of `deploy`."""
+    try:
+        code = app(standalone_mode=False, prog_name=name)
+    except Refused as refused:
+        return _say(name, str(refused))
+    except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
+        return _say(name, error.format_message())
+    except typer.Abort:
+        return 130
+    except BrokenPipeError:  # the reader of a pipe has gone: nobody is left to tell
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return code if isinstance(code, int) else 0
+
+
+def command_app(function: Callable[..., Any], help_text: str, example: str) -> typer.Typer:
+    """A script of one command."""
+    app = typer.Typer(add_completion=False, rich_markup_mode=None)
+    app.command(help=help_text, epilog=f"Example: {example}")(function)
+    return app
+
+
+def _say(name: str, text: str) -> int:
+    print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
+    return 2
+
+
+def _absent() -> None:
+    """Stands for a command that was not called."""
+
+
+_ABOUT = "A chain of robots, each its own process, that survives the loss of its leader."
