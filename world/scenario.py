@@ -18,6 +18,7 @@ import msgspec
 from msgspec.structs import replace
 
 from protocol.mission import Refused
+from protocol.radio import Radio
 from world.course import check_course, draw, starts_of
 from world.spec import (
     Body,
@@ -26,7 +27,6 @@ from world.spec import (
     Obstacle,
     Outcome,
     Point,
-    Radio,
     Scenario,
     Vary,
     WorldSpec,

@@ -143,6 +143,8 @@ def _ranges(scenario: Scenario) -> list[tuple[str, float, float, float]]:
         ("radio.delay_s", radio.delay_s, 0.0, 10.0),
         ("radio.jitter_s", radio.jitter_s, 0.0, 10.0),
         ("radio.loss", radio.loss, 0.0, 1.0),
+        ("radio.loss_burst", radio.loss_burst, 1.0, 1e4),
+        ("radio.duplication", radio.duplication, 0.0, 1.0),
     ]
 
 

@@ -1,0 +1,117 @@
+"""One simulated robot's hardware: its gateway, its sensors, and the words they are said in."""
+
+from __future__ import annotations
+
+from math import atan2
+
+from protocol.gateway import Gateway
+from protocol.geometry import TAU, Pose2D, wrap
+from protocol.messages import (
+    CmdVel,
+    Contact,
+    Fence,
+    Header,
+    LaserScan,
+    LeaseNote,
+    Localization,
+    Message,
+    Sensors,
+    Term,
+)
+from protocol.mission import robot_name
+from protocol.node import Envelope
+from protocol.timing import timing_of
+from protocol.topics import TO_ALL, WORLD_NAME, key
+from world.lidar import ANGLE_MIN, Floats
+from world.sensors import Localizer, RangeNoise, WheelOdometry
+from world.spec import Scenario
+
+REFUSAL_EVERY_S = 0.2
+"""Between two events of a gateway about the same reason, however often the term changes."""
+
+
+class Robot:
+    """What stands between an agent and its simulated body. `now` is the world's monotonic time [s] throughout."""
+
+    def __init__(self, fleet: str, robot_id: int, scenario: Scenario, seed: int, incarnation: int, now: float) -> None:
+        noise = scenario.world.noise
+        self.id = robot_id
+        self.name = robot_name(robot_id)
+        self.gateway = Gateway(robot_id, incarnation, timing_of(scenario.mission.profile), now)
+        self.odometry = WheelOdometry(noise, seed, robot_id)
+        self._localizer = Localizer(noise, seed, robot_id)
+        self._range_noise = RangeNoise(noise, seed, robot_id)
+        self._lidar = scenario.world.lidar
+        self._fleet = fleet
+        self._incarnation = incarnation
+        self._seq: dict[str, int] = {}
+        self._led: Term | None = None
+        self._told: dict[str, tuple[Term, float]] = {}
+
+    def command(self, cmd: CmdVel, now: float) -> tuple[str, dict[str, object]] | None:
+        """Give `cmd` to the gateway; what is worth an event: the first leader command of a term, a new refusal."""
+        reason = self.gateway.command(cmd, now)
+        if reason is None:
+            if not cmd.as_leader or cmd.term == self._led:
+                return None
+            self._led = cmd.term
+            return "leader_command", {"robot": self.id}
+        term, at = self._told.get(reason, (None, float("-inf")))
+        if cmd.term == term or now - at < REFUSAL_EVERY_S:
+            return None
+        self._told[reason] = cmd.term, now
+        return "refused", {"robot": self.id, "reason": reason, "count": self.gateway.refused[reason]}
+
+    def fence(self, fence: Fence, now: float) -> Envelope:
+        """FENCED, as this robot's own gateway says it to all (lease.md section 5)."""
+        header = self._header("lease", now, sender=self.name)
+        note = LeaseNote(header, self.gateway.fence(fence, now))
+        return Envelope(key(self._fleet, self.name, "lease", TO_ALL), note)
+
+    def sensors(self, stamp: float, now: float) -> Envelope:
+        """Odometry as of `stamp`; the gateway's own moment is `now`."""
+        odometry, gateway = self.odometry, self.gateway
+        message = Sensors(
+            self._header("sensors", stamp),
+            odometry.pose_odom,
+            odometry.twist,
+            odometry.odometer_m,
+            gateway.stamp(now),
+            gateway.term_max,
+            gateway.latched,
+            sum(gateway.refused.values()),
+        )
+        odometry.redraw()
+        return self._envelope("sensors", message)
+
+    def localization(self, stamp: float, pose_map: Pose2D) -> Envelope | None:
+        """A fix of the true `pose_map`, None when it drops out."""
+        fix = self._localizer.fix(pose_map)
+        if fix is None:
+            return None
+        return self._envelope("localization", Localization(self._header("localization", stamp), fix))
+
+    def scan(self, stamp: float, ranges: Floats) -> Envelope:
+        """The exact `ranges` [m], one a beam, as this robot's scanner measures them."""
+        lidar = self._lidar
+        message = LaserScan(
+            self._header("scan", stamp),
+            ANGLE_MIN,
+            TAU / lidar.beams,
+            lidar.range_min_m,
+            lidar.range_max_m,
+            self._range_noise.apply(ranges),
+        )
+        return self._envelope("scan", message)
+
+    def contact(self, stamp: float, pose_map: Pose2D, x: float, y: float) -> Envelope:
+        """The bumper was touched at (x, y) in `map`."""
+        bearing = wrap(atan2(y - pose_map.y, x - pose_map.x) - pose_map.theta)
+        return self._envelope("contact", Contact(self._header("contact", stamp), bearing))
+
+    def _envelope(self, topic: str, message: Message) -> Envelope:
+        return Envelope(key(self._fleet, self.name, topic), message)
+
+    def _header(self, topic: str, stamp: float, sender: str = WORLD_NAME) -> Header:
+        seq = self._seq[topic] = self._seq.get(topic, 0) + 1
+        return Header(sender, self._incarnation, seq, stamp)

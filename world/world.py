@@ -1,0 +1,222 @@
+"""The simulated world as a Node: commands in through the gateways, bodies stepped together, sensors out.
+
+It speaks what robots' hardware speaks, and besides only the mission, events, and ground truth that no agent may
+hear. Its time runs on the grid t0 + n/physics_hz: sensors are stamped with the moment that their state belongs to,
+however late the tick comes. What comes too late to be caught up with slows the world down instead, and is counted.
+"""
+
+from __future__ import annotations
+
+from math import floor, inf
+
+from protocol.messages import (
+    Ask,
+    Clock,
+    CmdVel,
+    Event,
+    Fence,
+    Header,
+    LeaseNote,
+    MissionNote,
+    Term,
+    TrueObstacle,
+    TrueRobot,
+    Truth,
+)
+from protocol.mission import robot_name
+from protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
+from world.kinematic import Kinematic, Touch
+from world.lidar import Scanner
+from world.physics import Physics
+from world.robot import Robot
+from world.spec import Scenario
+
+CATCH_UP_STEPS_MAX = 20
+"""Steps in one tick: after a longer pause the world's time has stood still for the rest."""
+ROUNDING = 1e-6
+"""Of a step: a tick may come this much early."""
+
+
+class World:
+    """All of a drawn `scenario` but its agents; `seed` draws the sensors' noise. Obeys the Node interface.
+
+    Its time begins at `start_at`, or with its first tick.
+    """
+
+    def __init__(
+        self,
+        fleet: str,
+        scenario: Scenario,
+        seed: int,
+        incarnation: int,
+        start_at: float | None = None,
+        bodies: type[Physics] | type[Kinematic] = Physics,
+    ) -> None:
+        self.name = WORLD_NAME
+        self.incarnation = incarnation
+        self.finished = False
+        self.refusal: str | None = None
+        self.slowed_s = 0.0
+        """How long [s] the world's time has stood still because ticks came too late."""
+        self._fleet = fleet
+        self._scenario = scenario
+        self._seed = seed
+        self._bodies = bodies(scenario)
+        self._scanner = Scanner(scenario)
+        self._robots: list[Robot] = []
+        self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
+        self._place = {name: n for n, name in enumerate(self._names)}
+        self._cut_off = False
+        self._t0 = start_at
+        self._dt_s = 1.0 / scenario.world.physics_hz
+        self._step = 0
+        """Number of the next point of the grid."""
+        self._seq: dict[str, int] = {}
+        self.interests = frozenset(
+            {key(fleet, "*", "ask")}
+            | {key(fleet, name, "cmd_vel") for name in self._names}
+            | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in scenario.mission.robots}
+            | {alive_key(fleet, name, "*") for name in self._names}
+        )
+
+    def next_deadline(self) -> float:
+        if self.finished:
+            return inf
+        return -inf if self._t0 is None else self._t0 + self._step * self._dt_s
+
+    def receive(self, received: Received) -> list[Envelope]:
+        """Commands, fences and asks count at once; what they do to bodies is seen from the next step on."""
+        now, message = received.at, received.message
+        if self.finished:
+            return []
+        self._switch_on(now)
+        match message:
+            case CmdVel():
+                return self._command(received.key, message, now)
+            case LeaseNote(body=Fence() as fence):
+                return self._fence(received.key, fence, now)
+            case Ask(what="mission"):
+                return [self._mission(now)]
+            case PeerUp(name=name, incarnation=incarnation) if name in self._place:
+                self._cut_off = False
+                self._robots[self._place[name]].gateway.agent_up(incarnation, now)
+            case PeerDown(name=name, incarnation=incarnation) if name in self._place and not self._cut_off:
+                self._robots[self._place[name]].gateway.agent_down(incarnation, now)
+            case RouterLost():
+                self._cut_off = True
+            case Stop():
+                self.finished = True
+        return []
+
+    def tick(self, now: float) -> list[Envelope]:
+        """Bring the bodies up to `now`, and say what happened and what the sensors see on the way."""
+        if self.finished:
+            return []
+        sent: list[Envelope] = []
+        self._switch_on(now)
+        if self._t0 is None:
+            self._t0 = now
+        if self._step == 0:
+            sent.append(self._mission(now))
+        due = floor((now - self._t0) / self._dt_s + ROUNDING) - self._step + 1
+        if due > CATCH_UP_STEPS_MAX:
+            stood_still_s = (due - CATCH_UP_STEPS_MAX) * self._dt_s
+            self._t0 += stood_still_s
+            self.slowed_s += stood_still_s
+        for _ in range(min(due, CATCH_UP_STEPS_MAX)):
+            stamp = self._t0 + self._step * self._dt_s
+            touches = self._move(now) if self._step > 0 else []
+            sent += self._speak(stamp, now, touches)
+            self._step += 1
+        return sent
+
+    def _switch_on(self, now: float) -> None:
+        """Gateways come to life with the first moment that the world is told of."""
+        if not self._robots:
+            mission = self._scenario.mission
+            self._robots = [
+                Robot(self._fleet, robot_id, self._scenario, self._seed, self.incarnation, now)
+                for robot_id in mission.robots
+            ]
+
+    def _command(self, at_key: str, cmd: CmdVel, now: float) -> list[Envelope]:
+        where = address(at_key)
+        place = self._place.get(where.owner) if where is not None else None
+        if place is None:
+            return []
+        news = self._robots[place].command(cmd, now)
+        if news is None:
+            return []
+        kind, data = news
+        return [self._event(kind, cmd.term, data | {"t": self._time_of(now)}, now)]
+
+    def _fence(self, at_key: str, fence: Fence, now: float) -> list[Envelope]:
+        where = address(at_key)
+        to = where.to if where is not None else None
+        return [robot.fence(fence, now) for robot in self._robots if to == _gateway_name(robot.id)]
+
+    def _move(self, now: float) -> list[Touch]:
+        touches = self._bodies.step([robot.gateway.twist(now) for robot in self._robots])
+        for robot, wheels in zip(self._robots, self._bodies.wheels, strict=True):
+            robot.odometry.turn(wheels, self._dt_s)
+        return touches
+
+    def _speak(self, stamp: float, now: float, touches: list[Touch]) -> list[Envelope]:
+        """What is due at this point of the grid."""
+        sent: list[Envelope] = []
+        poses = self._bodies.poses
+        for touch in touches:
+            robot = self._robots[touch.robot]
+            sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
+            data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
+            sent.append(self._event("contact", None, data | {"t": self._step * self._dt_s}, stamp))
+        if self._is_due(TOPIC["sensors"].rate_hz):
+            sent += [robot.sensors(stamp, now) for robot in self._robots]
+        if self._is_due(TOPIC["localization"].rate_hz):
+            fixes = (robot.localization(stamp, pose) for robot, pose in zip(self._robots, poses, strict=True))
+            sent += [fix for fix in fixes if fix is not None]
+        if self._is_due(self._scenario.world.lidar.rate_hz):
+            ranges = self._scanner.scan(poses, self._bodies.moved())
+            sent += [robot.scan(stamp, ranges[n]) for n, robot in enumerate(self._robots)]
+        if self._is_due(TOPIC["truth"].rate_hz):
+            sent.append(self._truth(stamp))
+        if self._is_due(TOPIC["clock"].rate_hz):
+            clock = Clock(self._header("clock", stamp), self._step * self._dt_s)
+            sent.append(Envelope(key(self._fleet, TRUTH_OWNER, "clock"), clock))
+        return sent
+
+    def _is_due(self, rate_hz: float | None) -> bool:
+        """Whether a point of a slower grid lies in the step that ends now."""
+        assert rate_hz is not None
+        part = rate_hz * self._dt_s
+        return floor(self._step * part + ROUNDING) > floor((self._step - 1) * part + ROUNDING)
+
+    def _truth(self, stamp: float) -> Envelope:
+        robots = tuple(
+            TrueRobot(robot.id, pose.x, pose.y, pose.theta, twist.linear_x, twist.angular_z)
+            for robot, pose, twist in zip(self._robots, self._bodies.poses, self._bodies.twists, strict=True)
+        )
+        obstacles = tuple(TrueObstacle(n, pose.x, pose.y) for n, pose in self._bodies.moved().items())
+        truth = Truth(self._header("truth", stamp), self._step * self._dt_s, robots, obstacles)
+        return Envelope(key(self._fleet, TRUTH_OWNER, "truth"), truth)
+
+    def _mission(self, now: float) -> Envelope:
+        note = MissionNote(self._header("mission", now), self._scenario.mission)
+        return Envelope(key(self._fleet, WORLD_NAME, "mission"), note)
+
+    def _event(self, kind: str, term: Term | None, data: dict[str, object], stamp: float) -> Envelope:
+        event = Event(self._header("event", stamp), kind, term, data)
+        return Envelope(key(self._fleet, WORLD_NAME, "event"), event)
+
+    def _time_of(self, now: float) -> float:
+        return 0.0 if self._t0 is None else now - self._t0
+
+    def _header(self, topic: str, stamp: float) -> Header:
+        seq = self._seq[topic] = self._seq.get(topic, 0) + 1
+        return Header(WORLD_NAME, self.incarnation, seq, stamp)
+
+
+def _gateway_name(robot_id: int) -> str:
+    """The receiver that FENCE names in its key."""
+    return f"gateway{robot_id}"
