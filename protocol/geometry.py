@@ -58,6 +58,14 @@ def along_arc(pose: Pose2D, twist: Twist, duration_s: float) -> Pose2D:
     return Pose2D(pose.x + chord * cos(middle), pose.y + chord * sin(middle), wrap(pose.theta + turn))
 
 
+def part_of_arc(step: Pose2D, part: float) -> Pose2D:
+    """The first `part` (0 to 1) of a motion `step` (the end in the frame of the start) made with constant twist."""
+    rest = 0.5 * (part - 1.0) * step.theta
+    length = part * sinc(0.5 * part * step.theta) / sinc(0.5 * step.theta)
+    c, s = length * cos(rest), length * sin(rest)
+    return Pose2D(c * step.x - s * step.y, s * step.x + c * step.y, part * step.theta)
+
+
 def sinc(x: float) -> float:
     """sin(x)/x, exact at zero."""
     return sin(x) / x if abs(x) > 1e-6 else 1.0 - x * x / 6.0

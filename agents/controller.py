@@ -1,0 +1,141 @@
+"""What a formation controller is, and the law of control.md section 2 (steps 4 to 7) as the default one.
+
+Everything else is shared by all controllers and lives in `follower.py`: the moving slot (steps 2, 3), the drive's
+limits (8, 9), stale data, the stop. A controller is found by name among the entry points `lfa.controllers`.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from math import cos, hypot, sin
+from typing import Protocol
+
+from msgspec import Struct
+
+from agents.config import Gains
+from protocol.geometry import Pose2D, Twist, wrap
+from protocol.mission import Limits, Refused
+
+ENTRY_POINTS = "lfa.controllers"
+SLOT_SPEED_MIN_MPS = 0.05
+"""A slower slot has no direction: the desired heading is held."""
+FLIP_RAD = 2.0
+"""A reversing predecessor does not turn the desired heading by more than this."""
+
+
+class Reference(Struct, frozen=True, gc=False):
+    """Where the follower belongs now, in `map`: [m], [rad], [m/s], [rad/s]."""
+
+    x: float
+    """r, the slot."""
+    y: float
+    vx: float
+    """The slot's velocity."""
+    vy: float
+    heading: float
+    """psi_r: the heading of a robot that drives with the slot (backwards when `direction` is -1)."""
+    turn_rate: float
+    """Of the formation heading: feed-forward for the follower's own turning."""
+    direction: int
+    """sigma: 1 forwards, -1 while the predecessor reverses."""
+    predecessor: Pose2D
+    predecessor_twist: Twist
+    separation_m: float
+    """Commanded k and phi, as blended by now."""
+    phi: float
+    guarded: bool
+    """False while the bodies overlap, which only simulated ones can."""
+
+    @property
+    def speed(self) -> float:
+        """Of the slot, positive [m/s]."""
+        return hypot(self.vx, self.vy)
+
+
+class Controller(Protocol):
+    """From slot to twist. `step` is called at `config.CONTROL_HZ`; the caller keeps the drive's limits."""
+
+    def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
+        """Begin from here: at the start, after an override, when data were stale."""
+
+    def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
+        """The twist that is wanted now; may exceed the limits."""
+
+
+class MakeController(Protocol):
+    """What an entry point names: a class or function with this call."""
+
+    def __call__(self, gains: Gains, limits: Limits) -> Controller: ...
+
+
+def find_controller(name: str) -> MakeController:
+    """The controller called `name` among the installed ones. Raises `Refused`. Read once, at the start."""
+    known = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+    if name not in known:
+        raise Refused(f"controller = {name}: must be one of {', '.join(sorted(known))} (entry points {ENTRY_POINTS})")
+    make: MakeController = known[name].load()
+    return make
+
+
+class Law:
+    """Look-ahead point with a filtered desired heading and norm-saturated feedback: |e(t)| = |e(0)| exp(-K t)."""
+
+    def __init__(self, gains: Gains, limits: Limits) -> None:
+        self._gains = gains
+        self._omega_max = limits.omega_max_radps
+        self._psi = 0.0
+        self._direction = 1
+
+    def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
+        self._psi = own_pose.theta
+        self._direction = 1
+
+    def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
+        gains = self._gains
+        sigma = reference.direction
+        theta = own_pose.theta
+        if sigma != self._direction:
+            self._direction, self._psi = sigma, theta
+        psi = self._psi
+        psi_rate = self._turn(reference, psi)
+        self._psi = wrap(psi + psi_rate * dt)
+
+        # Steps 5 and 6: the look-ahead point's target, its velocity, and feedback of at most m.
+        reach = sigma * gains.b_m
+        cp, sp, cf, sf = cos(psi), sin(psi), cos(theta), sin(theta)
+        ex = reference.x - own_pose.x + reach * (cp - cf)
+        ey = reference.y - own_pose.y + reach * (sp - sf)
+        error = hypot(ex, ey)
+        k = gains.k_per_s
+        if k * error > gains.m_mps:
+            k = gains.m_mps / error
+        a = gains.feed_forward
+        ux = a * (reference.vx - reach * psi_rate * sp) + k * ex
+        uy = a * (reference.vy + reach * psi_rate * cp) + k * ey
+        if reference.guarded:
+            ux, uy = guard(ux, uy, reference, own_pose, gains)
+        return Twist(cf * ux + sf * uy, sigma * (cf * uy - sf * ux) / gains.b_m)
+
+    def _turn(self, reference: Reference, psi: float) -> float:
+        """Step 4: rate of the desired heading."""
+        if reference.vx * reference.vx + reference.vy * reference.vy <= SLOT_SPEED_MIN_MPS**2:
+            return 0.0
+        ahead = wrap(reference.heading - psi)
+        if reference.direction < 0 and abs(ahead) > FLIP_RAD:
+            return 0.0
+        rate = reference.turn_rate + self._gains.lambda_psi_per_s * ahead
+        limit = self._omega_max
+        return limit if rate > limit else -limit if rate < -limit else rate
+
+
+def guard(ux: float, uy: float, reference: Reference, own_pose: Pose2D, gains: Gains) -> tuple[float, float]:
+    """Step 7: a velocity [m/s] towards the predecessor no greater than its own plus 2 (D - d_min)."""
+    nx, ny = reference.predecessor.x - own_pose.x, reference.predecessor.y - own_pose.y
+    apart = hypot(nx, ny)
+    if apart < 1e-9:
+        return ux, uy
+    nx, ny = nx / apart, ny / apart
+    theta, v = reference.predecessor.theta, reference.predecessor_twist.linear_x
+    closing_max = v * (nx * cos(theta) + ny * sin(theta)) + gains.guard_per_s * (apart - gains.d_min_m)
+    excess = ux * nx + uy * ny - closing_max
+    return (ux - excess * nx, uy - excess * ny) if excess > 0.0 else (ux, uy)

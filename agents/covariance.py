@@ -1,0 +1,54 @@
+"""Uncertainty of a pose (x, y, theta), updated one scalar at a time so that no matrix is inverted."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+
+class Covariance:
+    """Symmetric 3x3: the error of a pose in `map` axes [m, m, rad]."""
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, position: float = 0.0, heading: float = 0.0) -> None:
+        self._rows = [[position, 0.0, 0.0], [0.0, position, 0.0], [0.0, 0.0, heading]]
+
+    def move(self, dx: float, dy: float) -> None:
+        """The pose moved by (dx, dy): a heading error before it is a sideways error after it."""
+        p = self._rows
+        xt, yt, tt = p[0][2], p[1][2], p[2][2]
+        p[0][0] += -2.0 * dy * xt + dy * dy * tt
+        p[1][1] += 2.0 * dx * yt + dx * dx * tt
+        p[0][1] += dx * xt - dy * yt - dx * dy * tt
+        p[1][0] = p[0][1]
+        p[0][2] = p[2][0] = xt - dy * tt
+        p[1][2] = p[2][1] = yt + dx * tt
+
+    def grow(self, position: float, heading: float) -> None:
+        """Add variances [m^2, rad^2]."""
+        p = self._rows
+        p[0][0] += position
+        p[1][1] += position
+        p[2][2] += heading
+
+    def admits(self, innovation: tuple[float, float, float], variances: tuple[float, float], sigma: float) -> bool:
+        """Whether each component of a measured pose error is within `sigma` standard deviations."""
+        position, heading = variances
+        noise = (position, position, heading)
+        return all(abs(innovation[i]) <= sigma * sqrt(self._rows[i][i] + noise[i]) for i in range(3))
+
+    def update(
+        self, innovation: tuple[float, float, float], variances: tuple[float, float]
+    ) -> tuple[float, float, float]:
+        """Correction of the pose for a measured error whose variances are (position, heading)."""
+        position, heading = variances
+        correction = [0.0, 0.0, 0.0]
+        for i, variance in enumerate((position, position, heading)):
+            column = [row[i] for row in self._rows]
+            weight = 1.0 / (column[i] + variance)
+            rest = (innovation[i] - correction[i]) * weight
+            for a in range(3):
+                correction[a] += column[a] * rest
+                for b in range(3):
+                    self._rows[a][b] -= column[a] * column[b] * weight
+        return correction[0], correction[1], correction[2]

@@ -1,0 +1,223 @@
+"""Own pose in `map` from wheel odometry (50 Hz, smooth, drifting) and localisation (10 Hz, noisy, with gaps).
+
+The state is where `odom` stands in `map`: it only moves when a fix corrects it, so between fixes the pose is as
+smooth as the wheels. A fix is compared with the odometry at the fix's own stamp. Gains are those of a Kalman
+filter over (x, y, theta) whose uncertainty grows with the way travelled and the angle turned; without noise the
+first fix is exact and all later corrections are zero.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import isfinite
+
+from msgspec import Struct
+
+from agents.clocks import ClockOffset
+from agents.covariance import Covariance
+from agents.observer import plausible
+from protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, wrap
+from protocol.messages import Localization, Sensors
+
+ODOMETRY_KEPT = 64
+GATE_SIGMA = 5.0
+OUTLIERS_TO_RELOCATE = 5
+"""So many fixes in a row that contradict the odometry: the robot was carried, or the wheels slipped."""
+EXTRAPOLATION_MAX_S = 0.2
+
+
+class Noise(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the filter assumes: standard deviations of a fix, and of odometry after one metre, radian or second."""
+
+    fix_m: float = 0.005
+    fix_rad: float = 0.0087
+    per_metre_m: float = 0.002
+    per_metre_rad: float = 0.003
+    per_radian_rad: float = 0.005
+    per_second_m: float = 0.0003
+    per_second_rad: float = 0.0005
+
+
+NOISE = Noise()
+
+
+class _Odometry(Struct, frozen=True, gc=False):
+    stamp: float
+    pose_odom: Pose2D
+    twist: Twist
+    odometer_m: float
+
+
+class Estimator:
+    """Of one robot. All stamps are of the driver's clock; its offset to one's own is estimated here."""
+
+    def __init__(self, noise: Noise = NOISE) -> None:
+        self._noise = noise
+        self._clock = ClockOffset()
+        self._incarnation: int | None = None
+        self._history: deque[_Odometry] = deque(maxlen=ODOMETRY_KEPT)
+        self._map_odom: Pose2D | None = None
+        self._covariance = Covariance()
+        self._fix_at: _Odometry | None = None
+        self._pending: Localization | None = None
+        self._outlier: Pose2D | None = None
+        self._outliers_in_a_row = 0
+        self.refused = 0
+        self.outliers = 0
+        self.relocations = 0
+        self.last_fix_at: float | None = None
+
+    def sensors(self, sensors: Sensors, received_at: float) -> bool:
+        """Take wheel odometry; False when it is refused (not finite, absurd, out of order)."""
+        header = sensors.header
+        if header.incarnation != self._incarnation:
+            self._restart(header.incarnation)
+        newest = self._history[-1].stamp if self._history else None
+        fine = plausible(sensors.pose_odom, sensors.twist) and isfinite(sensors.odometer_m)
+        if not fine or (newest is not None and header.stamp <= newest):
+            self.refused += 1
+            return False
+        if not self._clock.heard(header.stamp, received_at):
+            self.refused += 1
+            return False
+        self._history.append(_Odometry(header.stamp, sensors.pose_odom, sensors.twist, sensors.odometer_m))
+        if self._pending is not None and header.stamp >= self._pending.header.stamp:
+            fix, self._pending = self._pending, None
+            self._correct(fix)
+        return True
+
+    def localization(self, fix: Localization, received_at: float) -> bool:
+        """Take a fix; it acts as soon as the odometry reaches its stamp. False when it is refused."""
+        stamp = fix.header.stamp
+        if not (isfinite(stamp) and plausible(fix.pose_map, Twist())):
+            self.refused += 1
+            return False
+        if self._history and stamp < self._history[0].stamp:
+            self.refused += 1
+            return False
+        self.last_fix_at = received_at
+        if not self._history or stamp > self._history[-1].stamp:
+            self._pending = fix
+            return True
+        self._correct(fix)
+        return True
+
+    @property
+    def ready(self) -> bool:
+        """True from the first fix on that the odometry could be joined to."""
+        return self._map_odom is not None
+
+    @property
+    def odometer_m(self) -> float:
+        return self._history[-1].odometer_m if self._history else 0.0
+
+    def pose_at(self, now: float) -> tuple[Pose2D, Twist] | None:
+        """Own pose in `map`, extrapolated along the arc to `now`, and own twist; None before it is `ready`."""
+        if self._map_odom is None:
+            return None
+        newest = self._history[-1]
+        age = now - newest.stamp - self._clock.offset(now)
+        age = min(EXTRAPOLATION_MAX_S, max(0.0, age))
+        here = compose(self._map_odom, newest.pose_odom)
+        return along_arc(here, newest.twist, age), newest.twist
+
+    def age_s(self, now: float) -> float:
+        """Of the newest odometry [s]; infinite before the first."""
+        return now - self._history[-1].stamp - self._clock.offset(now) if self._history else float("inf")
+
+    def _restart(self, incarnation: int) -> None:
+        """A new driver has a new clock and a new `odom`."""
+        self._incarnation = incarnation
+        self._clock = ClockOffset()
+        self._history.clear()
+        self._map_odom = None
+        self._fix_at = None
+        self._pending = None
+        self._outliers_in_a_row = 0
+
+    def _correct(self, fix: Localization) -> None:
+        odometry = _at(self._history, fix.header.stamp)
+        if self._map_odom is None or self._fix_at is None:
+            self._relocate(fix.pose_map, odometry)
+            return
+        predicted = compose(self._map_odom, odometry.pose_odom)
+        self._grow(odometry, predicted)
+        innovation = (
+            fix.pose_map.x - predicted.x,
+            fix.pose_map.y - predicted.y,
+            wrap(fix.pose_map.theta - predicted.theta),
+        )
+        variances = self._fix_variances()
+        if not self._covariance.admits(innovation, variances, GATE_SIGMA):
+            self._refuse_outlier(fix.pose_map, odometry)
+            return
+        self._outliers_in_a_row = 0
+        dx, dy, dtheta = self._covariance.update(innovation, variances)
+        corrected = Pose2D(predicted.x + dx, predicted.y + dy, wrap(predicted.theta + dtheta))
+        self._map_odom = compose(corrected, inverse(odometry.pose_odom))
+
+    def _grow(self, odometry: _Odometry, predicted: Pose2D) -> None:
+        """Uncertainty of the way since the last fix."""
+        last, noise = self._fix_at, self._noise
+        assert last is not None
+        assert self._map_odom is not None
+        before = compose(self._map_odom, last.pose_odom)
+        way_m = abs(odometry.odometer_m - last.odometer_m)
+        turn = abs(wrap(odometry.pose_odom.theta - last.pose_odom.theta))
+        elapsed = max(0.0, odometry.stamp - last.stamp)
+        self._covariance.move(predicted.x - before.x, predicted.y - before.y)
+        self._covariance.grow(
+            noise.per_metre_m**2 * way_m + noise.per_second_m**2 * elapsed,
+            noise.per_metre_rad**2 * way_m + noise.per_radian_rad**2 * turn + noise.per_second_rad**2 * elapsed,
+        )
+        self._fix_at = odometry
+
+    def _fix_variances(self) -> tuple[float, float]:
+        return self._noise.fix_m**2, self._noise.fix_rad**2
+
+    def _refuse_outlier(self, pose_map: Pose2D, odometry: _Odometry) -> None:
+        """Believe the fixes when several in a row agree with each other and not with the wheels."""
+        self.outliers += 1
+        self._outliers_in_a_row += 1
+        if self._outlier is not None and not _near(between(self._outlier, pose_map), self._noise):
+            self._outliers_in_a_row = 1
+        self._outlier = pose_map
+        if self._outliers_in_a_row >= OUTLIERS_TO_RELOCATE:
+            self.relocations += 1
+            self._relocate(pose_map, odometry)
+
+    def _relocate(self, pose_map: Pose2D, odometry: _Odometry) -> None:
+        self._map_odom = compose(pose_map, inverse(odometry.pose_odom))
+        self._fix_at = odometry
+        self._covariance = Covariance(*self._fix_variances())
+        self._outliers_in_a_row = 0
+        self._outlier = None
+
+
+def _near(step: Pose2D, noise: Noise) -> bool:
+    """Two fixes one period apart can both be of one robot: half a metre, half a radian."""
+    return abs(step.x) + abs(step.y) < 0.5 + 10.0 * noise.fix_m and abs(step.theta) < 0.5
+
+
+def _at(history: deque[_Odometry], stamp: float) -> _Odometry:
+    """Odometry at `stamp`, between the two samples around it along their arc. `stamp` lies within `history`."""
+    later = history[-1]
+    for sample in reversed(history):
+        if sample.stamp <= stamp:
+            earlier = sample
+            break
+        later = sample
+    else:
+        return history[0]
+    if later.stamp <= earlier.stamp:
+        return earlier
+    part = (stamp - earlier.stamp) / (later.stamp - earlier.stamp)
+    if part <= 0.0:
+        return earlier
+    step = between(earlier.pose_odom, later.pose_odom)
+    return _Odometry(
+        stamp,
+        compose(earlier.pose_odom, part_of_arc(step, part)),
+        later.twist,
+        earlier.odometer_m + part * (later.odometer_m - earlier.odometer_m),
+    )

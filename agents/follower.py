@@ -1,0 +1,222 @@
+"""One control step of a follower: predecessor, commanded slot and own pose in, a twist that the drive can do out.
+
+Around whichever `Controller` is chosen stand the parts that all share (control.md section 2): the moving slot,
+the direction switch, stop, stale data, limits that keep v/omega, acceleration limits. Whatever comes in, what
+goes out is finite and within the limits.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from math import atan2, hypot, isfinite
+
+from msgspec import Struct
+
+from agents.config import CONTROL_PERIOD_S, Gains
+from agents.controller import SLOT_SPEED_MIN_MPS, Controller, Reference
+from agents.formation import SlotMotion
+from agents.observer import plausible
+from agents.predecessor import Sighting
+from protocol.geometry import STILL, Pose2D, Twist, wrap
+from protocol.messages import Slot
+from protocol.mission import Limits
+
+REVERSE_BELOW_MPS = -0.05
+FORWARD_ABOVE_MPS = 0.02
+"""The direction switch, with hysteresis between the two."""
+STOP_ERROR_M = 0.002
+STOP_RATE = 1e-3
+"""[m/s, rad/s] Nearer than this and slower than that: stand."""
+DT_MAX_S = 0.1
+
+
+class State(StrEnum):
+    """What a follower is doing, for `Tracking.state` and `status`."""
+
+    HOLD = "hold"
+    """Nothing fresh to follow: braked along the path, standing."""
+    BLEND = "blend"
+    """The slot is still moving to where it is commanded."""
+    FOLLOW = "follow"
+    STAND = "stand"
+    """In the slot of a standing predecessor."""
+
+
+class Readout(Struct, frozen=True, gc=False):
+    """How the follower stands to its slot, as of the last step: what `Tracking` tells."""
+
+    slot_map: Pose2D
+    chi: float
+    heading: float
+    """psi_r [rad]."""
+    error_m: float
+    separation_m: float
+    """Commanded k and phi, as blended by now."""
+    phi: float
+    state: State
+
+
+class Follower:
+    """Of one robot, whoever its predecessor is."""
+
+    def __init__(
+        self,
+        gains: Gains,
+        limits: Limits,
+        controller: Controller,
+        *,
+        heading_filter_m: float = 0.0,
+        cruise_mps: float = 0.0,
+        radius_m: float = 0.15,
+    ) -> None:
+        """`cruise_mps` is the leader's nominal speed: a reference known to be old is shifted ahead by it (5.2)."""
+        self._gains = gains
+        self._limits = limits
+        self._controller = controller
+        self._cruise_mps = cruise_mps
+        self._overlap_m = 2.0 * radius_m
+        self._motion = SlotMotion(gains, limits, heading_filter_m)
+        self._source: tuple[int, int, bool] | None = None
+        self._holding = True
+        self._rejoining = False
+        self._guarded = False
+        self._direction = 1
+        self._heading = 0.0
+        self._last = STILL
+        self._error_m = 0.0
+        self._state = State.HOLD
+        self.refused = 0
+        """Steps whose input or result was not finite or absurd."""
+
+    def step(
+        self,
+        sighting: Sighting | None,
+        slot: Slot,
+        own_pose: Pose2D,
+        own_twist: Twist,
+        dt: float = CONTROL_PERIOD_S,
+        *,
+        on_trace: bool = False,
+    ) -> Twist:
+        """Command for the next `dt`.
+
+        Without a sighting, or with one older than `dead_reckoning_max_s`: brake along the path and hold.
+        """
+        if not 0.0 < dt <= DT_MAX_S:
+            self.refused += 1
+            dt = DT_MAX_S if dt > DT_MAX_S else CONTROL_PERIOD_S
+        if not plausible(own_pose, own_twist):
+            self.refused += 1
+            return self._brake(dt)
+        if sighting is None or not self._fresh(sighting):
+            return self._brake(dt)
+        self._move_slot(sighting, slot, own_pose, on_trace, dt)
+        if self._holding:
+            self._controller.reset(own_pose, own_twist)
+            self._heading, self._holding = own_pose.theta, False
+        motion = self._motion
+        reference = self._reference(sighting, own_pose)
+        self._error_m = hypot(motion.x - own_pose.x, motion.y - own_pose.y)
+        wanted = self._controller.step(reference, own_pose, own_twist, dt)
+        self._state = State.FOLLOW if motion.settled else State.BLEND
+        if self._stands(sighting):
+            self._state, wanted = State.STAND, STILL
+        if not (isfinite(wanted.linear_x) and isfinite(wanted.angular_z)):
+            self.refused += 1
+            return self._brake(dt)
+        return self._drive(wanted, dt)
+
+    def rejoin(self, own_pose: Pose2D, own_twist: Twist) -> None:
+        """After an override (an obstacle, a spell as leader): the next step begins from here, without a jump.
+
+        The target starts at the own position and moves to the slot at `offset_rate_max_mps`.
+        """
+        self._holding = self._rejoining = True
+        self._last = own_twist if plausible(own_pose, own_twist) else STILL
+
+    def overridden(self, twist: Twist) -> None:
+        """Another twist than `step`'s was sent: acceleration limits count from it."""
+        self._last = twist
+
+    @property
+    def readout(self) -> Readout:
+        m = self._motion
+        slot_map = Pose2D(m.x, m.y, self._heading)
+        return Readout(slot_map, m.chi, self._heading, self._error_m, m.separation_m, wrap(m.phi), self._state)
+
+    def _fresh(self, sighting: Sighting) -> bool:
+        if not plausible(sighting.pose, sighting.twist):
+            self.refused += 1
+            return False
+        return sighting.age_s <= self._gains.dead_reckoning_max_s
+
+    def _move_slot(self, sighting: Sighting, slot: Slot, own_pose: Pose2D, on_trace: bool, dt: float) -> None:
+        """Steps 2 and 3. When what the slot hangs on has changed, the target goes on from where it was."""
+        motion = self._motion
+        source = (sighting.robot, sighting.epoch, on_trace)
+        changed = source != self._source or self._rejoining
+        if self._source is None:
+            motion.reset(slot, sighting.pose)
+        kept = (own_pose.x, own_pose.y) if self._holding else (motion.x, motion.y)
+        if changed:
+            motion.offset_x = motion.offset_y = 0.0
+        motion.lead_m = sighting.delay_s * self._cruise_mps
+        if on_trace:
+            trace, travelled_m = sighting.trace, sighting.travelled_m
+            motion.step_on(trace, travelled_m, slot, sighting.pose, sighting.twist.linear_x, dt)
+        else:
+            motion.step(slot, sighting.pose, sighting.twist, dt)
+        if changed:
+            if self._source is not None or self._rejoining:
+                motion.hang_at(*kept)
+            self._guarded = hypot(sighting.pose.x - own_pose.x, sighting.pose.y - own_pose.y) >= self._overlap_m
+            self._source, self._rejoining = source, False
+
+    def _reference(self, sighting: Sighting, own_pose: Pose2D) -> Reference:
+        motion, v = self._motion, sighting.twist.linear_x
+        if v < REVERSE_BELOW_MPS:
+            self._direction = -1
+        elif v > FORWARD_ABOVE_MPS:
+            self._direction = 1
+        if motion.vx * motion.vx + motion.vy * motion.vy > SLOT_SPEED_MIN_MPS**2:
+            self._heading = atan2(self._direction * motion.vy, self._direction * motion.vx)
+        if not self._guarded:
+            apart = hypot(sighting.pose.x - own_pose.x, sighting.pose.y - own_pose.y)
+            self._guarded = apart >= self._gains.d_min_m
+        return Reference(
+            motion.x, motion.y, motion.vx, motion.vy, self._heading, motion.chi_rate, self._direction,
+            sighting.pose, sighting.twist, motion.separation_m, wrap(motion.phi), self._guarded,
+        )  # fmt: skip
+
+    def _stands(self, sighting: Sighting) -> bool:
+        """The stop dead-band: in the slot of a standing predecessor."""
+        return (
+            self._error_m < STOP_ERROR_M
+            and abs(sighting.twist.linear_x) < STOP_RATE
+            and abs(sighting.twist.angular_z) < STOP_RATE
+            and self._motion.settled
+        )
+
+    def _drive(self, wanted: Twist, dt: float) -> Twist:
+        """Steps 8 and 9: the drive's limits with v/omega kept, then its accelerations."""
+        limits, last = self._limits, self._last
+        v, omega = wanted.linear_x, wanted.angular_z
+        v_max = limits.v_max_mps if v >= 0.0 else limits.v_reverse_max_mps
+        scale = max(abs(v) / (v_max + 1e-9), abs(omega) / limits.omega_max_radps)
+        if scale > 1.0:
+            v, omega = v / scale, omega / scale
+        dv, domega = limits.a_max_mps2 * dt, limits.alpha_max_radps2 * dt
+        v0, omega0 = last.linear_x, last.angular_z
+        v = v0 + dv if v > v0 + dv else v0 - dv if v < v0 - dv else v
+        omega = omega0 + domega if omega > omega0 + domega else omega0 - domega if omega < omega0 - domega else omega
+        self._last = Twist(v, omega)
+        return self._last
+
+    def _brake(self, dt: float) -> Twist:
+        """Stop along the path that is being driven."""
+        self._state, self._holding = State.HOLD, True
+        limits, v, omega = self._limits, self._last.linear_x, self._last.angular_z
+        periods = max(abs(v) / (limits.a_max_mps2 * dt), abs(omega) / (limits.alpha_max_radps2 * dt))
+        rest = 1.0 - 1.0 / periods if periods > 1.0 else 0.0
+        self._last = Twist(v * rest, omega * rest)
+        return self._last

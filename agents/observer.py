@@ -1,0 +1,187 @@
+"""A predecessor's pose and velocity from its sampled poses (control.md section 3).
+
+Form B (`Observer`) is an alpha-beta observer of a unicycle with the poles of the paper's gain matrix
+[[4, 6], [-11.9, 9]], -6.5 +- 8.07i, exact for any sampling interval. Form A (`SlotVelocityObserver`) is that
+matrix taken literally: output injection on the slot's position in the follower's frame, with the slot's velocity
+as unknown input.
+All stamps here are of the sender's clock; who calls converts.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, hypot, isfinite, sin, sqrt
+from typing import Literal
+
+from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+
+Mode = Literal["velocity", "pose"]
+
+REAL = 6.5
+"""Half the trace of L [1/s]."""
+IMAGINARY = sqrt(107.4 - REAL * REAL)
+"""sqrt(det L - (tr L / 2)^2) = 8.0716 [rad/s]."""
+L = ((4.0, 6.0), (-11.9, 9.0))
+"""The paper's observer values, row by row [1/s]."""
+
+JUMP_M = 0.15
+"""A position this far from the predicted one is a fault; two in a row are a jump."""
+JUMP_MPS2 = 1.0
+"""What an honest predecessor may add to it by accelerating unseen."""
+POSITION_MAX_M = 1e6
+SPEED_MAX = 50.0
+"""[m/s, rad/s] More is no robot of ours."""
+
+
+class Observer:
+    """Form B. `velocity` mode takes the published twist and keeps the innovations as a fault monitor only."""
+
+    def __init__(self, mode: Mode = "velocity", extrapolation_max_s: float = 0.5) -> None:
+        self._with_velocity = mode == "velocity"
+        self._extrapolation_max_s = extrapolation_max_s
+        self._stamp: float | None = None
+        self._pose = Pose2D()
+        self._twist = STILL
+        self._suspect: Pose2D | None = None
+        self.jumps = 0
+        """How often the predecessor turned out to be elsewhere: each one starts a new life of the estimate."""
+        self.suspects = 0
+        self.refused = 0
+
+    @property
+    def stamp(self) -> float | None:
+        """Of the newest accepted message; None before the first."""
+        return self._stamp
+
+    def heard(self, stamp: float, pose: Pose2D, twist: Twist) -> bool:
+        """Take a sampled pose; False when it is refused: not finite, absurd, not newer, or an outlier."""
+        if not (isfinite(stamp) and plausible(pose, twist)):
+            self.refused += 1
+            return False
+        if self._stamp is None:
+            self._seed(stamp, pose, twist)
+            return True
+        h = stamp - self._stamp
+        if h <= 0.0:
+            self.refused += 1
+            return False
+        predicted = along_arc(self._pose, self._twist, min(h, self._extrapolation_max_s))
+        rx, ry = pose.x - predicted.x, pose.y - predicted.y
+        if not self._expected(hypot(rx, ry), h):
+            return self._suspicious(stamp, pose, twist)
+        self._suspect = None
+        if h > self._extrapolation_max_s:
+            self._seed(stamp, pose, twist)
+        elif self._with_velocity:
+            self._stamp, self._pose, self._twist = stamp, pose, twist
+        else:
+            self._correct(stamp, h, predicted, rx, ry, wrap(pose.theta - predicted.theta))
+        return True
+
+    def at(self, stamp: float) -> tuple[Pose2D, Twist, float]:
+        """(pose, twist, age [s]) at `stamp`, along the arc for at most `extrapolation_max_s`.
+
+        Call only after a message was accepted.
+        """
+        assert self._stamp is not None
+        age = stamp - self._stamp
+        reach = self._extrapolation_max_s
+        ahead = -reach if age < -reach else reach if age > reach else age
+        return along_arc(self._pose, self._twist, ahead), self._twist, age
+
+    def _expected(self, residual_m: float, h: float) -> bool:
+        unseen = max(0.0, h - self._extrapolation_max_s)
+        speed = abs(self._twist.linear_x) + JUMP_MPS2 * h
+        return residual_m <= JUMP_M + JUMP_MPS2 * h * h + unseen * speed
+
+    def _suspicious(self, stamp: float, pose: Pose2D, twist: Twist) -> bool:
+        """One message that is far from the prediction waits for a second one to agree with it."""
+        self.suspects += 1
+        previous, self._suspect = self._suspect, pose
+        if previous is None or hypot(pose.x - previous.x, pose.y - previous.y) > JUMP_M:
+            return False
+        self.jumps += 1
+        self._seed(stamp, pose, twist)
+        return True
+
+    def _seed(self, stamp: float, pose: Pose2D, twist: Twist) -> None:
+        self._stamp, self._pose = stamp, pose
+        self._twist = twist if self._with_velocity else STILL
+        self._suspect = None
+
+    def _correct(self, stamp: float, h: float, predicted: Pose2D, rx: float, ry: float, rtheta: float) -> None:
+        decay = exp(-REAL * h)
+        alpha = 1.0 - decay * decay
+        beta_h = (1.0 + decay * decay - 2.0 * decay * cos(IMAGINARY * h)) / h
+        along = cos(predicted.theta) * rx + sin(predicted.theta) * ry
+        self._stamp = stamp
+        self._pose = Pose2D(predicted.x + alpha * rx, predicted.y + alpha * ry, wrap(predicted.theta + alpha * rtheta))
+        self._twist = Twist(self._twist.linear_x + beta_h * along, self._twist.angular_z + beta_h * rtheta)
+
+
+class SlotVelocityObserver:
+    """Form A, the literal paper observer: the slot's velocity as unknown input of the slot's position.
+
+    Both are seen in the follower's frame. Exact for any constant own turn rate over a sampling interval.
+    """
+
+    def __init__(self) -> None:
+        self._z: tuple[float, float] | None = None
+        self._w = (0.0, 0.0)
+
+    def reset(self) -> None:
+        self._z = None
+        self._w = (0.0, 0.0)
+
+    def step(self, z: tuple[float, float] | None, own_twist: Twist, h: float) -> tuple[float, float]:
+        """Slot velocity in the follower's frame [m/s].
+
+        `z` is the slot's position there, `own_twist` what was driven for the last `h` seconds. Without a new
+        measurement (`z` None) the estimate coasts.
+        """
+        if self._z is None:
+            self._z = z
+            return self._w
+        turn = own_twist.angular_z * h
+        c, s = cos(turn), sin(turn)
+        g1, g2 = _integral(turn, h)
+        zx, zy = self._z
+        v = own_twist.linear_x
+        if z is None:
+            ux, uy = self._w[0] - v, self._w[1]
+            self._z = (c * zx + s * zy + g1 * ux + g2 * uy, -s * zx + c * zy - g2 * ux + g1 * uy)
+            return self._w
+        px, py = c * zx + s * zy - g1 * v, -s * zx + c * zy + g2 * v
+        ex, ey = z[0] - px, z[1] - py
+        f11, f12, f21, f22 = _decay(h)
+        # rest = (I - G) eps with I - G = exp(-L h); the corrected estimate is z - rest.
+        restx, resty = f11 * ex + f12 * ey, f21 * ex + f22 * ey
+        self._z = (z[0] - restx, z[1] - resty)
+        dx, dy = ex - (c * restx + s * resty), ey - (-s * restx + c * resty)
+        det = g1 * g1 + g2 * g2
+        self._w = ((g1 * dx - g2 * dy) / det, (g2 * dx + g1 * dy) / det)
+        return self._w
+
+
+def plausible(pose: Pose2D, twist: Twist) -> bool:
+    """Whether a robot of ours can be there and so fast. Anything that is not finite is not (nan compares false)."""
+    return (
+        abs(pose.x) < POSITION_MAX_M
+        and abs(pose.y) < POSITION_MAX_M
+        and abs(pose.theta) < POSITION_MAX_M
+        and abs(twist.linear_x) < SPEED_MAX
+        and abs(twist.angular_z) < SPEED_MAX
+    )
+
+
+def _integral(turn: float, h: float) -> tuple[float, float]:
+    """Gamma = integral over h of exp(-omega J s) = [[g1, g2], [-g2, g1]]."""
+    if abs(turn) < 1e-6:
+        return h, 0.5 * turn * h
+    return h * sin(turn) / turn, h * (1.0 - cos(turn)) / turn
+
+
+def _decay(h: float) -> tuple[float, float, float, float]:
+    """exp(-L h), row by row."""
+    decay = exp(-REAL * h)
+    c, s = decay * cos(IMAGINARY * h), decay * sin(IMAGINARY * h) / IMAGINARY
+    return c - (L[0][0] - REAL) * s, -L[0][1] * s, -L[1][0] * s, c - (L[1][1] - REAL) * s

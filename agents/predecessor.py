@@ -1,0 +1,181 @@
+"""All that a follower knows of its predecessor: its messages in, its state at a time of one's own clock out.
+
+Joins the clock offset, the observer, and for long chains the jitter buffer and the trace. A short chain looks at the
+predecessor now (dead reckoning, no lag); a long one at what it did `delay_s` ago (control.md 5.2).
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from msgspec import Struct
+
+from agents.clocks import ClockOffset
+from agents.observer import Mode, Observer, plausible
+from agents.trace import JitterBuffer, Sample, Trace
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import PoseStamped
+
+DEAD_RECKONING_FOLLOWERS_MAX = 3
+"""More followers than this use the buffer (control.md 5.1: dead reckoning amplifies along a chain)."""
+TRACE_MARGIN_M = 2.0
+DELAY_MIN_S = 0.04
+DELAY_MAX_S = 0.4
+DELAY_SPARE_S = 0.04
+"""Two message periods: the buffer outlives two losses in a row."""
+DELAY_RATE = 0.05
+"""How fast the delay is drawn out or in: a change is a change of the predecessor's apparent speed."""
+AGE_WINDOW_S = 10.0
+
+
+class Sighting(Struct, frozen=True):
+    """The predecessor as the law takes it."""
+
+    robot: int
+    epoch: int
+    """Changes when the estimate starts anew: the predecessor jumped or restarted."""
+    pose: Pose2D
+    twist: Twist
+    age_s: float
+    """How far the state had to be extrapolated beyond the newest message."""
+    delay_s: float
+    """How old the state is on purpose."""
+    travelled_m: float
+    """Arc length of `pose` on `trace`."""
+    trace: Trace
+
+
+class Predecessor:
+    """One robot as predecessor; make another one when the chain changes."""
+
+    def __init__(
+        self,
+        robot: int,
+        *,
+        mode: Mode = "velocity",
+        extrapolation_max_s: float = 0.5,
+        delay_s: float | None = 0.0,
+        trace_m: float = 4.0,
+        trace: Trace | None = None,
+    ) -> None:
+        """`delay_s` 0 dead-reckons, None chooses a buffer by what the messages' ages turn out to be.
+
+        `trace` is the path of the predecessor before this one, when a follower closes over it.
+        """
+        self.robot = robot
+        self.clock = ClockOffset()
+        self.trace = trace or Trace(trace_m + TRACE_MARGIN_M)
+        self._joining = trace is not None
+        self._mode: Mode = mode
+        self._extrapolation_max_s = extrapolation_max_s
+        self._observer = Observer(mode, extrapolation_max_s)
+        self._buffer = JitterBuffer(with_velocity=mode == "velocity")
+        self._automatic = delay_s is None
+        self._delay_s = DELAY_MIN_S if delay_s is None else delay_s
+        self._oldest = _WindowedMaximum()
+        self._asked_at: float | None = None
+        self._incarnation = -1
+        self._jumps = 0
+        self.epoch = 0
+        self.refused = 0
+        """Messages that were not finite, absurd, from the future, of an older life, or alone far off."""
+
+    @property
+    def delay_s(self) -> float:
+        return self._delay_s
+
+    def heard(self, message: PoseStamped, received_at: float) -> bool:
+        """Take a published pose; False when it is refused."""
+        header = message.header
+        if header.incarnation != self._incarnation and not self._restart(header.incarnation):
+            self.refused += 1
+            return False
+        pose = Pose2D(message.x, message.y, message.theta)
+        if not (isfinite(header.stamp) and plausible(pose, message.twist)):
+            self.refused += 1
+            return False
+        if not self.clock.heard(header.stamp, received_at):
+            self.refused += 1
+            return False
+        newest = self._observer.stamp
+        if newest is not None and header.stamp <= newest:
+            return self._buffer.insert_late(header.stamp, pose, message.twist)
+        if not self._observer.heard(header.stamp, pose, message.twist):
+            self.refused += 1
+            return False
+        if self._automatic:
+            self._oldest.add(received_at, received_at - header.stamp - self.clock.offset(received_at))
+        self._remember(header.stamp, pose, message.twist)
+        return True
+
+    def at(self, now: float) -> Sighting | None:
+        """The predecessor as of `now` (own clock), or as of `now - delay_s`; None before the first message."""
+        newest = self._observer.stamp
+        if newest is None:
+            return None
+        if self._automatic:
+            self._adapt(now)
+        stamp = now - self.clock.offset(now) - self._delay_s
+        if self._delay_s > 0.0:
+            sample = self._buffer.at(stamp)
+            if sample is not None:
+                return self._sighting(sample.pose, sample.twist, 0.0, sample.travelled_m)
+        pose, twist, age = self._observer.at(stamp)
+        reach = min(self._extrapolation_max_s, max(-self._extrapolation_max_s, age))
+        return self._sighting(pose, twist, age, self._buffer.newest.travelled_m + twist.linear_x * reach)
+
+    def _sighting(self, pose: Pose2D, twist: Twist, age_s: float, travelled_m: float) -> Sighting:
+        return Sighting(
+            self.robot, self.epoch, pose, twist, age_s if age_s > 0.0 else 0.0, self._delay_s, travelled_m, self.trace
+        )
+
+    def _restart(self, incarnation: int) -> bool:
+        """Another life of the same robot has another clock; an older life is not listened to."""
+        if incarnation < self._incarnation:
+            return False
+        if self._incarnation >= 0:
+            self.epoch += 1
+            self._joining = True
+        self._incarnation = incarnation
+        self.clock = ClockOffset()
+        self._observer = Observer(self._mode, self._extrapolation_max_s)
+        self._jumps = 0
+        self._buffer.clear()
+        return True
+
+    def _remember(self, stamp: float, pose: Pose2D, twist: Twist) -> None:
+        if self._observer.jumps != self._jumps or self._joining:
+            self.epoch += self._observer.jumps != self._jumps
+            self._jumps = self._observer.jumps
+            self._joining = False
+            self._buffer.clear()
+            self.trace.jump(pose)
+        else:
+            self.trace.add(pose)
+        self._buffer.add(Sample(stamp, pose, twist, self.trace.travelled_m))
+
+    def _adapt(self, now: float) -> None:
+        """Draw the delay towards the worst recent age plus what two losses in a row need."""
+        elapsed = 0.0 if self._asked_at is None else now - self._asked_at
+        self._asked_at = now
+        wanted = min(DELAY_MAX_S, max(DELAY_MIN_S, self._oldest.value + DELAY_SPARE_S))
+        step = DELAY_RATE * min(0.1, max(0.0, elapsed))
+        self._delay_s += min(step, max(-step, wanted - self._delay_s))
+
+
+class _WindowedMaximum:
+    """Of the last one to two windows."""
+
+    def __init__(self) -> None:
+        self._now = self._before = 0.0
+        self._until: float | None = None
+
+    def add(self, at: float, value: float) -> None:
+        if self._until is None or at >= self._until:
+            self._before, self._now = self._now, value
+            self._until = at + AGE_WINDOW_S
+        self._now = max(self._now, value)
+
+    @property
+    def value(self) -> float:
+        return max(self._now, self._before)
