@@ -8,14 +8,14 @@ goes out is finite and within the limits.
 from __future__ import annotations
 
 from enum import StrEnum
-from math import atan2, hypot, isfinite
+from math import atan2, cos, hypot, isfinite, sin
 
 from msgspec import Struct
 
 from agents.config import CONTROL_PERIOD_S, Gains
 from agents.controller import SLOT_SPEED_MIN_MPS, Controller, Reference
 from agents.formation import SlotMotion
-from agents.observer import plausible
+from agents.observer import SlotVelocityObserver, plausible
 from agents.predecessor import Sighting
 from protocol.geometry import STILL, Pose2D, Twist, wrap
 from protocol.messages import Slot
@@ -68,14 +68,19 @@ class Follower:
         heading_filter_m: float = 0.0,
         cruise_mps: float = 0.0,
         radius_m: float = 0.15,
+        paper_observer: bool = False,
     ) -> None:
-        """`cruise_mps` is the leader's nominal speed: a reference known to be old is shifted ahead by it (5.2)."""
+        """`cruise_mps` is the leader's nominal speed: a reference known to be old is shifted ahead by it (5.2).
+
+        With `paper_observer` the slot's velocity is what form A of the observer makes of the slot's positions.
+        """
         self._gains = gains
         self._limits = limits
         self._controller = controller
         self._cruise_mps = cruise_mps
         self._overlap_m = 2.0 * radius_m
         self._motion = SlotMotion(gains, limits, heading_filter_m)
+        self._paper = PaperVelocity() if paper_observer else None
         self._source: tuple[int, int, bool] | None = None
         self._holding = True
         self._rejoining = False
@@ -114,7 +119,11 @@ class Follower:
         if self._holding:
             self._controller.reset(own_pose, own_twist)
             self._heading, self._holding = own_pose.theta, False
+            if self._paper is not None:
+                self._paper.reset()
         motion = self._motion
+        if self._paper is not None:
+            self._paper.observe(motion, sighting, own_pose, self._last, dt)
         reference = self._reference(sighting, own_pose)
         self._error_m = hypot(motion.x - own_pose.x, motion.y - own_pose.y)
         wanted = self._controller.step(reference, own_pose, own_twist, dt)
@@ -220,3 +229,24 @@ class Follower:
         rest = 1.0 - 1.0 / periods if periods > 1.0 else 0.0
         self._last = Twist(v * rest, omega * rest)
         return self._last
+
+
+class PaperVelocity:
+    """Form A in the loop: replaces the slot's velocity, and knows nothing of the predecessor's turning."""
+
+    def __init__(self) -> None:
+        self._observer = SlotVelocityObserver()
+        self._age_s = 0.0
+
+    def reset(self) -> None:
+        self._observer.reset()
+
+    def observe(self, motion: SlotMotion, sighting: Sighting, own_pose: Pose2D, own_twist: Twist, dt: float) -> None:
+        """`own_twist` is what was driven for the last `dt`."""
+        c, s = cos(own_pose.theta), sin(own_pose.theta)
+        dx, dy = motion.x - own_pose.x, motion.y - own_pose.y
+        measured = (c * dx + s * dy, c * dy - s * dx) if sighting.age_s < self._age_s + 0.5 * dt else None
+        self._age_s = sighting.age_s
+        wx, wy = self._observer.step(measured, own_twist, dt)
+        motion.vx, motion.vy = c * wx - s * wy, s * wx + c * wy
+        motion.chi_rate = 0.0

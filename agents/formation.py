@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from math import cos, hypot, isfinite, pi, sin, sqrt
 
 from agents.config import Gains
+from agents.model import slot_velocity
 from agents.trace import Trace
 from protocol.geometry import TAU, Pose2D, Twist, bearing, wrap
 from protocol.messages import NO_TERM, FormationNote, Slot, Term
@@ -219,8 +220,7 @@ class SlotMotion:
         if self.lead_m != 0.0:
             behind_x += self.lead_m * cos(self.chi)
             behind_y += self.lead_m * sin(self.chi)
-        self.vx = v * cos(theta) - self.chi_rate * behind_y
-        self.vy = v * sin(theta) + self.chi_rate * behind_x
+        self.vx, self.vy = slot_velocity(theta, v, self.chi_rate, behind_x, behind_y)
         self.x = predecessor.x + behind_x + self.offset_x
         self.y = predecessor.y + behind_y + self.offset_y
         self.settled = self._blend(slot, c, s, dt)

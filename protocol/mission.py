@@ -35,6 +35,23 @@ class FormationSpec(Struct, frozen=True, forbid_unknown_fields=True):
     """L_chi: the travelled distance over which the formation's heading follows the predecessor's."""
 
 
+class Following(Struct, frozen=True, forbid_unknown_fields=True):
+    """How a follower keeps its place (control.md sections 2, 3 and 5)."""
+
+    controller: str = "law"
+    """An installed one: `law`, `kanayama`, `headway`, or anybody's own (entry points `lfa.controllers`)."""
+    observer: Literal["velocity", "pose", "paper"] = "velocity"
+    """What is used of the predecessor's messages: pose and velocity, pose only, or pose only by the paper's matrix."""
+    trace: bool = False
+    """Follow the predecessor's path instead of standing at an offset to it."""
+    delay_s: float | None = None
+    """Look at the predecessor so long ago. None: 0 for up to 3 followers, else as old as messages get."""
+    gains: dict[str, float] = {}
+    """Other than the default, by their names in `agents/config.py`."""
+    allow_saturation: bool = False
+    """Accept gains that ask for more acceleration than the drive has: for simulation only."""
+
+
 class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     """What a robot's drive can do; the follower law keeps v/omega when it saturates."""
 
@@ -66,6 +83,7 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     can_lead: tuple[int, ...] | None = None
     """Ids that may lead; all when not given."""
     formation: FormationSpec = FormationSpec()
+    following: Following = Following()
     leading: Leading = Leading()
     limits: Limits = Limits()
     radius_m: float = 0.15
@@ -126,6 +144,7 @@ def _ranges(mission: Mission) -> list[tuple[str, float, float, float]]:
         ("formation.separation_m", formation.separation_m, 2.0 * mission.radius_m + 0.1, 100.0),
         ("formation.angle_rad", formation.angle_rad, 0.0, pi / 2),
         ("formation.heading_filter_m", formation.heading_filter_m, 0.0, 100.0),
+        ("following.delay_s", mission.following.delay_s or 0.0, 0.0, 0.8),
         ("limits.v_max_mps", limits.v_max_mps, 0.01, inf),
         ("limits.v_reverse_max_mps", limits.v_reverse_max_mps, 0.0, inf),
         ("limits.omega_max_radps", limits.omega_max_radps, 0.01, inf),

@@ -1,0 +1,1 @@
+"""Other controllers than the law, for comparison, found through the entry points `lfa.controllers`."""

@@ -1,0 +1,31 @@
+"""Constant time headway: the slot falls back by `HEADWAY_S` of its own speed.
+
+Tolerates delay without a buffer (|G| <= 1 when the headway is at least the latency, control.md 5.1), and pays
+with a gap that grows with speed.
+"""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from agents.config import Gains
+from agents.controller import Law, Reference
+from protocol.geometry import Pose2D, Twist
+from protocol.mission import Limits
+
+HEADWAY_S = 0.3
+
+
+class Headway:
+    def __init__(self, gains: Gains, limits: Limits) -> None:
+        # K (r - h r' - p) takes K h from the feed-forward: with dead reckoning a + K tau becomes 1 - K (h - tau).
+        self._law = Law(gains, limits)
+
+    def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
+        self._law.reset(own_pose, own_twist)
+
+    def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
+        fallen_back = replace(
+            reference, x=reference.x - HEADWAY_S * reference.vx, y=reference.y - HEADWAY_S * reference.vy
+        )
+        return self._law.step(fallen_back, own_pose, own_twist, dt)

@@ -1,0 +1,46 @@
+"""Kanayama's tracker (1990) on the slot: v = v_r cos th_e + K_x x_e, omega = w_r + v_r (K_y y_e + K_th sin th_e).
+
+Needs a reference that moves and its turn rate, which is taken from the slot's heading between two steps.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from agents.config import Gains
+from agents.controller import Reference, guard
+from protocol.geometry import Pose2D, Twist, wrap
+from protocol.mission import Limits
+
+KX_PER_S = 1.5
+KY_PER_M2 = 6.0
+KTHETA_PER_M = 4.0
+"""Critically damped sideways: K_theta^2 >= 4 K_y / 1.5."""
+
+
+class Kanayama:
+    def __init__(self, gains: Gains, limits: Limits) -> None:
+        self._gains = gains
+        self._omega_max = limits.omega_max_radps
+        self._heading: float | None = None
+
+    def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
+        self._heading = None
+
+    def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
+        before, self._heading = self._heading, reference.heading
+        turn = 0.0 if before is None else wrap(reference.heading - before) / dt
+        limit = self._omega_max
+        turn = limit if turn > limit else -limit if turn < -limit else turn
+        theta = own_pose.theta
+        c, s = cos(theta), sin(theta)
+        dx, dy = reference.x - own_pose.x, reference.y - own_pose.y
+        x_e, y_e, theta_e = c * dx + s * dy, c * dy - s * dx, wrap(reference.heading - theta)
+        v_r = reference.direction * reference.speed
+        pull, bound = KX_PER_S * x_e, self._gains.m_mps
+        pull = bound if pull > bound else -bound if pull < -bound else pull
+        v = v_r * cos(theta_e) + pull
+        if reference.guarded:
+            ux, uy = guard(v * c, v * s, reference, own_pose, self._gains)
+            v = c * ux + s * uy
+        return Twist(v, turn + v_r * KY_PER_M2 * y_e + abs(v_r) * KTHETA_PER_M * sin(theta_e))

@@ -1,0 +1,54 @@
+"""A follower made to a mission's orders: gains, controller, observer and buffer."""
+
+from __future__ import annotations
+
+import msgspec
+
+from agents.config import CONTROL_PERIOD_S, Gains, check_gains
+from agents.controller import find_controller
+from agents.follower import Follower
+from agents.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
+from protocol.mission import Mission, Refused
+
+
+def gains_of(mission: Mission) -> Gains:
+    """The mission's gains. Raises `Refused` for an unknown name or a broken rule."""
+    following = mission.following
+    try:
+        gains = msgspec.convert(following.gains, Gains)
+    except msgspec.ValidationError as error:
+        names = ", ".join(Gains.__struct_fields__)
+        raise Refused(f"mission.following.gains: {error}; the names are {names}") from None
+    return check_gains(gains, mission.limits, CONTROL_PERIOD_S, allow_saturation=following.allow_saturation)
+
+
+def follower_of(mission: Mission) -> Follower:
+    """Raises `Refused` when the mission's gains or controller cannot be had."""
+    gains, following = gains_of(mission), mission.following
+    return Follower(
+        gains,
+        mission.limits,
+        find_controller(following.controller)(gains, mission.limits),
+        heading_filter_m=mission.formation.heading_filter_m,
+        cruise_mps=mission.leading.cruise_mps,
+        radius_m=mission.radius_m,
+        paper_observer=following.observer == "paper",
+    )
+
+
+def predecessor_of(mission: Mission, robot: int, followers: int, previous: Predecessor | None = None) -> Predecessor:
+    """`robot` as predecessor in a chain of `followers`; `previous` is the one that it takes the place of."""
+    following = mission.following
+    delay_s = following.delay_s
+    if delay_s is None and followers <= DEAD_RECKONING_FOLLOWERS_MAX:
+        delay_s = 0.0
+    # The paper's observer does not predict over latency: it takes each pose as it came.
+    paper = following.observer == "paper"
+    return Predecessor(
+        robot,
+        mode="pose" if following.observer == "pose" else "velocity",
+        extrapolation_max_s=0.0 if paper else gains_of(mission).dead_reckoning_max_s,
+        delay_s=0.0 if paper else delay_s,
+        trace_m=mission.formation.separation_m,
+        trace=previous.trace if previous is not None else None,
+    )
