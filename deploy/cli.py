@@ -48,7 +48,7 @@ def main() -> None:
 
 def build(called: list[str]) -> typer.Typer:
     """All commands; only the one that is `called` is imported, the others are known by name and help."""
-    app = typer.Typer(name="lfa", help=_ABOUT, add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+    app = typer.Typer(name="lfa", help=_ABOUT, no_args_is_help=True, **_PLAIN)
     for entry in COMMANDS:
         function = import_module(entry.module).command if [entry.name] == called else _absent
         app.command(entry.name, help=entry.help, epilog=f"Example: {entry.example}", no_args_is_help=False)(function)
@@ -73,7 +73,7 @@ def run_cli(name: str, app: typer.Typer) -> int:
 
 def command_app(function: Callable[..., Any], help_text: str, example: str) -> typer.Typer:
     """A script of one command."""
-    app = typer.Typer(add_completion=False, rich_markup_mode=None)
+    app = typer.Typer(**_PLAIN)
     app.command(help=help_text, epilog=f"Example: {example}")(function)
     return app
 
@@ -87,4 +87,5 @@ def _absent() -> None:
     """Stands for a command that was not called."""
 
 
+_PLAIN: dict[str, Any] = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 _ABOUT = "A chain of robots, each its own process, that survives the loss of its leader."

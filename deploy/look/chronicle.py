@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,7 @@ def reigns(events: Sequence[Line]) -> list[Reign]:
 def failovers(events: Sequence[Line], reigns: Sequence[Reign]) -> list[Failover]:
     """One for each fault that ended a reign; None where the run ended before it was over."""
     found = []
-    for reign, successor in zip(reigns, [*reigns[1:], None], strict=True):
+    for reign, successor in zip_longest(reigns, reigns[1:]):
         fault = next((f for f in faults(events) if _ended_by(f, reign) and f.at_s == reign.until_s), None)
         if fault is None:
             continue

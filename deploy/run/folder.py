@@ -13,6 +13,8 @@ from protocol.mission import Refused
 from world.scenario import Scenario, load
 
 SCENARIO = "scenario.toml"
+JOURNALS = "journal"
+LOGS = "logs"
 RUNS = Path("runs")
 
 

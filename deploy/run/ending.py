@@ -1,0 +1,86 @@
+"""How a run ends, in either mode: on a signal or a verdict, with a summary, figures and an exit code."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from deploy.look import summary as summaries
+from deploy.look.summary import Summary
+from deploy.look.table import text
+from deploy.run.folder import About
+from deploy.run.referee import Verdict
+
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Ended(Struct, frozen=True):
+    """A run that is over; `signal` is what ended it, if anything did."""
+
+    folder: Path
+    summary: Summary
+    signal: signal.Signals | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """128 + signal as shells count (130, 143), else what the summary says."""
+        return self.summary.exit_code if self.signal is None else 128 + self.signal
+
+
+class Interrupts:
+    """While this is open, Ctrl-C and SIGTERM are noted in `signal` instead of ending the process; `count` of them."""
+
+    def __init__(self) -> None:
+        self.signal: signal.Signals | None = None
+        self.count = 0
+        self._before: list[Any] = []
+
+    def __enter__(self) -> Interrupts:
+        self._before = [signal.signal(number, self._note) for number in ENDING_SIGNALS]
+        return self
+
+    def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _tb: TracebackType | None) -> None:
+        for number, before in zip(ENDING_SIGNALS, self._before, strict=True):
+            signal.signal(number, before)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        return None if self.signal is None else Verdict("interrupted", self.signal.name)
+
+    def _note(self, number: int, _frame: FrameType | None) -> None:
+        self.signal = signal.Signals(number)
+        self.count += 1
+
+
+def finish(
+    folder: Path,
+    about: About,
+    verdict: Verdict,
+    duration_s: float,
+    faults_left: Sequence[str],
+    ended_by: signal.Signals | None,
+) -> Ended:
+    """Read the closed recording back and write `summary.json`."""
+    summary = summaries.summarize(folder, about, verdict, duration_s, faults_left)
+    summaries.write(folder, summary)
+    return Ended(folder, summary, ended_by)
+
+
+def report(ended: Ended, *, figures: bool, as_json: bool) -> int:
+    """Draw, print, and return the exit code."""
+    if figures:
+        from deploy.look.plots import draw
+
+        draw(ended.folder)
+    if as_json:
+        facts = {"folder": str(ended.folder), **msgspec.to_builtins(ended.summary)}
+        print(msgspec.json.format(msgspec.json.encode(facts), indent=1).decode())
+    else:
+        print(text(ended.summary, ended.folder))
+    return ended.exit_code

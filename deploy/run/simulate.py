@@ -1,0 +1,155 @@
+"""`lfa sim`: a scenario in one process and virtual time, with agents, world, codec and journals as in real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from deploy.run.ending import Ended, Interrupts, finish, report
+from deploy.run.faults import Deed, Fault, Schedule, parse_all
+from deploy.run.folder import JOURNALS, About, make
+from deploy.run.operator import Operator
+from deploy.run.record import Recorder
+from deploy.run.referee import Referee, Verdict
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import Message
+from protocol.mission import WITNESS_ID, robot_name
+from protocol.node import Node
+from protocol.topics import WORLD_NAME
+from world.scenario import Scenario, draw, load
+from world.simulator import Simulator
+from world.world import World
+
+FLEET = "sim"
+JOURNAL_FLUSH_S = 1.0
+SILENCE_S_MAX = 1.0
+LEADER_WAIT_S = 0.01  # a fault on the leader waits for one, looking this often
+
+
+def command(
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")],
+    seed: Annotated[int, typer.Option(help="Draws noise, places, starts, delays and losses.")] = 0,
+    overrides: Annotated[list[str] | None, typer.Option("--set", help="Any field: world.lidar.beams=90.")] = None,
+    robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
+    fault: Annotated[list[str] | None, typer.Option(help="Such as 'kill leader at 20 s'; again for more.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")] = None,
+    figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+) -> int:
+    chosen = load(scenario, overrides or (), robots)
+    faults = parse_all(chosen.mission, chosen.faults, fault or ())
+    ended = run(chosen, seed, out, faults)
+    return report(ended, figures=figures, as_json=as_json)
+
+
+def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault] = ()) -> Ended:
+    """Run `scenario` as `seed` draws it; the run folder stands when this returns. Raises Refused for a bad `out`."""
+    drawn = draw(scenario, seed)
+    folder = make(out, drawn)
+    about = About(scenario.name, "simulated", seed, FLEET)
+    recorder = Recorder(folder, about.metadata())
+    run = _Run(drawn, seed, folder, recorder)
+    started = time.perf_counter()
+    with Interrupts() as interrupts:
+        verdict = run.play(Schedule(faults), interrupts)
+    duration_s = time.perf_counter() - started
+    return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal)
+
+
+class _Run:
+    """The team in the simulator; the recorder and the referee hear all that is published."""
+
+    def __init__(self, drawn: Scenario, seed: int, folder: Path, recorder: Recorder) -> None:
+        self._scenario = drawn
+        self._seed = seed
+        self._journals: dict[str, Journal] = {}
+        self._journal_folder = folder / JOURNALS
+        self._recorder = recorder
+        self._referee = Referee(drawn)
+        self._operator = Operator(FLEET, 1)
+        self._lives: dict[str, int] = {}
+        self._simulator = Simulator(drawn.radio, seed)
+        self._simulator.taps.append(self._hear)
+        self.faults_left: list[str] = []
+
+    def play(self, schedule: Schedule, interrupts: Interrupts) -> Verdict:
+        """Start the team, run until it is over, close the recording and the journals."""
+        ids = self._scenario.mission.robots
+        self._say("start", scenario=self._scenario.name, seed=self._seed)
+        self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
+        if self._scenario.mission.witness:
+            self._add(self._agent(WITNESS_ID, "witness"))
+        for robot_id in ids:
+            self._add(self._agent(robot_id, "leader" if robot_id == ids[0] else "follower"))
+        self._flush()
+        verdict = self._until_over(schedule, interrupts)
+        self.faults_left = [str(fault) for fault in schedule.pending]
+        self._say("end", outcome=verdict.outcome, reason=verdict.reason)
+        self._recorder.close()
+        for journal in self._journals.values():
+            journal.close()
+        return verdict
+
+    def _until_over(self, schedule: Schedule, interrupts: Interrupts) -> Verdict:
+        simulator, referee = self._simulator, self._referee
+        silent_at = self._scenario.time_limit_s + SILENCE_S_MAX
+        while simulator.now < silent_at:
+            for deed, victim in schedule.due(simulator.now, referee.leader):
+                self._do(deed, victim)
+            next_s = schedule.pending[0].at_s if schedule.pending else silent_at
+            until = max(next_s, simulator.now + LEADER_WAIT_S)
+            simulator.run(until, over=lambda: referee.verdict is not None or interrupts.signal is not None)
+            verdict = interrupts.verdict or referee.verdict
+            if verdict is not None:
+                return verdict
+        return Verdict("aborted", "the world fell silent")
+
+    def _do(self, deed: Deed, victim: int) -> None:
+        """A deed on one that is not there, or is there already, does nothing, as a signal would."""
+        name = robot_name(victim)
+        present = name in self._simulator.names
+        if present == (deed == "restart"):
+            return
+        self._say("fault", deed=deed, robot=victim, t=self._simulator.now)
+        match deed:
+            case "kill":
+                self._simulator.kill(name)
+            case "stop":
+                self._simulator.pause(name)
+            case "continue":
+                self._simulator.resume(name)
+            case "terminate":
+                self._simulator.terminate(name)
+            case "restart":
+                self._add(self._agent(victim, "follower"))
+
+    def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
+        self._recorder.record(now, key, message)
+        self._referee.see(message)
+
+    def _say(self, kind: str, **data: object) -> None:
+        now = self._simulator.now
+        self._recorder.record(now, self._operator.key, self._operator.says(kind, now, **data))
+
+    def _add(self, node: Node) -> None:
+        heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, 0, {"fleet": FLEET})
+        journal = Journal(self._journal_folder, heading)
+        self._journals[f"{node.name}-{node.incarnation}"] = journal
+        self._simulator.add(node, journal)
+
+    def _agent(self, robot_id: int, role: str) -> Node:
+        raise NotImplementedError
+
+    def _next_life(self, name: str) -> int:
+        self._lives[name] = self._lives.get(name, 0) + 1
+        return self._lives[name]
+
+    def _flush(self) -> None:
+        """Hand the journals to the kernel every so often, so that they do not pile up in memory."""
+        for journal in self._journals.values():
+            journal.flush()
+        self._simulator.at(self._simulator.now + JOURNAL_FLUSH_S, self._flush)
