@@ -38,6 +38,29 @@ def _slot(mission: Mission, hop: int) -> Pose2D:
     return Pose2D(formation.separation_m * cos(phi), formation.separation_m * sin(phi), 0.0)
 
 
+class Way:
+    """Where a moving obstacle is: to and fro along `center_m` -> `waypoints_m` at constant speed."""
+
+    def __init__(self, obstacle: Obstacle) -> None:
+        stops = (obstacle.center_m, *obstacle.waypoints_m)
+        self._legs = [(a, b, hypot(b[0] - a[0], b[1] - a[1])) for a, b in pairwise(stops) if a != b]
+        self._length_m = sum(leg[2] for leg in self._legs)
+        self._start_m = obstacle.phase * 2.0 * self._length_m
+        self._speed_mps = obstacle.speed_mps
+
+    def at(self, time_s: float) -> Point:
+        """Position [m] in `map` at the world's time."""
+        along = (self._start_m + self._speed_mps * time_s) % (2.0 * self._length_m)
+        along = min(along, 2.0 * self._length_m - along)
+        leg = 0
+        while along > self._legs[leg][2] and leg < len(self._legs) - 1:
+            along -= self._legs[leg][2]
+            leg += 1
+        a, b, length_m = self._legs[leg]
+        part = min(along / length_m, 1.0)
+        return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
+
+
 def check_course(scenario: Scenario) -> Scenario:
     """`scenario`, or `Refused` when a start or the goal cannot be stood on."""
     mission, world = scenario.mission, scenario.world
@@ -62,8 +85,9 @@ def check_course(scenario: Scenario) -> Scenario:
 def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
     radius_m = scenario.mission.radius_m
     for index, obstacle in enumerate(scenario.world.obstacles):
-        if _gap(place, obstacle, obstacle.center_m) < radius_m:
-            raise Refused(f"world.obstacles[{index}] = at {list(obstacle.center_m)}: must be clear of {whose}")
+        center_m = Way(obstacle).at(0.0) if obstacle.waypoints_m else obstacle.center_m
+        if gap_to(place, replace(obstacle, center_m=center_m)) < radius_m:
+            raise Refused(f"world.obstacles[{index}] = at {list(center_m)}: must be clear of {whose}")
     for index, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
         if _to_segment(place, (x1, y1), (x2, y2)) < radius_m:
             raise Refused(f"world.walls_m[{index}] = {[x1, y1, x2, y2]}: must be clear of {whose}")
@@ -107,9 +131,7 @@ def _draw_obstacle(
             center_m=(obstacle.center_m[0] + dx, obstacle.center_m[1] + dy),
             waypoints_m=tuple((x + dx, y + dy) for x, y in obstacle.waypoints_m),
         )
-        if all(
-            _gap(anchor, moved, stop) >= margin_m for anchor in anchors for stop in (moved.center_m, *moved.waypoints_m)
-        ):
+        if all(_swept_gap(anchor, moved) >= margin_m for anchor in anchors):
             return moved
     return obstacle
 
@@ -132,15 +154,30 @@ def _in_disc(radius_m: float, chance: Random) -> Point:
     return r * cos(angle), r * sin(angle)
 
 
-def _gap(place: Point, obstacle: Obstacle, center_m: Point) -> float:
-    """Distance [m] from `place` to the surface of `obstacle` standing at `center_m`; negative or zero inside."""
-    x, y = place[0] - center_m[0], place[1] - center_m[1]
+def gap_to(place: Point, obstacle: Obstacle) -> float:
+    """Distance [m] from `place` to the surface of `obstacle` at `center_m`; negative or zero inside."""
+    x, y = place[0] - obstacle.center_m[0], place[1] - obstacle.center_m[1]
     if obstacle.radius_m is not None:
         return hypot(x, y) - obstacle.radius_m
     assert obstacle.corners_m is not None, obstacle
     ring = (*obstacle.corners_m, obstacle.corners_m[0])
     inside = all((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0 for (ax, ay), (bx, by) in pairwise(ring))
     return 0.0 if inside else min(_to_segment((x, y), a, b) for a, b in pairwise(ring))
+
+
+def reach_of(obstacle: Obstacle) -> float:
+    """Distance [m] of the outermost part from `center_m`."""
+    if obstacle.radius_m is not None:
+        return obstacle.radius_m
+    return max(hypot(x, y) for x, y in obstacle.corners_m or ())
+
+
+def _swept_gap(place: Point, obstacle: Obstacle) -> float:
+    """The least distance [m] ever, wherever on its way a moving obstacle is."""
+    if not obstacle.waypoints_m:
+        return gap_to(place, obstacle)
+    legs = pairwise((obstacle.center_m, *obstacle.waypoints_m))
+    return min(_to_segment(place, a, b) for a, b in legs if a != b) - reach_of(obstacle)
 
 
 def _to_segment(p: Point, a: Point, b: Point) -> float:

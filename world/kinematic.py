@@ -7,15 +7,13 @@ parts that both share: a drive with its limits, and the way of a moving obstacle
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
-from math import hypot
 
 from msgspec import Struct
 
 from protocol.geometry import STILL, Pose2D, Twist, along_arc
 from protocol.mission import Limits
-from world.course import starts_of
-from world.spec import Obstacle, Point, Scenario
+from world.course import Way, starts_of
+from world.spec import Scenario
 
 
 class Touch(Struct, frozen=True, gc=False):
@@ -49,29 +47,6 @@ class Drive:
         reached = linear == wanted.linear_x and angular == wanted.angular_z
         self.twist = wanted if reached else Twist(linear, angular)
         return self.twist
-
-
-class Way:
-    """Where a moving obstacle is: to and fro along `center_m` -> `waypoints_m` at constant speed."""
-
-    def __init__(self, obstacle: Obstacle) -> None:
-        stops = (obstacle.center_m, *obstacle.waypoints_m)
-        self._legs = [(a, b, hypot(b[0] - a[0], b[1] - a[1])) for a, b in pairwise(stops) if a != b]
-        self._length_m = sum(leg[2] for leg in self._legs)
-        self._start_m = obstacle.phase * 2.0 * self._length_m
-        self._speed_mps = obstacle.speed_mps
-
-    def at(self, time_s: float) -> Point:
-        """Position [m] in `map` at the world's time."""
-        along = (self._start_m + self._speed_mps * time_s) % (2.0 * self._length_m)
-        along = min(along, 2.0 * self._length_m - along)
-        leg = 0
-        while along > self._legs[leg][2] and leg < len(self._legs) - 1:
-            along -= self._legs[leg][2]
-            leg += 1
-        a, b, length_m = self._legs[leg]
-        part = min(along / length_m, 1.0)
-        return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
 
 
 class Kinematic:

@@ -14,8 +14,8 @@ import pymunk
 
 from protocol.geometry import STILL, Pose2D, Twist, sinc, wrap
 from protocol.mission import robot_name
-from world.course import starts_of
-from world.kinematic import Drive, Touch, Way
+from world.course import Way, reach_of, starts_of
+from world.kinematic import Drive, Touch
 from world.spec import Obstacle, Scenario
 
 GRAVITY_MPS2 = 9.81
@@ -172,7 +172,7 @@ class Physics:
         turn = pymunk.GearJoint(self._space.static_body, body, 0.0, 1.0)
         slide.max_bias = turn.max_bias = 0.0
         slide.max_force = GROUND_FRICTION * body.mass * GRAVITY_MPS2
-        turn.max_force = slide.max_force * 2.0 / 3.0 * _reach_of(obstacle)
+        turn.max_force = slide.max_force * 2.0 / 3.0 * reach_of(obstacle)
         self._space.add(slide, turn)
 
     def _on_begin(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: object) -> None:
@@ -200,10 +200,3 @@ def _inertia_of(obstacle: Obstacle, mass_kg: float) -> float:
     corners = obstacle.corners_m or ()
     center = pymunk.Poly(None, corners).center_of_gravity
     return float(pymunk.moment_for_poly(mass_kg, corners, (-center.x, -center.y)))
-
-
-def _reach_of(obstacle: Obstacle) -> float:
-    """Distance [m] of the outermost part from the centre."""
-    if obstacle.radius_m is not None:
-        return obstacle.radius_m
-    return max(hypot(x, y) for x, y in obstacle.corners_m or ())
