@@ -41,11 +41,17 @@ class Bus(Protocol):
 class Inbox:
     """Newest value for state topics, a bounded queue for everything else, one wake-up."""
 
-    def __init__(self, wake: threading.Event | None = None, size_max: int = INBOX_SIZE_MAX) -> None:
-        """`wake` is set when something urgent came; several inboxes of one loop share it."""
+    def __init__(
+        self, wake: threading.Event | None = None, size_max: int = INBOX_SIZE_MAX, *, every: bool = False
+    ) -> None:
+        """`wake` is set when something urgent came; several inboxes of one loop share it.
+
+        `every` queues state topics too: a recorder wants all values, not the newest.
+        """
         self._queue: deque[Arrival] = deque()
         self._newest: dict[str, Arrival] = {}
         self._size_max = size_max
+        self._every = every
         self._lock = threading.Lock()
         self._wake = wake or threading.Event()
         self.dropped = 0
@@ -55,7 +61,7 @@ class Inbox:
         where = address(arrival.key)
         topic = TOPIC.get(where.topic) if where is not None else None
         with self._lock:
-            if topic is not None and topic.state:
+            if topic is not None and topic.state and not self._every:
                 self._newest[arrival.key] = arrival
             elif len(self._queue) < self._size_max:
                 self._queue.append(arrival)
