@@ -1,103 +1,498 @@
-"""The lease of one process: who leads, for how long, with whom behind it. Rules E1.. are in protocol/README.md."""
+"""The lease of one process: who leads, for how long, with whom behind it. Rules E1.. are in protocol/README.md.
+
+`Lease` joins the voter (`acceptor.py`), the candidacy (`candidate.py`) and the held term (`holder.py`) of one
+process, owns its config, and decides when each of them speaks. It never reads a clock: `now` is the process's own
+monotonic time [s] in every call, and calls must not go back in time.
+"""
 
 from __future__ import annotations
 
-from msgspec import Struct
+from protocol.acceptor import Acceptor
+from protocol.candidate import Candidate
+from protocol.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
+from protocol.holder import Holder
+from protocol.membership import ANY_LIFE, first_config, ids, is_first, led_by, rank, with_chain
+from protocol.messages import (
+    Config,
+    Fence,
+    Fenced,
+    Grant,
+    Hello,
+    LeaseBody,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Release,
+    Role,
+    Term,
+)
+from protocol.mission import WITNESS_ID, Mission, robot_name
+from protocol.timing import CLOCK_RATE_ERROR, Timing
 
-from protocol.messages import Config, LeaseBody, Member, Role, Term
-from protocol.mission import Mission
-from protocol.timing import Timing
+__all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Send", "StepDown"]
 
-
-class Send(Struct, frozen=True):
-    """Publish `body`. `to` is `all`, `robot2`, `witness`, or `gateway2`: the gateway of robot 2 (its driver's)."""
-
-    to: str
-    body: LeaseBody
-
-
-class BecomeLeader(Struct, frozen=True):
-    """A quorum granted `term` to this process until `expiry`, its own monotonic time [s]."""
-
-    term: Term
-    expiry: float
-
-
-class LeaseExtended(Struct, frozen=True):
-    term: Term
-    expiry: float
-
-
-class StepDown(Struct, frozen=True):
-    """Command no more under `term`: expired, released, deposed, handed_over."""
-
-    term: Term
-    cause: str
-
-
-class AdoptChain(Struct, frozen=True):
-    """A newer config than the last one; `config.chain[0]` leads."""
-
-    config: Config
+NEVER = float("inf")
+SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
+"""How many seconds of the fastest clock one second of the slowest may last."""
+FIRST_START_S = 5.0
+"""How long the very first election waits for everybody before a quorum is enough."""
+HELLO_HEARTBEATS = 3
 
 
-Effect = Send | BecomeLeader | LeaseExtended | StepDown | AdoptChain
+def gateway_of(robot_id: int) -> str:
+    """The address of a robot's gateway in `Send.to`."""
+    return f"gateway{robot_id}"
 
 
 class Lease:
-    """Voter, candidate and leader of one process. No clock, no socket: time comes in, effects go out, in order."""
-
-    config: Config
-    term: Term
-    """Of the lease that this process holds, or of the config that it obeys."""
-    leader: int | None
-    """Id of the holder of `term` as far as known; None when its lease has run out as seen from here."""
-    chain: tuple[int, ...]
-    """Ids of `config.chain`, leader first."""
-    role: Role
-    released: bool
-    """A requested release is complete: the last words are out and the process may end."""
+    """Voter, candidate and leader of one process; effects go out in the order given."""
 
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float, floor: int) -> None:
         """The lease of `me` (id 0: the witness, which votes and never leads) at its start.
 
-        `floor` is the wall clock's milliseconds at boot (small integers in simulation): terms of this life start
+        `floor` is the wall clock's milliseconds at boot (small integers in simulation): terms of this life are
         above it. It orders lives and is no part of any safety argument.
         """
-        raise NotImplementedError
+        self.me = me
+        self.config: Config = first_config(mission)
+        self.leader: int | None = None
+        """Id of the holder of the newest term heard of; None once its lease has run out as seen from here."""
+        self.released = False
+        """A requested release is complete: the last words are out and the process may end."""
+        self._timing = timing
+        self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
+        self._robots = mission.robots
+        self._voters = frozenset(member.id for member in self.config.voters)
+        self._acceptor = Acceptor(Term(floor), timing.grant_s, now)
+        self._candidate: Candidate | None = None
+        self._holder: Holder | None = None
+        self._seen = Term(floor)
+        """The highest term heard of."""
+        self._down: dict[int, tuple[int, float]] = {}
+        """Of each robot whose token vanished: the incarnation that it vanished of, and when."""
+        self._met: set[int] = {me.id}
+        """Ids that were ever heard."""
+        self._pending: tuple[Member, Prepare] | None = None
+        """The last PREPARE refused because of a bond."""
+        self._born_at = now
+        self._leader_until = now
+        self._hello_at = now
+        self._elect_at = NEVER
+        self._closing = False
+        self._commanded_at = float("-inf")
+        self._unreleased: Term | None = None
+        """The term given up whose RELEASE waits for the own gateway, until `_release_at` at most."""
+        self._release_at = NEVER
+        self._elect_after(self._acceptor.silent_until)
 
-    def receive(self, src: Member, body: LeaseBody, now: float) -> list[Effect]:
-        """A message of another process, or of this one's own gateway (FENCED: `src.id` is the gateway's robot)."""
-        raise NotImplementedError
+    # --- what the agent reads ----------------------------------------------------------------------------------
 
-    def tick(self, now: float) -> list[Effect]:
-        """A deadline passed."""
-        raise NotImplementedError
+    @property
+    def chain(self) -> tuple[int, ...]:
+        """Ids of `config.chain`, leader first."""
+        return ids(self.config.chain)
 
-    def next_deadline(self) -> float:
-        """When to tick next."""
-        raise NotImplementedError
+    @property
+    def term(self) -> Term:
+        """Of the lease that this process holds, or of the config that it obeys."""
+        return self._holder.term if self._holder is not None else self.config.version.term
 
-    def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:
-        """A liveliness token came (up) or went: never a proof."""
-        raise NotImplementedError
-
-    def gateway_term(self, term: Term, now: float, latched: bool = False) -> list[Effect]:
-        """What this robot's own gateway says in `sensors`: its highest term, and whether it is latched there."""
-        raise NotImplementedError
-
-    def commanded(self, now: float) -> None:
-        """A command as leader was just sent."""
-        raise NotImplementedError
+    @property
+    def role(self) -> Role:
+        if self._holder is not None:
+            return Role.LEADER
+        return Role.FOLLOWER if self.leader is not None and self.me.id in self.chain else Role.WAITING
 
     def may_command(self, now: float) -> bool:
         """Leading, and `now` is before the lease's expiry (I1, I2)."""
-        raise NotImplementedError
+        return self._holder is not None and now < _expiry(self._holder)
+
+    def commanded(self, now: float) -> None:
+        """A command as leader was just sent."""
+        self._commanded_at = now
+
+    # --- what comes in -----------------------------------------------------------------------------------------
+
+    def receive(self, src: Member, body: LeaseBody, now: float) -> list[Effect]:
+        """A message of another process, or of this one's own gateway (FENCED: `src.id` is the gateway's robot)."""
+        effects: list[Effect] = []
+        self._expire(now, effects)
+        own = src.id == self.me.id
+        if own != isinstance(body, Fenced):
+            return effects  # an echo of our own, or the gateway of another robot
+        self._met.add(src.id)
+        match body:
+            case Propose():
+                self._on_propose(src, body, now, effects)
+            case Grant():
+                self._on_grant(src, body, now, effects)
+            case Prepare():
+                self._on_prepare(src, body, now, effects)
+            case Promise():
+                self._on_promise(src, body, now, effects)
+            case Nack():
+                self._on_nack(body, now, effects)
+            case Release():
+                self._on_release(body, now, effects)
+            case Hello():
+                self._on_hello(src, now, effects)
+            case Fenced():
+                if body.old == self._unreleased:
+                    self._send_release(now, effects)
+            case Fence():
+                pass  # a gateway's matter
+        return effects
+
+    def tick(self, now: float) -> list[Effect]:
+        """A deadline passed."""
+        effects: list[Effect] = []
+        self._expire(now, effects)
+        if now >= self._release_at:
+            self._send_release(now, effects)
+        if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
+            self._mend(now, effects)
+        if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
+            self._send_round(self._holder, now, effects)
+        if self._candidate is not None:
+            self._press(self._candidate, now, effects)
+        elif self._holder is None and now >= self._elect_at:
+            self._stand(now, effects)
+        if now >= self._hello_at:
+            self._hello_at = now + HELLO_HEARTBEATS * self._timing.heartbeat_s
+            if self._is_out(now) and not self._closing:
+                effects.append(Send("all", Hello(self.config.version)))
+        if self.leader is not None and self._holder is None and now >= self._leader_until:
+            self.leader = None
+        return effects
+
+    def next_deadline(self) -> float:
+        """When to tick next."""
+        at = min(self._hello_at, self._release_at)
+        if self._holder is not None:
+            at = min(at, _expiry(self._holder))
+            if self._candidate is None:
+                at = min(at, self._holder.next_round_at)
+        elif self.leader is not None:
+            at = min(at, self._leader_until)
+        if self._candidate is not None:
+            at = min(at, self._candidate.deadline)
+        elif self._holder is None:
+            at = min(at, self._elect_at)
+        return at
+
+    def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:
+        """A liveliness token came (up) or went: never a proof. A leader closes the chain over a vanished follower."""
+        effects: list[Effect] = []
+        self._expire(now, effects)
+        if up:
+            if incarnation >= self._down.get(id, (0, now))[0]:
+                self._down.pop(id, None)
+        else:
+            self._down[id] = (max(incarnation, self._down.get(id, (0, now))[0]), now)
+            if self._holder is not None and self._candidate is None:
+                self._mend(now, effects)
+        return effects
+
+    def gateway_term(self, term: Term, now: float, latched: bool = False) -> list[Effect]:
+        """What this robot's own gateway says in `sensors`: its highest term, and whether it is latched there.
+
+        E10: a leader whose gateway has seen a higher term, or is latched in this one, raises its own term.
+        """
+        effects: list[Effect] = []
+        self._expire(now, effects)
+        self._seen = max(self._seen, term)
+        if self._holder is not None and self._candidate is None:
+            barred = term > self._holder.term or (latched and term == self._holder.term)
+            if barred:
+                self._stand(now, effects)
+        return effects
 
     def request_release(self, now: float) -> list[Effect]:
-        """Clean exit: stop leading, tell the voters; `released` turns true, at once when there is nothing to give up."""
-        raise NotImplementedError
+        """Clean exit: stop leading, tell the voters; `released` turns true, at once if there is nothing to give up."""
+        effects: list[Effect] = []
+        self._closing = True
+        self._elect_at = NEVER
+        self._step_down(now, "released", effects)
+        self._drop_candidate(now, effects)
+        self.released = self._unreleased is None
+        return effects
 
     def request_handover(self, now: float) -> list[Effect]:
-        """The leader is stuck: give the lease to the next in the chain that answers."""
-        raise NotImplementedError
+        """The leader is stuck: let another lead. It releases, and the next in the chain stands first."""
+        effects: list[Effect] = []
+        self._step_down(now, "handed_over", effects)
+        self._elect_after(now + self._timing.grant_s)
+        return effects
+
+    # --- voting ------------------------------------------------------------------------------------------------
+
+    def _on_prepare(self, src: Member, body: Prepare, now: float, effects: list[Effect]) -> None:
+        self._seen = max(self._seen, body.term)
+        if self.me.id not in self._voters:
+            return
+        answer = self._acceptor.prepare(src, body, self.config, now)
+        if answer is not None:
+            effects.append(Send(robot_name(src.id), answer))
+        if isinstance(answer, Promise):
+            self._yield_to(body.term, now, effects)
+        elif answer is not None and answer.remaining_s > 0.0:
+            self._pending = (src, body)  # answered again as soon as the bond ends: it may have overtaken the news
+
+    def _on_propose(self, src: Member, body: Propose, now: float, effects: list[Effect]) -> None:
+        self._seen = max(self._seen, body.term)
+        answer = self._acceptor.propose(src, body, self.config, now) if self.me.id in self._voters else None
+        if isinstance(answer, Nack):
+            effects.append(Send(robot_name(src.id), answer))
+            return
+        if answer is None and body.config.version < self.config.version:
+            return  # who does not vote (yet) follows the newest all the same
+        if answer is not None:
+            effects.append(Send(robot_name(body.holder.id), answer))
+        self._yield_to(body.term, now, effects)
+        self._adopt(body.config, effects)
+        self.leader = body.holder.id
+        self._leader_until = now + self._timing.grant_s
+        self._elect_after(self._leader_until)
+
+    def _on_release(self, body: Release, now: float, effects: list[Effect]) -> None:
+        if not self._acceptor.release(body.term):
+            return
+        self.leader = None
+        self._elect_after(now)
+        pending, self._pending = self._pending, None
+        if pending is not None:
+            self._on_prepare(*pending, now, effects)
+
+    def _yield_to(self, term: Term, now: float, effects: list[Effect]) -> None:
+        """Whoever promises or grants a higher term gives up its own lower candidacy."""
+        if self._candidate is not None and term > self._candidate.term:
+            self._drop_candidate(now, effects)
+            self._elect_after(now + 2.0 * self._timing.heartbeat_s)
+
+    # --- standing for election ---------------------------------------------------------------------------------
+
+    def _rank(self, robot_id: int) -> int:
+        return rank(self.config, robot_id, lambda other: other not in self._may_lead or self._is_down(other))
+
+    def _is_down(self, robot_id: int) -> bool:
+        """Its token vanished, and no later life of it is in the chain."""
+        if robot_id not in self._down:
+            return False
+        lives = [m.incarnation for m in self.config.chain if m.id == robot_id]
+        return self._down[robot_id][0] >= max(lives, default=ANY_LIFE)
+
+    def _start_waits_until(self, now: float) -> float | None:
+        """E5: when the very first election may begin here, None when now.
+
+        The head of the chain waits until everybody was heard, the others for the head; none longer than FIRST_START_S.
+        """
+        over_at = self._born_at + FIRST_START_S
+        if not is_first(self.config) or now >= over_at:
+            return None
+        if self._rank(self.me.id) > 0:
+            return over_at
+        return None if all(i in self._met for i in self._robots) else now + self._timing.heartbeat_s
+
+    def _elect_after(self, at: float) -> None:
+        """E6: stand for election once `at` has passed, each robot its rank later than the one before it."""
+        can_stand = self.me.id in self._may_lead and self.me.id in self._voters and not self._closing
+        self._elect_at = at + self._rank(self.me.id) * self._timing.rank_step_s if can_stand else NEVER
+
+    def _stand(self, now: float, effects: list[Effect]) -> None:
+        """A new candidacy under a term above all that was heard of. A leader may stand too: it raises its term."""
+        self._elect_after(now + self._timing.grant_s)
+        waits_until = self._start_waits_until(now)
+        if waits_until is not None:
+            self._elect_after(waits_until)
+            return
+        bond = self._acceptor.bound(now)
+        if bond is not None and bond.holder != self.me:
+            self._elect_after(bond.expiry)
+            return
+        number = max(self._seen.n, self._acceptor.promised.n) + 1
+        self._candidate = Candidate(Term(number, self.me.id, self.me.incarnation), self._timing, now)
+        self._seen = self._candidate.term
+        self._press(self._candidate, now, effects)
+
+    def _press(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
+        """The candidacy's deadline: ask (again) for promises, or (again) for grants."""
+        if candidate.holder is not None:
+            if now - candidate.holder.began_at >= self._timing.act_s:
+                self._drop_candidate(now, effects)
+                self._elect_after(now + self._timing.rank_step_s)
+            elif now >= candidate.holder.next_round_at:
+                self._send_round(candidate.holder, now, effects)
+        elif now >= candidate.ask_at:
+            candidate.asked(now)
+            request = Prepare(candidate.term, self.config.version)
+            effects.append(Send("all", request))
+            own = self._acceptor.prepare(self.me, request, self.config, now)
+            if isinstance(own, Promise):
+                self._on_promise(self.me, own, now, effects)
+
+    def _on_promise(self, src: Member, body: Promise, now: float, effects: list[Effect]) -> None:
+        candidate = self._candidate
+        if candidate is None or candidate.holder is not None or body.term != candidate.term:
+            return
+        candidate.promised(src)
+        if candidate.has_quorum(self.config):
+            candidate.holder = Holder(self.me, candidate.term, self._timing, now)
+            self._adopt(led_by(self.config, self.me, candidate.term, self._is_down), effects)
+            self._send_round(candidate.holder, now, effects)
+
+    def _drop_candidate(self, now: float, effects: list[Effect]) -> None:
+        """Give the candidacy up. Grants for it are given back, unless this robot may still move under another term."""
+        candidate, self._candidate = self._candidate, None
+        if candidate is None or candidate.holder is None or self._holder is not None:
+            return
+        if now >= self._at_rest_at():
+            self._acceptor.release(candidate.term)
+            effects.append(Send("all", Release(candidate.term)))
+
+    def _on_nack(self, body: Nack, now: float, effects: list[Effect]) -> None:
+        self._seen = max(self._seen, body.promised, body.config.version.term)
+        candidate, holder = self._candidate, self._holder
+        newer = body.config.version > self.config.version
+        if candidate is not None and body.term == candidate.term:
+            if newer:
+                self._adopt(body.config, effects)
+            if body.promised > candidate.term or (newer and candidate.holder is not None):
+                self._drop_candidate(now, effects)
+                self._elect_after(now + self._timing.rank_step_s)
+            elif newer:
+                candidate.ask_at = now
+                self._press(candidate, now, effects)
+            else:
+                candidate.wait_until(now + body.remaining_s * SLOWEST)
+        elif candidate is None and holder is not None and body.term == holder.term:
+            if newer:
+                self._adopt(body.config, effects)
+            if newer or body.promised > holder.term:
+                self._stand(now, effects)  # E10
+
+    # --- leading -----------------------------------------------------------------------------------------------
+
+    def _send_round(self, holder: Holder, now: float, effects: list[Effect]) -> None:
+        """One PROPOSE to all, this process's own voter first."""
+        propose = holder.next_propose(self.config, now)
+        own = self._acceptor.propose(self.me, propose, self.config, now)
+        if not isinstance(own, Grant):
+            if self._candidate is None:
+                self._stand(now, effects)  # E10: a raised term that was given up still binds the own voter
+            else:
+                self._drop_candidate(now, effects)
+            return
+        effects.append(Send("all", propose))
+        self._count(holder, self.me, own, now, effects)
+
+    def _on_grant(self, src: Member, body: Grant, now: float, effects: list[Effect]) -> None:
+        if src.id not in self._voters:
+            return
+        if self._candidate is not None and self._candidate.holder is not None and self._candidate.term == body.term:
+            self._count(self._candidate.holder, src, body, now, effects)
+        elif self._holder is not None and self._holder.term == body.term:
+            self._count(self._holder, src, body, now, effects)
+
+    def _count(self, holder: Holder, src: Member, grant: Grant, now: float, effects: list[Effect]) -> None:
+        if not holder.granted(src, grant, self.config, now):
+            return
+        expiry = _expiry(holder)
+        if holder is self._holder:
+            effects.append(LeaseExtended(holder.term, expiry))
+        elif now < expiry:
+            self._candidate, self._holder = None, holder
+            self.leader = self.me.id
+            effects.append(BecomeLeader(holder.term, expiry))
+
+    def _mend(self, now: float, effects: list[Effect]) -> None:
+        """E8: close the chain over whoever is silent for t_chain, or at once over whoever's token vanished."""
+        holder = self._holder
+        assert holder is not None
+        chain = self.config.chain
+        left = tuple(m for m in chain if m == self.me or not (self._is_down(m.id) or holder.silent(m.id, now)))
+        if len(left) < len(chain):
+            self._write(left, now, effects)
+
+    def _write(self, chain: tuple[Member, ...], now: float, effects: list[Effect]) -> None:
+        """A new version of the config, told at once."""
+        assert self._holder is not None
+        self._adopt(with_chain(self.config, chain), effects)
+        self._send_round(self._holder, now, effects)
+
+    def _on_hello(self, src: Member, now: float, effects: list[Effect]) -> None:
+        """E9: a robot that was out returns at the tail; so does a later life of one that was in."""
+        if self._holder is None or self._candidate is not None or src.id not in self._robots:
+            return
+        self._holder.heard_at[src.id] = now
+        incarnation, since = self._down.get(src.id, (ANY_LIFE, now))
+        if incarnation >= src.incarnation:
+            if now - since < self._timing.chain_silence_s:
+                return  # its last words, perhaps
+            del self._down[src.id]
+        place = next((m for m in self.config.chain if m.id == src.id), None)
+        if place is None or ANY_LIFE < place.incarnation < src.incarnation:
+            rest = tuple(m for m in self.config.chain if m.id != src.id)
+            self._write((*rest, src), now, effects)
+        elif place.incarnation == ANY_LIFE:
+            self._write(tuple(src if m is place else m for m in self.config.chain), now, effects)
+
+    # --- stopping ----------------------------------------------------------------------------------------------
+
+    def _expire(self, now: float, effects: list[Effect]) -> None:
+        """E7: the first thing in every call, so that nobody leads a moment longer than its lease."""
+        if self._holder is not None and now >= _expiry(self._holder):
+            self._step_down(now, "expired", effects)
+            # A leader that can talk but not hear would keep its voters bound for ever: it falls silent, and lets
+            # others go first.
+            self._elect_after(now + self._timing.grant_s)
+
+    def _step_down(self, now: float, cause: Cause, effects: list[Effect]) -> None:
+        """Stop, have the own gateway refuse the term, then free the voters (E4)."""
+        holder, self._holder = self._holder, None
+        if holder is None:
+            return
+        self.leader = None
+        self._unreleased = holder.term
+        self._release_at = max(now, self._at_rest_at())
+        effects.append(StepDown(holder.term, cause))
+        effects.append(Send(gateway_of(self.me.id), Fence(holder.term, _just_above(holder.term))))
+
+    def _at_rest_at(self) -> float:
+        """From when on no gateway obeys the last command sent as leader, by its age alone."""
+        return self._commanded_at + self._timing.deadman_s * SLOWEST
+
+    def _send_release(self, now: float, effects: list[Effect]) -> None:
+        term, self._unreleased, self._release_at = self._unreleased, None, NEVER
+        if term is not None:
+            self._acceptor.release(term)
+            effects.append(Send("all", Release(term)))
+        self.released = self._closing
+
+    # --- small -------------------------------------------------------------------------------------------------
+
+    def _adopt(self, config: Config, effects: list[Effect]) -> None:
+        if config.version > self.config.version:
+            self.config = config
+            effects.append(AdoptChain(config))
+
+    def _is_out(self, now: float) -> bool:
+        """E9: bound to nobody (a learner always is), or this life of it is not in the leader's chain."""
+        if self._holder is not None:
+            return False
+        if self.me.id != WITNESS_ID and not any(
+            m.id == self.me.id and m.incarnation in (ANY_LIFE, self.me.incarnation) for m in self.config.chain
+        ):
+            return True
+        return self._acceptor.bound(now) is None
+
+
+def _expiry(holder: Holder) -> float:
+    """When a held lease ends; before a quorum has granted it has not begun."""
+    return float("-inf") if holder.expiry is None else holder.expiry
+
+
+def _just_above(term: Term) -> Term:
+    """The least term above `term`."""
+    return Term(term.n, term.issuer, term.incarnation + 1)

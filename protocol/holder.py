@@ -1,0 +1,57 @@
+"""One term in the hands of one process, from its first PROPOSE: rounds, acknowledgements, expiry (rule E2)."""
+
+from __future__ import annotations
+
+from protocol.membership import seat
+from protocol.messages import Config, Grant, Member, Propose, Term
+from protocol.quorum import quorum_time
+from protocol.timing import Timing
+
+ROUNDS_KEPT = 64
+"""Send times kept for late grants: more than the rounds of one T_act in any profile."""
+
+
+class Holder:
+    """`expiry` is None until a quorum has granted; it only grows."""
+
+    def __init__(self, me: Member, term: Term, timing: Timing, now: float) -> None:
+        self.term = term
+        self.expiry: float | None = None
+        self.next_round_at = now
+        self.heard_at: dict[int, float] = {}
+        """When each robot last gave a sign of life to this holder."""
+        self.began_at = now
+        self._me = me
+        self._timing = timing
+        self._round = 0
+        self._sent_at: dict[int, float] = {}
+        self._acked: dict[Member, float] = {}
+        """Of each seat the newest send time [s] that it has granted."""
+
+    def next_propose(self, config: Config, now: float) -> Propose:
+        """The next round; `now` is read before the message leaves."""
+        number, self._round = self._round, self._round + 1
+        self._sent_at[number] = now
+        self._sent_at.pop(number - ROUNDS_KEPT, None)
+        self.next_round_at = now + self._timing.heartbeat_s
+        return Propose(self.term, config, number, self._me)
+
+    def granted(self, src: Member, grant: Grant, config: Config, now: float) -> bool:
+        """Count a grant; answers whether the lease got longer."""
+        self.heard_at[src.id] = now
+        sent_at = self._sent_at.get(grant.round)
+        voter = seat(src.id)
+        if sent_at is None or sent_at <= self._acked.get(voter, float("-inf")):
+            return False
+        self._acked[voter] = sent_at
+        # E2: the lease runs from when we asked. Counted from the grant it would outlive the voters' own count by
+        # the way back, and two robots could lead (I1).
+        since = quorum_time(config, self._acked)
+        if since is None or (self.expiry is not None and since + self._timing.act_s <= self.expiry):
+            return False
+        self.expiry = since + self._timing.act_s
+        return True
+
+    def silent(self, robot_id: int, now: float) -> bool:
+        """Nothing was heard of it for t_chain."""
+        return now - self.heard_at.get(robot_id, self.began_at) > self._timing.chain_silence_s
