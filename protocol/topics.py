@@ -17,6 +17,7 @@ Priority = Literal["real_time", "prompt", "data", "background"]
 TO_ALL = "all"
 WORLD_NAME = "world"
 OPERATOR_NAME = "operator"
+RECORDER_NAME = "recorder"
 
 
 class Topic(Struct, frozen=True):
