@@ -1,0 +1,217 @@
+"""How a leader drives: along way-points or point to point, slow enough for all behind it, to rest at the goal.
+
+The route is known to every robot, and each keeps its own progress on it, so that whoever leads next goes on from
+where the team is.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
+from math import atan2, ceil, cos, hypot, inf, pi, sin, tan
+
+from agents.formation import PLANNED_MARGIN, leader_speed_cap
+from protocol.geometry import Pose2D, Twist, wrap
+from protocol.messages import Slot
+from protocol.mission import Leading, Limits
+
+CORNER_RADIUS_M = 2.5
+SPACING_M = 0.1
+LOOK_AHEAD_M = 0.6
+DETOUR_AHEAD_M = 2.0
+BRAKING_SHARE = 0.6
+IN_PLACE_RAD = 1.0
+IN_PLACE_RADPS = 0.4
+ARRIVED_MPS = 0.02
+LATERAL_GAIN = 1.2
+
+Point = tuple[float, float]
+
+
+class Route:
+    """A polyline in `map` with rounded corners, its arc length and curvature."""
+
+    def __init__(self, points: Sequence[Point]) -> None:
+        self.points = _resampled(_rounded(points, CORNER_RADIUS_M), SPACING_M)
+        self.at_m = [0.0]
+        for a, b in pairwise(self.points):
+            self.at_m.append(self.at_m[-1] + hypot(b[0] - a[0], b[1] - a[1]))
+        self.length_m = self.at_m[-1]
+        self.curvature = _curvatures(self.points)
+
+    def point(self, s: float) -> Point:
+        """The point at arc length `s` [m], clamped to the ends."""
+        i = self._segment(s)
+        (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
+        share = (min(max(s, 0.0), self.length_m) - self.at_m[i]) / max(self.at_m[i + 1] - self.at_m[i], 1e-9)
+        return ax + share * (bx - ax), ay + share * (by - ay)
+
+    def nearest(self, x: float, y: float, low_m: float = 0.0, high_m: float = inf) -> float:
+        """Arc length of the point nearest to (x, y) between `low_m` and `high_m`."""
+        first, last = self._segment(low_m), self._segment(min(high_m, self.length_m))
+        best, best_s = inf, low_m
+        for i in range(first, last + 1):
+            (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
+            dx, dy = bx - ax, by - ay
+            share = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)))
+            apart = hypot(x - ax - share * dx, y - ay - share * dy)
+            if apart < best:
+                best, best_s = apart, self.at_m[i] + share * (self.at_m[i + 1] - self.at_m[i])
+        return best_s
+
+    def _segment(self, s: float) -> int:
+        return min(max(bisect_right(self.at_m, s) - 1, 0), len(self.points) - 2)
+
+
+class Lead:
+    """One robot's progress along the route, and its twist when it leads."""
+
+    def __init__(self, leading: Leading, limits: Limits) -> None:
+        self._leading = leading
+        self._limits = limits
+        self._route: Route | None = None
+        self._s = 0.0
+        self._profile: list[float] = []
+        self._profile_of: tuple[Slot, ...] | None = None
+
+    def track(self, pose: Pose2D) -> None:
+        """Keep the progress up, leader or not."""
+        if self._route is None:
+            self._route = self._first_route(pose)
+            self._s = self._route.nearest(pose.x, pose.y)
+        else:
+            self._s = self._route.nearest(pose.x, pose.y, self._s - 1.0, self._s + 2.0)
+
+    def begin(self, pose: Pose2D) -> None:
+        """Leadership starts here: point to point goes straight from where the robot stands."""
+        self.track(pose)
+        if self._leading.motion == "point_to_point":
+            self._route = Route([(pose.x, pose.y), self.goal])
+            self._s = 0.0
+            self._profile_of = None
+
+    @property
+    def goal(self) -> Point:
+        return self._leading.route_m[-1]
+
+    def remaining_m(self, pose: Pose2D) -> float:
+        """Way to the goal: along the route, or straight once the route is at its end."""
+        straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
+        return max(self._route.length_m - self._s, straight) if self._route is not None else straight
+
+    def arrived(self, pose: Pose2D, twist: Twist) -> bool:
+        """At rest within the goal's tolerance."""
+        near = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y) <= self._leading.goal_tolerance_m
+        return near and abs(twist.linear_x) < ARRIVED_MPS
+
+    def ahead(self, pose: Pose2D, by_m: float = DETOUR_AHEAD_M) -> Point:
+        """The point of the route `by_m` ahead, in `base_link`: where a detour is to lead back to."""
+        assert self._route is not None
+        return _in_base(pose, self._route.point(self._s + by_m))
+
+    def step(self, pose: Pose2D, twist: Twist, slots: Sequence[Slot], speed_max_mps: float) -> Twist:
+        """The wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
+        self.track(pose)
+        route = self._route
+        assert route is not None
+        straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
+        if straight <= 0.3 * self._leading.goal_tolerance_m:
+            return Twist(0.0, 0.0)
+        near_end = route.length_m - self._s < LOOK_AHEAD_M
+        target = _in_base(pose, self.goal if near_end else route.point(self._s + LOOK_AHEAD_M))
+        braking = (2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5
+        v = min(self._cruise(slots), braking, speed_max_mps, abs(twist.linear_x) + 0.05)
+        bearing = atan2(target[1], target[0])
+        if near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
+            return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing)
+        if abs(bearing) > IN_PLACE_RAD:
+            return self._turn(bearing)
+        reach = max(hypot(*target), 0.25)
+        curvature = 2.0 * target[1] / (reach * reach)
+        return Twist(v, v * curvature)
+
+    def _turn(self, bearing: float) -> Twist:
+        return Twist(0.0, IN_PLACE_RADPS if bearing > 0.0 else -IN_PLACE_RADPS)
+
+    def _cruise(self, slots: Sequence[Slot]) -> float:
+        """Fastest speed here from which every bend ahead can be met at the speed that its outermost robot keeps."""
+        assert self._route is not None
+        wanted = tuple(slots)
+        if wanted != self._profile_of:
+            self._profile = self._speeds(wanted)
+            self._profile_of = wanted
+        return self._profile[self._route._segment(self._s)]
+
+    def _speeds(self, slots: tuple[Slot, ...]) -> list[float]:
+        """Backwards over the route: each point's cap, or what still brakes to the next one's."""
+        assert self._route is not None
+        route, speed = self._route, self._leading.cruise_mps
+        speeds = [speed] * len(route.points)
+        for i in range(len(route.points) - 2, -1, -1):
+            step_m = route.at_m[i + 1] - route.at_m[i]
+            brake = (speeds[i + 1] ** 2 + 2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * step_m) ** 0.5
+            cap = leader_speed_cap(slots, route.curvature[i], self._limits, PLANNED_MARGIN)
+            speeds[i] = min(self._leading.cruise_mps, cap, brake)
+        return speeds
+
+    def _first_route(self, pose: Pose2D) -> Route:
+        points = list(self._leading.route_m)
+        if len(points) == 1 or self._leading.motion == "point_to_point":
+            points = [(pose.x, pose.y), points[-1]]
+        if hypot(points[0][0] - points[-1][0], points[0][1] - points[-1][1]) < 1e-6 and len(points) == 2:
+            points[0] = (points[0][0] - 0.01, points[0][1])
+        return Route(points)
+
+
+def _in_base(pose: Pose2D, point: Point) -> Point:
+    dx, dy = point[0] - pose.x, point[1] - pose.y
+    c, s = cos(pose.theta), sin(pose.theta)
+    return c * dx + s * dy, c * dy - s * dx
+
+
+def _rounded(points: Sequence[Point], radius_m: float) -> list[Point]:
+    """Corners replaced by arcs of `radius_m`, smaller where the legs are short."""
+    rounded = [points[0]]
+    for a, corner, b in zip(points, points[1:], points[2:], strict=False):
+        leg_in, leg_out = hypot(corner[0] - a[0], corner[1] - a[1]), hypot(b[0] - corner[0], b[1] - corner[1])
+        heading = atan2(corner[1] - a[1], corner[0] - a[0])
+        turn = wrap(atan2(b[1] - corner[1], b[0] - corner[0]) - heading)
+        cut = min(radius_m * tan(min(abs(turn), 3.0) / 2.0), 0.45 * leg_in, 0.45 * leg_out)
+        if abs(turn) < 0.02 or cut < 1e-3:
+            rounded.append(corner)
+            continue
+        r = cut / tan(min(abs(turn), 3.0) / 2.0)
+        side = 1.0 if turn > 0.0 else -1.0
+        start = (corner[0] - cut * cos(heading), corner[1] - cut * sin(heading))
+        center = (start[0] - side * r * sin(heading), start[1] + side * r * cos(heading))
+        steps = max(2, ceil(abs(turn) * r / SPACING_M))
+        for n in range(steps + 1):
+            angle = heading - side * pi / 2 + turn * n / steps
+            rounded.append((center[0] + r * cos(angle), center[1] + r * sin(angle)))
+    rounded.append(points[-1])
+    return rounded
+
+
+def _resampled(points: Sequence[Point], spacing_m: float) -> list[Point]:
+    """The polyline with no segment longer than `spacing_m` and no two points in one place."""
+    out = [points[0]]
+    for a, b in pairwise(points):
+        length = hypot(b[0] - a[0], b[1] - a[1])
+        if length < 1e-9:
+            continue
+        steps = ceil(length / spacing_m)
+        out += [(a[0] + (b[0] - a[0]) * n / steps, a[1] + (b[1] - a[1]) * n / steps) for n in range(1, steps + 1)]
+    return out if len(out) > 1 else [points[0], (points[0][0] + 1e-3, points[0][1])]
+
+
+def _curvatures(points: Sequence[Point]) -> list[float]:
+    """Signed curvature [1/m] at each point from its neighbours half a metre on either side, left > 0."""
+    reach = max(1, round(0.3 / SPACING_M))
+    out = [0.0] * len(points)
+    for i in range(reach, len(points) - reach):
+        a, b, c = points[i - reach], points[i], points[i + reach]
+        turn = wrap(atan2(c[1] - b[1], c[0] - b[0]) - atan2(b[1] - a[1], b[0] - a[0]))
+        length = 0.5 * (hypot(b[0] - a[0], b[1] - a[1]) + hypot(c[0] - b[0], c[1] - b[1]))
+        out[i] = turn / max(length, 1e-6)
+    return out

@@ -1,0 +1,86 @@
+"""From a scan to what stands in the way: points in `map`, and how far a motion is free of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, inf, pi, sin, sqrt
+
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import LaserScan
+
+SIGHT_M = 2.5
+"""Farther points do not matter to a robot that stops within half a metre."""
+STRAIGHT_RADPS = 1e-3
+
+Point = tuple[float, float]
+
+
+class Surroundings:
+    """What the newest scan shows, kept in `map` so that it stays where it is while the robot moves on."""
+
+    def __init__(self) -> None:
+        self._points_map: list[Point] = []
+        self.seen_at: float | None = None
+
+    def scan(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
+        """Take a scan that was made at `pose_map`. Out-of-range and bad readings are no points (REP-117)."""
+        x, y, angle, step = pose_map.x, pose_map.y, pose_map.theta + scan.angle_min, scan.angle_increment
+        low, high = scan.range_min_m, min(SIGHT_M, scan.range_max_m)
+        self._points_map = [
+            (x + r * cos(angle + i * step), y + r * sin(angle + i * step))
+            for i, r in enumerate(scan.ranges_m)
+            if low < r < high
+        ]
+        self.seen_at = now
+
+    def points(self, pose_map: Pose2D, within_m: float = SIGHT_M) -> list[Point]:
+        """The points nearer than `within_m`, in `base_link`."""
+        x, y, c, s = pose_map.x, pose_map.y, cos(pose_map.theta), sin(pose_map.theta)
+        limit = within_m * within_m
+        near = []
+        for px, py in self._points_map:
+            dx, dy = px - x, py - y
+            if dx * dx + dy * dy < limit:
+                near.append((c * dx + s * dy, c * dy - s * dx))
+        return near
+
+
+def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Point]:
+    """`points` less those within `radius_m` of `center`: a team-mate that is known to stand there."""
+    x, y, limit = center[0], center[1], radius_m * radius_m
+    return [p for p in points if (p[0] - x) ** 2 + (p[1] - y) ** 2 > limit]
+
+
+def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> float:
+    """How far [m] a robot of `half_width_m` gets along the arc of `twist` before it meets a point; inf if never.
+
+    Points that already lie within the half width count only when the motion goes towards them.
+    """
+    v, omega = twist.linear_x, twist.angular_z
+    if v == 0.0:
+        return inf
+    sign = 1.0 if v > 0.0 else -1.0
+    if abs(omega) < STRAIGHT_RADPS * abs(v):
+        return min((_straight(sign * x, y, half_width_m) for x, y in points), default=inf)
+    radius = abs(v / omega)
+    left = 1.0 if omega * sign > 0.0 else -1.0
+    return min((_bent(sign * x, left * y, radius, half_width_m) for x, y in points), default=inf)
+
+
+def _straight(x: float, y: float, half_width_m: float) -> float:
+    if x <= 0.0 or abs(y) >= half_width_m:
+        return inf
+    return max(0.0, x - sqrt(half_width_m * half_width_m - y * y))
+
+
+def _bent(x: float, y: float, radius: float, half_width_m: float) -> float:
+    """Forward motion on a left bend about (0, radius); the way until the body's edge meets the point."""
+    from_center = hypot(x, y - radius)
+    if abs(from_center - radius) >= half_width_m:
+        return inf
+    angle = atan2(x, radius - y)
+    if angle <= 0.0:
+        if x <= 0.0 and hypot(x, y) < 2.0 * half_width_m:
+            return inf
+        angle += 2.0 * pi
+    return max(0.0, radius * angle - half_width_m)

@@ -1,0 +1,43 @@
+"""The last function before `cmd_vel`: whatever was decided, what goes out is finite, within the drive's limits, and
+slow enough to stop before what the scan shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+
+from agents.perception import Point, free_along
+from protocol.geometry import STILL, Twist
+from protocol.mission import Limits
+
+SKIN_M = 0.02
+"""Kept between the body and the nearest point when braking."""
+BRAKING_SHARE = 0.8
+"""Of the drive's deceleration, planned with: the rest is for what a 10 Hz scan has not seen yet."""
+
+
+def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, limits: Limits, dt: float) -> Twist:
+    """`wanted` made safe. `points` are in `base_link`; `last` is the command before, `dt` [s] ago."""
+    if not (isfinite(wanted.linear_x) and isfinite(wanted.angular_z)):
+        wanted = STILL
+    v, omega = within(wanted, limits)
+    free_m = free_along(points, Twist(v, omega), radius_m + SKIN_M)
+    v_stop = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * free_m) ** 0.5
+    if abs(v) > v_stop:
+        scale = v_stop / abs(v)
+        v, omega = v * scale, omega * scale
+    return Twist(
+        _near(v, last.linear_x, limits.a_max_mps2 * dt), _near(omega, last.angular_z, limits.alpha_max_radps2 * dt)
+    )
+
+
+def within(twist: Twist, limits: Limits) -> tuple[float, float]:
+    """`twist` scaled into the drive's limits with v/omega kept, so that the path keeps its shape."""
+    v, omega = twist.linear_x, twist.angular_z
+    v_max = limits.v_max_mps if v >= 0.0 else limits.v_reverse_max_mps
+    scale = max(abs(v) / max(v_max, 1e-9), abs(omega) / limits.omega_max_radps, 1.0)
+    return v / scale, omega / scale
+
+
+def _near(value: float, last: float, step: float) -> float:
+    return max(last - step, min(last + step, value))
