@@ -1,0 +1,124 @@
+"""The witness: a voter without a robot. It breaks ties, so that one half of a team can go on and the other cannot."""
+
+from __future__ import annotations
+
+from protocol.effects import Effect, Send
+from protocol.lease import Lease
+from protocol.messages import (
+    NO_TERM,
+    Ask,
+    Header,
+    LeaseNote,
+    Level,
+    Member,
+    Message,
+    MissionNote,
+    Role,
+    Status,
+)
+from protocol.mission import WITNESS_ID, WITNESS_NAME, Mission, robot_id_of
+from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop
+from protocol.timing import timing_of
+from protocol.topics import TO_ALL, alive_key, key
+
+ASK_S = 0.5
+STATUS_S = 1.0
+
+
+class Witness:
+    """A Node around `Lease` with id 0. Without a mission it asks for one."""
+
+    name = WITNESS_NAME
+
+    def __init__(self, fleet: str, incarnation: int, floor: int, mission: Mission | None = None) -> None:
+        self.incarnation = incarnation
+        self.interests = frozenset(
+            {
+                key(fleet, "*", "lease", TO_ALL),
+                key(fleet, "*", "lease", WITNESS_NAME),
+                key(fleet, "*", "mission"),
+                alive_key(fleet, "*", "*"),
+            }
+        )
+        self.finished = False
+        self._fleet = fleet
+        self._floor = floor
+        self._mission = mission
+        self._lease: Lease | None = None
+        self._ask_at = float("-inf")
+        self._status_at = float("-inf")
+        self._seq: dict[str, int] = {}
+
+    def receive(self, received: Received) -> list[Envelope]:
+        now = received.at
+        match received.message:
+            case MissionNote(mission=mission) if self._mission is None:
+                self._mission = mission
+                return self._carry_out(self._lease_at(now, mission).tick(now), now)
+            case LeaseNote(header=header, body=body) if self._lease is not None:
+                sender = robot_id_of(header.sender)
+                if sender is None:
+                    return []
+                return self._carry_out(self._lease.receive(Member(sender, header.incarnation), body, now), now)
+            case PeerUp(name=name, incarnation=incarnation):
+                return self._hint(name, incarnation, True, now)
+            case PeerDown(name=name, incarnation=incarnation):
+                return self._hint(name, incarnation, False, now)
+            case Stop():
+                return self._stop(now)
+        return []
+
+    def tick(self, now: float) -> list[Envelope]:
+        if self._lease is None and self._mission is not None:
+            self._lease_at(now, self._mission)
+        envelopes: list[Envelope] = []
+        if self._lease is None:
+            if now >= self._ask_at:
+                self._ask_at = now + ASK_S
+                envelopes.append(self._envelope("ask", Ask(self._header("ask", now), "mission")))
+        else:
+            envelopes += self._carry_out(self._lease.tick(now), now)
+        if now >= self._status_at:
+            self._status_at = now + STATUS_S
+            envelopes.append(self._envelope("status", self._status(now)))
+        return envelopes
+
+    def next_deadline(self) -> float:
+        return min(self._status_at, self._ask_at if self._lease is None else self._lease.next_deadline())
+
+    def _lease_at(self, now: float, mission: Mission) -> Lease:
+        me = Member(WITNESS_ID, self.incarnation)
+        self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor)
+        return self._lease
+
+    def _hint(self, name: str, incarnation: int, up: bool, now: float) -> list[Envelope]:
+        robot_id = robot_id_of(name)
+        if self._lease is None or robot_id is None or robot_id == WITNESS_ID:
+            return []
+        return self._carry_out(self._lease.hint(robot_id, incarnation, up, now), now)
+
+    def _stop(self, now: float) -> list[Envelope]:
+        self.finished = True
+        return [] if self._lease is None else self._carry_out(self._lease.request_release(now), now)
+
+    def _carry_out(self, effects: list[Effect], now: float) -> list[Envelope]:
+        return [
+            self._envelope("lease", LeaseNote(self._header("lease", now), effect.body), effect.to)
+            for effect in effects
+            if isinstance(effect, Send)
+        ]
+
+    def _status(self, now: float) -> Status:
+        header = self._header("status", now)
+        if self._lease is None:
+            return Status(header, Level.WARN, "waiting for a mission", Role.WAITING, NO_TERM, {})
+        text = "no leader" if self._lease.leader is None else f"robot{self._lease.leader} leads"
+        return Status(header, Level.OK, text, Role.WAITING, self._lease.term, {})
+
+    def _header(self, topic: str, now: float) -> Header:
+        number = self._seq.get(topic, 0)
+        self._seq[topic] = number + 1
+        return Header(WITNESS_NAME, self.incarnation, number, now)
+
+    def _envelope(self, topic: str, message: Message, to: str | None = None) -> Envelope:
+        return Envelope(key(self._fleet, WITNESS_NAME, topic, to), message)
