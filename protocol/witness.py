@@ -41,6 +41,7 @@ class Witness:
             }
         )
         self.finished = False
+        self.refusal: str | None = None
         self._fleet = fleet
         self._floor = floor
         self._mission = mission

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from agents.agent import Agent
+from agents.agent import Agent
 from deploy.run.ending import Ended, Interrupts, finish, report
 from deploy.run.faults import Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
@@ -17,9 +19,11 @@ from deploy.run.record import Recorder
 from deploy.run.referee import Referee, Verdict
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import Message
-from protocol.mission import WITNESS_ID, robot_name
+from protocol.mission import robot_name
 from protocol.node import Node
 from protocol.topics import WORLD_NAME
+from protocol.witness import Witness
+from protocol.witness import Witness
 from world.scenario import Scenario, draw, load
 from world.simulator import Simulator
 from world.world import World
@@ -78,13 +82,12 @@ class _Run:
 
     def play(self, schedule: Schedule, interrupts: Interrupts) -> Verdict:
         """Start the team, run until it is over, close the recording and the journals."""
-        ids = self._scenario.mission.robots
         self._say("start", scenario=self._scenario.name, seed=self._seed)
         self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
         if self._scenario.mission.witness:
-            self._add(self._agent(WITNESS_ID, "witness"))
+            self._add(self._agent(WITNESS_ID))
         for robot_id in ids:
-            self._add(self._agent(robot_id, "leader" if robot_id == ids[0] else "follower"))
+            self._add(self._agent(robot_id))
         self._flush()
         verdict = self._until_over(schedule, interrupts)
         self.faults_left = [str(fault) for fault in schedule.pending]
@@ -125,7 +128,7 @@ class _Run:
             case "terminate":
                 self._simulator.terminate(name)
             case "restart":
-                self._add(self._agent(victim, "follower"))
+                self._add(self._agent(victim))
 
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
         self._recorder.record(now, key, message)
@@ -141,8 +144,9 @@ class _Run:
         self._journals[f"{node.name}-{node.incarnation}"] = journal
         self._simulator.add(node, journal)
 
-    def _agent(self, robot_id: int, role: str) -> Node:
-        raise NotImplementedError
+    def _agent(self, robot_id: int) -> Node:
+        life = self._next_life(robot_name(robot_id))
+        return Witness(FLEET, life, life) if robot_id == WITNESS_ID else Agent(robot_id, life, FLEET, life)
 
     def _next_life(self, name: str) -> int:
         self._lives[name] = self._lives.get(name, 0) + 1
