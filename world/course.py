@@ -89,7 +89,7 @@ def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
         if gap_to(place, replace(obstacle, center_m=center_m)) < radius_m:
             raise Refused(f"world.obstacles[{index}] = at {list(center_m)}: must be clear of {whose}")
     for index, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
-        if _to_segment(place, (x1, y1), (x2, y2)) < radius_m:
+        if to_segment(place, (x1, y1), (x2, y2)) < radius_m:
             raise Refused(f"world.walls_m[{index}] = {[x1, y1, x2, y2]}: must be clear of {whose}")
 
 
@@ -144,7 +144,7 @@ def _draw_start(
         dx, dy = _in_disc(within_m, chance)
         drawn = Pose2D(pose.x + dx, pose.y + dy, pose.theta + chance.uniform(-within_rad, within_rad))
         free = all(hypot(drawn.x - other.x, drawn.y - other.y) > 2.0 * radius_m for other in placed)
-        if free and all(_to_segment((drawn.x, drawn.y), w[:2], w[2:]) > radius_m for w in scenario.world.walls_m):
+        if free and all(to_segment((drawn.x, drawn.y), w[:2], w[2:]) > radius_m for w in scenario.world.walls_m):
             return drawn
     return pose
 
@@ -162,7 +162,7 @@ def gap_to(place: Point, obstacle: Obstacle) -> float:
     assert obstacle.corners_m is not None, obstacle
     ring = (*obstacle.corners_m, obstacle.corners_m[0])
     inside = all((bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0 for (ax, ay), (bx, by) in pairwise(ring))
-    return 0.0 if inside else min(_to_segment((x, y), a, b) for a, b in pairwise(ring))
+    return 0.0 if inside else min(to_segment((x, y), a, b) for a, b in pairwise(ring))
 
 
 def reach_of(obstacle: Obstacle) -> float:
@@ -177,10 +177,11 @@ def _swept_gap(place: Point, obstacle: Obstacle) -> float:
     if not obstacle.waypoints_m:
         return gap_to(place, obstacle)
     legs = pairwise((obstacle.center_m, *obstacle.waypoints_m))
-    return min(_to_segment(place, a, b) for a, b in legs if a != b) - reach_of(obstacle)
+    return min(to_segment(place, a, b) for a, b in legs if a != b) - reach_of(obstacle)
 
 
-def _to_segment(p: Point, a: Point, b: Point) -> float:
+def to_segment(p: Point, a: Point, b: Point) -> float:
+    """Distance [m] from `p` to the nearest point between `a` and `b`."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     along = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)
     along = min(1.0, max(0.0, along))
