@@ -166,8 +166,14 @@ def _alive(own: Sequence[Line]) -> bool:
 
 
 def _obstacles_met(own: Sequence[Line]) -> dict[str, int]:
+    """Encounters by class: from a decision to the `resume` that ends it is one, whatever is decided in between."""
     met = dict.fromkeys(OBSTACLE_CLASSES, 0)
+    busy: set[str] = set()
     for line in chronicle.of_kind(own, "decision"):
-        if line.get("class") in met:
-            met[line["class"]] += 1
+        kind = str(line.get("class"))
+        if line.get("action") == "resume":
+            busy.clear()
+        elif kind not in busy:
+            busy.add(kind)
+            met[kind] = met.get(kind, 0) + 1
     return met

@@ -15,11 +15,12 @@ from mcap.writer import CompressionType, Writer
 from deploy.run import channels
 from protocol.messages import Event, Message
 from protocol.mission import robot_id_of
-from protocol.topics import OPERATOR_NAME, WORLD_NAME, address
+from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
 
 RECORDING = "recording.mcap"
 EVENTS = "events.jsonl"
 FLUSH_S = 1.0  # what a SIGKILL of the recorder may cost
+ONLOOKERS = (WORLD_NAME, OPERATOR_NAME, RECORDER_NAME)
 CHUNK_BYTES_MAX = 4 * 1024 * 1024
 
 _line_encoder = msgspec.json.Encoder(order="deterministic")
@@ -49,13 +50,13 @@ class Recorder:
         self._writer.add_message(channel, stamp_ns, channels.encode(message), stamp_ns, message.header.seq)
         if isinstance(message, Event):
             self._events.write(event_line(t, message))
-        if t >= self._flushed_at + FLUSH_S:
-            self.flush(t)
+        self.flush_when_due(t)
 
-    def flush(self, t: float) -> None:
-        """Close the current chunk, so that all up to now can be read even if this process dies."""
-        self._flushed_at = t
-        self._writer.flush()  # type: ignore[no-untyped-call]
+    def flush_when_due(self, t: float) -> None:
+        """Close the chunk every second, so that all before can be read even if this process dies."""
+        if t >= self._flushed_at + FLUSH_S:
+            self._flushed_at = t
+            self._writer.flush()  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
         self._writer.finish()  # type: ignore[no-untyped-call]
@@ -74,11 +75,11 @@ class Recorder:
 def event_line(t: float, event: Event) -> bytes:
     """One line of events.jsonl: when [s], about which robot, in which term, what, who says it, and its data.
 
-    World and operator speak about others, and know when: they say `robot` and `t` themselves.
+    World, operator and recorder speak about others, and may know when: they say `robot` and `t` themselves.
     """
     data = channels.plain(event.data)
     sender = event.header.sender
-    said = data if sender in (WORLD_NAME, OPERATOR_NAME) else {}
+    said = data if sender in ONLOOKERS else {}
     head = {
         "t": round(said.get("t", t), 6),
         "robot": said.get("robot", robot_id_of(sender)),
@@ -89,9 +90,3 @@ def event_line(t: float, event: Event) -> bytes:
     rest = {name: value for name, value in data.items() if name not in head}
     tail = b"," + _line_encoder.encode(rest)[1:] if rest else b"}"
     return msgspec.json.encode(head)[:-1] + tail + b"\n"
-
-
-def recorded(key: str) -> bool:
-    """True for keys that belong in a recording: ours, and not liveliness."""
-    where = address(key)
-    return where is not None and where.topic != "alive"

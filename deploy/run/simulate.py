@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from agents.agent import Agent
-from agents.agent import Agent
 from deploy.run.ending import Ended, Interrupts, finish, report
 from deploy.run.faults import Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
@@ -22,7 +21,6 @@ from protocol.messages import Message
 from protocol.mission import robot_name
 from protocol.node import Node
 from protocol.topics import WORLD_NAME
-from protocol.witness import Witness
 from protocol.witness import Witness
 from world.scenario import Scenario, draw, load
 from world.simulator import Simulator
@@ -85,8 +83,8 @@ class _Run:
         self._say("start", scenario=self._scenario.name, seed=self._seed)
         self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
         if self._scenario.mission.witness:
-            self._add(self._agent(WITNESS_ID))
-        for robot_id in ids:
+            self._add(Witness(FLEET, 1, 1))
+        for robot_id in self._scenario.mission.robots:
             self._add(self._agent(robot_id))
         self._flush()
         verdict = self._until_over(schedule, interrupts)
@@ -144,9 +142,9 @@ class _Run:
         self._journals[f"{node.name}-{node.incarnation}"] = journal
         self._simulator.add(node, journal)
 
-    def _agent(self, robot_id: int) -> Node:
+    def _agent(self, robot_id: int) -> Agent:
         life = self._next_life(robot_name(robot_id))
-        return Witness(FLEET, life, life) if robot_id == WITNESS_ID else Agent(robot_id, life, FLEET, life)
+        return Agent(robot_id, life, FLEET, life)
 
     def _next_life(self, name: str) -> int:
         self._lives[name] = self._lives.get(name, 0) + 1

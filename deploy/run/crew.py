@@ -1,0 +1,126 @@
+"""The processes of one run: a table, started in order, watched, and ended whatever happens."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from msgspec import Struct
+
+from deploy.run import processes
+from deploy.run.folder import JOURNALS, LOGS, SCENARIO, About
+from deploy.run.processes import Identity
+from protocol import clock
+from protocol.mission import Mission, robot_name
+from protocol.topics import RECORDER_NAME, WORLD_NAME
+
+ROUTER_NAME = "router"
+GRACE_S = 2.0  # between SIGTERM and SIGKILL
+POLL_S = 0.01
+
+
+class Row(Struct, frozen=True):
+    """One process: what it is called, and `python -m` what."""
+
+    name: str
+    arguments: tuple[str, ...]
+    outlives_launcher: bool = False
+    """It hears of the launcher's death, wakes up if it was stopped, and ends by itself."""
+
+
+def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
+    """The table of processes of a run, in the order in which they are started."""
+    team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS))
+    world = ("world.cli", str(folder / SCENARIO), "--seed", str(about.seed), *team)
+    return [
+        Row(ROUTER_NAME, ("deploy.fleet.router", "--listen", endpoint)),
+        Row(RECORDER_NAME, ("deploy.run.recorder", recorder_task), outlives_launcher=True),
+        Row(WORLD_NAME, world),
+        *(agent_row(robot_id, "leader" if robot_id == mission.robots[0] else "follower", team)
+          for robot_id in mission.robots),
+    ]  # fmt: skip
+
+
+def agent_row(robot_id: int, role: str, team: tuple[str, ...]) -> Row:
+    return Row(robot_name(robot_id), ("agents.cli", "--role", role, "--id", str(robot_id), *team))
+
+
+class Crew:
+    """Those that were started; each has its log. All calls come from the main thread."""
+
+    def __init__(self, folder: Path) -> None:
+        self._logs = folder / LOGS
+        self._logs.mkdir()
+        self._children: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, row: Row) -> None:
+        """Raises OSError when no process can be made."""
+        death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
+        stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
+        with (self._logs / f"{row.name}.log").open("ab") as log:
+            self._children[row.name] = processes.start(row.arguments, log, death, stdin)
+
+    def runs(self, name: str) -> bool:
+        child = self._children.get(name)
+        return child is not None and child.poll() is None
+
+    def exit_of(self, name: str) -> str | None:
+        """How `name` ended, in words; None while it runs."""
+        code = self._children[name].poll()
+        if code is None:
+            return None
+        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        last_line = self._last_line(name)
+        return f"{name} ended ({how})" + (f": {last_line}" if code > 0 and last_line else "")
+
+    def signal(self, name: str, number: signal.Signals) -> bool:
+        """Signal `name`, checked to be still the process that was started; False when it has gone."""
+        identity = self._identity(name)
+        return identity is not None and processes.send(identity, number)
+
+    def tell(self, name: str, line: bytes) -> None:
+        """Write a line to the standard input of `name` and close it; one that has gone hears nothing."""
+        stdin = self._children[name].stdin
+        if stdin is None or stdin.closed:
+            return
+        try:
+            stdin.write(line + b"\n")
+            stdin.close()
+        except BrokenPipeError:
+            pass
+
+    def end(self, names: Sequence[str], grace_s: float = GRACE_S) -> None:
+        """SIGTERM to all of them, SIGKILL to what is left after the grace; stopped ones are woken for it."""
+        for name in names:
+            self.signal(name, signal.SIGTERM)
+            self.signal(name, signal.SIGCONT)
+        self.wait(names, grace_s)
+        for name in names:
+            if self.runs(name):
+                self._children[name].kill()
+        self.wait(names, grace_s)
+
+    def wait(self, names: Sequence[str], timeout_s: float) -> bool:
+        """True as soon as all of them have ended."""
+        until = clock.now() + timeout_s
+        while any(self.runs(name) for name in names):
+            if clock.now() > until:
+                return False
+            clock.sleep(POLL_S)
+        return True
+
+    def kill_all(self) -> None:
+        """The last resort, for errors of our own."""
+        for child in self._children.values():
+            child.kill()
+            child.wait()
+
+    def _identity(self, name: str) -> Identity | None:
+        """A child that has not been waited for keeps its pid: this is who it is now."""
+        return processes.identify(self._children[name].pid) if self.runs(name) else None
+
+    def _last_line(self, name: str) -> str:
+        lines = (self._logs / f"{name}.log").read_text(errors="replace").strip().splitlines()
+        return lines[-1] if lines else ""

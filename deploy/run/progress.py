@@ -1,0 +1,77 @@
+"""Live progress: a table that is redrawn on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Protocol
+
+from deploy.run.standing import Standing
+
+if TYPE_CHECKING:
+    from rich.live import Live
+    from rich.table import Table
+
+LINE_EVERY_S = 5.0
+REDRAW_HZ = 5.0
+
+
+class Progress(Protocol):
+    """Where a person looks while a run goes on. It goes to stderr: stdout is for what comes out at the end."""
+
+    def show(self, standing: Standing, leader: int | None) -> None: ...
+
+    def note(self, standing: Standing, text: str) -> None:
+        """Something happened."""
+
+    def close(self) -> None: ...
+
+
+def progress() -> Progress:
+    return _OnTerminal() if sys.stderr.isatty() else _InLines()
+
+
+class _InLines:
+    def __init__(self) -> None:
+        self._next_s = 0.0
+        self._leader: int | None = None
+
+    def show(self, standing: Standing, leader: int | None) -> None:
+        if standing.time_s >= self._next_s or leader != self._leader:
+            self._next_s = standing.time_s + LINE_EVERY_S
+            self._leader = leader
+            print(standing.line(leader), file=sys.stderr, flush=True)
+
+    def note(self, standing: Standing, text: str) -> None:
+        print(f"{standing.time_s:7.1f} s  {text}", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        pass
+
+
+class _OnTerminal:
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        self._live: Live = Live(console=Console(stderr=True), refresh_per_second=REDRAW_HZ)
+        self._live.start()
+
+    def show(self, standing: Standing, leader: int | None) -> None:
+        self._live.update(_table(standing, leader))
+
+    def note(self, standing: Standing, text: str) -> None:
+        self._live.console.print(f"{standing.time_s:7.1f} s  {text}", highlight=False)
+
+    def close(self) -> None:
+        self._live.stop()
+
+
+def _table(standing: Standing, leader: int | None) -> Table:
+    from rich.table import Table
+
+    table = Table(title=standing.headline(leader), title_justify="left", box=None, padding=(0, 2))
+    for heading in ("", "role", "distance error", "state"):
+        table.add_column(heading, justify="right" if heading == "distance error" else "left")
+    for row in standing.rows():
+        table.add_row(*row)
+    return table

@@ -1,0 +1,142 @@
+"""The recorder process: hears everything of one fleet, writes it down, and closes the run folder whoever dies.
+
+The launcher holds the other end of its standard input. One line of JSON there is the verdict; an end of file without
+one means that the launcher died: then the run is called aborted, and what the launcher would have cleaned up is
+cleaned up here. Start: `python -m deploy.run.recorder TASK`, with a `Task` as JSON.
+"""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import sys
+import threading
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from deploy.run.ending import finish
+from deploy.run.folder import About
+from deploy.run.operator import Operator
+from deploy.run.record import Recorder
+from deploy.run.referee import Verdict
+from deploy.run.worldtime import WorldTime
+from protocol import clock
+from protocol.bus import Arrival, Inbox
+from protocol.messages import BadMessage, Event, Header, Message, Truth, decode
+from protocol.mission import robot_id_of
+from protocol.node import PeerDown, PeerUp
+from protocol.topics import RECORDER_NAME, TOPIC, address, alive_key, key
+from protocol.zenoh_bus import ZenohBus
+
+INBOX_SIZE_MAX = 65536  # a minute of a fleet of four, should the disk be slow
+WAIT_S = 0.05
+LAST_WORDS_S = 0.2  # what is still on its way when the verdict comes
+
+
+class Task(Struct, frozen=True):
+    """What to record, where to, and which folder of sockets goes when the launcher cannot remove it."""
+
+    folder: str
+    about: About
+    endpoint: str
+    sockets: str
+
+
+class LastWord(Struct, frozen=True):
+    """The verdict, as the launcher sends it."""
+
+    verdict: Verdict
+    duration_s: float
+    faults_left: tuple[str, ...]
+
+
+def main() -> None:
+    task = msgspec.json.decode(sys.argv[1], type=Task)
+    told = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: told.set())
+    word: list[LastWord] = []
+    threading.Thread(target=_listen, args=(word, told), daemon=True).start()
+    tape = _Tape(task)
+    begun = clock.now()
+    while not told.wait(WAIT_S):
+        tape.wind()
+    if word:
+        clock.sleep(LAST_WORDS_S)
+    tape.wind()
+    last = word[0] if word else LastWord(Verdict("aborted", "the launcher died"), clock.now() - begun, ())
+    tape.close(last.verdict)
+    finish(Path(task.folder), task.about, last.verdict, last.duration_s, last.faults_left, None)
+    if not word:
+        shutil.rmtree(task.sockets, ignore_errors=True)
+
+
+def _listen(word: list[LastWord], told: threading.Event) -> None:
+    """Wait for the launcher's line, or for its end."""
+    line = sys.stdin.buffer.readline()
+    if line.endswith(b"\n"):
+        word.append(msgspec.json.decode(line, type=LastWord))
+    told.set()
+
+
+class _Tape:
+    """The bus on one side, the recorder on the other."""
+
+    def __init__(self, task: Task) -> None:
+        fleet = task.about.fleet
+        self._inbox = Inbox(size_max=INBOX_SIZE_MAX, every=True)
+        self._incarnation = clock.wall_ms()
+        self._key = key(fleet, RECORDER_NAME, "event")
+        self._seq = 0
+        self._time = WorldTime()
+        self._operator = Operator(fleet, self._incarnation)
+        self._recorder = Recorder(Path(task.folder), task.about.metadata())
+        self._bus = ZenohBus(task.endpoint, self._inbox)
+        self._bus.follow(frozenset({f"lfa/{fleet}/**", alive_key(fleet, "*", "*")}))
+        self._bus.announce(fleet, RECORDER_NAME, self._incarnation)
+
+    def wind(self) -> None:
+        """Write down all that came."""
+        for arrival in self._inbox.take():
+            heard = self._heard(arrival)
+            if heard is None:
+                continue
+            where, message = heard
+            if isinstance(message, Truth):
+                self._time.see(arrival.at, message.time_s)
+            self._recorder.record(self._time.of(arrival.at), where, message)
+        self._recorder.flush_when_due(self._time.of(clock.now()))
+
+    def close(self, verdict: Verdict) -> None:
+        now = clock.now()
+        end = self._operator.says("end", now, outcome=verdict.outcome, reason=verdict.reason)
+        self._recorder.record(self._time.of(now), self._operator.key, end)
+        self._recorder.close()
+        self._bus.close()
+
+    def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
+        """Key and message to be recorded; a liveliness change is an event of the recorder's own."""
+        match arrival.payload:
+            case PeerUp(name=name, incarnation=life):
+                return self._key, self._says("peer_up", name, life)
+            case PeerDown(name=name, incarnation=life):
+                return self._key, self._says("peer_down", name, life)
+            case bytes() as payload:
+                where = address(arrival.key)
+                topic = TOPIC.get(where.topic) if where is not None else None
+                try:
+                    return (arrival.key, decode(payload, topic.type)) if topic is not None else None
+                except BadMessage:
+                    return None
+        return None
+
+    def _says(self, kind: str, name: str, life: int) -> Event:
+        self._seq += 1
+        header = Header(RECORDER_NAME, self._incarnation, self._seq, clock.now())
+        return Event(header, kind, None, {"robot": robot_id_of(name), "name": name, "incarnation": life})
+
+
+if __name__ == "__main__":
+    main()
