@@ -8,7 +8,7 @@ from __future__ import annotations
 from protocol.holder import Holder
 from protocol.membership import seat
 from protocol.messages import Config, Member, Term
-from protocol.quorum import is_quorum
+from protocol.quorum import electors, is_quorum
 from protocol.timing import Timing
 
 PAUSE_GROWTH = 1.5
@@ -21,6 +21,7 @@ class Candidate:
         self.holder: Holder | None = None
         """Set once the first PROPOSE has left: the term as it is being granted."""
         self._promised: set[Member] = set()
+        self._refused: set[Member] = set()
         self._pause_s = 2.0 * timing.rank_step_s
         self._pause_s_max = 2.0 * timing.heartbeat_s
 
@@ -39,6 +40,16 @@ class Candidate:
 
     def promised(self, src: Member) -> None:
         self._promised.add(seat(src.id))
+
+    def refused(self, src: Member, config: Config) -> bool:
+        """`src` has promised a higher term; answers whether this one is beaten.
+
+        While it only asks, at once: a higher term of its own costs nothing. Once grants are on their way, only
+        when no quorum is left: a late refusal by one voter must not undo an election that the others have made.
+        """
+        self._refused.add(seat(src.id))
+        left = [m for m in electors(config) if m not in self._refused]
+        return self.holder is None or not is_quorum(config, left)
 
     def has_quorum(self, config: Config) -> bool:
         return is_quorum(config, self._promised)

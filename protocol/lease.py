@@ -133,7 +133,7 @@ class Lease:
             case Promise():
                 self._on_promise(src, body, now, effects)
             case Nack():
-                self._on_nack(body, now, effects)
+                self._on_nack(src, body, now, effects)
             case Release():
                 self._on_release(body, now, effects)
             case Hello():
@@ -351,14 +351,15 @@ class Lease:
             self._acceptor.release(candidate.term)
             effects.append(Send("all", Release(candidate.term)))
 
-    def _on_nack(self, body: Nack, now: float, effects: list[Effect]) -> None:
+    def _on_nack(self, src: Member, body: Nack, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.promised, body.config.version.term)
         candidate, holder = self._candidate, self._holder
         newer = body.config.version > self.config.version
         if candidate is not None and body.term == candidate.term:
             if newer:
                 self._adopt(body.config, effects)
-            if body.promised > candidate.term or (newer and candidate.holder is not None):
+            beaten = candidate.refused(src, self.config) if body.promised > candidate.term else False
+            if beaten or (newer and candidate.holder is not None):
                 self._drop_candidate(now, effects)
                 self._elect_after(now + self._timing.rank_step_s)
             elif newer:
