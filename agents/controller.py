@@ -83,11 +83,12 @@ class Law:
     def __init__(self, gains: Gains, limits: Limits) -> None:
         self._gains = gains
         self._omega_max = limits.omega_max_radps
-        self._psi = 0.0
+        self.heading = 0.0
+        """psi_d, the desired heading: a filter's state, so its rate is known without anybody's acceleration."""
         self._direction = 1
 
     def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
-        self._psi = own_pose.theta
+        self.heading = own_pose.theta
         self._direction = 1
 
     def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
@@ -95,10 +96,10 @@ class Law:
         sigma = reference.direction
         theta = own_pose.theta
         if sigma != self._direction:
-            self._direction, self._psi = sigma, theta
-        psi = self._psi
+            self._direction, self.heading = sigma, theta
+        psi = self.heading
         psi_rate = self._turn(reference, psi)
-        self._psi = wrap(psi + psi_rate * dt)
+        self.heading = wrap(psi + psi_rate * dt)
 
         # Steps 5 and 6: the look-ahead point's target, its velocity, and feedback of at most m.
         reach = sigma * gains.b_m
