@@ -29,6 +29,10 @@ class Row(Struct, frozen=True):
     outlives_launcher: bool = False
     """It hears of the launcher's death, wakes up if it was stopped, and ends by itself."""
 
+    def restarted(self) -> Row:
+        """An agent that starts again starts as a follower; the others tell it the rest."""
+        return Row(self.name, tuple("follower" if word == "leader" else word for word in self.arguments))
+
 
 def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
     """The table of processes of a run, in the order in which they are started."""
@@ -38,13 +42,13 @@ def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_t
         Row(ROUTER_NAME, ("deploy.fleet.router", "--listen", endpoint)),
         Row(RECORDER_NAME, ("deploy.run.recorder", recorder_task), outlives_launcher=True),
         Row(WORLD_NAME, world),
-        *(agent_row(robot_id, "leader" if robot_id == mission.robots[0] else "follower", team)
-          for robot_id in mission.robots),
+        *(Row(robot_name(i), ("agents.cli", "--role", _role(i, mission), "--id", str(i), *team))
+          for i in mission.robots),
     ]  # fmt: skip
 
 
-def agent_row(robot_id: int, role: str, team: tuple[str, ...]) -> Row:
-    return Row(robot_name(robot_id), ("agents.cli", "--role", role, "--id", str(robot_id), *team))
+def _role(robot_id: int, mission: Mission) -> str:
+    return "leader" if robot_id == mission.robots[0] else "follower"
 
 
 class Crew:
@@ -66,9 +70,13 @@ class Crew:
         child = self._children.get(name)
         return child is not None and child.poll() is None
 
+    def succeeded(self, name: str) -> bool:
+        return self._children[name].poll() == 0
+
     def exit_of(self, name: str) -> str | None:
-        """How `name` ended, in words; None while it runs."""
-        code = self._children[name].poll()
+        """How `name` ended, in words; None while it runs, and before it was started."""
+        child = self._children.get(name)
+        code = None if child is None else child.poll()
         if code is None:
             return None
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"

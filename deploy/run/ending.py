@@ -33,6 +33,11 @@ class Ended(Struct, frozen=True):
         return self.summary.exit_code if self.signal is None else 128 + self.signal
 
 
+def reread(folder: Path, ended_by: signal.Signals | None) -> Ended:
+    """A run whose summary somebody else has written."""
+    return Ended(folder, summaries.read(folder), ended_by)
+
+
 class Interrupts:
     """While this is open, Ctrl-C and SIGTERM are noted in `signal` instead of ending the process; `count` of them."""
 

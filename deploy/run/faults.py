@@ -7,6 +7,7 @@ of virtual time, is the business of whoever runs the fleet.
 from __future__ import annotations
 
 import re
+import signal
 from collections.abc import Sequence
 from typing import Literal, cast
 
@@ -24,6 +25,13 @@ DEEDS: dict[str, str] = {
     "terminate": "SIGTERM: leaves in good order",
     "restart":   "starts again after a kill or terminate, with a new incarnation",
 }  # fmt: skip
+
+SIGNALS: dict[str, signal.Signals] = {
+    "kill": signal.SIGKILL,
+    "stop": signal.SIGSTOP,
+    "continue": signal.SIGCONT,
+    "terminate": signal.SIGTERM,
+}
 
 LEADER = "leader"
 RIGHT = "'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' (kill, stop, continue, terminate, restart)"

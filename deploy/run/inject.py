@@ -1,0 +1,140 @@
+"""`lfa fault`: do something to a robot of a fleet that runs on this machine, however it was started.
+
+Agents are found in the process table by what they were told (`--id`, `--fleet`); the signal goes only to exactly the
+process that was found: same pid, start time, user and command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import msgspec
+import typer
+from msgspec import Struct
+
+from deploy.run import processes
+from deploy.run.faults import DEEDS, LEADER, SIGNALS
+from deploy.run.operator import Operator
+from deploy.run.processes import Identity
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.messages import BadMessage, PoseStamped, Role, decode, encode
+from protocol.mission import Refused, robot_id_of
+from protocol.topics import key
+from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
+
+LISTEN_S = 1.0  # 50 poses of a leader
+SENT_S = 0.05  # the word about a fault leaves before the fault
+
+
+class Running(Struct, frozen=True):
+    """One agent's process."""
+
+    robot: int
+    fleet: str
+    endpoint: str
+    identity: Identity
+
+
+def command(
+    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(SIGNALS)}.")],
+    target: Annotated[str, typer.Argument(help="A robot's id, or leader.")],
+    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was done as JSON.")] = False,
+) -> int:
+    if deed not in SIGNALS:
+        raise Refused(f"{deed!r}: must be one of {', '.join(SIGNALS)}")
+    team = _one_fleet(agents(), fleet)
+    inbox = Inbox()
+    bus = _bus(team[0], inbox)
+    try:
+        victim = _victim(target, team, bus, inbox)
+        operator = Operator(victim.fleet, clock.wall_ms())
+        event = operator.says("fault", clock.now(), deed=deed, robot=victim.robot)
+        bus.publish(operator.key, encode(event))
+        clock.sleep(SENT_S)
+        done = processes.send(victim.identity, SIGNALS[deed])
+    finally:
+        bus.close()
+    if not done:
+        raise Refused(f"robot {victim.robot}: its process {victim.identity.pid} has gone in the meantime")
+    facts = {"deed": deed, "robot": victim.robot, "fleet": victim.fleet, "pid": victim.identity.pid}
+    said = f"{deed} robot {victim.robot} of {victim.fleet} (process {victim.identity.pid}): {DEEDS[deed]}"
+    print(msgspec.json.encode(facts).decode() if as_json else said)
+    return 0
+
+
+def agents() -> list[Running]:
+    """The agents of this user that run on this machine."""
+    found = (_agent(identity) for identity in processes.own_processes())
+    return [agent for agent in found if agent is not None]
+
+
+def _agent(identity: Identity) -> Running | None:
+    words = identity.arguments
+    names = {word.rpartition("/")[2] for word in words[:3]}
+    if not names & {"agents.cli", "lfa-agent"}:
+        return None
+    robot = _option(words, "--id", "")
+    if not robot.isdecimal():
+        return None
+    endpoint = _option(words, "--connect", default_endpoint())
+    return Running(int(robot), _option(words, "--fleet", "fleet"), endpoint, identity)
+
+
+def _option(words: Sequence[str], name: str, default: str) -> str:
+    """The value of `--name value` or `--name=value`."""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == name:
+            return following
+        if word.startswith(f"{name}="):
+            return word.partition("=")[2]
+    return default
+
+
+def _one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
+    fleets = sorted({agent.fleet for agent in running})
+    if not fleets:
+        raise Refused("no agent of yours runs on this machine: start one with lfa run, or lfa-agent")
+    if fleet is None and len(fleets) > 1:
+        raise Refused(f"several fleets run here: say --fleet {' or --fleet '.join(fleets)}")
+    if fleet is not None and fleet not in fleets:
+        raise Refused(f"--fleet {fleet}: no such fleet here, must be one of {', '.join(fleets)}")
+    return [agent for agent in running if agent.fleet == (fleet or fleets[0])]
+
+
+def _victim(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> Running:
+    digits = target.removeprefix("robot")
+    robot = _leader(team[0].fleet, bus, inbox) if target == LEADER else int(digits) if digits.isdecimal() else None
+    if robot is None and target == LEADER:
+        raise Refused(f"fleet {team[0].fleet} has no leader at the moment")
+    victim = next((agent for agent in team if agent.robot == robot), None)
+    if victim is None:
+        ids = ", ".join(str(agent.robot) for agent in team)
+        raise Refused(f"robot {target!r}: not here, must be 'leader' or one of {ids}")
+    return victim
+
+
+def _leader(fleet: str, bus: ZenohBus, inbox: Inbox) -> int | None:
+    """Whoever calls itself leader in the highest term, listening for a second."""
+    bus.follow(frozenset({key(fleet, "*", "pose")}))
+    clock.sleep(LISTEN_S)
+    leaders = []
+    for arrival in inbox.take():
+        if not isinstance(arrival.payload, bytes):
+            continue
+        try:
+            pose = decode(arrival.payload, PoseStamped)
+        except BadMessage:
+            continue
+        if isinstance(pose, PoseStamped) and pose.role is Role.LEADER:
+            leaders.append((pose.term, robot_id_of(pose.header.sender)))
+    return max(leaders)[1] if leaders else None
+
+
+def _bus(agent: Running, inbox: Inbox) -> ZenohBus:
+    try:
+        return ZenohBus(agent.endpoint, inbox)
+    except RouterAbsent:
+        raise Refused(f"no router answers at {agent.endpoint}, where robot {agent.robot} looks for it") from None

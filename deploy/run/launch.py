@@ -1,0 +1,254 @@
+"""`lfa run`: router, recorder, world and agents as processes of this machine, from start to verdict to nothing left.
+
+The launcher starts them, watches the bus as an onlooker, does the faults, and ends them all. Should it be killed
+itself, the kernel ends router, world and agents (`tether.py`), and the recorder closes the run folder.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from deploy.run.crew import ROUTER_NAME, Crew, rows
+from deploy.run.ending import Ended, Interrupts, finish, report, reread
+from deploy.run.faults import SIGNALS, Deed, Fault, Schedule, parse_all
+from deploy.run.folder import About, make
+from deploy.run.operator import Operator
+from deploy.run.progress import Progress, progress
+from deploy.run.recorder import LastWord, Task
+from deploy.run.referee import Referee, Verdict
+from deploy.run.standing import Standing
+from deploy.run.worldtime import WorldTime
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.messages import BadMessage, Event, Message, Truth, decode, encode
+from protocol.mission import robot_name
+from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
+from protocol.zenoh_bus import ZenohBus, answers
+from world.scenario import Scenario, draw, load
+
+STEP_S = 0.01
+SHOW_EVERY_S = 0.2
+START_S_MAX = 20.0
+SILENCE_S_MAX = 5.0
+RECORDER_S_MAX = 30.0  # to read the recording back and sum it up
+
+
+def command(
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")],
+    seed: Annotated[int, typer.Option(help="Draws noise, places and starts.")] = 0,
+    overrides: Annotated[list[str] | None, typer.Option("--set", help="Any field: world.lidar.beams=90.")] = None,
+    robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
+    fault: Annotated[list[str] | None, typer.Option(help="Such as 'kill leader at 20 s'; again for more.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")] = None,
+    figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+) -> int:
+    chosen = load(scenario, overrides or (), robots)
+    faults = parse_all(chosen.mission, chosen.faults, fault or ())
+    ended = run(chosen, seed, out, faults)
+    return report(ended, figures=figures and ended.signal is None, as_json=as_json)
+
+
+def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
+    """Run `scenario` as processes; when this returns, none of them is left. Raises Refused for a bad `out`."""
+    drawn = draw(scenario, seed)
+    folder = make(out, drawn)
+    about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}")
+    sockets = Path(tempfile.mkdtemp(prefix="lfa-"))
+    try:
+        with Interrupts() as interrupts:
+            launch = _Launch(drawn, folder, about, sockets, faults)
+            word = launch.play(interrupts)
+            if not launch.summed_up:
+                return finish(folder, about, word.verdict, word.duration_s, word.faults_left, interrupts.signal)
+            return reread(folder, interrupts.signal)
+    finally:
+        shutil.rmtree(sockets, ignore_errors=True)
+
+
+class _Aborted(Exception):
+    """One of the processes that a run cannot do without has failed."""
+
+
+class _Launch:
+    """One run: the crew, the onlooker's view of it, and what is still to be done to it."""
+
+    def __init__(self, drawn: Scenario, folder: Path, about: About, sockets: Path, faults: Sequence[Fault]) -> None:
+        self._mission = drawn.mission
+        self._about = about
+        self._endpoint = f"unixsock-stream/{sockets / 'router.sock'}"
+        task = msgspec.json.encode(Task(str(folder), about, self._endpoint, str(sockets))).decode()
+        self._rows = rows(folder, about, self._endpoint, drawn.mission, task)
+        self._crew = Crew(folder)
+        self._schedule = Schedule(faults)
+        self._undone: list[str] = []
+        self._doomed: set[str] = set()
+        self._referee = Referee(drawn)
+        self._standing = Standing(drawn.mission.robots)
+        self._time = WorldTime()
+        self._heard_at = clock.now()
+        self._began_at: float | None = None
+        self._operator = Operator(about.fleet, clock.wall_ms())
+        self._inbox = Inbox()
+        self._bus: ZenohBus | None = None
+        self.summed_up = False
+        """The recorder has written `summary.json`."""
+
+    # --- from start to verdict ----------------------------------------------------------------------------------
+
+    def play(self, interrupts: Interrupts) -> LastWord:
+        """All of the run; nothing that was started is left when this returns or raises."""
+        view = progress()
+        try:
+            verdict = self._watch(interrupts, view)
+            now = clock.now()
+            left = (*self._undone, *(str(fault) for fault in self._schedule.pending))
+            word = LastWord(verdict, now - (self._began_at or now), left)
+            self._end(word)
+            return word
+        finally:
+            view.close()
+            if self._bus is not None:
+                self._bus.close()
+            self._crew.kill_all()
+
+    def _watch(self, interrupts: Interrupts, view: Progress) -> Verdict:
+        try:
+            self._start(interrupts)
+            show_at = clock.now()
+            while interrupts.verdict is None and self._referee.verdict is None:
+                self._listen()
+                self._check(view)
+                self._do_faults(view)
+                if clock.now() >= show_at:
+                    show_at += SHOW_EVERY_S
+                    view.show(self._standing, self._referee.leader)
+                clock.sleep(STEP_S)
+        except _Aborted as aborted:
+            return interrupts.verdict or Verdict("aborted", str(aborted))
+        return interrupts.verdict or self._referee.verdict or Verdict("aborted")
+
+    def _start(self, interrupts: Interrupts) -> None:
+        """Router first, then the recorder, so that nothing goes unheard; world and agents in no order."""
+        router, recorder, *others = self._rows
+        self._crew.start(router)
+        self._await(router.name, lambda: answers(self._endpoint), interrupts)
+        self._crew.start(recorder)
+        self._bus = bus = ZenohBus(self._endpoint, self._inbox)
+        wanted = {key(self._about.fleet, "*", topic) for topic in ("event", "tracking", "status", "truth")}
+        bus.follow(frozenset(wanted))
+        fleet = self._about.fleet
+        self._await(recorder.name, lambda: bool(bus.living(fleet, RECORDER_NAME)), interrupts)
+        self._say("start", scenario=self._about.scenario, seed=self._about.seed)
+        for row in others:
+            self._crew.start(row)
+        self._heard_at = clock.now()
+
+    def _await(self, name: str, ready: Callable[[], bool], interrupts: Interrupts) -> None:
+        until = clock.now() + START_S_MAX
+        while interrupts.verdict is None and not ready():
+            self._needs(name)
+            if clock.now() > until:
+                raise _Aborted(f"{name} was not ready within {START_S_MAX:g} s")
+            clock.sleep(STEP_S)
+
+    # --- what comes -----------------------------------------------------------------------------------------------
+
+    def _listen(self) -> None:
+        for arrival in self._inbox.take():
+            where = address(arrival.key)
+            if not isinstance(arrival.payload, bytes) or where is None or where.topic not in TOPIC:
+                continue
+            try:
+                message = decode(arrival.payload, TOPIC[where.topic].type)
+            except BadMessage:
+                continue
+            self._hear(arrival.at, message)
+
+    def _hear(self, at: float, message: Message) -> None:
+        if isinstance(message, Truth):
+            self._heard_at = at
+            self._began_at = at if self._began_at is None else self._began_at
+            self._time.see(at, message.time_s)
+        elif isinstance(message, Event) and message.header.sender == OPERATOR_NAME:
+            self._expect(message)
+        self._referee.see(message)
+        self._standing.see(message)
+
+    def _expect(self, event: Event) -> None:
+        """Somebody does a fault by hand (`lfa fault`): that death is no accident."""
+        robot, deed = event.data.get("robot"), event.data.get("deed")
+        if event.kind == "fault" and deed in ("kill", "terminate") and robot in self._mission.robots:
+            self._doomed.add(robot_name(robot))
+
+    # --- what must go on -------------------------------------------------------------------------------------------
+
+    def _check(self, view: Progress) -> None:
+        """Without router, recorder or world there is no run; an agent's death is what the others are for."""
+        for name in (ROUTER_NAME, RECORDER_NAME, WORLD_NAME):
+            self._needs(name)
+        for robot_id in self._mission.robots:
+            name = robot_name(robot_id)
+            if robot_id not in self._standing.gone and not self._crew.runs(name):
+                self._standing.gone.add(robot_id)
+                how = self._crew.exit_of(name)
+                view.note(self._standing, str(how))
+                if name not in self._doomed:
+                    self._say("died", robot=robot_id, how=how)
+        if len(self._standing.gone) == len(self._mission.robots) and not self._schedule.pending:
+            raise _Aborted("no agent is left")
+        if clock.now() > self._heard_at + max(SILENCE_S_MAX, START_S_MAX if not self._time.known else 0.0):
+            raise _Aborted("nothing is heard of the world")
+
+    def _needs(self, name: str) -> None:
+        how = self._crew.exit_of(name)
+        if how is not None:
+            raise _Aborted(how)
+
+    def _do_faults(self, view: Progress) -> None:
+        if not self._time.known:
+            return
+        for deed, victim in self._schedule.due(self._time.of(clock.now()), self._referee.leader):
+            if self._do(deed, victim):
+                view.note(self._standing, f"fault: {deed} robot {victim}")
+            else:
+                self._undone.append(f"{deed} {victim}")
+
+    def _do(self, deed: Deed, victim: int) -> bool:
+        """False when there is nobody to do it to, or somebody already."""
+        name = robot_name(victim)
+        if self._crew.runs(name) == (deed == "restart"):
+            return False
+        self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
+        if deed == "restart":
+            self._doomed.discard(name)
+            self._standing.gone.discard(victim)
+            self._crew.start(next(row for row in self._rows if row.name == name).restarted())
+            return True
+        if deed in ("kill", "terminate"):
+            self._doomed.add(name)
+        return self._crew.signal(name, SIGNALS[deed])
+
+    def _say(self, kind: str, **data: object) -> None:
+        if self._bus is not None:
+            self._bus.publish(self._operator.key, encode(self._operator.says(kind, clock.now(), **data)))
+
+    # --- the end ---------------------------------------------------------------------------------------------------
+
+    def _end(self, word: LastWord) -> None:
+        """Agents and world, then the recorder, which sums up, then the router; each with a grace."""
+        team = [row.name for row in self._rows if row.name not in (ROUTER_NAME, RECORDER_NAME)]
+        self._crew.end(team)
+        if self._crew.runs(RECORDER_NAME):
+            self._crew.tell(RECORDER_NAME, msgspec.json.encode(word))
+            self._crew.wait([RECORDER_NAME], RECORDER_S_MAX)
+            self.summed_up = self._crew.succeeded(RECORDER_NAME)
+        self._crew.end([RECORDER_NAME, ROUTER_NAME])
