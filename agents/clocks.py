@@ -82,7 +82,8 @@ class ClockOffset:
         least = self._value + self._drift * (now - self._anchor)
         if self._report is None or now - self._report[0] > REPORT_TIMEOUT_S:
             return least
-        round_trip = least + self._report[1]
+        reported_at, theirs = self._report
+        round_trip = least + theirs - self._drift * (now - reported_at)
         return least - 0.5 * round_trip if round_trip > 0.0 else least
 
     @property
