@@ -41,7 +41,7 @@ ROUNDING = 1e-6
 class World:
     """All of a drawn `scenario` but its agents; `seed` draws the sensors' noise. Obeys the Node interface.
 
-    Its time begins at `start_at`, or with its first tick.
+    Its time begins with its first tick, which is asked for at `start_at` or at once.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class World:
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
         self._cut_off = False
-        self._t0 = start_at
+        self._t0 = -inf if start_at is None else start_at
         self._dt_s = 1.0 / scenario.world.physics_hz
         self._step = 0
         """Number of the next point of the grid."""
@@ -83,7 +83,7 @@ class World:
     def next_deadline(self) -> float:
         if self.finished:
             return inf
-        return -inf if self._t0 is None else self._t0 + self._step * self._dt_s
+        return self._t0 + self._step * self._dt_s
 
     def receive(self, received: Received) -> list[Envelope]:
         """Commands, fences and asks count at once; what they do to bodies is seen from the next step on."""
@@ -115,15 +115,16 @@ class World:
             return []
         sent: list[Envelope] = []
         self._switch_on(now)
-        if self._t0 is None:
+        if self._step == 0 and now >= self._t0:
             self._t0 = now
-        if self._step == 0:
             sent.append(self._mission(now))
         due = floor((now - self._t0) / self._dt_s + ROUNDING) - self._step + 1
         if due > CATCH_UP_STEPS_MAX:
             stood_still_s = (due - CATCH_UP_STEPS_MAX) * self._dt_s
             self._t0 += stood_still_s
             self.slowed_s += stood_still_s
+            news: dict[str, object] = {"stood_still_s": stood_still_s, "t": self._step * self._dt_s}
+            sent.append(self._event("slowed", None, news, now))
         for _ in range(min(due, CATCH_UP_STEPS_MAX)):
             stamp = self._t0 + self._step * self._dt_s
             touches = self._move(now) if self._step > 0 else []
@@ -210,7 +211,7 @@ class World:
         return Envelope(key(self._fleet, WORLD_NAME, "event"), event)
 
     def _time_of(self, now: float) -> float:
-        return 0.0 if self._t0 is None else now - self._t0
+        return now - self._t0 if self._step > 0 else 0.0
 
     def _header(self, topic: str, stamp: float) -> Header:
         seq = self._seq[topic] = self._seq.get(topic, 0) + 1

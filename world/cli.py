@@ -1,0 +1,69 @@
+"""`lfa-world`: the simulated world of a scenario as one process, with the witness in it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from protocol import clock
+from protocol.mission import Refused
+from protocol.node import Node
+from protocol.runtime import Options, run
+from protocol.witness import Witness
+from protocol.zenoh_bus import default_endpoint
+from world.scenario import draw, load
+from world.world import World
+
+EXAMPLE = "Example: lfa-world paper_path1 --seed 7 --set world.lidar.beams=90"
+
+
+def start(
+    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a file in TOML.")],
+    seed: Annotated[int, typer.Option(help="Draws noise, obstacle places and start poses.")] = 0,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="Override a field, a.b=value; again for more.")
+    ] = None,
+    robots: Annotated[int | None, typer.Option(help="Size of the team, ids 1 to N.")] = None,
+    fleet: Annotated[str, typer.Option(help="Name of the fleet: part of every key.")] = "fleet",
+    connect: Annotated[str | None, typer.Option(help="Router's endpoint, like tcp/127.0.0.1:7447.")] = None,
+    journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
+    witness: Annotated[bool, typer.Option(help="Hold the mission's witness here.")] = True,
+) -> int:
+    """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
+    drawn = draw(load(scenario, set_ or (), robots), seed)
+    options = Options(_fleet(fleet), connect or default_endpoint(), journal)
+    wall_ms = clock.wall_ms()
+    nodes: list[Node] = [World(fleet, drawn, seed, wall_ms, start_at=clock.now())]
+    if witness and drawn.mission.witness:
+        nodes.append(Witness(fleet, wall_ms, wall_ms))
+    return run(nodes, options, wall_ms)
+
+
+def _fleet(name: str) -> str:
+    if not name or not all(c.isalnum() or c in "-_." for c in name):
+        raise Refused(f"--fleet {name!r}: must be letters, digits, '-', '_' or '.'")
+    return name
+
+
+def main() -> None:
+    """Entry point of `lfa-world`."""
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command(epilog=EXAMPLE)(start)
+    try:
+        sys.exit(app(standalone_mode=False, prog_name="lfa-world"))
+    except Refused as refused:
+        _refuse(str(refused))
+    except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
+        _refuse(error.format_message())
+
+
+def _refuse(line: str) -> NoReturn:
+    print(f"lfa-world: {line}", file=sys.stderr)
+    sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()
