@@ -25,7 +25,7 @@ class Reign(Struct):
     until_s: float | None
     """When the next one led, or when a fault ended this one; None: to the end."""
     cause: str
-    """`start`, the fault that ended the one before, or `handover`."""
+    """`start`, the fault that ended the one before, `handover`, or `reelection` of the same robot."""
 
 
 class Failover(Struct):
@@ -83,8 +83,7 @@ def reigns(events: Sequence[Line]) -> list[Reign]:
         ended = _ending(done, found[-1], at_s) if found else None
         if found:
             found[-1].until_s = at_s if ended is None else ended.at_s
-        cause = "start" if not found else "handover" if ended is None else ended.kind
-        found.append(Reign(term, robot, at_s, None, cause))
+        found.append(Reign(term, robot, at_s, None, _cause(found[-1] if found else None, ended, robot)))
     if found:
         last = _ending(done, found[-1], float("inf"))
         found[-1].until_s = None if last is None else last.at_s
@@ -142,6 +141,14 @@ def _line(text: bytes) -> Line | None:
 
 def _ended_by(fault: FaultDone, reign: Reign) -> bool:
     return fault.kind in ENDING_FAULTS and fault.target == reign.robot_id and fault.at_s >= reign.from_s
+
+
+def _cause(before: Reign | None, ended: FaultDone | None, robot: int) -> str:
+    if before is None:
+        return "start"
+    if ended is not None:
+        return ended.kind
+    return "reelection" if before.robot_id == robot else "handover"
 
 
 def _ending(done: Sequence[FaultDone], reign: Reign, before_s: float) -> FaultDone | None:

@@ -68,8 +68,9 @@ class Standing:
         return f"{hypot(x - px, y - py) - tracking.separation_m:+.3f} m"
 
     def _state(self, robot: int) -> str:
-        if robot in self.gone:
-            return ""
-        tracking = self._tracking.get(robot)
-        follows = tracking is not None and self._role(robot) == "follower"
-        return tracking.state if follows and tracking is not None else self._notes.get(robot, "")
+        """What a follower is doing, or what else a robot has to say about itself."""
+        tracking, role = self._tracking.get(robot), self._role(robot)
+        if role == "follower" and tracking is not None:
+            return tracking.state
+        note = self._notes.get(robot, "")
+        return "" if role == "gone" or note == role else note
