@@ -28,6 +28,10 @@ GAP_WAIT = 2.2
 GAP_WAIT_S_MAX = 15.0
 CATCH_UP_PER_S = 0.8
 LOOK_M = 2.0
+LEADER_OMEGA_MAX_RADPS = 0.6
+"""A slot at k^d = 1.2 m then swings at 0.7 m/s."""
+TRACK_EVERY = 5
+"""Control periods between a follower's looks at its place on the route."""
 DT_MIN_S = 0.002
 
 
@@ -50,6 +54,7 @@ class Driver:
         self._last = STILL
         self._driven_at: float | None = None
         self._waiting_since: float | None = None
+        self._steps = 0
 
     @property
     def decision(self) -> Decision | None:
@@ -83,7 +88,9 @@ class Driver:
         if role is Role.LEADER:
             wanted = self._leading(chain, points, pose, twist, now)
         elif role is Role.FOLLOWER:
-            self.lead.track(pose)
+            self._steps += 1
+            if self._steps % TRACK_EVERY == 0:
+                self.lead.track(pose)
             wanted = self._following(points, pose, twist, dt, now)
         else:
             wanted = STILL
@@ -99,6 +106,8 @@ class Driver:
         self._role = role
         self._detour.decision = None
         self._waiting_since = None
+        omega_max = self._mission.limits.omega_max_radps
+        self._detour.omega_max_radps = min(LEADER_OMEGA_MAX_RADPS, omega_max) if role is Role.LEADER else omega_max
         if role is Role.LEADER:
             self.lead.begin(pose)
         elif role is Role.FOLLOWER:

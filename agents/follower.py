@@ -27,6 +27,12 @@ FORWARD_ABOVE_MPS = 0.02
 STOP_ERROR_M = 0.002
 STOP_RATE = 1e-3
 """[m/s, rad/s] Nearer than this and slower than that: stand."""
+IDLE_MPS, IDLE_RADPS = 0.005, 0.02
+"""A controller that asks for less than this has brought the robot as near as its held heading allows."""
+LEAVE_M = 0.010
+"""A standing robot starts again when its slot is this much farther off than it was: noise alone does not move it."""
+ASTRAY_M = 0.10
+"""Idle, but farther off than this: the controller begins anew from the robot's own heading."""
 DT_MAX_S = 0.1
 
 
@@ -85,6 +91,7 @@ class Follower:
         self._holding = True
         self._rejoining = False
         self._guarded = False
+        self._standing_m = -1.0
         self._direction = 1
         self._heading = 0.0
         self._last = STILL
@@ -128,8 +135,11 @@ class Follower:
         self._error_m = hypot(motion.x - own_pose.x, motion.y - own_pose.y)
         wanted = self._controller.step(reference, own_pose, own_twist, dt)
         self._state = State.FOLLOW if motion.settled else State.BLEND
-        if self._stands(sighting):
+        if self._stands(sighting, wanted):
             self._state, wanted = State.STAND, STILL
+            if self._error_m > ASTRAY_M:
+                self._standing_m = -1.0
+                self._controller.reset(own_pose, own_twist)
         if not (isfinite(wanted.linear_x) and isfinite(wanted.angular_z)):
             self.refused += 1
             return self._brake(dt)
@@ -138,9 +148,10 @@ class Follower:
     def rejoin(self, own_pose: Pose2D, own_twist: Twist) -> None:
         """After an override (an obstacle, a spell as leader): the next step begins from here, without a jump.
 
-        The target starts at the own position and moves to the slot at `offset_rate_max_mps`.
+        The target starts at the own position and moves to the slot at `offset_rate_max_mps`. A robot that has
+        followed nobody yet has nothing to rejoin: it goes straight for its slot.
         """
-        self._holding = self._rejoining = True
+        self._holding, self._rejoining = True, self._source is not None
         self._last = own_twist if plausible(own_pose, own_twist) else STILL
 
     def overridden(self, twist: Twist) -> None:
@@ -176,7 +187,7 @@ class Follower:
         else:
             motion.step(slot, sighting.pose, sighting.twist, dt)
         if changed:
-            if self._source is not None or self._rejoining:
+            if self._source is not None:
                 motion.hang_at(*kept)
             self._guarded = hypot(sighting.pose.x - own_pose.x, sighting.pose.y - own_pose.y) >= self._overlap_m
             self._source, self._rejoining = source, False
@@ -197,14 +208,21 @@ class Follower:
             sighting.pose, sighting.twist, motion.separation_m, wrap(motion.phi), self._guarded,
         )  # fmt: skip
 
-    def _stands(self, sighting: Sighting) -> bool:
-        """The stop dead-band: in the slot of a standing predecessor."""
-        return (
-            self._error_m < STOP_ERROR_M
-            and abs(sighting.twist.linear_x) < STOP_RATE
-            and abs(sighting.twist.angular_z) < STOP_RATE
-            and self._motion.settled
-        )
+    def _stands(self, sighting: Sighting, wanted: Twist) -> bool:
+        """The stop dead-band, with hysteresis: a resting target, and nothing to gain by moving on."""
+        if not self._target_rests(sighting):
+            self._standing_m = -1.0
+        elif self._standing_m < 0.0:
+            idle = abs(wanted.linear_x) < IDLE_MPS and abs(wanted.angular_z) < IDLE_RADPS
+            if idle or self._error_m < STOP_ERROR_M:
+                self._standing_m = self._error_m
+        elif self._error_m > self._standing_m + LEAVE_M:
+            self._standing_m = -1.0
+        return self._standing_m >= 0.0
+
+    def _target_rests(self, sighting: Sighting) -> bool:
+        twist = sighting.twist
+        return abs(twist.linear_x) < STOP_RATE and abs(twist.angular_z) < STOP_RATE and self._motion.settled
 
     def _drive(self, wanted: Twist, dt: float) -> Twist:
         """Steps 8 and 9: the drive's limits with v/omega kept, then its accelerations."""

@@ -20,6 +20,7 @@ CORNER_RADIUS_M = 2.5
 SPACING_M = 0.1
 LOOK_AHEAD_M = 0.6
 DETOUR_AHEAD_M = 2.0
+WINDOW_M = 0.5
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
 IN_PLACE_RADPS = 0.4
@@ -81,7 +82,7 @@ class Lead:
             self._route = self._first_route(pose)
             self._s = self._route.nearest(pose.x, pose.y)
         else:
-            self._s = self._route.nearest(pose.x, pose.y, self._s - 1.0, self._s + 2.0)
+            self._s = self._route.nearest(pose.x, pose.y, self._s - WINDOW_M, self._s + 2.0 * WINDOW_M)
 
     def begin(self, pose: Pose2D) -> None:
         """Leadership starts here: point to point goes straight from where the robot stands."""

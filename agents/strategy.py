@@ -26,6 +26,8 @@ HEADWAY_S = 0.8
 KEEP_SIDE_RAD = 0.6
 """How much nearer a direction on the other side must be before the detour changes sides."""
 CLEAR_S = 0.4
+HOLD_S = 1.0
+"""A decision is held at least this long."""
 TURN_GAIN = 2.5
 IN_PLACE_RAD = 0.9
 
@@ -47,10 +49,13 @@ class Detour:
     def __init__(self, radius_m: float, limits: Limits) -> None:
         self._radius_m = radius_m
         self._limits = limits
+        self.omega_max_radps = limits.omega_max_radps
+        """A leader turns more slowly than its drive could: its followers' slots swing with it."""
         self.decision: Decision | None = None
         """None while the wanted way is taken."""
         self._side = 0.0
         self._clear_since: float | None = None
+        self._since = -inf
 
     def steer(
         self, points: Sequence[Point], target: Point, wanted: Twist, speed_mps: float, now: float
@@ -59,7 +64,9 @@ class Detour:
         blocked_m = self._blocked(points, wanted)
         if self.decision is None and blocked_m is None:
             return None
-        if self.decision is not None and blocked_m is None and self._clear(points, target, now):
+        if self.decision is None:
+            self._since, self._clear_since = now, None
+        elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
             return None
         return self._round(points, target, speed_mps, inf if blocked_m is None else blocked_m)
@@ -114,7 +121,7 @@ class Detour:
         return best
 
     def _towards(self, points: Sequence[Point], bearing: float, speed_mps: float) -> Twist:
-        omega_max = self._limits.omega_max_radps
+        omega_max = self.omega_max_radps
         omega = max(-omega_max, min(omega_max, TURN_GAIN * bearing))
         if abs(bearing) > IN_PLACE_RAD:
             return Twist(0.0, omega)

@@ -195,7 +195,8 @@ class Simulator:
         for tap in self.taps:
             tap(self.now, key, payload, message)
         where = address(key)
-        for seat in self._routes.get(key) or self._route(key):
+        seats = self._routes.get(key)
+        for seat in self._route(key) if seats is None else seats:
             delays = (
                 [LOCAL_DELAY_S] if _local(where, sender, seat) else self._air.delays(sender.node.name, seat.node.name)
             )
