@@ -1,0 +1,35 @@
+"""`lfa-world`: bad input is one line on stderr and exit code 2, before anything is started."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from world import cli
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["paper_pth1"], "no scenario 'paper_pth1': did you mean 'paper_path1'?"),
+        (["straight", "--robots", "0"], "--robots 0: mission.robots = []: must be at least one robot id"),
+        (["straight", "--set", "world.body.mass_kg=-1"], "world.body.mass_kg = -1"),
+        (["straight", "--fleet", "a/b"], "--fleet 'a/b'"),
+        (["straight", "--seed", "x"], "--seed"),
+        (["straight", "--sed", "1"], "--sed"),
+        ([], "scenario"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str], says: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["lfa-world", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    printed = capsys.readouterr()
+    assert ended.value.code == 2
+    assert printed.out == ""
+    assert printed.err.startswith("lfa-world: ")
+    assert printed.err.count("\n") == 1
+    assert says in printed.err
