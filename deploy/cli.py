@@ -43,7 +43,10 @@ COMMANDS = (
 
 def main() -> None:
     """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
-    sys.exit(run_cli("lfa", build(sys.argv[1:2])))
+    try:
+        sys.exit(run_cli("lfa", build(sys.argv[1:2])))
+    except KeyboardInterrupt:
+        sys.exit(130)
 
 
 def build(called: list[str]) -> typer.Typer:

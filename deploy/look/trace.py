@@ -54,7 +54,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 
 
 def read(folder: Path) -> Trace:
-    """The trace of the run in `folder`. Raises FileNotFoundError when it holds no recording."""
+    """The trace of the run in `folder`; an empty one when nothing was recorded."""
     truth: dict[int, list[Row]] = {}
     obstacles: dict[int, list[Row]] = {}
     said: dict[str, dict[int, list[Row]]] = {topic: {} for topic in _ROWS}
@@ -75,6 +75,8 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
     """Owner, topic, time [s] and content (an object with the wire type's fields) of every message on `topics`."""
     decoders = {t: msgspec.json.Decoder(channels.shape(TOPIC[t].type)) for t in topics}
     wanted: dict[int, tuple[str, str]] = {}
+    if not (folder / RECORDING).exists():
+        return
     with (folder / RECORDING).open("rb") as stream:
         for chunk in _chunks(stream):
             for opcode, body in _records(chunk):

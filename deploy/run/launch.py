@@ -154,8 +154,10 @@ class _Launch:
 
     def _await(self, name: str, ready: Callable[[], bool], interrupts: Interrupts) -> None:
         until = clock.now() + START_S_MAX
-        while interrupts.verdict is None and not ready():
+        while not ready():
             self._needs(name)
+            if interrupts.verdict is not None:
+                raise _Aborted("interrupted")
             if clock.now() > until:
                 raise _Aborted(f"{name} was not ready within {START_S_MAX:g} s")
             clock.sleep(STEP_S)
