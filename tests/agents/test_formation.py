@@ -1,0 +1,193 @@
+"""Slots, orientation requests, curvature limits and blends against control.md sections 2.2, 2.3 and 4."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import atan2, cos, hypot, pi, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.config import DEFAULT
+from agents.formation import (
+    Formation,
+    SlotMotion,
+    check_slot,
+    leader_speed_cap,
+    leader_speed_floor,
+    named,
+    paper_phi,
+    phi_of,
+    radius_min,
+    slots_of,
+    speed_factors,
+)
+from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from protocol.messages import FormationNote, Header, Slot, Term
+from protocol.mission import FormationSpec, Limits, Refused
+
+DT = 0.02
+LIMITS = Limits()
+
+
+def _slots(side: str, followers: int = 3) -> tuple[Slot, ...]:
+    return slots_of(named(side, FormationSpec()), range(2, followers + 2))
+
+
+def test_eq_32_33_corrected_left_and_right_are_mirror_images_behind_the_predecessor() -> None:
+    left, right = phi_of("left", pi / 3, 0), phi_of("right", pi / 3, 0)
+    assert left == pytest.approx(2.0944, abs=1e-4)
+    assert right == pytest.approx(-2.0944, abs=1e-4)
+    assert (1.2 * cos(left), 1.2 * sin(left)) == pytest.approx((-0.600, 1.0392), abs=1e-4)
+    assert (1.2 * cos(right), 1.2 * sin(right)) == pytest.approx((-0.600, -1.0392), abs=1e-4)
+
+
+@pytest.mark.parametrize("phi", [0.3, pi / 3, 2.0, 3.0])
+def test_eq_32_33_every_branch_lies_behind_and_33_is_the_mirror_image_of_32(phi: float) -> None:
+    left, right = paper_phi("left", phi), paper_phi("right", phi)
+    assert abs(left) >= pi / 2
+    assert wrap(left + right) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_eq_32_33_are_refused_at_pi_half_where_they_jump() -> None:
+    with pytest.raises(Refused, match="pi/2"):
+        paper_phi("left", pi / 2)
+
+
+def test_zigzag_alternates_and_column_is_straight_behind() -> None:
+    assert [round(s.phi, 4) for s in _slots("zigzag")] == [2.0944, -2.0944, 2.0944]
+    assert [s.phi for s in _slots("column")] == [pi] * 3
+
+
+def test_an_operators_unknown_formation_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(Refused, match="left, right, column, zigzag"):
+        named("diamond", FormationSpec())
+
+
+@pytest.mark.parametrize(
+    "slot",
+    [
+        Slot(2, 0.2, pi),
+        Slot(2, float("nan"), pi),
+        Slot(2, float("inf"), pi),
+        Slot(2, 1.2, float("nan")),
+        Slot(2, 1.2, 9.0),
+        Slot(2, 1.2, 0.3),
+        Slot(2, -1.2, pi),
+    ],
+)
+def test_slots_that_no_robot_can_take_are_refused(slot: Slot) -> None:
+    with pytest.raises(Refused, match="robot2"):
+        check_slot(slot, 0.4)
+
+
+def _note(term: Term, number: int, *slots: Slot) -> FormationNote:
+    return FormationNote(Header("robot1", 1, 0, 0.0), term, number, slots)
+
+
+def test_the_highest_term_and_number_counts_and_a_bad_request_changes_nothing() -> None:
+    formation = Formation(FormationSpec(), (1, 2, 3), 0.4)
+    assert formation.request(_note(Term(2, 1, 1), 5, Slot(2, 1.0, pi)))
+    assert not formation.request(_note(Term(2, 1, 1), 5, Slot(2, 1.1, pi)))
+    assert not formation.request(_note(Term(1, 3, 1), 9, Slot(2, 1.1, pi)))
+    assert not formation.request(_note(Term(3, 1, 1), 0, Slot(2, 1.5, pi), Slot(3, 0.1, pi)))
+    assert formation.refused == 1
+    assert formation.slot_of(2) == Slot(2, 1.0, pi)
+    assert formation.slot_of(3).phi == pytest.approx(2 * pi / 3)
+    assert formation.request(_note(Term(3, 1, 1), 0, Slot(2, 1.5, pi)))
+    assert formation.slot_of(2).separation_m == 1.5
+
+
+@pytest.mark.parametrize(
+    ("side", "followers", "radius_m"), [("left", 1, 1.84), ("left", 3, 5.3), ("zigzag", 3, 2.06), ("column", 3, 1.68)]
+)
+def test_smallest_leader_radius_for_0_8_over_0_5_mps(side: str, followers: int, radius_m: float) -> None:
+    """Section 2.2."""
+    assert radius_min(_slots(side, followers), 0.8 / 0.5) == pytest.approx(radius_m, rel=0.01)
+
+
+def test_speeds_in_a_left_turn_of_the_left_echelon() -> None:
+    """Section 2.2: R = 4 m: 0.38, 0.26, 0.15 m/s behind a leader at 0.5."""
+    speeds = [0.5 * f for f in speed_factors(_slots("left"), 0.25)]
+    assert speeds == pytest.approx([0.38, 0.26, 0.15], abs=0.01)
+
+
+@pytest.mark.parametrize(("n", "factor"), [(10, 2.1), (50, 4.4), (100, 6.1)])
+def test_speed_factor_of_a_rigid_column(n: int, factor: float) -> None:
+    """Section 2.2: sqrt(1 + N k^2 / R^2) at R = 2 m."""
+    assert speed_factors(_slots("column", n), 0.5)[-1] == pytest.approx(factor, abs=0.05)
+
+
+def test_the_leader_is_capped_so_that_no_follower_exceeds_nine_tenths_of_v_max() -> None:
+    slots = _slots("left")
+    for curvature in (-0.5, -0.2, 0.0, 0.2):
+        cap = leader_speed_cap(slots, curvature, LIMITS)
+        assert max([1.0, *speed_factors(slots, curvature)]) * cap <= 0.9 * LIMITS.v_max_mps + 1e-9
+    assert leader_speed_cap((), 4.0, LIMITS) == pytest.approx(0.9 * LIMITS.omega_max_radps / 4.0)
+    assert leader_speed_floor(slots, 0.25) == pytest.approx(0.05 / speed_factors(slots, 0.25)[-1])
+
+
+@given(st.floats(-0.45, 0.45), st.sampled_from(["left", "right", "zigzag", "column"]))
+def test_speed_factors_are_those_of_driven_circles(curvature: float, side: str) -> None:
+    """f is |r'| / v of slots that hang on slots, each heading along its own motion."""
+    pose, twist = Pose2D(), Twist(0.5, 0.5 * curvature)
+    expected = []
+    for slot in _slots(side):
+        angle = pose.theta + slot.phi
+        x, y = slot.separation_m * cos(angle), slot.separation_m * sin(angle)
+        vx = twist.linear_x * cos(pose.theta) - twist.angular_z * y
+        vy = twist.linear_x * sin(pose.theta) + twist.angular_z * x
+        speed = hypot(vx, vy)
+        expected.append(speed / 0.5)
+        pose = Pose2D(pose.x + x, pose.y + y, atan2(vy, vx))
+        twist = Twist(speed, twist.angular_z)
+    if min(expected) > 0.05:
+        assert speed_factors(_slots(side), curvature) == pytest.approx(expected, rel=1e-6)
+
+
+def _swing(start: Slot, end: Slot, twist: Twist = STILL) -> list[tuple[float, float, float, float]]:
+    """(x, y, vx, vy) of the target in each step of a change of slot."""
+    motion = SlotMotion(DEFAULT, LIMITS, 0.0)
+    pose = Pose2D()
+    motion.reset(start, pose)
+    steps = []
+    for _ in range(900):
+        motion.step(end, pose, twist, DT)
+        steps.append((motion.x, motion.y, motion.vx, motion.vy))
+        pose = along_arc(pose, twist, DT)
+    assert motion.settled
+    return steps
+
+
+def test_a_change_of_side_swings_through_the_rear_at_the_commanded_distance() -> None:
+    steps = _swing(Slot(2, 1.2, 2 * pi / 3), Slot(2, 1.2, -2 * pi / 3))
+    assert all(hypot(x, y) == pytest.approx(1.2, abs=1e-9) for x, y, _, _ in steps)
+    assert all(x < -0.59 for x, _, _, _ in steps)
+    assert steps[-1][:2] == pytest.approx((-0.6, -1.0392), abs=1e-4)
+    swinging = [n for n, s in enumerate(steps) if hypot(s[2], s[3]) > 1e-9]
+    assert len(swinging) * DT == pytest.approx((2 * pi / 3) / 0.35, abs=0.1)
+
+
+@pytest.mark.parametrize("twist", [STILL, Twist(0.5, 0.1), Twist(0.8, -0.2)])
+def test_the_targets_velocity_is_its_derivative_and_stays_below_nine_tenths_of_v_max(twist: Twist) -> None:
+    steps = _swing(Slot(2, 1.2, 2 * pi / 3), Slot(2, 0.8, -2 * pi / 3), twist)
+    for (x0, y0, vx, vy), (x1, y1, _, _) in pairwise(steps):
+        assert hypot((x1 - x0) / DT - vx, (y1 - y0) / DT - vy) < 0.02
+        assert hypot(vx, vy) <= max(0.9 * LIMITS.v_max_mps, hypot(twist.linear_x, 0.0) + 0.25) + 1e-6
+
+
+def test_the_filtered_heading_does_not_move_while_the_predecessor_turns_in_place() -> None:
+    """Section 2.3: with L_chi > 0 the slot stays; with L_chi = 0 it orbits."""
+    for heading_filter_m, moved in ((0.36, 0.0), (0.0, 1.2 * pi / 2)):
+        motion = SlotMotion(DEFAULT, LIMITS, heading_filter_m)
+        pose, slot = Pose2D(), Slot(2, 1.2, 2 * pi / 3)
+        motion.reset(slot, pose)
+        way, last = 0.0, None
+        for _ in range(101):
+            motion.step(slot, pose, Twist(0.0, pi / 4), DT)
+            if last is not None:
+                way += hypot(motion.x - last[0], motion.y - last[1])
+            last = motion.x, motion.y
+            pose = along_arc(pose, Twist(0.0, pi / 4), DT)
+        assert way == pytest.approx(moved, abs=1e-3)
