@@ -178,7 +178,8 @@ def test_phase_is_a_part_of_the_way_there_and_back(phase: float, place: float) -
 
 
 def test_a_touch_that_flickers_is_one_touch() -> None:
-    world = bodies("world.walls_m=[[0.5,-3,0.5,3]]")
+    nimble = ("mission.limits.a_max_mps2=100.0", "world.body.push_n=4000.0")
+    world = bodies("world.walls_m=[[0.5,-3,0.5,3]]", *nimble)
     touches = drive(world, Twist(0.3, 0.0), 3.0)
     for _ in range(20):
         touches += drive(world, Twist(-0.3, 0.0), 0.04) + drive(world, Twist(0.3, 0.0), 0.1)
