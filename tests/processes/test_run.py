@@ -1,0 +1,84 @@
+"""`lfa run`: processes of this machine, from start to goal, with one killed on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from deploy.look import trace
+from deploy.look.summary import read
+from tests.processes.fleet import SHORT, eventually, lfa, running
+
+pytestmark = pytest.mark.processes
+
+FIRST_COMMAND_MS_MAX = 500.0
+DISTANCE_RMS_M_MAX = 0.010
+
+
+def test_a_team_reaches_its_goal_and_keeps_its_distances(tmp_path: Path) -> None:
+    done = lfa("run", "straight", *SHORT, "--out", str(tmp_path / "run"), "--json")
+    assert done.returncode == 0, done.stderr + done.stdout
+    facts = json.loads(done.stdout)
+    assert facts["outcome"] == "goal_reached"
+    assert facts["violations"] == []
+    for robot in facts["robots"][1:]:
+        assert robot["distance_error_rms_m"] < DISTANCE_RMS_M_MAX, robot
+        assert robot["final_speed_mps"] < 1e-3, robot
+
+
+def test_the_run_folder_is_whole(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    done = lfa("run", "straight", *SHORT, "--robots", "2", "--out", str(folder))
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert done.stdout.splitlines()[-1] == f"run folder: {folder}"
+    assert {path.name for path in (folder / "figures").iterdir()} == {"paths.png", "distance_error.png", "leader.png"}
+    logs = {path.name for path in (folder / "logs").iterdir()}
+    assert logs == {f"{name}.log" for name in ("router", "recorder", "world", "robot1", "robot2")}
+    journals = sorted(path.name.split("-")[0] for path in (folder / "journal").iterdir())
+    assert journals == ["robot1", "robot2", "witness", "world"]
+    assert set(trace.read(folder).truth) == {1, 2}
+    assert read(folder).robots[1].distance_error_rms_m is not None
+
+
+def test_the_next_in_chain_takes_over_within_half_a_second(tmp_path: Path) -> None:
+    killed = ("--set", "mission.leading.route_m=[[4.0, 0.0]]", "--set", 'faults=["kill leader at 3 s"]')
+    done = lfa("run", "leader_killed", *killed, "--out", str(tmp_path / "run"), "--no-figures")
+    assert done.returncode == 0, done.stderr + done.stdout
+    summary = read(tmp_path / "run")
+    failover = summary.failovers[0]
+    assert (failover.victim, failover.leader) == (1, 2)
+    assert failover.first_command_ms is not None
+    assert 0.0 < failover.first_command_ms < FIRST_COMMAND_MS_MAX
+    assert summary.violations == []
+    assert [robot.alive for robot in summary.robots] == [False, True, True, True]
+
+
+def test_a_stopped_robot_goes_on_when_it_is_woken(tmp_path: Path) -> None:
+    fault = ("--fault", "stop 2 at 2 s for 0.3 s")
+    done = lfa("run", "straight", *SHORT, "--robots", "2", *fault, "--out", str(tmp_path / "run"), "--no-figures")
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert [(fault.kind, fault.target) for fault in read(tmp_path / "run").faults] == [("stop", 2), ("continue", 2)]
+
+
+def test_a_fault_by_hand_is_no_accident(tmp_path: Path) -> None:
+    with running(tmp_path / "run", "straight", "--set", "mission.leading.route_m=[[4.0, 0.0]]") as run:
+        run.wait_for("leader_command")
+        fleet = f"straight-{run.launcher.pid}"
+        done = lfa("fault", "kill", "leader", "--fleet", fleet, "--json")
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout)["robot"] == 1
+        assert run.launcher.wait(60.0) == 0
+        assert [(fault.kind, fault.target) for fault in read(run.folder).faults] == [("kill", 1)]
+        assert not [line for line in run.events() if line["kind"] == "died"]
+
+
+def test_an_agent_that_dies_by_itself_is_named_and_the_run_goes_on(tmp_path: Path) -> None:
+    with running(tmp_path / "run", "straight", *SHORT) as run:
+        run.wait_for("leader_command")
+        os.kill(run.crew()["robot4"].pid, 9)
+        eventually(lambda: any(line["kind"] == "died" for line in run.events()), "robot 4's death was not told")
+        assert run.launcher.wait(60.0) == 0
+        assert [robot.alive for robot in read(run.folder).robots] == [True, True, True, False]
