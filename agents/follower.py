@@ -27,13 +27,14 @@ FORWARD_ABOVE_MPS = 0.02
 STOP_ERROR_M = 0.002
 STOP_RATE = 1e-3
 """[m/s, rad/s] Nearer than this and slower than that: stand."""
-IDLE_MPS, IDLE_RADPS = 0.005, 0.02
+IDLE_MPS, IDLE_RADPS = 0.003, 0.01
 """A controller that asks for less than this has brought the robot as near as its held heading allows."""
 LEAVE_M = 0.010
 """A standing robot starts again when its slot is this much farther off than it was: noise alone does not move it."""
 ASTRAY_M = 0.10
 """Idle, but farther off than this: the controller begins anew from the robot's own heading."""
-DT_MAX_S = 0.1
+DT_MIN_S, DT_MAX_S = 0.001, 0.1
+"""A step outside of these (time stood still, ran backwards, jumped) is taken as the nearer one, and counted."""
 
 
 class State(StrEnum):
@@ -114,9 +115,9 @@ class Follower:
 
         Without a sighting, or with one older than `dead_reckoning_max_s`: brake along the path and hold.
         """
-        if not 0.0 < dt <= DT_MAX_S:
+        if not DT_MIN_S <= dt <= DT_MAX_S:
             self.refused += 1
-            dt = DT_MAX_S if dt > DT_MAX_S else CONTROL_PERIOD_S
+            dt = DT_MAX_S if dt > DT_MAX_S else DT_MIN_S
         if not plausible(own_pose, own_twist):
             self.refused += 1
             return self._brake(dt)
