@@ -1,47 +1,65 @@
-"""`lfa-agent`: one robot, or the witness, as one process."""
+"""`lfa-agent`: one robot, or the witness, as one process.
+
+The command line is read by argparse: the library that reads `lfa`'s own would be half of an agent's resident memory.
+"""
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import NoReturn
 
 import msgspec
-import typer
 
 from agents.agent import Agent
 from protocol import clock
 from protocol.mission import Mission, Refused, check_mission
+from protocol.node import Node
 from protocol.runtime import Options, run
 from protocol.witness import Witness
 from protocol.zenoh_bus import default_endpoint
 
 ROLES = ("leader", "follower", "witness")
-EXAMPLE = "Example: lfa-agent --role follower --id 2"
+EXAMPLE = "example: lfa-agent --role follower --id 2"
 
 
-def start(
-    role: Annotated[str, typer.Option(help="Place it starts in: leader, follower or witness. Roles change later.")],
-    id: Annotated[str, typer.Option(help="Robot id from the mission (1, 2, ...), or w for the witness.")],
-    fleet: Annotated[str, typer.Option(help="Name of the fleet: part of every key.")] = "fleet",
-    connect: Annotated[str | None, typer.Option(help="Router's endpoint, like tcp/127.0.0.1:7447.")] = None,
-    mission: Annotated[Path | None, typer.Option(help="Mission as JSON or TOML; else it comes over Zenoh.")] = None,
-    journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
-) -> None:
-    """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM)."""
+def main() -> None:
+    """Entry point of `lfa-agent`: 0 ended well, 2 refused."""
     try:
-        given = None if mission is None else read_mission(mission)
-        options = Options(_fleet(fleet), connect or default_endpoint(), journal)
-        wall_ms = clock.wall_ms()
-        node = _node(role, id, fleet, wall_ms, given)
-        code = run([node], options, wall_ms)
+        sys.exit(start(_parser().parse_args()))
     except Refused as refused:
         print(f"lfa-agent: {refused}", file=sys.stderr)
-        raise typer.Exit(2) from None
-    raise typer.Exit(code)
+        sys.exit(2)
 
 
-def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None) -> Agent | Witness:
+def start(arguments: argparse.Namespace) -> int:
+    """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
+    mission = None if arguments.mission is None else read_mission(arguments.mission)
+    options = Options(_fleet(arguments.fleet), arguments.connect or default_endpoint(), arguments.journal)
+    wall_ms = clock.wall_ms()
+    return run([_node(arguments.role, arguments.id, arguments.fleet, wall_ms, mission)], options, wall_ms)
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line instead of usage and a line."""
+        raise Refused(f"{message} ({EXAMPLE})")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="lfa-agent", description="Run one robot of a fleet until it is stopped.", epilog=EXAMPLE)
+    add = parser.add_argument
+    add("--role", required=True, help="place it starts in: leader, follower or witness; roles change at run time")
+    add("--id", required=True, help="robot id from the mission (1, 2, ...), or w for the witness")
+    add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
+    add("--connect", metavar="ENDPOINT", help="the router, like tcp/127.0.0.1:7447 (default: this machine's)")
+    add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; else it comes over Zenoh")
+    add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
+    return parser
+
+
+def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None) -> Node:
     if role not in ROLES:
         raise Refused(f"--role {role}: must be one of {', '.join(ROLES)}")
     if role == "witness":
@@ -74,13 +92,6 @@ def read_mission(path: Path) -> Mission:
         raise Refused(f"{path}: {refused}") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise Refused(f"{path}: {error}") from None
-
-
-def main() -> None:
-    """Entry point of `lfa-agent`."""
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command(epilog=EXAMPLE)(start)
-    app()
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ run on Zenoh's receiver threads and do nothing but append to the inbox.
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import zenoh
 
 from protocol import clock
@@ -188,7 +188,7 @@ def _config(mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: 
     }
     config = zenoh.Config()
     for name, value in settings.items():
-        config.insert_json5(name, json.dumps(value))
+        config.insert_json5(name, msgspec.json.encode(value).decode())
     return config
 
 
