@@ -1,0 +1,155 @@
+"""Six terminals: router, world and agents started one by one, in any order, and one of them twice."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from protocol.bus import Inbox
+from protocol.messages import Message, Role, Status, Tracking, decode
+from protocol.topics import TOPIC, address, key
+from protocol.zenoh_bus import ZenohBus, answers
+from tests.processes.fleet import eventually
+
+pytestmark = pytest.mark.processes
+
+FLEET = "hand"
+RSS_MB_MAX = 35.0
+
+
+class Terminals:
+    """Processes of one fleet and an onlooker on its bus."""
+
+    def __init__(self, folder: Path) -> None:
+        self.endpoint = f"unixsock-stream/{folder / 'router.sock'}"
+        self._folder = folder
+        self._children: list[subprocess.Popen[str]] = []
+        self._bus: ZenohBus | None = None
+        self._inbox = Inbox()
+
+    def router(self) -> subprocess.Popen[str]:
+        child = self._start("deploy.fleet.router", "--listen", self.endpoint)
+        eventually(lambda: answers(self.endpoint), "the router does not answer")
+        return child
+
+    def world(self) -> subprocess.Popen[str]:
+        return self._start("world.cli", "straight", *self._team())
+
+    def agent(self, robot_id: int, role: str = "follower") -> subprocess.Popen[str]:
+        return self._start("agents.cli", "--role", role, "--id", str(robot_id), *self._team())
+
+    def look_on(self) -> None:
+        self._bus = ZenohBus(self.endpoint, self._inbox)
+        self._bus.follow(frozenset(key(FLEET, "*", topic) for topic in ("tracking", "status", "pose")))
+
+    def heard(self) -> list[Message]:
+        """All that came since the last call; of each key only the newest."""
+        arrivals = [a for a in self._inbox.take() if isinstance(a.payload, bytes)]
+        topics = [address(arrival.key) for arrival in arrivals]
+        return [decode(a.payload, TOPIC[t.topic].type) for a, t in zip(arrivals, topics, strict=True) if t]  # type: ignore[arg-type]
+
+    def end(self) -> None:
+        if self._bus is not None:
+            self._bus.close()
+        for child in reversed(self._children):
+            child.kill()
+            child.communicate()
+
+    def _team(self) -> tuple[str, ...]:
+        return ("--fleet", FLEET, "--connect", self.endpoint)
+
+    def _start(self, *arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", *arguments]
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self._children.append(child)
+        return child
+
+
+@pytest.fixture
+def terminals() -> Iterator[Terminals]:
+    folder = Path(tempfile.mkdtemp(prefix="lfa-"))  # short: a socket's path has 107 bytes at most
+    opened = Terminals(folder)
+    yield opened
+    opened.end()
+    shutil.rmtree(folder)
+
+
+def follows(terminals: Terminals, robot: str, incarnation_not: int | None = None) -> bool:
+    """`robot` has just said whom it follows, in another life than `incarnation_not`."""
+    said = (message for message in terminals.heard() if isinstance(message, Tracking))
+    return any(m.header.sender == robot and m.header.incarnation != incarnation_not for m in said)
+
+
+def test_agents_started_before_router_and_world_wait_and_then_follow(terminals: Terminals) -> None:
+    follower = terminals.agent(2)
+    assert follower.stderr is not None
+    assert follower.stderr.readline().startswith("no router at ")
+    terminals.agent(1, "leader")
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    eventually(lambda: follows(terminals, "robot2"), "robot 2 follows nobody")
+
+
+def test_a_killed_follower_that_starts_again_follows_again(terminals: Terminals) -> None:
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    terminals.agent(1, "leader")
+    follower = terminals.agent(2)
+    first_life: list[int] = []
+
+    def first() -> bool:
+        first_life.extend(m.header.incarnation for m in terminals.heard() if isinstance(m, Tracking))
+        return bool(first_life)
+
+    eventually(first, "robot 2 follows nobody")
+    follower.kill()
+    follower.wait()
+    terminals.agent(2)
+    eventually(lambda: follows(terminals, "robot2", first_life[0]), "robot 2 does not follow in its second life")
+
+
+def test_an_id_that_already_runs_is_refused_in_one_line(terminals: Terminals) -> None:
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    terminals.agent(2)
+    eventually(lambda: any(m.header.sender == "robot2" for m in terminals.heard()), "robot 2 says nothing")
+    second = terminals.agent(2)
+    _, said = second.communicate(timeout=20.0)
+    assert second.returncode == 2
+    assert said.count("\n") == 1
+    assert "robot2 already runs" in said
+
+
+def test_a_second_router_at_the_same_place_is_refused_in_one_line(terminals: Terminals) -> None:
+    terminals.router()
+    command = [sys.executable, "-m", "deploy.fleet.router", "--listen", terminals.endpoint]
+    second = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert second.returncode == 2
+    assert second.stderr.count("\n") == 1
+    assert answers(terminals.endpoint), "the first router has gone"
+
+
+def test_an_agent_is_small(terminals: Terminals) -> None:
+    """Under 35 MB resident while it leads."""
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    terminals.agent(1, "leader")
+    sizes_mb: list[float] = []
+
+    def told() -> bool:
+        said = [m for m in terminals.heard() if isinstance(m, Status) and m.header.sender == "robot1"]
+        sizes_mb.extend(m.counters["rss_mib"] * 2**20 / 1e6 for m in said if m.role is Role.LEADER)
+        return len(sizes_mb) >= 2
+
+    eventually(told, "robot 1 does not lead")
+    assert max(sizes_mb) < RSS_MB_MAX
