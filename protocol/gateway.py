@@ -35,7 +35,8 @@ class Gateway:
         """Whom leader and followers of `term_max` named as its holder; 0: nobody yet."""
         self._latched: Term | None = None
         self._twist = STILL
-        self._accepted_at = float("-inf")
+        self._stamped_at = float("-inf")
+        """The moment of this gateway that the last obeyed command echoes: how old the information is that moves it."""
 
     def command(self, cmd: CmdVel, now: float) -> str | None:
         """Obey `cmd` and answer None, or answer (and count) the reason of refusal."""
@@ -50,7 +51,7 @@ class Gateway:
             self._holder = cmd.holder
         if cmd.as_leader:
             self._latched = None
-        self._twist, self._accepted_at = cmd.twist, now
+        self._twist, self._stamped_at = cmd.twist, cmd.gateway.time
         return None
 
     def _objection(self, cmd: CmdVel, now: float) -> str | None:
@@ -66,7 +67,7 @@ class Gateway:
             return TWO_HOLDERS
         if cmd.gateway.incarnation != self.incarnation:
             return FOREIGN_STAMP
-        if now - cmd.gateway.time > self._deadman_s:
+        if now - cmd.gateway.time > self._deadman_s or cmd.gateway.time < self._stamped_at:
             return OLD_STAMP
         if cmd.as_leader and self._latched is not None and cmd.term <= self._latched:
             return LATCHED
@@ -76,7 +77,7 @@ class Gateway:
         """E11: from here on nothing below `fence.term` moves this robot, and what moved it so far is braked."""
         if fence.term > self.term_max:
             self.term_max, self._holder = fence.term, 0
-            self._brake(now)
+            self._twist = STILL
         return Fenced(fence.old, fence.term)
 
     def agent_down(self, incarnation: int, now: float) -> None:
@@ -87,13 +88,13 @@ class Gateway:
         """
         if incarnation >= self._obeyed:
             self._obeyed, self._latched = incarnation, self.term_max
-            self._brake(now)
+            self._twist = STILL
 
     def agent_up(self, incarnation: int, now: float) -> None:
         """An agent of this robot is on the wire; a newer life than the one obeyed replaces it."""
         if incarnation > self._obeyed:
             self._obeyed = incarnation
-            self._brake(now)
+            self._twist = STILL
 
     @property
     def latched(self) -> bool:
@@ -105,8 +106,9 @@ class Gateway:
         return GatewayStamp(self.incarnation, now)
 
     def twist(self, now: float) -> Twist:
-        """What the motors get: the last command obeyed, or a stop once the deadman has run out."""
-        return self._twist if now - self._accepted_at <= self._deadman_s else STILL
+        """What the motors get: the last command obeyed, or a stop once the deadman has run out.
 
-    def _brake(self, now: float) -> None:
-        self._twist, self._accepted_at = STILL, now
+        The deadman runs from the moment that the command echoes, not from its arrival: a command that was long on
+        its way would otherwise move the robot up to 2 D after its sender's lease, and T_grant allows for one (I8).
+        """
+        return self._twist if now - self._stamped_at <= self._deadman_s else STILL

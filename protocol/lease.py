@@ -13,6 +13,7 @@ from protocol.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExten
 from protocol.holder import Holder
 from protocol.membership import ANY_LIFE, first_config, ids, is_first, led_by, rank, with_chain
 from protocol.messages import (
+    NO_TERM,
     Config,
     Fence,
     Fenced,
@@ -137,7 +138,7 @@ class Lease:
             case Release():
                 self._on_release(body, now, effects)
             case Hello():
-                self._on_hello(src, now, effects)
+                self._on_hello(src, body, now, effects)
             case Fenced():
                 if body.old == self._unreleased:
                     self._send_release(now, effects)
@@ -372,6 +373,8 @@ class Lease:
                 self._adopt(body.config, effects)
             if newer or body.promised > holder.term:
                 self._stand(now, effects)  # E10
+        elif newer and candidate is None and holder is None:
+            self._adopt(body.config, effects)
 
     # --- leading -----------------------------------------------------------------------------------------------
 
@@ -422,8 +425,13 @@ class Lease:
         self._adopt(with_chain(self.config, chain), effects)
         self._send_round(self._holder, now, effects)
 
-    def _on_hello(self, src: Member, now: float, effects: list[Effect]) -> None:
-        """E9: a robot that was out returns at the tail; so does a later life of one that was in."""
+    def _on_hello(self, src: Member, body: Hello, now: float, effects: list[Effect]) -> None:
+        """E9: a robot that was out returns at the tail; so does a later life of one that was in.
+
+        While nobody leads, whoever says HELLO is told the newest config, so that it does not wait for a first start.
+        """
+        if self.leader is None and (body.version is None or body.version < self.config.version):
+            effects.append(Send(robot_name(src.id), self._acceptor.refusal(NO_TERM, self.config, now)))
         if self._holder is None or self._candidate is not None or src.id not in self._robots:
             return
         self._holder.heard_at[src.id] = now

@@ -1,30 +1,33 @@
 """A small world for leases alone: processes with clocks of their own, a faulty network, gateways, virtual time.
 
 One heap of (true time, number, event). Everything random comes from one generator, so two arenas with the same seed
-and the same calls do the same. Directed tests and `lfa fuzz` drive it; checkers listen as `Watcher`s and see true
-time, which no process does.
+and the same calls do the same. Directed tests and `lfa fuzz` drive it; checkers (`deploy/look/checkers.py`)
+are told what leaves processes and gateways, in true time, which no process knows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from random import Random
 from typing import Any
 
 from msgspec import Struct
 
-from protocol.effects import BecomeLeader, Effect, Send, StepDown
+from deploy.look.checkers import Checker
+from protocol.effects import AdoptChain, BecomeLeader, Effect, Send, StepDown
 from protocol.gateway import Gateway
 from protocol.geometry import Twist
 from protocol.lease import Lease
-from protocol.messages import NO_TERM, CmdVel, Fence, Header, LeaseBody, Member
+from protocol.messages import NO_TERM, CmdVel, Fence, Grant, Header, LeaseBody, Member, Promise, Propose, Release
 from protocol.mission import WITNESS_ID, Leading, Mission, Profile, robot_id_of, robot_name
 from protocol.timing import CONTROL_PERIOD_S, timing_of
 
 FORWARD = Twist(0.5, 0.0)
 FOLLOW_PERIOD_S = 0.1
 """Followers command more rarely here than on the road: enough to carry terms to their gateways."""
+ROUNDING_S = 1e-9
+"""Of converting a time from one clock to another and back."""
 INBOX_SIZE_MAX = 500
 """Messages kept for a process that is paused."""
 
@@ -83,19 +86,6 @@ class GatewayHost(Struct):
     alive: bool = True
 
 
-class Watcher:
-    """What a checker may listen to; it overrides what it needs. All times are true times [s]."""
-
-    def started(self, at: float, process: Process) -> None: ...
-    def ended(self, at: float, process: Process) -> None: ...
-    def effect(self, at: float, process: Process, effect: Effect) -> None: ...
-    def delivered(self, at: float, src: Member, process: Process, body: LeaseBody) -> None: ...
-    def fenced(self, at: float, robot_id: int, fence: Fence) -> None: ...
-    def gateway_started(self, at: float, robot_id: int) -> None: ...
-    def command(self, at: float, robot_id: int, cmd: CmdVel, refused: str | None) -> None: ...
-    def fault(self, at: float, kind: str, targets: tuple[int, ...]) -> None: ...
-
-
 Filter = Callable[[int, int, LeaseBody], float | None]
 """(from, to, body) -> extra delay [s]; None loses the message. Gateways are addressed as minus their robot's id."""
 
@@ -112,7 +102,6 @@ class Arena:
         mission: Mission | None = None,
         weather: Weather | None = None,
         gateways_at_world: bool = False,
-        watchers: tuple[Watcher, ...] = (),
         gateway_type: type[Gateway] = Gateway,
     ) -> None:
         self.random = Random(seed)
@@ -132,7 +121,6 @@ class Arena:
         self.rates = rates or {}
         self.processes: dict[int, Process] = {}
         self.gateways: dict[int, GatewayHost] = {}
-        self.watchers = watchers
         self.accepted: list[tuple[float, CmdVel]] = []
         """Leader commands that a gateway obeyed."""
         self.log: list[tuple[float, int, Effect]] = []
@@ -142,10 +130,15 @@ class Arena:
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._number = 0
         self._lives = 0
-        self._watching = {name: self._listeners(name) for name in vars(Watcher) if not name.startswith("_")}
+        self.listen(())
 
-    def _listeners(self, name: str) -> list[Callable[..., None]]:
-        return [getattr(w, name) for w in self.watchers if getattr(type(w), name) is not getattr(Watcher, name)]
+    def listen(self, checkers: Sequence[Checker]) -> None:
+        """Tell these checkers, and only these, what happens from here on."""
+        self._tell: dict[str, list[Callable[..., None]]] = {
+            name: [getattr(c, name) for c in checkers if getattr(type(c), name) is not getattr(Checker, name)]
+            for name in vars(Checker)
+            if not name.startswith("_")
+        }
 
     # --- the course of time ------------------------------------------------------------------------------------
 
@@ -180,11 +173,9 @@ class Arena:
         self._lives += 1
         member = Member(robot_id, self._lives)
         clock = Clock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
-        lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor=self._lives)
+        lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor=round(self.now * 1000.0))
         process = Process(member, lease, clock)
         self.processes[robot_id] = process
-        for listen in self._watching["started"]:
-            listen(self.now, process)
         self._tell_token(member, up=True)
         if robot_id != WITNESS_ID:
             self.at(self.now + self.random.uniform(0.0, FOLLOW_PERIOD_S), self._follow, process)
@@ -199,7 +190,8 @@ class Arena:
         if not process.alive:
             return
         process.alive = False
-        self._told("ended", process)
+        for tell in self._tell["leads_no_more"]:
+            tell(self.now, process.member)
         if hinted:
             self._tell_token(process.member, up=False)
 
@@ -218,7 +210,7 @@ class Arena:
         """SIGSTOP: what comes is kept, the clock goes on."""
         self.processes[robot_id].paused = True
 
-    def resume(self, robot_id: int, *, shuffled: bool = False) -> None:
+    def resume(self, robot_id: int, shuffled: bool = False) -> None:
         """SIGCONT: the command that was about to leave leaves, then everything that came is handled."""
         process = self.processes[robot_id]
         if not process.paused:
@@ -242,8 +234,8 @@ class Arena:
         clock = Clock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
         gateway = self._gateway_type(robot_id, self._lives, self.timing, clock.local(born_at))
         self.gateways[robot_id] = GatewayHost(gateway, clock, born_at)
-        for listen in self._watching["gateway_started"]:
-            listen(self.now, robot_id)
+        for tell in self._tell["gateway_starts"]:
+            tell(self.now, robot_id, born_at + self.timing.grant_s / clock.rate)
 
     def kill_gateway(self, robot_id: int) -> None:
         self.gateways[robot_id].alive = False
@@ -306,8 +298,8 @@ class Arena:
         host = self.gateways.get(robot_id)
         if host is None or not host.alive or not isinstance(body, Fence):
             return
-        for listen in self._watching["fenced"]:
-            listen(self.now, robot_id, body)
+        for tell in self._tell["bars"]:
+            tell(self.now, robot_id, body.term)
         answer = host.gateway.fence(body, host.clock.local(self.now))
         speaker = Member(robot_id, host.gateway.incarnation)
         self._post(speaker, self._host_of_gateway(robot_id), src.id, answer)
@@ -330,17 +322,22 @@ class Arena:
             if len(process.inbox) < INBOX_SIZE_MAX:
                 process.inbox.append((method, arguments))
             return
-        if method == "receive":
-            for listen in self._watching["delivered"]:
-                listen(self.now, arguments[0], process, arguments[1])
+        if method == "receive" and type(arguments[1]) is Promise:
+            for tell in self._tell["promises"]:
+                tell(self.now, arguments[0], arguments[1])
         self._carry_out(process, getattr(process.lease, method)(*arguments, process.clock.local(self.now)))
 
     def _wake(self, process: Process) -> None:
-        if process.wakes_at > self.now or not process.alive or process.paused:
-            return  # an earlier wake-up has been set since, or nobody is there
+        if process.wakes_at > self.now:
+            return  # set before the deadline moved
         process.wakes_at = float("inf")
-        local = process.clock.local(self.now)
-        self._carry_out(process, process.lease.tick(max(local, process.lease.next_deadline())))
+        if not process.alive or process.paused:
+            return
+        local, deadline = process.clock.local(self.now), process.lease.next_deadline()
+        if local < deadline - ROUNDING_S:
+            self._wake_at(process, process.clock.true(deadline))  # the deadline has moved since
+        else:
+            self._carry_out(process, process.lease.tick(max(local, deadline)))
 
     def _wake_at(self, process: Process, true: float) -> None:
         if true < process.wakes_at:
@@ -348,25 +345,34 @@ class Arena:
             self.at(true, self._wake, process)
 
     def _carry_out(self, process: Process, effects: list[Effect]) -> None:
-        listeners = self._watching["effect"]
         for effect in effects:
-            if type(effect) is Send:
+            if isinstance(effect, Send):
                 self._send(process, effect)
-            elif type(effect) is BecomeLeader or type(effect) is StepDown:
+            elif isinstance(effect, AdoptChain):
+                for tell in self._tell["adopts"]:
+                    tell(self.now, process.member, effect.config)
+            elif isinstance(effect, StepDown):
                 self.log.append((self.now, process.id, effect))
-                if type(effect) is BecomeLeader and not process.commanding:
-                    process.commanding = True
-                    self._lead(process)
-            for listen in listeners:
-                listen(self.now, process, effect)
+                for tell in self._tell["leads_no_more"]:
+                    tell(self.now, process.member)
+            else:
+                for tell in self._tell["leads"]:
+                    tell(self.now, process.member, effect.term, process.clock.true(effect.expiry))
+                if isinstance(effect, BecomeLeader):
+                    self.log.append((self.now, process.id, effect))
+                    if not process.commanding:
+                        process.commanding = True
+                        self._lead(process)
         if process.lease.released:
             process.alive = False
-            self._told("ended", process)
+            for tell in self._tell["leads_no_more"]:
+                tell(self.now, process.member)
             self._tell_token(process.member, up=False)
             return
         self._wake_at(process, max(self.now, process.clock.true(process.lease.next_deadline())))
 
     def _send(self, process: Process, send: Send) -> None:
+        self._witnessed(process, send.body)
         if send.to == "all":
             for to in self.ids:
                 if to != process.id:
@@ -377,6 +383,22 @@ class Arena:
             receiver = robot_id_of(send.to)
             assert receiver is not None, send
             self._post(process.member, process.id, receiver, send.body)
+
+    def _witnessed(self, process: Process, body: LeaseBody) -> None:
+        """Tell the checkers what leaves a process. A PROPOSE by its holder is its own voter's grant as well."""
+        until = self.now + self.timing.grant_s / process.clock.rate
+        if isinstance(body, Grant):
+            for tell in self._tell["grants"]:
+                tell(self.now, process.member, body, until)
+        elif isinstance(body, Propose):
+            for tell in self._tell["proposes"]:
+                tell(self.now, process.member, body)
+            if body.holder == process.member:
+                for tell in self._tell["grants"]:
+                    tell(self.now, process.member, Grant(body.term, body.round, body.config.version, 0.0), until)
+        elif isinstance(body, Release):
+            for tell in self._tell["releases"]:
+                tell(self.now, body.term)
 
     # --- commands ----------------------------------------------------------------------------------------------
 
@@ -434,11 +456,15 @@ class Arena:
         host = self.gateways.get(robot_id)
         if host is None or not host.alive:
             return
-        refused = host.gateway.command(cmd, host.clock.local(self.now))
-        if refused is None and cmd.as_leader:
+        local = host.clock.local(self.now)
+        if host.gateway.command(cmd, local) is not None:
+            return
+        if cmd.as_leader:
             self.accepted.append((self.now, cmd))
-        for listen in self._watching["command"]:
-            listen(self.now, robot_id, cmd, refused)
+        for tell in self._tell["obeys"]:
+            tell(self.now, robot_id, cmd, local - cmd.gateway.time)
+        for tell in self._tell["bars"]:
+            tell(self.now, robot_id, cmd.term)
 
     # --- what tests ask ----------------------------------------------------------------------------------------
 
@@ -450,7 +476,3 @@ class Arena:
 
     def lease_of(self, robot_id: int) -> Lease:
         return self.processes[robot_id].lease
-
-    def _told(self, name: str, process: Process) -> None:
-        for listen in self._watching[name]:
-            listen(self.now, process)

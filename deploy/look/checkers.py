@@ -1,0 +1,243 @@
+"""The invariants I1-I8 of protocol/README.md as objects that watch from outside.
+
+They see true time and what left each process and each gateway, nothing of anybody's state: the fuzzer feeds
+them while a schedule runs, and a recording of real processes can feed them as well.
+"""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from protocol.messages import CmdVel, Config, Grant, Member, Promise, Propose, Term, Version
+from protocol.timing import CLOCK_RATE_ERROR, Timing
+
+EARLY_S = 1e-6
+"""Rounding of clock conversions."""
+LONG_AGO = float("-inf")
+
+
+class Violation(Struct, frozen=True):
+    """What was broken, when (true time [s]), and by what."""
+
+    name: str
+    at: float
+    text: str
+
+
+class Checker:
+    """One invariant. It overrides what it needs to hear; `violations` is what it found."""
+
+    name = ""
+
+    def __init__(self, timing: Timing) -> None:
+        self.timing = timing
+        self.violations: list[Violation] = []
+
+    def broken(self, at: float, text: str) -> None:
+        self.violations.append(Violation(self.name, at, text))
+
+    def leads(self, at: float, who: Member, term: Term, until: float) -> None:
+        """`who` holds `term`, new or extended, and believes so until true time `until`."""
+
+    def leads_no_more(self, at: float, who: Member) -> None:
+        """It stepped down, or its process ended."""
+
+    def adopts(self, at: float, who: Member, config: Config) -> None: ...
+
+    def promises(self, at: float, who: Member, promise: Promise) -> None:
+        """A promise reached the candidate that `promise.term` names."""
+
+    def proposes(self, at: float, who: Member, propose: Propose) -> None: ...
+
+    def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
+        """`voter` is bound to the holder of `grant.term` until true time `until`."""
+
+    def releases(self, at: float, term: Term) -> None:
+        """A RELEASE of `term` left its holder."""
+
+    def bars(self, at: float, robot_id: int, below: Term) -> None:
+        """The gateway of `robot_id` refuses every term under `below` from here on, by a fence or a command."""
+
+    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None: ...
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        """The gateway of `robot_id` let `cmd` through, whose stamp is `age` seconds old by the gateway's clock."""
+
+
+class Fences:
+    """What each gateway refuses at a moment: the knowledge that I1, I4 and I8 share."""
+
+    def __init__(self) -> None:
+        self._least: dict[int, Term] = {}
+        self._shut_until: dict[int, float] = {}
+
+    def bars(self, robot_id: int, below: Term) -> None:
+        self._least[robot_id] = max(self._least.get(robot_id, below), below)
+
+    def gateway_starts(self, robot_id: int, shut_until: float) -> None:
+        self._least.pop(robot_id, None)
+        self._shut_until[robot_id] = shut_until
+
+    def refuses(self, robot_id: int, term: Term, until: float) -> bool:
+        """No command of `term` moves `robot_id`, now and until `until`."""
+        least = self._least.get(robot_id)
+        return (least is not None and term < least) or until <= self._shut_until.get(robot_id, LONG_AGO)
+
+
+class _WithFences(Checker):
+    """A checker that has to know what is fenced."""
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self.fences = Fences()
+
+    def bars(self, at: float, robot_id: int, below: Term) -> None:
+        self.fences.bars(robot_id, below)
+
+    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
+        self.fences.gateway_starts(robot_id, shut_until)
+
+
+class LeaseExclusivity(_WithFences):
+    name = "I1"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._valid: dict[Member, tuple[Term, float]] = {}
+
+    def leads(self, at: float, who: Member, term: Term, until: float) -> None:
+        self._valid[who] = (term, until)
+        for other, (its_term, its_until) in list(self._valid.items()):
+            if other == who:
+                continue
+            if its_until <= at + EARLY_S:
+                del self._valid[other]
+                continue
+            lower, holder, end = min((term, who, until), (its_term, other, its_until))
+            if not self.fences.refuses(holder.id, lower, end):
+                self.broken(at, f"{_t(term)} of {_m(who)} and {_t(its_term)} of {_m(other)} are valid together")
+
+    def leads_no_more(self, at: float, who: Member) -> None:
+        self._valid.pop(who, None)
+
+
+class Acting(Checker):
+    name = "I2"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._highest = Term()
+        self._of_gateway: dict[int, Term] = {}
+        self._holder: dict[Term, int] = {}
+
+    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
+        self._of_gateway.pop(robot_id, None)
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        if cmd.term < self._of_gateway.get(robot_id, cmd.term):
+            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)} after {_t(self._of_gateway[robot_id])}")
+        self._of_gateway[robot_id] = cmd.term
+        if age > self.timing.deadman_s + EARLY_S:
+            self.broken(at, f"gateway {robot_id} obeyed a command {age * 1000:.1f} ms old")
+        if self._holder.setdefault(cmd.term, cmd.holder) != cmd.holder:
+            self.broken(at, f"{_t(cmd.term)} obeyed for {cmd.holder} and for {self._holder[cmd.term]}")
+        if not cmd.as_leader:
+            return
+        if cmd.holder != robot_id:
+            self.broken(at, f"gateway {robot_id} obeyed a leader command of {cmd.holder}")
+        if cmd.term < self._highest:
+            self.broken(at, f"leader command of {_t(cmd.term)} obeyed after one of {_t(self._highest)}")
+        self._highest = max(self._highest, cmd.term)
+
+
+class OneHolder(Checker):
+    name = "I3"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._holder: dict[Term, Member] = {}
+
+    def proposes(self, at: float, who: Member, propose: Propose) -> None:
+        known = self._holder.setdefault(propose.term, propose.holder)
+        if known != propose.holder:
+            self.broken(at, f"{_t(propose.term)} held by {_m(known)} and by {_m(propose.holder)}")
+        if who != propose.holder and (who.id, who.incarnation) != (propose.term.issuer, propose.term.incarnation):
+            self.broken(at, f"{_t(propose.term)} proposed by {_m(who)}")
+
+
+class OneBond(_WithFences):
+    name = "I4"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._bond: dict[Member, tuple[Term, Member, float]] = {}
+        self._released: set[Term] = set()
+        self._holder: dict[Term, Member] = {}
+
+    def proposes(self, at: float, who: Member, propose: Propose) -> None:
+        self._holder[propose.term] = propose.holder
+
+    def releases(self, at: float, term: Term) -> None:
+        self._released.add(term)
+
+    def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
+        holder = self._holder[grant.term]
+        term, other, its_until = self._bond.get(voter, (grant.term, holder, LONG_AGO))
+        handed_over = (grant.term.issuer, grant.term.incarnation) == (other.id, other.incarnation)
+        free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
+        if not free and not self.fences.refuses(other.id, term, its_until):
+            self.broken(at, f"{_m(voter)} granted {_t(grant.term)} to {_m(holder)}, bound to {_t(term)} of {_m(other)}")
+        self._bond[voter] = (grant.term, holder, until)
+
+
+class OneChain(Checker):
+    name = "I5"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._content: dict[Version, Config] = {}
+        self._newest: dict[Member, Config] = {}
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        if self._content.setdefault(config.version, config) != config:
+            self.broken(at, f"{_m(who)} has another config of version {config.version}")
+        if who in self._newest and config.version <= self._newest[who].version:
+            self.broken(at, f"{_m(who)} went back to version {config.version}")
+        self._newest[who] = config
+
+    def leads(self, at: float, who: Member, term: Term, until: float) -> None:
+        chain = self._newest[who].chain if who in self._newest else ()
+        if not chain or chain[0] != who:
+            self.broken(at, f"{_m(who)} leads {_t(term)} with chain {[m.id for m in chain]}")
+
+
+class Residual(_WithFences):
+    name = "I8"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._last: tuple[float, CmdVel] | None = None
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        if not cmd.as_leader:
+            return
+        if self._last is not None:
+            stamped_at, old = self._last
+            rest_at = stamped_at + self.timing.deadman_s / (1.0 + CLOCK_RATE_ERROR) - EARLY_S
+            if cmd.holder != old.holder and at < rest_at and not self.fences.refuses(old.holder, old.term, at):
+                early = (rest_at - at) * 1000.0
+                self.broken(
+                    at, f"{_t(cmd.term)} obeyed {early:.1f} ms before {_t(old.term)} of {old.holder} is at rest"
+                )
+        self._last = (at - age, cmd)
+
+
+SAFETY: tuple[type[Checker], ...] = (LeaseExclusivity, Acting, OneHolder, OneBond, OneChain, Residual)
+
+
+def _t(term: Term) -> str:
+    return f"({term.n},{term.issuer},{term.incarnation})"
+
+
+def _m(member: Member) -> str:
+    return f"{member.id}/{member.incarnation}"

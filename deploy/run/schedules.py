@@ -1,0 +1,149 @@
+"""What `lfa fuzz` does to a team: the fault model as data, and schedules drawn from a seed.
+
+Each seed draws its own kind of weather and its own few kinds of fault (a swarm): a schedule in which everything happens
+a little tests less than many in which some things happen a lot. Faults fall in the first 4 s, then everything heals.
+"""
+
+from __future__ import annotations
+
+from random import Random
+
+from msgspec import Struct, structs
+
+from deploy.run.arena import Weather
+from protocol.mission import Profile
+from protocol.timing import CLOCK_RATE_ERROR
+
+FAULTS_UNTIL_S = 4.0
+DURATION_S = 8.0
+WARM_UP_S = 0.6
+FAULTS_MEAN = 26
+LEADER_SHARE = 0.4
+"""Of the faults with one target, how many are aimed at whoever leads at that moment."""
+
+LEADER = -1
+
+
+class Fault(Struct, frozen=True):
+    """One thing done at true time `at`. `targets` are ids, LEADER is whoever leads then."""
+
+    at: float
+    kind: str
+    targets: tuple[int, ...] = ()
+    duration_s: float = 0.0
+    value: float = 0.0
+
+
+class Schedule(Struct, frozen=True):
+    """Everything that a seed draws."""
+
+    seed: int
+    robots: int
+    witness: bool
+    profile: Profile
+    gateways_at_world: bool
+    rates: dict[int, float]
+    faults: tuple[Fault, ...]
+    weather: Weather
+    revive_all: bool
+    """At the end of the faults every dead process starts again; else only as many as a quorum needs."""
+
+
+KINDS: tuple[str, ...] = (
+    "kill",
+    "restart",
+    "exit",
+    "pause",
+    "cut",
+    "cut_one_way",
+    "cut_pair",
+    "loss",
+    "burst",
+    "duplicate",
+    "tail",
+    "false_hint",
+    "hand_over",
+    "gateway",
+    "witness",
+)
+"""Kinds that a schedule may draw; `burst` is a short total loss, `gateway` and `witness` are a crash with a restart."""
+
+
+def draw(seed: int) -> Schedule:
+    """The schedule of a seed. Weather is the same whatever `lfa fuzz` does with it."""
+    random = Random(seed)
+    robots = random.randint(2, 6)
+    witness = random.random() < 0.9
+    ids = tuple(range(1, robots + 1))
+    kinds = [kind for kind in KINDS if random.random() < 0.4 and (witness or kind != "witness")] or ["kill"]
+    mean = 0.0 if random.random() < 0.05 else FAULTS_MEAN
+    return Schedule(
+        seed=seed,
+        robots=robots,
+        witness=witness,
+        profile=random.choices(("std", "fast", "wifi"), (0.7, 0.15, 0.15))[0],
+        gateways_at_world=witness and random.random() < 0.5,
+        rates={i: _rate(random) for i in (*ids, 0, *(-i for i in ids))},
+        faults=tuple(sorted((_fault(random, kinds, ids) for _ in range(_count(random, mean))), key=_when)),
+        weather=_weather(random),
+        revive_all=random.random() < 0.5,
+    )
+
+
+def _count(random: Random, mean: float) -> int:
+    return round(mean * random.uniform(0.8, 1.4))
+
+
+def _when(fault: Fault) -> float:
+    return fault.at
+
+
+def _rate(random: Random) -> float:
+    """Two clocks in three run as fast or as slow as is allowed."""
+    return 1.0 + CLOCK_RATE_ERROR * random.choice((-1.0, 1.0, random.uniform(-1.0, 1.0)))
+
+
+def _weather(random: Random) -> Weather:
+    return Weather(
+        delay_max=random.choice((0.002, 0.002, 0.005, 0.02)),
+        loss=random.choice((0.0, 0.0, 0.0, 0.05, 0.2)),
+        duplicate=random.choice((0.0, 0.0, 0.05, 0.3)),
+        tail=random.choice((0.0, 0.0, 0.02, 0.1)),
+        tail_mean=random.choice((0.02, 0.1, 0.3)),
+    )
+
+
+def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> Fault:
+    at = random.uniform(WARM_UP_S, FAULTS_UNTIL_S)
+    kind = random.choice(kinds)
+    target = LEADER if random.random() < LEADER_SHARE else random.choice(ids)
+    lasts = random.choice((0.0, random.uniform(0.02, 0.2), random.uniform(0.1, 1.5)))
+    match kind:
+        case "cut" | "cut_one_way":
+            side = tuple(i for i in (*ids, 0) if random.random() < 0.5)
+            return Fault(at, kind, side or (target,), random.uniform(0.05, 1.5))
+        case "cut_pair":
+            return Fault(at, kind, (target, random.choice((*ids, 0))), random.uniform(0.05, 1.5))
+        case "loss":
+            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.5))
+        case "burst":
+            return Fault(at, kind, (), random.uniform(0.01, 0.15), 1.0)
+        case "duplicate":
+            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
+        case "tail":
+            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.05, 0.5))
+        case "false_hint":
+            observers = tuple(i for i in (*ids, 0) if random.random() < random.choice((0.3, 1.0)))
+            return Fault(at, kind, (target, *observers), lasts)
+        case "pause":
+            return Fault(at, kind, (target,), random.uniform(0.05, 1.0), float(random.random() < 0.3))
+        case "witness":
+            return Fault(at, kind, (0,), lasts)
+        case _:
+            return Fault(at, kind, (target,), lasts)
+
+
+def without(schedule: Schedule, *indices: int) -> Schedule:
+    """The same schedule with some faults left out."""
+    kept = tuple(fault for index, fault in enumerate(schedule.faults) if index not in indices)
+    return structs.replace(schedule, faults=kept)

@@ -1,0 +1,427 @@
+"""The timed lease core, one rule or one usual bug a test. Directed scenarios in virtual time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from deploy.look.checkers import SAFETY, Checker
+from deploy.run.arena import Arena
+from protocol.acceptor import Acceptor
+from protocol.effects import BecomeLeader, Effect, Send, StepDown
+from protocol.lease import Lease
+from protocol.membership import first_config
+from protocol.messages import (
+    Config,
+    Grant,
+    Hello,
+    LeaseBody,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Role,
+    Term,
+    Version,
+)
+from protocol.mission import Leading, Mission
+from protocol.timing import timing_of
+
+STD = timing_of("std")
+TEAM = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))
+
+
+class Team(Arena):
+    """An arena whose safety checkers are on, with everybody started and led by robot 1 at 1 s."""
+
+    def __init__(self, robots: int = 4, **options: object) -> None:
+        super().__init__(robots, **options)  # type: ignore[arg-type]
+        self.checkers: list[Checker] = [checker(self.timing) for checker in SAFETY]
+        self.listen(self.checkers)
+        self.start_all().run(1.0)
+        assert self.leaders() == [1]
+
+    def safe(self) -> bool:
+        found = [v for checker in self.checkers for v in checker.violations]
+        assert not found, found
+        return True
+
+    def changes(self, since: float = 1.0) -> list[tuple[int, str]]:
+        """Who became leader or stepped down since then."""
+        return [(who, type(effect).__name__) for at, who, effect in self.log if at > since]
+
+    def led_at(self, since: float) -> float:
+        """When somebody first became leader after `since`."""
+        return next(at for at, _, effect in self.log if at > since and isinstance(effect, BecomeLeader))
+
+
+def config_of(term: Term, seq: int = 0) -> Config:
+    first = first_config(TEAM)
+    return Config(Version(term, seq), first.voters, first.tie, None, first.chain)
+
+
+def voter(now: float = 10.0) -> Acceptor:
+    """One that has been up for long."""
+    return Acceptor(Term(), STD.grant_s, now - 1.0)
+
+
+def ask(voter: Acceptor, who: Member, term: Term, now: float, number: int = 0) -> Grant | Nack | None:
+    return voter.propose(who, Propose(term, config_of(term), number, who), config_of(Term()), now)
+
+
+A, B = Member(1, 7), Member(2, 8)
+LOW, HIGH = Term(5, 1, 7), Term(6, 2, 8)
+
+
+# --- the voter -----------------------------------------------------------------------------------------------
+
+
+def test_e1_a_voter_that_starts_promises_and_grants_nothing_for_the_longest_bond() -> None:
+    fresh = Acceptor(Term(), STD.grant_s, 10.0)
+    soon, later = 10.0 + STD.grant_s - 0.001, 10.0 + STD.grant_s
+    assert fresh.prepare(A, Prepare(LOW, Version()), config_of(Term()), soon) is None
+    assert ask(fresh, A, LOW, soon) is None
+    assert isinstance(ask(fresh, A, LOW, later), Grant)
+
+
+def test_e1_promises_of_a_new_life_are_above_its_floor() -> None:
+    fresh = Acceptor(Term(100), STD.grant_s, 0.0)
+    assert isinstance(ask(fresh, A, Term(99, 1, 7), 10.0), Nack)
+    assert isinstance(ask(fresh, A, Term(100, 1, 7), 10.0), Grant)
+
+
+def test_e3_a_bound_voter_refuses_another_holder_and_tells_when_it_is_free() -> None:
+    bound = voter()
+    ask(bound, A, LOW, 10.0)
+    refusal = ask(bound, B, HIGH, 10.1)
+    assert isinstance(refusal, Nack)
+    assert refusal.holder == A
+    assert refusal.remaining_s == pytest.approx(STD.grant_s - 0.1)
+    assert isinstance(ask(bound, B, HIGH, 10.0 + STD.grant_s), Grant)
+
+
+def test_e3_refusing_a_candidate_changes_nothing_at_a_bound_voter() -> None:
+    bound = voter()
+    ask(bound, A, LOW, 10.0)
+    assert isinstance(bound.prepare(B, Prepare(HIGH, Version(HIGH)), config_of(LOW), 10.1), Nack)
+    assert isinstance(ask(bound, A, LOW, 10.1, 1), Grant), "the holder could not renew after a refused candidate"
+
+
+def test_e3_the_holder_may_raise_its_own_term() -> None:
+    bound = voter()
+    ask(bound, A, LOW, 10.0)
+    raised = Term(9, 1, 7)
+    assert isinstance(bound.prepare(A, Prepare(raised, Version(LOW)), config_of(LOW), 10.1), Promise)
+    assert isinstance(ask(bound, A, raised, 10.1), Grant)
+
+
+def test_e3_what_was_promised_is_kept() -> None:
+    free = voter()
+    free.prepare(B, Prepare(HIGH, Version()), config_of(Term()), 10.0)
+    assert isinstance(ask(free, A, LOW, 10.1), Nack)
+
+
+def test_e3_a_fenced_term_binds_no_more_but_another_still_does() -> None:
+    bound = voter()
+    ask(bound, A, LOW, 10.0)
+    wrong = Propose(HIGH, config_of(HIGH), 0, B, fenced=(Term(4, 1, 7),))
+    assert isinstance(bound.propose(B, wrong, config_of(LOW), 10.1), Nack)
+    right = Propose(HIGH, config_of(HIGH), 0, B, fenced=(LOW,))
+    assert isinstance(bound.propose(B, right, config_of(LOW), 10.1), Grant)
+
+
+def test_e4_a_release_frees_the_bond_of_exactly_its_term() -> None:
+    bound = voter()
+    ask(bound, A, LOW, 10.0)
+    assert not bound.release(Term(4, 1, 7))
+    assert isinstance(ask(bound, B, HIGH, 10.1), Nack)
+    assert bound.release(LOW)
+    assert isinstance(ask(bound, B, HIGH, 10.2), Grant)
+
+
+def test_bug_14_a_late_propose_does_not_bring_a_released_lease_back() -> None:
+    bound = voter()
+    ask(bound, A, LOW, 10.0)
+    bound.release(LOW)
+    assert isinstance(ask(bound, A, LOW, 10.1, 1), Nack)
+
+
+def test_a_voter_refuses_a_config_older_than_its_own() -> None:
+    free = voter()
+    newer = config_of(HIGH, 3)
+    refusal = free.prepare(A, Prepare(Term(9, 1, 7), Version(HIGH, 2)), newer, 10.0)
+    assert isinstance(refusal, Nack)
+    assert refusal.config == newer
+
+
+# --- lease time ------------------------------------------------------------------------------------------------
+
+
+def alone(timing_now: float = 0.0) -> Lease:
+    """Robot 1 of two with a witness, open for votes."""
+    mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
+    lease = Lease(Member(1, 7), mission, STD, timing_now, floor=0)
+    for other in (Member(0, 3), Member(2, 4)):
+        lease.receive(other, Hello(Version()), timing_now)
+    return lease
+
+
+def sent(effects: list[Effect], kind: type) -> list[LeaseBody]:
+    return [e.body for e in effects if isinstance(e, Send) and isinstance(e.body, kind)]
+
+
+def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
+    """Robot 1 asked at `asked_at`; the witness's grant came `slow_s` later."""
+    lease = alone()
+    now = STD.grant_s
+    [prepare] = sent(lease.tick(now), Prepare)
+    assert isinstance(prepare, Prepare)
+    asked_at = now + 0.001
+    promise = Promise(prepare.term, lease.config, None, False)
+    [propose] = sent(lease.receive(Member(0, 3), promise, asked_at), Propose)
+    assert isinstance(propose, Propose)
+    at = asked_at + slow_s
+    grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
+    return lease, asked_at, at, lease.receive(Member(0, 3), grant, at)
+
+
+def test_e2_bug_1_the_lease_runs_from_when_it_was_asked_for_not_from_the_grant() -> None:
+    lease, asked_at, at, effects = elected(slow_s=0.035)
+    [become] = [e for e in effects if isinstance(e, BecomeLeader)]
+    assert become.expiry == asked_at + STD.act_s, "counted from the grant, two robots could lead (I1)"
+    assert lease.may_command(at)
+    assert not lease.may_command(asked_at + STD.act_s)
+
+
+def test_bug_6_leadership_is_announced_only_with_the_quorums_grants() -> None:
+    lease = alone()
+    [prepare] = sent(lease.tick(STD.grant_s), Prepare)
+    assert isinstance(prepare, Prepare)
+    effects = lease.receive(Member(0, 3), Promise(prepare.term, lease.config, None, False), STD.grant_s)
+    assert not any(isinstance(e, BecomeLeader) for e in effects)
+    assert lease.role is not Role.LEADER
+
+
+def test_e2_a_grant_that_comes_after_the_lease_would_have_run_out_makes_no_leader() -> None:
+    lease, _, _, effects = elected(slow_s=STD.act_s + 0.001)
+    assert not any(isinstance(e, BecomeLeader) for e in effects)
+    assert lease.role is not Role.LEADER
+
+
+def test_e7_bug_5_at_the_lease_end_it_stops_before_anything_else() -> None:
+    lease, asked_at, _, _ = elected(slow_s=0.001)
+    effects = lease.receive(Member(2, 4), Hello(Version()), asked_at + STD.act_s)
+    assert isinstance(effects[0], StepDown)
+    assert not lease.may_command(asked_at + STD.act_s)
+    assert not sent(effects, Propose), "a leader whose lease has run out must fall silent"
+
+
+def test_e4_the_release_waits_for_the_own_gateway() -> None:
+    team = Team()
+    team.filter = lambda src, to, body: None if to == -1 else 0.0  # the gateway's link is dead
+    last = [at for at, _ in team.accepted][-1]
+    team.exit(1)
+    assert not team.lease_of(1).released
+    team.run(1.0 + STD.deadman_s * 2)
+    assert team.lease_of(1).released
+    assert team.led_at(1.0) >= last + STD.deadman_s * 0.99
+    assert team.safe()
+
+
+# --- the team --------------------------------------------------------------------------------------------------
+
+
+def test_e5_whatever_the_order_of_starting_the_head_of_the_chain_leads_first() -> None:
+    team = Arena(4, seed=3)
+    for robot_id in team.mission.robots:
+        team.start_gateway(robot_id, -1.0)
+    for at, robot_id in ((0.0, 4), (0.3, 2), (0.9, 0), (1.4, 3), (2.0, 1)):
+        team.at(at, team.start, robot_id)
+    team.run(4.0)
+    assert team.leaders() == [1]
+    assert team.lease_of(3).chain == (1, 2, 3, 4)
+
+
+def test_e5_a_head_that_never_comes_is_not_waited_for_for_ever() -> None:
+    team = Arena(4, seed=3)
+    for robot_id in (0, 2, 3, 4):
+        team.at(0.0, team.start, robot_id)
+    team.run(8.0)
+    assert team.leaders() == [2]
+    assert team.lease_of(3).chain == (2, 3, 4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_within_its_bond(seed: int) -> None:
+    team = Team(seed=seed)
+    team.kill(1, hinted=False)
+    team.run(2.0)
+    assert team.leaders() == [2]
+    assert team.led_at(1.0) - 1.0 <= STD.grant_s + 4 * STD.rank_step_s
+    assert team.lease_of(4).chain == (2, 3, 4)
+    assert team.safe()
+
+
+def test_e6_the_election_passes_over_those_that_may_not_lead() -> None:
+    mission = Mission(robots=(1, 2, 3, 4), can_lead=(1, 4), leading=Leading(route_m=((1.0, 0.0),)))
+    team = Team(mission=mission)
+    team.kill(1)
+    team.run(2.0)
+    assert team.leaders() == [4]
+    assert team.lease_of(2).chain == (4, 2, 3)
+
+
+def test_e8_a_silent_follower_leaves_the_chain_after_t_chain_and_the_order_stays() -> None:
+    team = Team()
+    team.kill(3, hinted=False)
+    team.run(1.0 + STD.chain_silence_s - 0.1)
+    assert team.lease_of(4).chain == (1, 2, 3, 4)
+    team.run(1.0 + STD.chain_silence_s + 0.1)
+    assert team.lease_of(4).chain == (1, 2, 4)
+
+
+def test_e8_the_chain_closes_over_a_vanished_token_at_once() -> None:
+    team = Team()
+    team.kill(3)
+    team.run(1.03)
+    assert team.lease_of(4).chain == (1, 2, 4)
+    assert team.changes() == []
+
+
+def test_e9_a_robot_that_was_out_returns_at_the_tail() -> None:
+    team = Team()
+    team.kill(2)
+    team.run(2.0)
+    team.start(2)
+    team.run(3.0)
+    assert team.lease_of(2).chain == team.lease_of(4).chain == (1, 3, 4, 2)
+    assert team.changes() in ([], [(1, "BecomeLeader")]), "only the leader's own term may have been raised"
+
+
+def test_e9_the_leader_that_was_killed_returns_at_the_tail() -> None:
+    team = Team()
+    team.kill(1)
+    team.at(1.05, team.start, 1)
+    team.run(3.0)
+    assert team.leaders() == [2]
+    assert team.lease_of(1).chain == (2, 3, 4, 1)
+    assert team.safe()
+
+
+def test_e10_a_raised_term_interrupts_nobody() -> None:
+    team = Team()
+    team.gateways[1].gateway.term_max = Term(team.lease_of(1).term.n, 9, 9)  # a fence whose candidate died
+    team.run(1.5)
+    assert team.changes() == [(1, "BecomeLeader")]
+    times = [at for at, _ in team.accepted if at > 1.1]
+    assert max(b - a for a, b in pairwise(times)) < STD.deadman_s
+
+
+@pytest.mark.parametrize("gateways_at_world", [False, True])
+def test_l7_a_leader_that_is_cut_off_commands_no_more_after_its_lease(gateways_at_world: bool) -> None:
+    team = Team(gateways_at_world=gateways_at_world)
+    team.cut((1,))
+    team.run(3.0)
+    by_1 = [at for at, cmd in team.accepted if cmd.holder == 1]
+    assert by_1[-1] <= 1.0 + STD.act_s + STD.deadman_s
+    assert team.leaders() == [2]
+    assert team.safe()
+
+
+def test_bug_4_the_command_of_a_zombie_is_refused() -> None:
+    team = Team()
+    team.pause(1)
+    team.run(2.0)
+    assert team.leaders() == [2]
+    team.resume(1)
+    team.run(2.1)
+    refused = team.gateways[1].gateway.refused
+    assert refused == {"old_stamp": 1}
+    assert team.safe()
+
+
+def test_bug_8_terms_grow_over_a_total_blackout() -> None:
+    team = Team()
+    before = team.lease_of(1).term
+    for robot_id in team.ids:
+        team.kill(robot_id)
+    for robot_id in team.ids:
+        team.start(robot_id)
+    team.run(3.0)
+    assert team.leaders() == [1]
+    assert team.lease_of(1).term > before
+    assert team.safe()
+
+
+def test_bug_10_an_isolated_follower_that_returns_deposes_nobody() -> None:
+    team = Team()
+    before = team.lease_of(1).term
+    team.cut((3,))
+    team.run(11.0)
+    team.heal()
+    team.run(13.0)
+    assert team.changes() in ([], [(1, "BecomeLeader")]), "only the leader's own term may have been raised"
+    assert team.lease_of(1).term.n <= before.n + 2, "ten seconds alone must not drive the terms up"
+    assert team.lease_of(3).chain == (1, 2, 4, 3)
+
+
+def test_bug_11_a_deaf_leader_does_not_keep_its_voters_bound() -> None:
+    team = Team()
+    team.cuts |= {(other, 1) for other in (0, 2, 3, 4)}
+    team.run(1.0 + STD.grant_s + STD.act_s + 4 * STD.rank_step_s + 0.05)
+    assert team.leaders() == [2]
+    assert team.safe()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bug_12_sixteen_that_start_at_once_agree_on_one_leader(seed: int) -> None:
+    team = Arena(16, seed=seed)
+    team.start_all().run(STD.grant_s + 4 * STD.rank_step_s * 16)
+    assert team.leaders() == [1]
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.2])
+def test_l5_bug_15_loss_changes_neither_holder_nor_chain(loss: float) -> None:
+    team = Team()
+    team.weather.loss = loss
+    version = team.lease_of(1).config.version
+    team.run(21.0)
+    assert team.changes() == []
+    assert team.lease_of(1).config.version == version
+
+
+def test_after_a_release_the_next_leads_within_two_round_trips() -> None:
+    team = Team()
+    team.exit(1)
+    team.run(2.0)
+    assert team.leaders() == [2]
+    assert team.led_at(1.0) - 1.0 < 0.02
+    assert team.lease_of(3).chain == (2, 3, 4)
+    assert team.safe()
+
+
+def test_a_release_does_not_revive_the_voters_old_promise() -> None:
+    assert not voter().release(LOW)
+
+
+def test_followers_that_leave_stay_out_of_the_election() -> None:
+    team = Team()
+    team.exit(2)
+    team.run(1.2)
+    assert not team.processes[2].alive
+    assert team.lease_of(3).chain == (1, 3, 4)
+
+
+def test_more_than_seven_robots_lead_with_seven_voters_and_all_follow() -> None:
+    team = Team(20)
+    team.run(4.0)
+    assert len(team.lease_of(1).config.voters) == 7
+    assert team.lease_of(20).chain == tuple(range(1, 21))
+    team.kill(15)
+    team.kill(1)
+    team.run(5.0)
+    assert team.leaders() == [2]
+    assert team.lease_of(20).chain == tuple(i for i in range(2, 21) if i != 15)
+    assert team.safe()
