@@ -110,26 +110,42 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _override(document: dict[str, Any], override: str) -> str:
-    """Put `a.b=value` into `document`; the key that it sets."""
+    """Put `a.b=value` or `a.b[0].c=value` into `document`; the key that it sets."""
     key, equals, text = override.partition("=")
     key, text = key.strip(), text.strip()
-    parts = key.split(".")
-    if not equals or not all(parts):
+    if not equals or not re.fullmatch(r"\w+(\.\w+|\[\d+\])*", key):
         raise Refused(f"--set {override!r}: must be key=value, such as world.lidar.beams=360")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, KeyError, RecursionError):
-        if not re.fullmatch(r"[\w./ -]+", text):
-            raise Refused(f"--set {key} = {text}: must be a TOML value (a number, text, true, [1, 2])") from None
-        value = text
-    table = document
-    for depth, part in enumerate(parts[:-1]):
-        inner = table.setdefault(part, {})
-        if not isinstance(inner, dict):
-            raise Refused(f"--set {key} = {text}: must name a field ({'.'.join(parts[: depth + 1])} has no parts)")
-        table = inner
-    table[parts[-1]] = value
+    *way, last = (int(part) if part.isdecimal() else part for part in re.findall(r"\w+", key))
+    value = _toml_value(key, text)
+    table: Any = document
+    for part in way:
+        table = _inside(table, part)
+    if not _holds(table, last):
+        raise Refused(f"--set {key} = {text}: must name a field of a scenario, and {key} is in none")
+    table[last] = value
     return key
+
+
+def _toml_value(key: str, text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError):
+        if re.fullmatch(r"[\w./ -]+", text):
+            return text
+        raise Refused(f"--set {key} = {text}: must be a TOML value (a number, text, true, [1, 2])") from None
+
+
+def _inside(table: Any, part: str | int) -> Any:
+    """What `table` holds at `part`; a table that is not there yet is made, what cannot hold anything is None."""
+    if not _holds(table, part):
+        return None
+    return table.setdefault(part, {}) if isinstance(table, dict) else table[part]
+
+
+def _holds(table: Any, part: str | int) -> bool:
+    if isinstance(table, list):
+        return isinstance(part, int) and part < len(table)
+    return isinstance(table, dict) and isinstance(part, str)
 
 
 def _renumber(document: dict[str, Any], robots: int) -> None:

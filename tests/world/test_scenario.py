@@ -65,6 +65,9 @@ BAD = [
     (["world.starts=[[0,0,0],[0,0.1,0],[3,0,0],[4,0,0]]"], ["world.starts", "robots 1 and 2", "0.3 m apart"]),
     (["mission=3"], ["mission = 3", "object"]),
     (["mission.robots.x=3"], ["mission.robots", "array"]),
+    (["world.obstacles[3].radius_m=1"], ["--set world.obstacles[3].radius_m = 1", "is in none"]),
+    (["title.x=1"], ["--set title.x = 1", "is in none"]),
+    (["a b=1"], ["--set 'a b=1'", "key=value"]),
     (["nonsense"], ["--set 'nonsense'", "key=value"]),
     (["mission.leading.route_m=[[1,2,]"], ["--set mission.leading.route_m", "TOML value"]),
     (["mission.leading.route_m=[]"], ["mission.leading.route_m", "way-point"]),
@@ -129,6 +132,14 @@ def test_set_overrides_any_field() -> None:
     assert scenario.world.lidar.beams == 90
     assert scenario.mission.formation.side == "column"
     assert scenario.radio.loss == 0.25
+
+
+def test_set_reaches_into_lists() -> None:
+    scenario = load("paper_path1", ["world.obstacles[2].radius_m=0.4", "mission.leading.route_m[0]=[4.0, 0.1]"])
+    assert scenario.world.obstacles[2].radius_m == 0.4
+    assert scenario.mission.leading.route_m[0] == (4.0, 0.1)
+    with pytest.raises(Refused, match=r"^paper_path1.toml with --set: world.obstacles\[2\].radius_m = -1"):
+        load("paper_path1", ["world.obstacles[2].radius_m=-1"])
 
 
 def test_a_scenario_is_read_without_the_engine() -> None:
