@@ -96,3 +96,14 @@ def address(key: str) -> Address | None:
     if parts[3] not in TOPIC and parts[3] != "alive":
         return None
     return Address(parts[1], parts[2], parts[3], parts[4] if len(parts) == 5 else None)
+
+
+def matches(expression: str, key: str) -> bool:
+    """Zenoh's key expressions as far as this project uses them: `*` for one part, a last `**` for any rest."""
+    if expression == key:
+        return True
+    wanted, parts = expression.split("/"), key.split("/")
+    if wanted[-1] == "**":
+        wanted = wanted[:-1]
+        parts = parts[: len(wanted)]
+    return len(wanted) == len(parts) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))

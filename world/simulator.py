@@ -17,7 +17,7 @@ from protocol.journal import Journal
 from protocol.messages import Message
 from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
 from protocol.radio import Air, Radio
-from protocol.topics import HARDWARE, TOPIC, Address, address, alive_key
+from protocol.topics import HARDWARE, TOPIC, Address, address, alive_key, matches
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
@@ -207,7 +207,7 @@ class Simulator:
         self.at(self.now + delay_s, lambda: self._give(seat, key, message, payload))
 
     def _route(self, key: str) -> list[_Seat]:
-        seats = [seat for seat in self._seats.values() if any(_matches(e, key) for e in seat.interests)]
+        seats = [seat for seat in self._seats.values() if any(matches(e, key) for e in seat.interests)]
         self._routes[key] = seats
         return seats
 
@@ -219,13 +219,13 @@ class Simulator:
         self._routes.clear()
         for other in list(self._seats.values()):
             token = _token(other.node)
-            if other is not seat and any(_matches(e, token) for e in added):
+            if other is not seat and any(matches(e, token) for e in added):
                 self._hint_later(seat, PeerUp(other.node.name, other.node.incarnation), LOCAL_DELAY_S)
 
     def _announce(self, event: PeerUp | PeerDown, delay_s: float) -> None:
         for seat in list(self._seats.values()):
             token = alive_key(_fleet(seat.node), event.name, event.incarnation)
-            if seat.node.name != event.name and any(_matches(e, token) for e in seat.interests):
+            if seat.node.name != event.name and any(matches(e, token) for e in seat.interests):
                 self._hint_later(seat, event, delay_s)
 
     def _hint_later(self, seat: _Seat, event: PeerUp | PeerDown, delay_s: float) -> None:
@@ -239,17 +239,6 @@ def _local(where: Address | None, sender: _Seat, receiver: _Seat) -> bool:
     if where.topic == "lease":
         return where.to == where.owner.replace("robot", "gateway")
     return where.topic in HARDWARE or where.topic == "cmd_vel"
-
-
-def _matches(expression: str, key: str) -> bool:
-    """Zenoh's key expressions as far as this project uses them: `*` for one part, a last `**` for any rest."""
-    if expression == key:
-        return True
-    wanted, parts = expression.split("/"), key.split("/")
-    if wanted[-1] == "**":
-        wanted = wanted[:-1]
-        parts = parts[: len(wanted)]
-    return len(wanted) == len(parts) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))
 
 
 def _token(node: Node) -> str:

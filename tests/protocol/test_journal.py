@@ -1,0 +1,52 @@
+"""A journal is read up to its last whole entry, however its writer ended."""
+
+from pathlib import Path
+
+import pytest
+
+from protocol.journal import JOURNAL_VERSION, Heading, Journal, digest, read
+
+HEADING = Heading(JOURNAL_VERSION, "robot2", 17, 3, {"fleet": "f"})
+
+
+def written(folder: Path) -> Path:
+    journal = Journal(folder, HEADING)
+    for n in range(10):
+        journal.add("message", float(n), "lfa/f/robot1/pose", bytes([n]) * n, [("k", bytes([n]))])
+    journal.add("tick", 10.0, "", b"", [])
+    journal.close()
+    return folder / "robot2-17.bin"
+
+
+def test_entries_come_back_in_order_with_the_digest_of_what_was_returned(tmp_path: Path) -> None:
+    heading, entries = read(written(tmp_path))
+    listed = list(entries)
+    assert heading == HEADING
+    assert [entry.at for entry in listed] == [float(n) for n in range(11)]
+    assert listed[3].digest == digest([("k", b"\x03")])
+    assert listed[-1].digest == 0
+
+
+def test_a_file_cut_anywhere_is_read_up_to_its_last_whole_entry(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    data = path.read_bytes()
+    whole = list(read(path)[1])
+    heading_bytes = 4 + int.from_bytes(data[:4], "little")
+    for cut in range(heading_bytes, len(data)):
+        path.write_bytes(data[:cut])
+        entries = list(read(path)[1])
+        assert entries == whole[: len(entries)], f"cut at byte {cut}"
+        assert len(entries) < len(whole)
+
+
+def test_what_is_no_journal_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.bin"
+    for content in (b"", b"abc", b"\x05\x00\x00\x00hello"):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match="not a journal"):
+            read(path)
+
+
+def test_a_digest_tells_a_changed_payload_and_a_changed_key_apart() -> None:
+    assert digest([("a", b"1")]) != digest([("a", b"2")])
+    assert digest([("a", b"1")]) != digest([("b", b"1")])

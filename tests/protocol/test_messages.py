@@ -1,0 +1,93 @@
+"""The codec: what is said arrives as it was said; what is no message of ours is refused and crashes nothing."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocol import messages as m
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import BadMessage, Header, Term, decode, encode
+from protocol.topics import TOPICS
+
+HEADER = Header("robot1", 5, 7, 12.5)
+TERM = Term(3, 1, 5)
+GATEWAY = m.GatewayStamp(9, 12.48)
+CONFIG = m.Config(m.Version(TERM, 1), (m.Member(1, 5), m.Member(0, 2)), m.Member(0, 2), None, (m.Member(1, 5),))
+
+SAMPLES: list[m.Message] = [
+    m.PoseStamped(HEADER, 1.0, 2.0, 0.0, 0.5, Twist(0.5, 0.1), 12.0, m.Role.LEADER, TERM),
+    m.CmdVel(HEADER, Twist(0.5, -0.2), TERM, 1, True, GATEWAY),
+    m.Sensors(HEADER, Pose2D(1.0, 2.0, 3.0), Twist(0.1, 0.2), 4.0, GATEWAY, TERM),
+    m.LeaseNote(HEADER, m.Prepare(TERM, CONFIG.version)),
+    m.LeaseNote(HEADER, m.Promise(TERM, CONFIG, m.Grantee(TERM, m.Member(1, 5)), False)),
+    m.LeaseNote(HEADER, m.Propose(TERM, CONFIG, 4, m.Member(1, 5), (TERM,), 1.5)),
+    m.LeaseNote(HEADER, m.Hello(None)),
+    m.TableRow(HEADER, 1.0, 2.0, 0.0, 0.5, 3.0, m.Role.FOLLOWER, (m.Delay(2, 0.001),)),
+    m.Event(HEADER, "decision", None, {"action": "left", "free_m": 0.5}),
+]
+
+
+@pytest.mark.parametrize("message", SAMPLES, ids=lambda message: type(message).__name__)
+def test_what_is_said_arrives_as_it_was_said(message: m.Message) -> None:
+    assert decode(encode(message), type(message)) == message
+
+
+def test_out_of_range_beams_arrive_as_infinities_and_bad_ones_as_nan() -> None:
+    scan = m.LaserScan(HEADER, 0.0, 0.1, 0.05, 8.0, (math.inf, -math.inf, math.nan, 1.5))
+    ranges = decode(encode(scan), m.LaserScan).ranges_m  # type: ignore[union-attr]
+    assert ranges[:2] == (math.inf, -math.inf)
+    assert math.isnan(ranges[2])
+    assert ranges[3] == 1.5
+
+
+@given(st.binary(max_size=400))
+def test_random_bytes_are_refused_on_every_topic(payload: bytes) -> None:
+    for topic in TOPICS:
+        with pytest.raises(BadMessage):
+            decode(payload, topic.type)
+
+
+@given(st.sampled_from(SAMPLES), st.data())
+def test_truncated_messages_are_refused(message: m.Message, data: st.DataObject) -> None:
+    payload = encode(message)
+    cut = data.draw(st.integers(0, len(payload) - 1))
+    with pytest.raises(BadMessage):
+        decode(payload[:cut], type(message))
+
+
+@given(st.sampled_from(SAMPLES), st.data())
+def test_one_flipped_byte_is_refused_or_decodes_to_a_finite_message(message: m.Message, data: st.DataObject) -> None:
+    payload = bytearray(encode(message))
+    payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
+    try:
+        got = decode(bytes(payload), type(message))
+    except BadMessage:
+        return
+    assert math.isfinite(got.header.stamp)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_numbers_that_a_core_would_compute_with_are_finite(bad: float) -> None:
+    wrong: list[m.Message] = [
+        m.PoseStamped(HEADER, bad, 2.0, 0.0, 0.5, Twist(), 12.0, m.Role.LEADER, TERM),
+        m.CmdVel(HEADER, Twist(bad, 0.0), TERM, 1, True, GATEWAY),
+        m.CmdVel(HEADER, Twist(), TERM, 1, True, m.GatewayStamp(1, bad)),
+        m.Localization(Header("robot1", 1, 1, bad), Pose2D()),
+        m.LeaseNote(HEADER, m.Grant(TERM, 1, CONFIG.version, bad)),
+        m.FormationNote(HEADER, TERM, 1, (m.Slot(2, bad, 3.0),)),
+    ]
+    for message in wrong:
+        with pytest.raises(BadMessage):
+            decode(encode(message), type(message))
+
+
+def test_a_message_of_another_topic_is_refused() -> None:
+    with pytest.raises(BadMessage, match="CmdVel belongs"):
+        decode(encode(SAMPLES[0]), m.CmdVel)
+
+
+def test_an_oversized_message_is_refused_unread() -> None:
+    with pytest.raises(BadMessage, match="bytes"):
+        decode(bytes(m.MESSAGE_BYTES_MAX + 1), m.LaserScan)

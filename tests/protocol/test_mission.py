@@ -1,0 +1,35 @@
+"""A mission that no team could obey is refused with one line: field, value, what would be right."""
+
+import msgspec
+import pytest
+
+from protocol.mission import FormationSpec, Leading, Limits, Mission, Refused, check_mission
+
+GOOD = Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0))))
+
+REFUSED = [
+    (msgspec.structs.replace(GOOD, robots=()), "mission.robots"),
+    (msgspec.structs.replace(GOOD, robots=(1, 2, 2)), "id 2 is given twice"),
+    (msgspec.structs.replace(GOOD, robots=(0, 1)), "mission.robots"),
+    (msgspec.structs.replace(GOOD, can_lead=(7,)), "mission.can_lead"),
+    (msgspec.structs.replace(GOOD, can_lead=()), "mission.can_lead"),
+    (msgspec.structs.replace(GOOD, radius_m=-0.1), "mission.radius_m"),
+    (msgspec.structs.replace(GOOD, formation=FormationSpec(separation_m=0.2)), "mission.formation.separation_m"),
+    (msgspec.structs.replace(GOOD, formation=FormationSpec(angle_rad=2.0)), "mission.formation.angle_rad"),
+    (msgspec.structs.replace(GOOD, limits=Limits(v_max_mps=float("nan"))), "mission.limits.v_max_mps"),
+    (msgspec.structs.replace(GOOD, leading=Leading(route_m=())), "mission.leading.route_m"),
+    (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, float("inf")),))), "mission.leading.route_m"),
+    (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, 0.0),), cruise_mps=3.0)), "mission.leading.cruise"),
+]
+
+
+@pytest.mark.parametrize(("mission", "says"), REFUSED, ids=[says for _, says in REFUSED])
+def test_refused_in_one_line_that_names_the_field(mission: Mission, says: str) -> None:
+    with pytest.raises(Refused) as refused:
+        check_mission(mission)
+    assert says in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_good_mission_is_taken_as_it_is() -> None:
+    assert check_mission(GOOD) is GOOD

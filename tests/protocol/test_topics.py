@@ -1,0 +1,55 @@
+"""The table of topics holds what the rest of the project reads from it."""
+
+import pytest
+
+from agents.agent import Agent
+from protocol.mission import Leading, Mission, robot_id_of, robot_name
+from protocol.topics import TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches
+
+
+def test_each_topic_is_named_once_and_has_its_own_type() -> None:
+    assert len(TOPIC) == len(TOPICS) == len({topic.type for topic in TOPICS})
+
+
+def test_no_agent_hears_ground_truth() -> None:
+    agent = Agent(2, 1, "f", 1, Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0)))))
+    before = agent.interests
+    agent.tick(0.0)
+    for expression in before | agent.interests:
+        assert not any(matches(expression, key("f", TRUTH_OWNER, topic)) for topic in ("truth", "clock")), expression
+
+
+def test_address_reads_what_key_writes() -> None:
+    where = address(key("f", "robot2", "lease", "all"))
+    assert where is not None
+    assert (where.fleet, where.owner, where.topic, where.to) == ("f", "robot2", "lease", "all")
+    alive = address(alive_key("f", "robot2", 17))
+    assert alive is not None
+    assert alive.to == "17"
+
+
+@pytest.mark.parametrize(
+    "foreign", ["", "x", "lfa/f/robot1", "ros/f/robot1/pose", "lfa/f/robot1/nothing", "lfa/a/b/c/d/e"]
+)
+def test_keys_that_are_not_ours_have_no_address(foreign: str) -> None:
+    assert address(foreign) is None
+
+
+@pytest.mark.parametrize(
+    ("expression", "key", "yes"),
+    [
+        ("lfa/f/*/pose", "lfa/f/robot1/pose", True),
+        ("lfa/f/*/pose", "lfa/g/robot1/pose", False),
+        ("lfa/f/*/pose", "lfa/f/robot1/pose/x", False),
+        ("lfa/f/**", "lfa/f/robot1/lease/all", True),
+        ("lfa/f/*/alive/*", "lfa/f/robot1/alive/3", True),
+        ("lfa/f/*/alive/*", "lfa/f/robot1/alive", False),
+    ],
+)
+def test_key_expressions_match_as_zenoh_does(expression: str, key: str, yes: bool) -> None:
+    assert matches(expression, key) is yes
+
+
+def test_names_and_ids_say_the_same() -> None:
+    assert [robot_id_of(robot_name(i)) for i in (0, 1, 42)] == [0, 1, 42]
+    assert [robot_id_of(n) for n in ("robot", "robot01", "world", "robot-1", "robotx")] == [None] * 5
