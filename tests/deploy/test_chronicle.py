@@ -1,0 +1,69 @@
+"""What the events of a run say about leaders and failovers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from deploy.look import chronicle
+from deploy.look.chronicle import Failover, Line
+
+
+def _line(t: float, robot: int, kind: str, term: tuple[int, int, int] | None = None, **data: Any) -> Line:
+    return {"t": t, "robot": robot, "term": None if term is None else list(term), "kind": kind, **data}
+
+
+FIRST, SECOND, THIRD = (2, 1, 1), (3, 2, 1), (4, 3, 1)
+KILLED = [
+    _line(0.3, 1, "leader_command", FIRST),
+    _line(8.0, 1, "fault", deed="kill"),
+    _line(8.1, 2, "chain", SECOND, chain=[2, 3]),
+    _line(8.11, 2, "lease", SECOND, change="acquired"),
+    _line(8.12, 2, "leader_command", SECOND),
+    _line(8.15, 3, "chain", SECOND, chain=[2, 3]),
+]
+
+
+def test_a_reign_ends_when_its_holder_is_killed() -> None:
+    first, second = chronicle.reigns(KILLED)
+    assert (first.robot_id, first.from_s, first.until_s, first.cause) == (1, 0.3, 8.0, "start")
+    assert (second.robot_id, second.from_s, second.until_s, second.cause) == (2, 8.12, None, "kill")
+
+
+def test_a_failover_counts_from_the_fault() -> None:
+    (failover,) = chronicle.failovers(KILLED, chronicle.reigns(KILLED))
+    assert failover == Failover("kill", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
+
+
+def test_a_chain_that_not_all_have_closed_is_not_closed() -> None:
+    (failover,) = chronicle.failovers(KILLED[:-1], chronicle.reigns(KILLED[:-1]))
+    assert failover.chain_ms is None
+
+
+def test_a_failover_that_never_came_is_told_as_such() -> None:
+    (failover,) = chronicle.failovers(KILLED[:2], chronicle.reigns(KILLED[:2]))
+    assert (failover.leader, failover.first_command_ms) == (None, None)
+
+
+def test_a_fault_on_a_follower_is_no_failover() -> None:
+    events = [KILLED[0], _line(5.0, 3, "fault", deed="kill")]
+    assert chronicle.failovers(events, chronicle.reigns(events)) == []
+
+
+def test_a_hand_over_is_no_failover() -> None:
+    events = [KILLED[0], _line(6.0, 2, "leader_command", SECOND)]
+    reigns = chronicle.reigns(events)
+    assert [reign.cause for reign in reigns] == ["start", "handover"]
+    assert reigns[0].until_s == 6.0
+    assert chronicle.failovers(events, reigns) == []
+
+
+def test_the_same_robot_elected_again_is_no_hand_over() -> None:
+    events = [KILLED[0], _line(6.0, 1, "leader_command", (3, 1, 1))]
+    assert [reign.cause for reign in chronicle.reigns(events)] == ["start", "reelection"]
+
+
+def test_I2_an_older_leader_command_after_a_newer_one_is_a_violation() -> None:
+    events = [_line(1.0, 1, "leader_command", SECOND), _line(1.1, 2, "leader_command", FIRST)]
+    (violation,) = chronicle.terms_that_went_back(events)
+    assert (violation.invariant, violation.at_s) == ("I2", 1.1)
+    assert chronicle.terms_that_went_back(KILLED) == []

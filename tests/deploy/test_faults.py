@@ -1,0 +1,65 @@
+"""The grammar of faults, and when each is due."""
+
+from __future__ import annotations
+
+import pytest
+
+from deploy.run.faults import Fault, Schedule, parse, parse_all
+from protocol.mission import Mission, Refused
+
+MISSION = Mission()
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("kill leader at 20 s", Fault("kill", "leader", 20.0)),
+        ("kill leader at 20s", Fault("kill", "leader", 20.0)),
+        (" terminate  3 at 9.5 s ", Fault("terminate", 3, 9.5)),
+        ("stop robot2 at 5 s for 3 s", Fault("stop", 2, 5.0, 3.0)),
+        ("restart 2 at 12 s", Fault("restart", 2, 12.0)),
+    ],
+)
+def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
+    assert parse(text, MISSION) == fault
+    assert parse(str(fault), MISSION) == fault
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "kill", "kill leader", "kill leader at noon", "kill leader at -1 s", "kill leader at 20", "kill 5 at 1 s",
+        "kill 0 at 1 s", "hug leader at 20 s", "kill 2 at 1 s for 3 s", "restart leader at 2 s",
+        "kill leader at 1 s or so", "kill \u0662 at 1 s", "kill leader at 1e3 s",
+    ],
+)  # fmt: skip
+def test_what_is_no_fault_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(Refused) as refused:
+        parse(text, MISSION)
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith("--fault")
+
+
+def test_a_scenarios_fault_is_refused_as_the_scenarios() -> None:
+    with pytest.raises(Refused, match=r"^scenario\.faults"):
+        parse_all(MISSION, ["kill 7 at 1 s"], [])
+
+
+def test_faults_come_in_the_order_of_their_times() -> None:
+    schedule = Schedule(parse_all(MISSION, ["kill 3 at 9 s"], ["kill 2 at 4 s"]))
+    assert schedule.due(3.9, None) == []
+    assert schedule.due(10.0, None) == [("kill", 2), ("kill", 3)]
+    assert schedule.pending == []
+
+
+def test_a_fault_on_the_leader_waits_for_one() -> None:
+    schedule = Schedule([parse("kill leader at 1 s", MISSION)])
+    assert schedule.due(2.0, None) == []
+    assert schedule.due(2.5, 4) == [("kill", 4)]
+
+
+def test_who_is_stopped_for_a_while_is_woken_even_if_another_leads_by_then() -> None:
+    schedule = Schedule([parse("stop leader at 1 s for 2 s", MISSION)])
+    assert schedule.due(1.0, 1) == [("stop", 1)]
+    assert schedule.due(2.9, 2) == []
+    assert schedule.due(3.0, 2) == [("continue", 1)]

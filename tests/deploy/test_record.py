@@ -1,0 +1,105 @@
+"""What is recorded can be read back: all of it, or all but the end when the writer was cut off."""
+
+from __future__ import annotations
+
+import json
+from math import inf, isnan, nan
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from deploy.look import chronicle, trace
+from deploy.run import channels
+from deploy.run.record import EVENTS, RECORDING, Recorder
+from protocol.messages import Event, Header, LaserScan, LeaseNote, Member, Nack, Term, TrueRobot, Truth
+from protocol.topics import TOPICS, key
+
+HEADER = Header("robot2", 7, 3, 12.5)
+
+
+def _scan(ranges_m: tuple[float, ...]) -> LaserScan:
+    return LaserScan(HEADER, -3.1, 0.035, 0.05, 8.0, ranges_m)
+
+
+def _truth(time_s: float) -> Truth:
+    return Truth(Header("world", 1, round(time_s * 50), time_s), time_s, (TrueRobot(1, time_s, 0.0, 0.0, 1.0, 0.0),))
+
+
+def test_a_scans_beams_out_of_range_are_recorded(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {})
+    recorder.record(0.1, key("f", "robot2", "scan"), _scan((1.5, inf, -inf, nan)))
+    recorder.close()
+    ((owner, topic, t, scan),) = trace.messages(tmp_path, frozenset({"scan"}))
+    assert (owner, topic, t) == ("robot2", "scan", 0.1)
+    ranges = [float(r) for r in scan.ranges_m]
+    assert ranges[:3] == [1.5, inf, -inf]
+    assert isnan(ranges[3])
+
+
+def test_the_schema_says_that_a_range_may_be_a_word(tmp_path: Path) -> None:
+    schema = json.loads(channels.schema(LaserScan))
+    items = schema["$defs"]["LaserScan"]["properties"]["ranges_m"]["items"]
+    assert {"type": "number"} in items["anyOf"]
+    assert {"enum": ["-inf", "inf", "nan"]} in items["anyOf"]
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=[topic.name for topic in TOPICS])
+def test_every_topic_has_a_schema_with_names(topic: object) -> None:
+    schema = json.loads(channels.schema(topic.type))  # type: ignore[attr-defined]
+    assert "header" in schema["$defs"][topic.type.__name__]["properties"]  # type: ignore[attr-defined]
+
+
+def test_what_a_union_holds_keeps_its_tag() -> None:
+    note = LeaseNote(HEADER, Nack(Term(1, 2, 3), Term(2, 1, 1), Member(1, 5), inf, None))  # type: ignore[arg-type]
+    body = json.loads(channels.encode(note))["body"]
+    assert body["type"] == "nack"
+    assert body["remaining_s"] == "inf"
+    assert body["holder"] == {"id": 1, "incarnation": 5}
+
+
+@given(ranges=st.lists(st.floats(allow_nan=False), max_size=20))
+def test_every_number_survives(ranges: list[float]) -> None:
+    read = msgspec.json.decode(channels.encode(_scan(tuple(ranges))), type=channels.shape(LaserScan))
+    assert [float(r) for r in read.ranges_m] == ranges  # type: ignore[attr-defined]
+
+
+@settings(max_examples=30)
+@given(part=st.floats(0.0, 1.0))
+def test_a_recording_cut_off_anywhere_can_be_read(part: float, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.mktemp("cut")
+    recorder = Recorder(folder, {})
+    for step in range(200):
+        recorder.record(step * 0.02, key("f", "sim", "truth"), _truth(step * 0.02))
+    recorder.close()
+    whole = (folder / RECORDING).read_bytes()
+    (folder / RECORDING).write_bytes(whole[: int(part * len(whole))])
+    seen = trace.read(folder)
+    for rows in seen.truth.values():
+        assert (rows[:, 1] == rows[:, 0]).all()
+
+
+def test_a_killed_recorder_loses_no_more_than_a_second(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {})
+    for step in range(226):
+        recorder.record(step * 0.02, key("f", "sim", "truth"), _truth(step * 0.02))
+    assert trace.read(tmp_path).end_s > 4.5 - 1.1  # never closed
+
+
+def test_an_event_is_a_line_about_the_robot_that_it_is_about(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {})
+    accepted = Event(Header("world", 1, 1, 99.0), "leader_command", Term(3, 2, 1), {"robot": 2, "t": 8.25})
+    own = Event(HEADER, "lease", Term(3, 2, 1), {"change": "acquired", "t": "not a time"})
+    recorder.record(8.3, key("f", "world", "event"), accepted)
+    recorder.record(8.4, key("f", "robot2", "event"), own)
+    recorder.close()
+    first, second = (tmp_path / EVENTS).read_text().splitlines()
+    assert first == '{"t":8.25,"robot":2,"term":[3,2,1],"kind":"leader_command","from":"world"}'
+    assert second == '{"t":8.4,"robot":2,"term":[3,2,1],"kind":"lease","from":"robot2","change":"acquired"}'
+
+
+def test_a_last_line_cut_off_by_a_kill_is_left_out(tmp_path: Path) -> None:
+    (tmp_path / EVENTS).write_bytes(b'{"t":1.0,"robot":1,"term":null,"kind":"role","from":"robot1"}\n{"t":2.0,"rob')
+    assert [line["t"] for line in chronicle.lines(tmp_path)] == [1.0]

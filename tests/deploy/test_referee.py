@@ -1,0 +1,84 @@
+"""When a run is over: one claim a rule of the referee."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from deploy.run.referee import REST_S, Referee
+from protocol.messages import Event, Header, Message, Term, TrueRobot, Truth
+from world.scenario import Scenario, load
+
+
+def _scenario() -> Scenario:
+    return load("straight", ["mission.leading.route_m=[[3.0, 0.0]]", "time_limit_s=20.0"], robots=2)
+
+
+def _truth(time_s: float, leader_x: float, speed: float = 0.0, follower_turns: float = 0.0) -> Truth:
+    robots = (TrueRobot(1, leader_x, 0.0, 0.0, speed, 0.0), TrueRobot(2, 2.0, 1.0, 0.0, 0.0, follower_turns))
+    return Truth(Header("world", 1, 1, time_s), time_s, robots)
+
+
+def _event(kind: str, sender: str, term: Term | None, **data: object) -> Event:
+    return Event(Header(sender, 1, 1, 0.0), kind, term, data)
+
+
+def _outcome(*messages: Message) -> str | None:
+    referee = Referee(_scenario())
+    for message in messages:
+        referee.see(message)
+    return None if referee.verdict is None else referee.verdict.outcome
+
+
+def test_all_at_rest_at_the_goal_for_half_a_second_is_the_goal() -> None:
+    assert _outcome(_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95)) == "goal_reached"
+
+
+def test_a_short_rest_is_not_yet_the_goal() -> None:
+    assert _outcome(_truth(9.0, 2.95), _truth(8.9 + REST_S, 2.95)) is None
+
+
+def test_a_follower_that_still_turns_keeps_the_run_going() -> None:
+    assert _outcome(_truth(9.0, 2.95, follower_turns=0.01), _truth(10.0, 2.95, follower_turns=0.01)) is None
+
+
+def test_a_rest_that_was_interrupted_starts_anew() -> None:
+    still = (_truth(9.0, 2.95), _truth(9.4, 2.95, speed=0.1), _truth(9.6, 2.95), _truth(9.9, 2.95))
+    assert _outcome(*still) is None
+
+
+def test_rest_away_from_the_goal_is_no_goal() -> None:
+    assert _outcome(_truth(9.0, 2.0), _truth(10.0, 2.0)) is None
+
+
+def test_who_is_no_longer_in_the_chain_need_not_rest() -> None:
+    alone = _event("chain", "robot2", Term(2, 2, 1), chain=[2])
+    moving = [replace(_truth(t, 0.0, speed=1.0), robots=(TrueRobot(1, 0.0, 0.0, 0.0, 1.0, 0.0),
+              TrueRobot(2, 3.0, 0.0, 0.0, 0.0, 0.0))) for t in (9.0, 9.5)]  # fmt: skip
+    assert _outcome(alone, *moving) == "goal_reached"
+
+
+def test_an_older_terms_chain_changes_nothing() -> None:
+    newer = _event("chain", "robot1", Term(3, 1, 1), chain=[1, 2])
+    older = _event("chain", "robot2", Term(2, 2, 1), chain=[2])
+    assert _outcome(newer, older, _truth(9.0, 2.95), _truth(9.5, 2.95)) == "goal_reached"
+
+
+def test_the_time_limit_is_the_worlds() -> None:
+    assert _outcome(_truth(19.98, 1.0, speed=0.5)) is None
+    assert _outcome(_truth(20.0, 1.0, speed=0.5)) == "time_limit"
+
+
+def test_an_agent_that_gives_up_fails_the_run() -> None:
+    referee = Referee(_scenario())
+    verdict = referee.see(_event("failed", "robot2", None, reason="stuck at (1.0, 2.0)"))
+    assert verdict is not None
+    assert (verdict.outcome, verdict.reason) == ("failed", "robot 2: stuck at (1.0, 2.0)")
+
+
+def test_events_with_foreign_data_do_no_harm() -> None:
+    referee = Referee(_scenario())
+    for data in ({}, {"chain": "all"}, {"chain": [None]}, {"robot": "x"}):
+        referee.see(_event("chain", "robot2", Term(9, 1, 1), **data))
+        referee.see(_event("leader_command", "world", Term(9, 1, 1), **data))
+    assert referee.chain == (1, 2)
+    assert referee.leader is None
