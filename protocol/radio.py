@@ -16,7 +16,7 @@ class Radio(Struct, frozen=True, forbid_unknown_fields=True):
     loss: float = 0.0
     """Probability that one message to one receiver is lost."""
     loss_burst: float = 1.0
-    """Mean number of messages in a row that one loss takes along (Gilbert's two-state channel)."""
+    """Mean number of messages lost in a row, where more than chance makes it (Gilbert's two-state channel)."""
     duplication: float = 0.0
 
 
@@ -39,9 +39,13 @@ class Air:
         return delays
 
     def _lost(self, sender: str, receiver: str) -> bool:
-        """Gilbert's channel: leaves the fade with 1/burst, enters it so that the mean loss is `loss`."""
-        leave = 1.0 / max(self.radio.loss_burst, 1.0)
-        enter = leave * self.radio.loss / max(1.0 - self.radio.loss, 1e-9)
+        """Gilbert's channel: leaves a fade with 1/burst, enters one so that the mean loss is `loss`.
+
+        Bursts no longer than independent losses make by themselves are independent losses.
+        """
+        loss = self.radio.loss
+        leave = min(1.0 / max(self.radio.loss_burst, 1.0), 1.0 - loss)
+        enter = leave * loss / (1.0 - loss) if loss < 1.0 else 1.0
         link = (sender, receiver)
         fading = self._fading.get(link, False)
         fading = self._random.random() >= leave if fading else self._random.random() < enter
