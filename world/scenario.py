@@ -10,7 +10,6 @@ import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +51,7 @@ __all__ = [
 
 SCENARIOS = Path(__file__).parent / "scenarios"
 FILE_BYTES_MAX = 4 * 1024 * 1024
+NUMBER_MAX = 1e9
 
 
 def shipped() -> dict[str, Scenario]:
@@ -220,9 +220,9 @@ def _structs_in(type_: Any) -> Iterator[type[msgspec.Struct]]:
 
 
 def _refuse_endless(value: Any, where: str = "") -> None:
-    """TOML knows nan and inf; no field of a scenario does."""
-    if isinstance(value, float) and not isfinite(value):
-        raise Refused(f"{where} = {value}: must be a finite number")
+    """TOML knows nan, inf and 1e300; no field of a scenario does."""
+    if isinstance(value, int | float) and not abs(value) <= NUMBER_MAX:
+        raise Refused(f"{where} = {value}: must be a finite number, at most {NUMBER_MAX:g}")
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, item in items:
         part = f"[{key}]" if isinstance(value, list) else f".{key}" if where else str(key)

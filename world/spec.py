@@ -6,7 +6,7 @@ Nothing here imports the engine: a launcher, a test or an editor reads a scenari
 
 from __future__ import annotations
 
-from math import inf, isfinite, pi
+from math import hypot, pi
 from typing import Literal
 
 from msgspec import Struct
@@ -16,6 +16,7 @@ from protocol.radio import Radio
 
 Point = tuple[float, float]
 ROBOTS_MAX = 500
+LENGTH_M_MIN = 0.001
 PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
 
 
@@ -109,13 +110,13 @@ def check_scenario(scenario: Scenario) -> Scenario:
     _require(len(robots) <= ROBOTS_MAX, "mission.robots", f"{len(robots)} ids", f"at most {ROBOTS_MAX} ids")
     check_mission(scenario.mission)
     for where, value, low, high in _ranges(scenario):
-        right = f"a number from {low:g} to {high:g}" if high < inf else f"a finite number, at least {low:g}"
-        _require(isfinite(value) and low <= value <= high, where, value, right)
+        _require(low <= value <= high, where, value, f"a number from {low:g} to {high:g}")
     for index, obstacle in enumerate(scenario.world.obstacles):
         _check_obstacle(f"world.obstacles[{index}]", obstacle)
     for index, wall in enumerate(scenario.world.walls_m):
         where = f"world.walls_m[{index}]"
-        _require(wall[:2] != wall[2:], where, list(wall), "two different ends x1, y1, x2, y2")
+        long_enough = hypot(wall[2] - wall[0], wall[3] - wall[1]) >= LENGTH_M_MIN
+        _require(long_enough, where, list(wall), "two different ends x1, y1, x2, y2")
     return scenario
 
 
@@ -176,7 +177,7 @@ def _convex(corners_m: tuple[Point, ...]) -> bool:
     following = corners_m[1:] + corners_m[:1]
     after = corners_m[2:] + corners_m[:2]
     return all(
-        (bx - ax) * (cy - by) - (by - ay) * (cx - bx) > 0.0
+        (bx - ax) * (cy - by) - (by - ay) * (cx - bx) > LENGTH_M_MIN**2
         for (ax, ay), (bx, by), (cx, cy) in zip(corners_m, following, after, strict=True)
     )
 
