@@ -1,0 +1,77 @@
+"""How a leader drives: progress on the route, rest at the goal, and bends that the whole chain can keep up with."""
+
+from math import hypot, pi
+
+import pytest
+
+from agents.formation import slots_of
+from agents.motion import CORNER_RADIUS_M, Lead, Route
+from protocol.geometry import STILL, Pose2D, Twist, along_arc
+from protocol.mission import FormationSpec, Leading, Limits
+
+LIMITS = Limits()
+DT = 0.02
+CORNERED = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0))
+
+
+def driven(leading: Leading, start: Pose2D, slots: tuple = (), seconds: float = 80.0) -> list[tuple[Pose2D, Twist]]:
+    lead, pose, twist = Lead(leading, LIMITS), start, STILL
+    lead.begin(pose)
+    course = []
+    for _ in range(round(seconds / DT)):
+        wanted = lead.step(pose, twist, slots, leading.cruise_mps)
+        v = max(twist.linear_x - DT, min(twist.linear_x + DT, wanted.linear_x))
+        twist = Twist(v, wanted.angular_z)
+        pose = along_arc(pose, twist, DT)
+        course.append((pose, twist))
+    return course
+
+
+@pytest.mark.parametrize("motion", ["path_following", "point_to_point"])
+def test_a_leader_comes_to_rest_at_the_goal(motion: str) -> None:
+    course = driven(Leading(motion=motion, route_m=CORNERED), Pose2D())  # type: ignore[arg-type]
+    pose, twist = course[-1]
+    assert hypot(pose.x - 8.0, pose.y - 8.0) <= 0.10
+    assert abs(twist.linear_x) < 1e-3
+    assert abs(twist.angular_z) < 1e-3
+
+
+def test_path_following_keeps_to_the_rounded_route() -> None:
+    route = Route(CORNERED)
+    for pose, _ in driven(Leading(route_m=CORNERED), Pose2D()):
+        x, y = route.point(route.nearest(pose.x, pose.y))
+        assert hypot(pose.x - x, pose.y - y) < 0.08
+
+
+def test_point_to_point_goes_straight() -> None:
+    course = driven(Leading(motion="point_to_point", route_m=CORNERED), Pose2D(0.0, 0.0, pi / 4))
+    assert max(abs(pose.x - pose.y) for pose, _ in course) < 0.05
+
+
+def test_a_leader_that_starts_beside_the_route_joins_it_ahead_and_never_turns_back() -> None:
+    course = driven(Leading(route_m=((0.0, 0.0), (12.0, 0.0))), Pose2D(4.0, 1.0, 0.0))
+    assert min(pose.x for pose, _ in course) >= 4.0 - 1e-6
+    assert abs(course[-1][0].y) < 0.10
+
+
+def test_corners_are_rounded_to_the_radius() -> None:
+    route = Route(CORNERED)
+    assert max(abs(k) for k in route.curvature) == pytest.approx(1.0 / CORNER_RADIUS_M, rel=0.1)
+    assert route.length_m < 16.0
+
+
+def test_in_a_bend_the_leader_slows_for_the_outermost_follower() -> None:
+    """control.md 2.2: f v <= 0.8 v_max, here for three in left echelon in a right bend."""
+    route = ((0.0, 0.0), (8.0, 0.0), (8.0, -8.0))
+    slots = slots_of(FormationSpec(), (2, 3, 4))
+    alone = driven(Leading(route_m=route), Pose2D())
+    team = driven(Leading(route_m=route), Pose2D(), slots)
+    fastest_in_bend = max(t.linear_x for p, t in team if p.x > 7.0 and -1.0 < p.y < -0.5)
+    assert max(t.linear_x for p, t in alone if p.x > 7.0 and -1.0 < p.y < -0.5) == pytest.approx(0.5, abs=0.01)
+    assert fastest_in_bend < 0.4
+
+
+def test_a_route_of_one_point_begins_where_the_robot_stands() -> None:
+    pose, twist = driven(Leading(route_m=((3.0, 1.0),)), Pose2D())[-1]
+    assert hypot(pose.x - 3.0, pose.y - 1.0) <= 0.10
+    assert twist.linear_x < 1e-3

@@ -1,0 +1,64 @@
+"""From a scan to what stands in the way."""
+
+from math import hypot, inf, nan, pi
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.perception import SIGHT_M, Surroundings, free_along, without
+from protocol.geometry import Pose2D, Twist, along_arc
+from protocol.messages import Header, LaserScan
+
+HEADER = Header("robot1", 1, 0, 0.0)
+
+
+def scan(*ranges: float) -> LaserScan:
+    return LaserScan(HEADER, 0.0, pi / 2, 0.05, 8.0, ranges)
+
+
+def test_points_stay_where_they_are_while_the_robot_moves_on() -> None:
+    seen = Surroundings()
+    seen.scan(scan(2.0, inf, inf, inf), Pose2D(1.0, 0.0, 0.0), 0.0)
+    [(x, y)] = seen.points(Pose2D(2.0, 0.0, pi / 2))
+    assert abs(x) < 1e-9
+    assert abs(y + 1.0) < 1e-9
+
+
+def test_out_of_range_too_near_and_bad_beams_are_no_points() -> None:
+    seen = Surroundings()
+    seen.scan(scan(inf, -inf, nan, SIGHT_M + 1.0), Pose2D(), 0.0)
+    assert seen.points(Pose2D()) == []
+
+
+def test_a_known_team_mate_is_left_out() -> None:
+    assert without([(1.0, 0.0), (1.0, 0.5)], (1.0, 0.0), 0.3) == [(1.0, 0.5)]
+
+
+def test_the_way_straight_ahead_ends_at_the_bodys_edge() -> None:
+    assert free_along([(1.0, 0.0)], Twist(0.5, 0.0), 0.2) == 0.8
+    assert free_along([(1.0, 0.21)], Twist(0.5, 0.0), 0.2) == inf
+    assert free_along([(-1.0, 0.0)], Twist(0.5, 0.0), 0.2) == inf
+    assert free_along([(-1.0, 0.0)], Twist(-0.5, 0.0), 0.2) == 0.8
+
+
+@given(
+    st.floats(-2.0, 2.0),
+    st.floats(-2.0, 2.0),
+    st.floats(0.1, 1.0),
+    st.floats(-1.0, 1.0).filter(lambda w: abs(w) > 0.05),
+)
+def test_no_body_that_stays_within_the_free_way_touches_the_point(x: float, y: float, v: float, omega: float) -> None:
+    """Against small steps along the arc; a point inside the body at the start is another matter."""
+    half_width = 0.2
+    if hypot(x, y) < half_width + 0.01:
+        return
+    free_m = free_along([(x, y)], Twist(v, omega), half_width)
+    duration = min(free_m, 2.0 * pi * v / abs(omega), 6.0) / v
+    for n in range(201):
+        pose = along_arc(Pose2D(), Twist(v, omega), duration * n / 200)
+        assert hypot(x - pose.x, y - pose.y) > half_width - 0.06, f"touched after {n / 2} % of {free_m:.3f} m"
+
+
+def test_a_point_that_was_passed_does_not_bar_a_bend() -> None:
+    beside = (0.0, -0.19)
+    assert free_along([beside], Twist(0.5, 0.5), 0.2) > 0.5

@@ -1,0 +1,57 @@
+"""The last function before cmd_vel: finite, within the limits, and able to stop in time, whatever comes in."""
+
+from math import inf, isfinite, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.safety import BRAKING_SHARE, SKIN_M, safe, within
+from protocol.geometry import STILL, Twist
+from protocol.mission import Limits
+
+LIMITS = Limits()
+DT = 0.02
+numbers = st.floats(allow_nan=True, allow_infinity=True)
+speeds = st.builds(Twist, st.floats(-0.3, 1.0), st.floats(-2.0, 2.0))
+points = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), max_size=20)
+
+
+@given(numbers, numbers, speeds, points)
+def test_what_goes_out_is_finite_and_within_limits_and_accelerations(
+    v: float, w: float, last: Twist, seen: list
+) -> None:
+    out = safe(Twist(v, w), last, seen, 0.15, LIMITS, DT)
+    assert isfinite(out.linear_x)
+    assert isfinite(out.angular_z)
+    assert -LIMITS.v_reverse_max_mps - 1e-9 <= out.linear_x <= LIMITS.v_max_mps + 1e-9
+    assert abs(out.angular_z) <= LIMITS.omega_max_radps + 1e-9
+    assert abs(out.linear_x - last.linear_x) <= LIMITS.a_max_mps2 * DT + 1e-9
+    assert abs(out.angular_z - last.angular_z) <= LIMITS.alpha_max_radps2 * DT + 1e-9
+
+
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+def test_a_number_that_is_none_means_stand_still(bad: float) -> None:
+    assert safe(Twist(bad, 0.0), STILL, [], 0.15, LIMITS, DT) == STILL
+    assert safe(Twist(0.5, bad), STILL, [], 0.15, LIMITS, DT) == STILL
+
+
+@given(st.floats(0.2, 3.0))
+def test_a_robot_that_drives_at_a_wall_stops_before_it(start_m: float) -> None:
+    ahead, last = start_m, STILL
+    for _ in range(1000):
+        last = safe(Twist(1.0, 0.0), last, [(ahead, 0.0)], 0.15, LIMITS, DT)
+        ahead -= last.linear_x * DT
+    assert ahead >= 0.15
+    assert abs(last.linear_x) < 0.01
+
+
+def test_the_speed_before_an_obstacle_leaves_the_way_to_stop() -> None:
+    out = safe(Twist(1.0, 0.0), Twist(1.0, 0.0), [(0.15 + SKIN_M + 0.5, 0.0)], 0.15, LIMITS, 1.0)
+    assert out.linear_x**2 / (2.0 * BRAKING_SHARE * LIMITS.a_max_mps2) == pytest.approx(0.5)
+
+
+@given(st.floats(-5.0, 5.0), st.floats(-9.0, 9.0))
+def test_limits_keep_the_shape_of_the_path(v: float, w: float) -> None:
+    out_v, out_w = within(Twist(v, w), LIMITS)
+    assert out_v * w == pytest.approx(out_w * v, abs=1e-9)

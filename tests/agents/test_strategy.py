@@ -1,0 +1,85 @@
+"""Round what the scan shows: one robot, a few points, and where it ends."""
+
+from math import atan2, cos, hypot, pi, sin
+
+import pytest
+
+from agents.perception import Surroundings
+from agents.safety import safe
+from agents.strategy import NARROW_M, Detour
+from protocol.geometry import STILL, Pose2D, Twist, along_arc
+from protocol.mission import Limits
+
+LIMITS = Limits()
+RADIUS_M = 0.15
+DT = 0.02
+
+
+def circle(x: float, y: float, r: float) -> list[tuple[float, float]]:
+    return [(x + r * cos(n * pi / 18), y + r * sin(n * pi / 18)) for n in range(36)]
+
+
+def wall(x: float, low: float, high: float) -> list[tuple[float, float]]:
+    return [(x, low + 0.05 * n) for n in range(round((high - low) / 0.05) + 1)]
+
+
+def drive(
+    obstacles: list[tuple[float, float]], goal: tuple[float, float], seconds: float = 40.0
+) -> tuple[Pose2D, float, list[str]]:
+    """Towards `goal` past points known at once: final pose, least clearance from the surface, actions in order."""
+    seen, detour = Surroundings(), Detour(RADIUS_M, LIMITS)
+    seen._points_map = obstacles
+    pose, last, least, actions = Pose2D(), STILL, float("inf"), [""]
+    for n in range(round(seconds / DT)):
+        points = seen.points(pose)
+        dx, dy = goal[0] - pose.x, goal[1] - pose.y
+        c, s = cos(pose.theta), sin(pose.theta)
+        target = (c * dx + s * dy, c * dy - s * dx)
+        bearing = atan2(target[1], target[0])
+        v = min(0.5, hypot(*target)) * max(0.0, cos(bearing))
+        around = detour.steer(points, target, Twist(v, 2.0 * bearing), 0.4, n * DT)
+        last = safe(around or Twist(v, 2.0 * bearing), last, points, RADIUS_M, LIMITS, DT)
+        pose = along_arc(pose, last, DT)
+        least = min([least, *(hypot(x - pose.x, y - pose.y) - RADIUS_M for x, y in obstacles)])
+        action = detour.decision.action if detour.decision is not None else ""
+        if action != actions[-1]:
+            actions.append(action)
+        if hypot(dx, dy) < 0.05:
+            break
+    return pose, least, actions
+
+
+@pytest.mark.parametrize("y", [-0.1, 0.0, 0.05, 0.3])
+def test_a_round_obstacle_is_passed_with_clearance(y: float) -> None:
+    pose, least, _ = drive(circle(3.0, y, 0.3), (6.0, 0.0))
+    assert hypot(pose.x - 6.0, pose.y) < 0.06
+    assert least >= NARROW_M - 0.03
+
+
+def test_the_nearer_side_is_taken() -> None:
+    assert "left" in drive(circle(3.0, -0.2, 0.3), (6.0, 0.0))[2]
+    assert "right" in drive(circle(3.0, 0.2, 0.3), (6.0, 0.0))[2]
+
+
+def test_a_wall_is_passed_at_its_end() -> None:
+    pose, least, _ = drive(wall(3.0, -0.4, 1.5), (6.0, 0.0))
+    assert hypot(pose.x - 6.0, pose.y) < 0.06
+    assert least > 0.0
+
+
+def test_a_gap_that_is_wide_enough_is_taken() -> None:
+    pose, least, _ = drive(wall(3.0, -3.0, -0.35) + wall(3.0, 0.35, 3.0), (6.0, 0.0))
+    assert hypot(pose.x - 6.0, pose.y) < 0.06
+    assert least > 0.0
+
+
+def test_what_lies_beside_the_way_changes_nothing() -> None:
+    assert drive(circle(3.0, 1.0, 0.3), (6.0, 0.0))[2] == [""]
+
+
+def test_a_decision_is_held_at_least_a_second() -> None:
+    detour = Detour(RADIUS_M, LIMITS)
+    wanted, target = Twist(0.5, 0.0), (3.0, 0.0)
+    assert detour.steer([(0.5, 0.0)], target, wanted, 0.4, 0.0) is not None
+    assert detour.steer([], target, wanted, 0.4, 0.9) is not None
+    assert detour.steer([], target, wanted, 0.4, 1.5) is None
