@@ -23,7 +23,16 @@ _PLAIN = frozenset({int, str, bool, type(None)})
 
 
 def encode(message: Struct) -> bytes:
-    """`message` as a JSON object with field names."""
+    """`message` as a JSON object with field names.
+
+    Nearly all go the quick way, a third of the time: renamed and written by msgspec. It writes null for what is not
+    finite, and cannot tell the members of a union apart; such a message goes the thorough way.
+    """
+    kind = type(message)
+    if not _holds_union(kind):
+        quick = _encoder.encode(msgspec.convert(message, shape(kind), from_attributes=True))
+        if b"null" not in quick:
+            return quick
     return _encoder.encode(plain(message))
 
 
@@ -48,6 +57,21 @@ def plain(value: Any) -> Any:
 @cache  # bounded by the number of types in the program
 def _fields(kind: type[Struct]) -> tuple[str | None, tuple[str, ...]]:
     return kind.__struct_config__.tag, kind.__struct_fields__  # type: ignore[return-value]
+
+
+@cache  # bounded by the number of types in the program
+def _holds_union(kind: type[Struct]) -> bool:
+    """Somewhere in `kind`, a field may be one of several structs."""
+    return any(_in_union(annotation) for annotation in get_type_hints(kind).values())
+
+
+def _in_union(annotation: Any) -> bool:
+    if isinstance(annotation, type) and issubclass(annotation, Struct):
+        return _holds_union(annotation)
+    arguments = get_args(annotation)
+    structs = [a for a in arguments if isinstance(a, type) and issubclass(a, Struct)]
+    several = get_origin(annotation) in (Union, UnionType) and len(structs) > 1
+    return several or any(_in_union(argument) for argument in arguments)
 
 
 @cache  # bounded by the number of types in the program

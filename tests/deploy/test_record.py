@@ -14,7 +14,19 @@ from hypothesis import strategies as st
 from deploy.look import chronicle, trace
 from deploy.run import channels
 from deploy.run.record import EVENTS, RECORDING, Recorder
-from protocol.messages import Event, Header, LaserScan, LeaseNote, Member, Nack, Term, TrueRobot, Truth
+from protocol.messages import (
+    Event,
+    Header,
+    LaserScan,
+    LeaseNote,
+    Member,
+    Message,
+    Nack,
+    OperatorNote,
+    Term,
+    TrueRobot,
+    Truth,
+)
 from protocol.topics import TOPICS, key
 
 HEADER = Header("robot2", 7, 3, 12.5)
@@ -103,3 +115,19 @@ def test_an_event_is_a_line_about_the_robot_that_it_is_about(tmp_path: Path) -> 
 def test_a_last_line_cut_off_by_a_kill_is_left_out(tmp_path: Path) -> None:
     (tmp_path / EVENTS).write_bytes(b'{"t":1.0,"robot":1,"term":null,"kind":"role","from":"robot1"}\n{"t":2.0,"rob')
     assert [line["t"] for line in chronicle.lines(tmp_path)] == [1.0]
+
+
+ANYTHING = st.dictionaries(st.text(), st.recursive(st.none() | st.floats() | st.text(), st.lists, max_leaves=4))
+MESSAGES = [
+    st.builds(Event, data=ANYTHING),
+    st.builds(OperatorNote, arguments=ANYTHING),
+    *(st.from_type(topic.type) for topic in TOPICS if topic.type not in (Event, OperatorNote)),
+]
+
+
+@settings(max_examples=200)
+@given(message=st.one_of(*MESSAGES))
+def test_every_message_becomes_an_object_of_its_schemas_type(message: Message) -> None:
+    written = channels.encode(message)
+    assert json.loads(written) == json.loads(msgspec.json.encode(channels.plain(message)))
+    msgspec.json.decode(written, type=channels.shape(type(message)))
