@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FIGURES = "figures"
 # Okabe and Ito's palette: told apart with any colour vision, and in print by the line styles below.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+TERM_SHARE_MIN = 0.15  # of the run: a shorter bar has no room for its term
 STYLES = ("-", "--", "-.", ":")
 
 
@@ -72,7 +73,7 @@ def _paths(axes: Axes, scenario: Scenario, seen: Trace, _events: list[Line]) -> 
         axes.plot(rows[-1, 1], rows[-1, 2], marker="o", color=_look(n)["color"], markersize=5)
     axes.plot(*scenario.mission.goal_m, marker="*", markersize=14, color="black", linestyle="none", label="goal")
     axes.set(title=f"Paths: {scenario.title}", xlabel="x in map [m]", ylabel="y in map [m]", aspect="equal")
-    axes.legend(loc="best")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
 def _distance_error(axes: Axes, scenario: Scenario, seen: Trace, events: list[Line]) -> None:
@@ -96,9 +97,11 @@ def _leader(axes: Axes, scenario: Scenario, seen: Trace, events: list[Line]) -> 
     for reign in chronicle.reigns(events):
         until_s = seen.end_s if reign.until_s is None else reign.until_s
         n = robots.index(reign.robot_id) if reign.robot_id in robots else 0
-        axes.barh(reign.robot_id, until_s - reign.from_s, left=reign.from_s, height=0.6, color=_look(n)["color"])
-        axes.annotate(f"term {reign.term[0]}", (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
-                      textcoords="offset points", color="white")  # fmt: skip
+        lasted_s = until_s - reign.from_s
+        axes.barh(reign.robot_id, lasted_s, left=reign.from_s, height=0.6, color=_look(n)["color"], edgecolor="white")
+        if lasted_s > TERM_SHARE_MIN * seen.end_s:
+            axes.annotate(f"term {reign.term[0]}", (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
+                          textcoords="offset points", color="white")  # fmt: skip
     _mark_faults(axes, events)
     axes.set(title="Who led", xlabel="time [s]", ylabel="robot", xlim=(0.0, max(seen.end_s, 1.0)))
     axes.set_yticks(robots)
