@@ -19,6 +19,7 @@ from agents.estimator import Estimator
 from agents.follower import Follower
 from agents.formation import SlotMotion
 from agents.predecessor import Predecessor
+from agents.trace import Trace
 from protocol.geometry import STILL, Pose2D, Twist, along_arc, bearing, wrap
 from protocol.messages import NO_TERM, GatewayStamp, Header, Localization, PoseStamped, Role, Sensors, Slot
 from protocol.mission import Limits
@@ -63,6 +64,9 @@ class Setup(Struct, frozen=True):
     clock_offset_s: float = 0.0
     """Of each robot's clock against that of the one before it."""
     clock_drift: float = 0.0
+    """Of every second robot's clock."""
+    judged: bool = True
+    """Whether `Chain.errors` is wanted."""
     seed: int = 1
 
 
@@ -97,6 +101,7 @@ class Robot:
             trace_m=self.slot.separation_m,
         )
         self.true_slot = SlotMotion(gains, limits, setup.heading_filter_m)
+        self.true_trace = Trace(self.slot.separation_m + 2.0)
         self.heading = pose.theta
         self.pose = pose
         self.twist = STILL
@@ -114,6 +119,7 @@ class Chain:
         poses = list(starts[1:]) if starts is not None else in_slots(self.leader_pose, setup.slots)
         self.robots = [Robot(setup, index, pose) for index, pose in enumerate(poses)]
         self._chance = Random(setup.seed)
+        self._errors: list[Errors] = []
         self._air: list[tuple[float, int, int, PoseStamped]] = []
         self._sent = 0
         self._slots_known = False
@@ -135,9 +141,19 @@ class Chain:
             robot.twist = robot.follower.step(sighting, robot.slot, known, robot.twist, dt, on_trace=self.setup.trace)
             messages.append((known, robot.twist))
         self._publish(now, messages)
-        self._judge(dt)
+        if self.setup.judged:
+            self._judge(dt)
         self._move(dt)
         self.time_s = now + dt
+
+    def lose(self, index: int) -> Robot:
+        """Follower `index` is gone, and the one behind it closes over it. Messages under way are lost."""
+        gone = self.robots.pop(index)
+        if index < len(self.robots):
+            heir = self.robots[index]
+            heir.predecessor = Predecessor(index + 1 + len(self.setup.slots), trace=heir.predecessor.trace)
+        self._air.clear()
+        return gone
 
     def errors(self, index: int) -> Errors:
         """Of follower `index` (from 0) before the last move."""
@@ -150,18 +166,23 @@ class Chain:
             slot = robot.true_slot
             if not self._slots_known:
                 slot.reset(robot.slot, ahead_pose)
-            slot.step(robot.slot, ahead_pose, ahead_twist, dt)
+            if self.setup.trace:
+                travelled_m = robot.true_trace.add(ahead_pose)
+                slot.step_on(robot.true_trace, travelled_m, robot.slot, ahead_pose, ahead_twist.linear_x, dt)
+            else:
+                slot.step(robot.slot, ahead_pose, ahead_twist, dt)
             if hypot(slot.vx, slot.vy) > 0.05:
                 sign = -1.0 if ahead_twist.linear_x < 0.0 else 1.0
                 robot.heading = bearing(Pose2D(), Pose2D(sign * slot.vx, sign * slot.vy))
             pose = robot.pose
             apart = hypot(pose.x - ahead_pose.x, pose.y - ahead_pose.y)
-            # chi has already moved on by one period; the angle of the slot itself has not.
+            # chi has already moved on by one period; the slot itself has not.
             side = bearing(ahead_pose, Pose2D(slot.x, slot.y))
+            commanded_m = hypot(slot.x - ahead_pose.x, slot.y - ahead_pose.y)
             self._errors.append(
                 Errors(
                     hypot(slot.x - pose.x, slot.y - pose.y),
-                    apart - slot.separation_m,
+                    apart - commanded_m,
                     wrap(bearing(ahead_pose, pose) - side),
                     wrap(robot.heading - pose.theta),
                 )

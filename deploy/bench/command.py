@@ -1,10 +1,14 @@
-"""`lfa bench NAME`: one module a name in this package, each with `run(as_json) -> exit code`."""
+"""`lfa bench NAME`: one module a name in this package, each with `run(as_json, ...) -> exit code`.
+
+What else a bench takes (`rows`, `jobs`, `processes`) is what its `run` has parameters for.
+"""
 
 from __future__ import annotations
 
 from importlib import import_module
+from inspect import signature
 from pkgutil import iter_modules
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -17,12 +21,25 @@ def command(
     as_json: Annotated[
         bool, typer.Option("--json", help='Print {"rows": [...]}, each with value, bar and ok.')
     ] = False,
+    rows: Annotated[str | None, typer.Option(help="Only rows with such names, as 'clean/*'.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes that measure at the same time.")] = None,
+    processes: Annotated[
+        bool, typer.Option("--processes", help="Also with real processes, against their bars.")
+    ] = False,
 ) -> int:
     """Exit code 1 when a row does not reach its bar."""
     names = _names()
     if name not in names:
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
-    code: int = import_module(f"deploy.bench.{name}").run(as_json)
+    run = import_module(f"deploy.bench.{name}").run
+    given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None}
+    given = {option: value for option, value in given.items() if value is not None}
+    for option in given:
+        if option not in signature(run).parameters:
+            raise Refused(f"lfa bench {name} takes no --{option}")
+    if jobs is not None and jobs < 1:
+        raise Refused(f"--jobs {jobs}: must be at least 1")
+    code: int = run(as_json, **given)
     return code
 
 

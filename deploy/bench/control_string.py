@@ -1,0 +1,275 @@
+"""String stability (control.md 5.4): does what the leader does grow or fade along a chain of a hundred?
+
+The chain is causal: one run of 100 followers gives the ratios at 3, 10, 50 and 100. Longitudinal: a sine on the
+leader's speed, the worst of several frequencies. Lateral: a sum of small sines on its heading, one run a mode.
+"""
+
+from __future__ import annotations
+
+from cmath import exp
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+from math import ceil, cos, hypot, pi, sin, sqrt
+
+from msgspec import Struct
+
+from agents.config import CONTROL_PERIOD_S, Gains
+from agents.formation import slots_of
+from agents.trace import Trace
+from deploy.bench.chain import Chain, Setup, Weather
+from deploy.bench.leaders import Leader, figure_eight
+from deploy.bench.rows import Case, Quantity
+from protocol.geometry import Twist
+from protocol.messages import Slot
+from protocol.mission import FormationSpec, Side
+
+PLACES = (3, 10, 50, 100)
+SLOW_RADPS, FAST_RADPS = (0.2, 0.5), (1.0, 2.0, 4.0, 8.0)
+SLOW_FOLLOWERS = 10
+"""|G| grows with frequency in every scheme: the slow sines, which cost most time, are run on a short chain."""
+PERIODS = 8
+MEASURE_S_MAX = 100.0
+"""At 0.2 rad/s that is three periods."""
+CRUISE_MPS = 0.5
+RAMP_MPS2 = 0.4
+SETTLE_S = 10.0
+SEPARATION_M = 1.2
+
+
+class Scheme(Struct, frozen=True):
+    """One row of 5.4 with its reference ratios at N = 3, 10, 50, 100 and of the worst hop; None: saturated."""
+
+    name: str
+    mode: str
+    delay_s: float
+    latency_s: float
+    jitter_s: float
+    loss: float
+    reference: tuple[float | None, ...]
+    good: tuple[float | None, ...] = (None,) * 5
+    """Bars of section 6, where there are any."""
+    gains: Gains = Gains()
+    extrapolation_max_s: float = 0.5
+    slow_radps: tuple[float, ...] = SLOW_RADPS
+    fast_radps: tuple[float, ...] = FAST_RADPS
+
+
+_BUFFER = (None, 1.005, 1.01, 1.02, None)
+#      name                         mode        buffer latency jitter loss   N=3     10      50      100     hop
+SCHEMES = (
+    # Without feed-forward |G| is below 1 at once, and 1 only for the slowest waves. Its lag needs more than m = 0.5.
+    Scheme("pose, no feed-forward", "pose",     0.0,   0.02,   0.0,   0.0,  (1.00,   1.00,   0.999,  0.998,  1.000),
+           gains=Gains(feed_forward=0.0, m_mps=0.65, b_m=0.3), extrapolation_max_s=0.0, slow_radps=(),
+           fast_radps=(0.02,)),
+    Scheme("pose, DR, 20 ms",       "pose",     0.0,   0.02,   0.0,   0.0,  (1.75,   3.7,    None,   None,   1.21)),
+    Scheme("pose, DR, 100 ms 20 %", "pose",     0.0,   0.10,   0.0,   0.2,  (2.34,   5.8,    None,   None,   1.33)),
+    Scheme("vel, DR, 20 ms",        "velocity", 0.0,   0.02,   0.0,   0.0,  (1.09,   1.34,   None,   None,   1.030),
+           (None, None, None, None, 1.035)),
+    Scheme("vel, DR, 20 ms 20 %",   "velocity", 0.0,   0.02,   0.0,   0.2,  (1.11,   1.42,   None,   None,   1.044)),
+    Scheme("vel, DR, 100 ms",       "velocity", 0.0,   0.10,   0.0,   0.0,  (1.51,   3.2,    None,   None,   1.148)),
+    Scheme("vel, 40 ms",            "velocity", 0.04,  0.02,   0.0,   0.0,  (1.0004, 1.0002, 1.0003, 1.0003, 1.0002),
+           _BUFFER),
+    Scheme("vel, 40 ms 10 %",       "velocity", 0.04,  0.02,   0.0,   0.1,  (1.008,  1.017,  1.085,  1.173,  1.006)),
+    Scheme("vel, 80 ms 5 %",        "velocity", 0.08,  0.02,   0.0,   0.05, (1.0000, 1.0001, 1.0001, 1.0001, 1.0012),
+           _BUFFER),
+    Scheme("vel, 80 ms 20 %",       "velocity", 0.08,  0.02,   0.0,   0.2,  (1.0008, 1.003,  1.007,  1.012,  1.003),
+           _BUFFER),
+    Scheme("vel, 220 ms 20 %",      "velocity", 0.22,  0.10,   0.04,  0.2,  (1.0001, 1.0001, 1.0001, 1.0001, 1.003),
+           _BUFFER),
+    Scheme("pose, 220 ms 10 %",     "pose",     0.22,  0.10,   0.04,  0.1,  (1.0001, 1.0000, 0.9999, 1.0000, 1.003),
+           _BUFFER),
+    Scheme("pose, 220 ms 20 %",     "pose",     0.22,  0.10,   0.04,  0.2,  (1.0017, 1.0013, 1.0011, 1.0011, 1.016),
+           _BUFFER),
+    Scheme("pose, 60 ms",           "pose",     0.06,  0.02,   0.0,   0.0,  (1.0004, 1.0003, 1.0003, 1.0004, 1.0002),
+           _BUFFER),
+    Scheme("pose, 60 ms 10 %",      "pose",     0.06,  0.02,   0.0,   0.1,  (1.010,  1.013,  1.046,  1.12,   1.019)),
+)  # fmt: skip
+
+HEADING_RADPS = (0.2, 0.4, 0.8, 1.5, 3.0)
+HEADING_RAD = 0.012
+"""Amplitude of each sine of the leader's heading: small, so that they do not disturb each other."""
+WAVE_S = 20.0 * pi
+"""All of `HEADING_RADPS` have whole periods in it."""
+WAVES = 2
+HOP_S = 2.5
+"""No mode passes a wave on later than this per hop (a trace: 1.2 m at 0.5 m/s)."""
+
+
+class Mode(Struct, frozen=True):
+    """A lateral row of 5.4: reference amplitude ratios after the given numbers of hops, one a frequency."""
+
+    name: str
+    side: Side
+    filter_m: float
+    trace: bool
+    after: dict[int, tuple[float, ...]]
+
+
+MODES = (
+    Mode("column L=k/2", "column", 0.6, False,
+         {3: (1.00, 1.002, 1.02, 1.07, 1.08), 100: (1.006, 1.08, 1.98, 29.0, 4.0)}),
+    Mode("column L=0.6k", "column", 0.72, False,
+         {3: (0.94, 0.80, 0.57, 0.41, 0.33), 100: (0.11, 0.001, 0.0, 0.0, 0.0)}),
+    Mode("zigzag L=0.30", "zigzag", 0.30, False,
+         {3: (1.00, 1.00, 1.00, 0.99, 0.90), 100: (1.00, 1.001, 0.995, 0.75, 0.04)}),
+    Mode("zigzag L=0.36", "zigzag", 0.36, False,
+         {3: (0.98, 0.94, 0.80, 0.57, 0.34), 100: (0.57, 0.11, 0.001, 0.0, 0.05)}),
+    Mode("zigzag L=0.60", "zigzag", 0.60, False,
+         {3: (0.92, 0.73, 0.38, 0.12, 0.02), 100: (0.06, 0.0, 0.0, 0.0, 0.0)}),
+    Mode("trace", "column", 0.0, True,
+         {3: (1.000, 1.000, 1.002, 1.010, 1.04), 100: (1.000, 1.003, 1.015, 1.075, 1.25)}),
+    Mode("column rigid", "column", 0.0, False, {3: (1.37, 2.7, 10.0)}),
+    Mode("zigzag rigid", "zigzag", 0.0, False, {3: (1.09, 1.37, 2.7)}),
+)  # fmt: skip
+
+TRACE_LAP_M = 20.0
+TRACE_FOLLOWERS = 100
+
+
+def cases() -> list[Case]:
+    return [
+        *(_lateral(mode) for mode in MODES),
+        *(_longitudinal(scheme) for scheme in SCHEMES),
+        _trace_path("20 ms", Weather(), 0.04),
+        _trace_path("100 ms + 40 ms, 10 %", Weather(0.1, 0.04, 0.1), 0.22),
+    ]
+
+
+def _longitudinal(scheme: Scheme) -> Case:
+    names = [*(f"N={n}" for n in PLACES), "worst hop"]
+    quantities = tuple(
+        Quantity(name, "ratio", good) if good is not None else Quantity(name, "ratio", reference, "near")
+        for name, reference, good in zip(names, scheme.reference, scheme.good, strict=True)
+    )
+    return Case(f"string/{scheme.name}", quantities, partial(longitudinal, scheme))
+
+
+def longitudinal(scheme: Scheme, places: Sequence[int] = PLACES) -> tuple[float, ...]:
+    """Speeds' rms deviations over the leader's at each place, and the worst hop's, at the worst frequency."""
+    runs = [(omega, min(SLOW_FOLLOWERS, places[-1])) for omega in scheme.slow_radps]
+    runs += [(omega, places[-1]) for omega in scheme.fast_radps]
+    worst, worst_hop = [0.0] * len(places), 0.0
+    for omega, followers in runs:
+        deviations = speed_wave(scheme, omega, followers)
+        for index, place in enumerate(places):
+            if place <= followers:
+                worst[index] = max(worst[index], deviations[place] / deviations[0])
+        worst_hop = max(worst_hop, *(b / a for a, b in pairwise(deviations)))
+    return *worst, worst_hop
+
+
+def speed_wave(scheme: Scheme, omega: float, followers: int) -> list[float]:
+    """Rms deviation of the speed of each robot, the leader first, under a sine of `omega` on the leader's [m/s]."""
+    slots = slots_of(FormationSpec(side="column", separation_m=SEPARATION_M), range(2, followers + 2))
+    chain = Chain(
+        Setup(
+            slots,
+            gains=scheme.gains,
+            mode=scheme.mode,
+            delay_s=scheme.delay_s,
+            trace=True,
+            weather=Weather(scheme.latency_s, scheme.jitter_s, scheme.loss),
+            extrapolation_max_s=scheme.extrapolation_max_s,
+            judged=False,
+        )
+    )
+    amplitude, period = min(0.1, 0.5 / omega), 2.0 * pi / omega
+    periods = min(PERIODS, max(1, int(MEASURE_S_MAX / period)))
+    begin = ceil((SETTLE_S + followers * max(scheme.delay_s, 0.02)) / CONTROL_PERIOD_S)
+    steps = round(periods * period / CONTROL_PERIOD_S)
+    sums = [[0.0, 0.0] for _ in range(followers + 1)]
+    for step in range(begin + steps):
+        t = step * CONTROL_PERIOD_S
+        wave = amplitude * sin(omega * t) if t > 2.0 else 0.0
+        chain.step(Twist(min(CRUISE_MPS, RAMP_MPS2 * t) + wave, 0.0))
+        if step >= begin:
+            _add(sums[0], chain.leader_twist.linear_x)
+            for index, robot in enumerate(chain.robots):
+                _add(sums[index + 1], robot.twist.linear_x)
+    return [sqrt(max(0.0, square / steps - (total / steps) ** 2)) for total, square in sums]
+
+
+def _add(sums: list[float], value: float) -> None:
+    sums[0] += value
+    sums[1] += value * value
+
+
+# --- lateral ------------------------------------------------------------------------------------------------------
+
+
+def _lateral(mode: Mode) -> Case:
+    quantities = tuple(
+        Quantity(f"N={n} {omega:g} rad/s", "ratio", reference, "near")
+        for n, references in mode.after.items()
+        for omega, reference in zip(HEADING_RADPS, references, strict=False)
+    )
+    return Case(f"lateral/{mode.name}", quantities, partial(lateral, mode))
+
+
+def lateral(mode: Mode) -> tuple[float, ...]:
+    """Amplitude of each frequency of the sideways motion at each place, over the leader's."""
+    followers = max(mode.after)
+    count = len(next(iter(mode.after.values())))
+    omegas = HEADING_RADPS[:count]
+    amplitude = HEADING_RAD if followers > 3 else 0.25 * HEADING_RAD
+    slots = slots_of(FormationSpec(side=mode.side, separation_m=SEPARATION_M), range(2, followers + 2))
+    chain = Chain(Setup(slots, trace=mode.trace, heading_filter_m=mode.filter_m, judged=False))
+    begin = round((SETTLE_S + HOP_S * followers) / CONTROL_PERIOD_S)
+    steps = round(WAVES * WAVE_S / CONTROL_PERIOD_S)
+    watched = (0, *mode.after)
+    waves = {place: [0j] * count for place in watched}
+    for step in range(begin + steps):
+        t = step * CONTROL_PERIOD_S
+        turn = sum(amplitude * omega * cos(omega * t) for omega in omegas)
+        chain.step(Twist(CRUISE_MPS, turn if t > 1.0 else 0.0))
+        if step >= begin:
+            for place in watched:
+                y = (chain.leader_pose if place == 0 else chain.robots[place - 1].pose).y
+                for index, omega in enumerate(omegas):
+                    waves[place][index] += y * exp(-1j * omega * t)
+    return tuple(abs(waves[place][index]) / abs(waves[0][index]) for place in mode.after for index in range(count))
+
+
+# --- a hundred robots on one path ---------------------------------------------------------------------------------
+
+
+def _trace_path(name: str, weather: Weather, delay_s: float) -> Case:
+    quantities = tuple(
+        Quantity(f"robot {n} off the leader's path", "mm", 8.0 if n == TRACE_FOLLOWERS else None) for n in PLACES
+    )
+    return Case(f"trace/figure_eight {name}", quantities, partial(trace_path, weather, delay_s))
+
+
+def trace_path(weather: Weather, delay_s: float) -> tuple[float, ...]:
+    """Rms distance [mm] of robots' paths from the leader's, over one lap of a small figure-eight."""
+    slots: tuple[Slot, ...] = slots_of(FormationSpec(side="column"), range(2, TRACE_FOLLOWERS + 2))
+    setup = Setup(slots, trace=True, delay_s=delay_s, weather=weather, judged=False)
+    chain = Chain(setup)
+    leader = Leader(figure_eight(TRACE_LAP_M), (), setup.limits)
+    # The last robot starts 120 m behind on a straight line, and must have reached the curve before it is measured.
+    way_m = TRACE_FOLLOWERS * SEPARATION_M + 2.0 * TRACE_LAP_M
+    path = Trace(2.0 * way_m)
+    sums, count = [0.0] * len(PLACES), 0
+    while leader.s < way_m:
+        path.add(chain.leader_pose)
+        chain.step(leader.step(CONTROL_PERIOD_S))
+        if leader.s > way_m - TRACE_LAP_M:
+            count += 1
+            for index, place in enumerate(PLACES):
+                pose = chain.robots[place - 1].pose
+                sums[index] += _off(path, pose.x, pose.y, path.travelled_m - place * SEPARATION_M) ** 2
+    return tuple(1e3 * sqrt(total / count) for total in sums)
+
+
+def _off(path: Trace, x: float, y: float, near_s: float) -> float:
+    """Distance [m] of a point from `path`, looked for around arc length `near_s`."""
+    s = near_s
+    for _ in range(20):
+        point = path.at(s)
+        along = cos(point.theta) * (x - point.x) + sin(point.theta) * (y - point.y)
+        s += along
+        if abs(along) < 1e-7:
+            break
+    point = path.at(s)
+    return hypot(x - point.x, y - point.y)

@@ -1,0 +1,119 @@
+"""Rows of a bench: what was measured beside the bar to be reached, by several processes, as a table or JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from fnmatch import fnmatchcase
+from math import isfinite
+from multiprocessing import get_context
+from typing import Literal
+
+from msgspec import Struct, structs
+
+from protocol.mission import Refused
+
+NEAR = 0.10
+NEAR_FLOOR = 0.02
+"""Amplitude ratios are given to two decimals: a smaller difference is none."""
+ROUNDED = 6
+"""Significant digits of a printed value."""
+
+
+class Quantity(Struct, frozen=True):
+    """One thing that a case measures. Without a bar it is only reported."""
+
+    name: str
+    unit: str
+    bar: float | None = None
+    rule: Literal["at most", "at least", "near"] = "at most"
+
+
+class Case(Struct, frozen=True):
+    """One run and all that is read from it; `measure` gives one value a quantity, and must be picklable."""
+
+    name: str
+    quantities: tuple[Quantity, ...]
+    measure: Callable[[], Sequence[float]]
+
+    def row_names(self) -> list[str]:
+        return [f"{self.name}/{quantity.name}" for quantity in self.quantities]
+
+
+class Row(Struct, frozen=True):
+    name: str
+    value: float
+    unit: str
+    bar: float | None
+    ratio: float | None
+    """Value over bar."""
+    ok: bool
+
+
+def row(case: str, quantity: Quantity, value: float) -> Row:
+    """A value that is not finite never reaches a bar."""
+    bar = quantity.bar
+    value = float(f"{value:.{ROUNDED}g}")
+    ratio = None if not bar else float(f"{value / bar:.4g}")
+    return Row(f"{case}/{quantity.name}", value, quantity.unit, bar, ratio, isfinite(value) and _holds(quantity, value))
+
+
+def _holds(quantity: Quantity, value: float) -> bool:
+    bar = quantity.bar
+    if bar is None:
+        return True
+    if quantity.rule == "at least":
+        return value >= bar
+    if quantity.rule == "near":
+        return abs(value - bar) <= max(NEAR * bar, NEAR_FLOOR)
+    return value <= bar
+
+
+def select(cases: Sequence[Case], glob: str) -> list[Case]:
+    """The cases with a row whose name matches. Raises `Refused` when there is none."""
+    chosen = [case for case in cases if any(fnmatchcase(name, glob) for name in case.row_names())]
+    if not chosen:
+        groups = sorted({case.name.split("/")[0] for case in cases})
+        raise Refused(f"--rows {glob!r}: no row has such a name; they begin with {', '.join(groups)}")
+    return chosen
+
+
+def measured(cases: Sequence[Case], jobs: int, glob: str = "*") -> Iterator[list[Row]]:
+    """The matching rows of each case, in the order of the cases, as they become known."""
+    if jobs <= 1 or len(cases) == 1:
+        for case in cases:
+            yield _matching(case, case.measure(), glob)
+        return
+    # Spawned, not forked: the caller may have threads.
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        waiting = [pool.submit(case.measure) for case in cases]
+        for case, future in zip(cases, waiting, strict=True):
+            yield _matching(case, future.result(), glob)
+
+
+def _matching(case: Case, values: Sequence[float], glob: str) -> list[Row]:
+    rows = (row(case.name, quantity, value) for quantity, value in zip(case.quantities, values, strict=True))
+    return [row for row in rows if fnmatchcase(row.name, glob)]
+
+
+def show(rows: Iterator[list[Row]], as_json: bool) -> int:
+    """Print as they come (a table) or at the end (JSON); 0 when every row holds, else 1."""
+    done: list[Row] = []
+    for some in rows:
+        done += some
+        if not as_json:
+            for one in some:
+                print(line(one), flush=True)
+    if as_json:
+        print(json.dumps({"rows": [structs.asdict(one) for one in done]}))
+    failed = [one.name for one in done if not one.ok]
+    if not as_json:
+        print(f"{len(done)} rows, {len(failed)} below the bar" + "".join(f"\n  {name}" for name in failed))
+    return 1 if failed else 0
+
+
+def line(one: Row) -> str:
+    bar = "-" if one.bar is None else f"{one.bar:g}"
+    mark = "ok" if one.ok else "BELOW THE BAR"
+    return f"{one.name:<52}{one.value:>12.5g} {one.unit:<6} bar {bar:>8}  {mark}"
