@@ -6,6 +6,7 @@ moment. A robot that becomes leader commands at once.
 
 from __future__ import annotations
 
+from math import pi
 from typing import Any
 
 from agents.beliefs import Beliefs
@@ -44,6 +45,9 @@ ASK_S = 0.5
 TABLE_ROBOTS_FULL_RATE = 16
 TRACKING_EVERY = 2
 FORMATION_S = 1.0
+BEND_CHECK_S = 0.5
+BEND_AHEAD_M = 5.0
+"""Far enough ahead for a chain of four to fall into column at cruise speed."""
 
 
 class Agent:
@@ -64,6 +68,8 @@ class Agent:
         self._next_formation = 0.0
         self._formation_number = -1
         self._steps = 0
+        self._oriented = 0
+        self._next_bend_check = 0.0
         self._arrived = False
         self._detouring: str | None = None
         self._stopping = False
@@ -175,15 +181,23 @@ class Agent:
         """An operator's word; only the leader changes the formation."""
         if note.command != "formation" or lease.role is not Role.LEADER or self._mission is None:
             return
+        self._order(str(note.arguments.get("side")), "operator", now, lease, driver)
+
+    def _order(self, side: str, reason: str, now: float, lease: Lease, driver: Driver) -> None:
+        """An orientation request to all behind this leader, with its term and the next number."""
+        assert self._mission is not None
         try:
-            spec = named(str(note.arguments.get("side")), self._mission.formation)
+            spec = named(side, self._mission.formation)
         except Refused:
             return
-        slots = slots_of(spec, lease.chain[1:])
         self._formation_number += 1
-        self._request_note(FormationNote(
-            self._voice.header("formation", now), lease.term, self._formation_number, slots, driver.formation.trace
-        ), now)  # fmt: skip
+        header = self._voice.header("formation", now)
+        slots = slots_of(spec, lease.chain[1:])
+        note = FormationNote(header, lease.term, self._formation_number, slots, driver.formation.trace)
+        if driver.formation.request(note):
+            self._say("formation", note)
+            self._next_formation = now + FORMATION_S
+            self._event("formation", now, {"number": note.number, "side": side, "by": reason}, note.term)
 
     # --- beginning and ending ---------------------------------------------------------------------------------------
 
@@ -224,7 +238,7 @@ class Agent:
                 case BecomeLeader(term, _):
                     self._event("lease", now, {"change": "acquired"}, term)
                     self._event("role", now, {"role": Role.LEADER.value, "leader": self._id}, term)
-                    self._formation_number, self._next_formation = 0, now
+                    self._lead_on(now)
                     self._control(now)
                 case StepDown(term, cause):
                     self._event("lease", now, {"change": cause}, term)
@@ -234,6 +248,13 @@ class Agent:
                     self._event("chain", now, {"chain": chain, "seq": config.version.seq}, config.version.term)
                 case LeaseExtended():
                     pass
+
+    def _lead_on(self, now: float) -> None:
+        """A reign begins: its requests count from 0, and what the route asked for so far has been asked for."""
+        assert self._driver is not None and self._mission is not None
+        self._formation_number, self._next_formation = 0, now
+        progress_m = self._driver.lead.progress_m
+        self._oriented = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
 
     def _adopt(self, now: float) -> None:
         """Follow whoever the newest config puts ahead."""
@@ -264,10 +285,28 @@ class Agent:
         command = driver.drive(role, lease.chain, pose, twist, now)
         self._command(command, role, now)
         self._speak(role, pose, twist, now)
+        if role is Role.LEADER:
+            self._orient(now, lease, driver)
         self._tell_decision(now)
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
+
+    def _orient(self, now: float, lease: Lease, driver: Driver) -> None:
+        """The mission's changes of formation as the route comes to them; column before a bend too tight for others."""
+        assert self._mission is not None
+        orientations = self._mission.leading.orientations
+        progress_m = driver.lead.progress_m
+        while self._oriented < len(orientations) and orientations[self._oriented].at_m <= progress_m:
+            self._order(orientations[self._oriented].side, "mission", now, lease, driver)
+            self._oriented += 1
+        if now >= self._next_bend_check:
+            self._next_bend_check = now + BEND_CHECK_S
+            slots = [driver.formation.slot_of(robot) for robot in lease.chain[1:]]
+            column = all(abs(abs(slot.phi) - pi) < 1e-6 for slot in slots)
+            ahead_m = None if column or driver.formation.trace else driver.lead.narrow_bend_m(slots, BEND_AHEAD_M)
+            if ahead_m is not None:
+                self._order("column", f"bend in {ahead_m:.1f} m", now, lease, driver)
 
     def _role(self, lease: Lease) -> Role:
         if lease.role is Role.LEADER:
@@ -314,14 +353,6 @@ class Agent:
             note = FormationNote(header, self._lease.term, self._formation_number, slots, formation.trace)
             formation.request(note)
             self._say("formation", note)
-
-    def _request_note(self, note: FormationNote, now: float) -> None:
-        """A change asked for by the leader itself or its operator: one orientation request."""
-        assert self._driver is not None
-        if self._driver.formation.request(note):
-            self._say("formation", note)
-            self._next_formation = now + FORMATION_S
-            self._event("formation", now, {"number": note.number, "by": "leader"}, note.term)
 
     def _tell_tracking(self, now: float) -> None:
         assert self._driver is not None

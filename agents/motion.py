@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, ceil, cos, hypot, inf, pi, sin, tan
 
-from agents.formation import PLANNED_MARGIN, leader_speed_cap
+from agents.formation import COLUMN_BELOW_MPS, PLANNED_MARGIN, leader_speed_cap
 from protocol.geometry import Pose2D, Twist, wrap
 from protocol.messages import Slot
 from protocol.mission import Leading, Limits
@@ -43,14 +43,14 @@ class Route:
 
     def point(self, s: float) -> Point:
         """The point at arc length `s` [m], clamped to the ends."""
-        i = self._segment(s)
+        i = self.segment(s)
         (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
         share = (min(max(s, 0.0), self.length_m) - self.at_m[i]) / max(self.at_m[i + 1] - self.at_m[i], 1e-9)
         return ax + share * (bx - ax), ay + share * (by - ay)
 
     def nearest(self, x: float, y: float, low_m: float = 0.0, high_m: float = inf) -> float:
         """Arc length of the point nearest to (x, y) between `low_m` and `high_m`."""
-        first, last = self._segment(low_m), self._segment(min(high_m, self.length_m))
+        first, last = self.segment(low_m), self.segment(min(high_m, self.length_m))
         best, best_s = inf, low_m
         for i in range(first, last + 1):
             (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
@@ -61,7 +61,8 @@ class Route:
                 best, best_s = apart, self.at_m[i] + share * (self.at_m[i + 1] - self.at_m[i])
         return best_s
 
-    def _segment(self, s: float) -> int:
+    def segment(self, s: float) -> int:
+        """Index of the point that arc length `s` [m] lies on or behind."""
         return min(max(bisect_right(self.at_m, s) - 1, 0), len(self.points) - 2)
 
 
@@ -95,6 +96,22 @@ class Lead:
     @property
     def goal(self) -> Point:
         return self._leading.route_m[-1]
+
+    @property
+    def progress_m(self) -> float:
+        """Arc length of the route so far; 0 before the own pose is known."""
+        return self._s
+
+    def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
+        """How far ahead the nearest bend is in which `slots` would hold the leader below `COLUMN_BELOW_MPS`."""
+        if self._route is None:
+            return None
+        first, last = self._route.segment(self._s), self._route.segment(self._s + within_m)
+        for i in range(first, last + 1):
+            curvature = self._route.curvature[i]
+            if curvature and leader_speed_cap(slots, curvature, self._limits, PLANNED_MARGIN) < COLUMN_BELOW_MPS:
+                return self._route.at_m[i] - self._s
+        return None
 
     def remaining_m(self, pose: Pose2D) -> float:
         """Way to the goal: along the route, or straight once the route is at its end."""
@@ -142,7 +159,7 @@ class Lead:
         if wanted != self._profile_of:
             self._profile = self._speeds(wanted)
             self._profile_of = wanted
-        return self._profile[self._route._segment(self._s)]
+        return self._profile[self._route.segment(self._s)]
 
     def _speeds(self, slots: tuple[Slot, ...]) -> list[float]:
         """Backwards over the route: each point's cap, or what still brakes to the next one's."""

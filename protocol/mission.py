@@ -62,6 +62,13 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     alpha_max_radps2: float = 4.0
 
 
+class Orientation(Struct, frozen=True, forbid_unknown_fields=True):
+    """A change of formation that the leader asks for when it has come so far along the route."""
+
+    at_m: float
+    side: Side
+
+
 class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     """How a leader drives."""
 
@@ -71,6 +78,8 @@ class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     cruise_mps: float = 0.5
     acceleration_mps2: float = 0.5
     goal_tolerance_m: float = 0.10
+    orientations: tuple[Orientation, ...] = ()
+    """In the order of the route."""
 
 
 class Mission(Struct, frozen=True, forbid_unknown_fields=True):
@@ -132,6 +141,9 @@ def check_mission(mission: Mission) -> Mission:
             f"a number from {low:g} to {high:g}" if high < inf else f">= {low:g}",
         )
     _require(len(mission.leading.route_m) >= 1, "mission.leading.route_m", "[]", "at least one way-point [x, y]")
+    for orientation in mission.leading.orientations:
+        fine = isfinite(orientation.at_m) and orientation.at_m >= 0.0
+        _require(fine, "mission.leading.orientations.at_m", orientation.at_m, ">= 0, metres along the route")
     for point in mission.leading.route_m:
         _require(all(isfinite(c) for c in point), "mission.leading.route_m", point, "finite coordinates [m]")
     return mission
