@@ -45,17 +45,13 @@ class Robot:
         self._fleet = fleet
         self._incarnation = incarnation
         self._seq: dict[str, int] = {}
-        self._led: Term | None = None
         self._told: dict[str, tuple[Term, float]] = {}
 
     def command(self, cmd: CmdVel, now: float) -> tuple[str, dict[str, object]] | None:
-        """Give `cmd` to the gateway; what is worth an event: the first leader command of a term, a new refusal."""
+        """Give `cmd` to the gateway; what may be worth an event: an obeyed leader command, a new refusal."""
         reason = self.gateway.command(cmd, now)
         if reason is None:
-            if not cmd.as_leader or cmd.term == self._led:
-                return None
-            self._led = cmd.term
-            return "leader_command", {"robot": self.id}
+            return ("leader_command", {"robot": self.id}) if cmd.as_leader else None
         term, at = self._told.get(reason, (None, float("-inf")))
         if cmd.term == term or now - at < REFUSAL_EVERY_S:
             return None

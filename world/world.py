@@ -73,6 +73,8 @@ class World:
         self._step = 0
         """Number of the next point of the grid."""
         self._seq: dict[str, int] = {}
+        self._led: tuple[int, Term] | None = None
+        """Whose leader command was obeyed last, over all gateways: a change back to an older term shows (I2)."""
         self.interests = frozenset(
             {key(fleet, "*", "ask")}
             | {key(fleet, name, "cmd_vel") for name in self._names}
@@ -150,6 +152,10 @@ class World:
         if news is None:
             return []
         kind, data = news
+        if kind == "leader_command":
+            if self._led == (place, cmd.term):
+                return []
+            self._led = (place, cmd.term)
         return [self._event(kind, cmd.term, data | {"t": self._time_of(now)}, now)]
 
     def _fence(self, at_key: str, fence: Fence, now: float) -> list[Envelope]:

@@ -229,6 +229,17 @@ def test_a_leader_command_is_told_once_a_term_and_robot() -> None:
     assert told[0].header.sender == "world"
 
 
+def test_a_change_back_to_an_older_leader_is_told() -> None:
+    """What a violation of I2 looks like from outside: the old leader's own gateway still obeys it."""
+    rig = Rig().opened()
+    rig.run(0.1, Twist(0.1, 0.0))
+    rig.command(1, Twist(0.1, 0.0), as_leader=True)
+    rig.command(2, Twist(0.1, 0.0), as_leader=True, term=Term(6, 2, 1), holder=2)
+    rig.command(1, Twist(0.1, 0.0), as_leader=True)
+    told = events(rig.said, "leader_command")
+    assert [event.data["robot"] for event in told] == [1, 2, 1]
+
+
 def test_refusals_are_told_once_a_reason_and_term() -> None:
     rig = Rig().opened()
     rig.run(0.02, Twist(0.0, 0.0))
