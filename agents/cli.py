@@ -36,7 +36,8 @@ def main() -> None:
 def start(arguments: argparse.Namespace) -> int:
     """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
     mission = None if arguments.mission is None else read_mission(arguments.mission)
-    options = Options(_fleet(arguments.fleet), arguments.connect or default_endpoint(), arguments.journal)
+    endpoint = arguments.connect or default_endpoint()
+    options = Options(_fleet(arguments.fleet), endpoint, arguments.journal, arguments.faults)
     wall_ms = clock.wall_ms()
     return run([_node(arguments.role, arguments.id, arguments.fleet, wall_ms, mission)], options, wall_ms)
 
@@ -56,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--connect", metavar="ENDPOINT", help="the router, like tcp/127.0.0.1:7447 (default: this machine's)")
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; else it comes over Zenoh")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
+    add("--faults", action="store_true", help="obey an operator's radio weather (lfa fault cut, loss): for tests")
     return parser
 
 

@@ -1,10 +1,30 @@
-"""What the air does to messages: one model for the simulator and, at a receiver, for the live bus."""
+"""What the air does to messages: one model for the simulator and, at a receiver, for the live bus.
+
+Places are robots and the world (with the witness); a robot's gateway and sensors are on the robot. A cut is of one
+link in one direction, so partial and asymmetric ones are just fewer links. Tokens are not messages: they stay.
+"""
 
 from __future__ import annotations
 
+import heapq
+from collections.abc import Mapping
 from random import Random
+from typing import Any
 
-from msgspec import Struct
+import msgspec
+from msgspec import Struct, structs
+
+from protocol.bus import Arrival
+from protocol.mission import WITNESS_NAME
+from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER, WORLD_NAME, address
+
+Link = tuple[str, str]
+"""From a place to a place."""
+WEATHER = "weather"
+"""The operator's command; its arguments are those of `Air.obey`."""
+WAITING_MAX = 4096
+"""Messages that wait in a live receiver's air."""
+_NOT_IN_THE_AIR = (OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
 
 
 class Radio(Struct, frozen=True, forbid_unknown_fields=True):
@@ -20,23 +40,67 @@ class Radio(Struct, frozen=True, forbid_unknown_fields=True):
     duplication: float = 0.0
 
 
+CLEAR = Radio(delay_s=0.0, jitter_s=0.0)
+"""Adds nothing to what a live bus does by itself."""
+
+
+def link_of(key: str, receiver: str) -> Link | None:
+    """The link that a message on `key` crosses on its way to the process `receiver`; None when it is none.
+
+    A robot and its own hardware do not speak through the air, and operator, recorder and ground truth never do.
+    """
+    where = address(key)
+    if where is None or where.topic == "alive" or where.owner in _NOT_IN_THE_AIR:
+        return None
+    sender, place = _place(where.owner), _place(receiver)
+    if where.to is not None and where.to.startswith("gateway"):
+        place = where.to.replace("gateway", "robot")
+    elif where.topic == "cmd_vel":
+        place = sender
+    return None if sender == place else (sender, place)
+
+
+def _place(name: str) -> str:
+    return WORLD_NAME if name == WITNESS_NAME else name
+
+
 class Air:
     """The weather with its memory: chance comes in as a seeded generator."""
 
     def __init__(self, radio: Radio, random: Random) -> None:
         self.radio = radio
+        self.cuts: frozenset[Link] = frozenset()
+        self._fair = radio
         self._random = random
         self._fading: dict[tuple[str, str], bool] = {}
 
     def delays(self, sender: str, receiver: str) -> list[float]:
         """After how long [s] a message reaches `receiver`: none when lost, two when doubled."""
         radio = self.radio
+        if (sender, receiver) in self.cuts:
+            return []
         if radio.loss > 0.0 and self._lost(sender, receiver):
             return []
         delays = [radio.delay_s + radio.jitter_s * self._random.random()]
         if radio.duplication > 0.0 and self._random.random() < radio.duplication:
             delays.append(radio.delay_s + radio.jitter_s * self._random.random())
         return delays
+
+    def obey(self, arguments: Mapping[str, Any]) -> bool:
+        """Change the weather by an operator's word; False, and no change, when the word is none.
+
+        `cut`: pairs (from, to) of places that from now on do not reach each other, besides those cut already;
+        `radio`: fields of `Radio`; `heal`: true ends all cuts and brings the first weather back.
+        """
+        try:
+            order = msgspec.convert(dict(arguments), type=_Order)
+            if order.heal:
+                self.cuts, self.radio = frozenset(), self._fair
+            self.radio = msgspec.convert(structs.asdict(self.radio) | order.radio, type=Radio)
+        except msgspec.ValidationError:
+            return False
+        self.cuts |= frozenset((_place(sender), _place(receiver)) for sender, receiver in order.cut)
+        return True
 
     def _lost(self, sender: str, receiver: str) -> bool:
         """Gilbert's channel: leaves a fade with 1/burst, enters one so that the mean loss is `loss`.
@@ -51,3 +115,38 @@ class Air:
         fading = self._random.random() >= leave if fading else self._random.random() < enter
         self._fading[link] = fading
         return fading
+
+
+class _Order(Struct, forbid_unknown_fields=True):
+    cut: tuple[Link, ...] = ()
+    radio: dict[str, float] = {}
+    heal: bool = False
+
+
+class Reception:
+    """The air before one process on a live bus: what is put in comes out when it has come through, or never."""
+
+    def __init__(self, receiver: str, random: Random) -> None:
+        self.air = Air(CLEAR, random)
+        self._receiver = receiver
+        self._waiting: list[tuple[float, int, Arrival]] = []
+        self._order = 0
+
+    def put(self, arrival: Arrival) -> None:
+        """A message came over the bus."""
+        link = link_of(arrival.key, self._receiver)
+        delays = [0.0] if link is None else self.air.delays(*link)
+        for delay_s in delays[: WAITING_MAX - len(self._waiting)]:
+            self._order += 1
+            due = structs.replace(arrival, at=arrival.at + delay_s) if delay_s > 0.0 else arrival
+            heapq.heappush(self._waiting, (due.at, self._order, due))
+
+    def take(self, now: float) -> list[Arrival]:
+        """All that has come through until `now`, in the order of its times."""
+        through = []
+        while self._waiting and self._waiting[0][0] <= now:
+            through.append(heapq.heappop(self._waiting)[2])
+        return through
+
+    def next_due(self) -> float:
+        return self._waiting[0][0] if self._waiting else float("inf")

@@ -13,18 +13,20 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
+from random import Random
 from types import FrameType
 
 from msgspec import Struct
 
 from protocol import clock
-from protocol.bus import Inbox
+from protocol.bus import Arrival, Inbox
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import BadMessage, decode
+from protocol.messages import BadMessage, OperatorNote, decode
 from protocol.mission import Refused
 from protocol.node import Local, Node, Stop, Vitals
-from protocol.topics import TOPIC, address
+from protocol.radio import WEATHER, Reception
+from protocol.topics import OPERATOR_NAME, TOPIC, address, key, matches
 from protocol.zenoh_bus import LINK_LEASE_MS, RouterAbsent, ZenohBus
 
 CONNECT_RETRY_S = 0.2
@@ -39,21 +41,29 @@ class Options(Struct, frozen=True):
     fleet: str
     endpoint: str
     journal: Path | None = None
+    faults: bool = False
+    """Obey an operator's weather: bad radio, made at the receiver."""
 
 
 class _Seat:
     """One node in the loop: its session, its inbox, its host, and what it has followed so far."""
 
-    def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal) -> None:
+    def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal, weather_key: str | None) -> None:
+        """`weather_key` is where an operator's weather comes, None when there shall be none."""
         self.host = Host(node, journal)
         self.bus = bus
         self.inbox = inbox
         self._followed: frozenset[str] | None = None
+        self._weather_key = weather_key
+        self._reception = Reception(node.name, Random(f"air-{node.name}-{node.incarnation}"))
+
+    def next_deadline(self) -> float:
+        return min(self.host.node.next_deadline(), self._reception.next_due())
 
     def step(self, now: float) -> float:
         """Feed what came, tick if due; how late the tick was [s]."""
         host, node = self.host, self.host.node
-        for arrival in self.inbox.take():
+        for arrival in self._through_the_air(now):
             if isinstance(arrival.payload, bytes):
                 self._publish(host.message(arrival.at, arrival.key, arrival.payload))
             else:
@@ -63,17 +73,40 @@ class _Seat:
             self._publish(host.tick(clock.now()))
         if node.interests is not self._followed:
             self._followed = node.interests
-            self.bus.follow(node.interests)
+            self.bus.follow(node.interests | self._weather_interest(node.interests))
         host.journal.flush()
         return late
+
+    def _weather_interest(self, interests: frozenset[str]) -> frozenset[str]:
+        """Nothing when there is no weather, or when the node hears operators anyway."""
+        wanted = self._weather_key
+        heard = wanted is None or any(matches(interest, wanted) for interest in interests)
+        return frozenset() if wanted is None or heard else frozenset({wanted})
+
+    def _through_the_air(self, now: float) -> list[Arrival]:
+        """What came, less what the weather took; the operator's word about the weather goes no further."""
+        arrivals = self.inbox.take()
+        if self._weather_key is None:
+            return arrivals
+        for arrival in arrivals:
+            if arrival.key != self._weather_key or not self._is_weather(arrival):
+                self._reception.put(arrival)
+        return self._reception.take(max([now, *(arrival.at for arrival in arrivals)]))
+
+    def _is_weather(self, arrival: Arrival) -> bool:
+        try:
+            note = decode(arrival.payload, OperatorNote) if isinstance(arrival.payload, bytes) else None
+        except BadMessage:
+            return False
+        return isinstance(note, OperatorNote) and note.command == WEATHER and self._reception.air.obey(note.arguments)
 
     def tell(self, event: Local, now: float) -> None:
         """Give the node a local event."""
         self._publish(self.host.deliver(now, "", event, b""))
 
     def _publish(self, sent: Sent) -> None:
-        for key, payload in sent:
-            self.bus.publish(key, payload)
+        for to, payload in sent:
+            self.bus.publish(to, payload)
 
 
 def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
@@ -84,6 +117,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     wake = threading.Event()
     stop = _on_signals(wake)
     seats: list[_Seat] = []
+    weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     try:
         for node in nodes:
             inbox = Inbox(wake)
@@ -92,7 +126,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
                 return 0
             _refuse_double(bus, inbox, options.fleet, node)
             heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, {"fleet": options.fleet})
-            seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading)))
+            seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading), weather_key))
             bus.announce(options.fleet, node.name, node.incarnation)
         gc.collect()
         gc.freeze()
@@ -126,7 +160,7 @@ def _loop(seats: Sequence[_Seat], wake: threading.Event, stop: threading.Event) 
     stop_by = None
     vitals = _VitalSigns(now)
     while True:
-        deadline = min(seat.host.node.next_deadline() for seat in seats)
+        deadline = min(seat.next_deadline() for seat in seats)
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
         wake.clear()
         now = clock.now()

@@ -31,10 +31,11 @@ def start(
     connect: Annotated[str | None, typer.Option(help="Router's endpoint, like tcp/127.0.0.1:7447.")] = None,
     journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
     witness: Annotated[bool, typer.Option(help="Hold the mission's witness here.")] = True,
+    faults: Annotated[bool, typer.Option("--faults", help="Obey an operator's radio weather: for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
     drawn = draw(load(scenario, set_ or (), robots), seed)
-    options = Options(_fleet(fleet), connect or default_endpoint(), journal)
+    options = Options(_fleet(fleet), connect or default_endpoint(), journal, faults)
     wall_ms = clock.wall_ms()
     nodes: list[Node] = [World(fleet, drawn, seed, wall_ms, start_at=clock.now())]
     if witness and drawn.mission.witness:

@@ -16,8 +16,8 @@ from protocol.host import Host, Sent
 from protocol.journal import Journal
 from protocol.messages import Message
 from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
-from protocol.radio import Air, Radio
-from protocol.topics import HARDWARE, TOPIC, Address, address, alive_key, matches
+from protocol.radio import Air, Radio, link_of
+from protocol.topics import TOPIC, address, alive_key, matches
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
@@ -64,7 +64,7 @@ class Simulator:
         self.now = 0.0
         self.taps: list[Tap] = []
         self._random = Random(f"air-{seed}")
-        self._air = Air(radio, self._random)
+        self.air = Air(radio, self._random)
         self._seats: dict[str, _Seat] = {}
         self._heap: list[tuple[float, int, Callable[[], None]]] = []
         self._order = 0
@@ -194,13 +194,10 @@ class Simulator:
             return
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        where = address(key)
         seats = self._routes.get(key)
         for seat in self._route(key) if seats is None else seats:
-            delays = (
-                [LOCAL_DELAY_S] if _local(where, sender, seat) else self._air.delays(sender.node.name, seat.node.name)
-            )
-            for delay_s in delays:
+            link = link_of(key, seat.node.name)
+            for delay_s in [LOCAL_DELAY_S] if link is None else self.air.delays(*link):
                 self._deliver_later(seat, key, message, payload, delay_s)
 
     def _deliver_later(self, seat: _Seat, key: str, message: Message, payload: bytes, delay_s: float) -> None:
@@ -230,15 +227,6 @@ class Simulator:
 
     def _hint_later(self, seat: _Seat, event: PeerUp | PeerDown, delay_s: float) -> None:
         self.at(self.now + delay_s, lambda: self._give(seat, "", event, b""))
-
-
-def _local(where: Address | None, sender: _Seat, receiver: _Seat) -> bool:
-    """A robot and its own hardware (sensors, commands, its gateway's fence) do not speak through the air."""
-    if where is None:
-        return False
-    if where.topic == "lease":
-        return where.to == where.owner.replace("robot", "gateway")
-    return where.topic in HARDWARE or where.topic == "cmd_vel"
 
 
 def _token(node: Node) -> str:

@@ -4,7 +4,8 @@ from random import Random
 
 import pytest
 
-from protocol.radio import Air, Radio
+from protocol.bus import Arrival
+from protocol.radio import Air, Radio, Reception, link_of
 
 
 def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:
@@ -40,3 +41,58 @@ def test_the_same_seed_is_the_same_weather() -> None:
     radio = Radio(jitter_s=0.01, loss=0.3, loss_burst=3.0, duplication=0.1)
     assert fates(radio, 500, seed=7) == fates(radio, 500, seed=7)
     assert fates(radio, 500, seed=7) != fates(radio, 500, seed=8)
+
+
+@pytest.mark.parametrize(
+    ("key", "receiver", "link"),
+    [
+        ("lfa/f/robot1/pose", "robot2", ("robot1", "robot2")),
+        ("lfa/f/robot1/lease/all", "witness", ("robot1", "world")),
+        ("lfa/f/witness/lease/robot3", "robot3", ("world", "robot3")),
+        ("lfa/f/world/mission", "robot3", ("world", "robot3")),
+        ("lfa/f/world/mission", "witness", None),
+        ("lfa/f/robot1/cmd_vel", "world", None),
+        ("lfa/f/robot1/sensors", "robot1", None),
+        ("lfa/f/robot2/lease/gateway1", "world", ("robot2", "robot1")),
+        ("lfa/f/robot1/lease/gateway1", "world", None),
+        ("lfa/f/robot1/lease/all", "robot1", None),
+        ("lfa/f/operator/operator", "robot1", None),
+        ("lfa/f/robot1/alive/7", "robot2", None),
+        ("", "robot2", None),
+    ],
+)
+def test_a_robot_and_its_own_hardware_do_not_speak_through_the_air(
+    key: str, receiver: str, link: tuple[str, str] | None
+) -> None:
+    assert link_of(key, receiver) == link
+
+
+def test_a_cut_is_of_one_direction_and_healing_ends_it() -> None:
+    air = Air(Radio(), Random(1))
+    assert air.obey({"cut": [["robot1", "witness"]]})
+    assert air.obey({"cut": [["robot2", "robot3"]]})
+    assert air.delays("robot1", "world") == []
+    assert air.delays("robot2", "robot3") == []
+    assert len(air.delays("world", "robot1")) == len(air.delays("robot3", "robot2")) == 1
+    assert air.obey({"heal": True})
+    assert len(air.delays("robot1", "world")) == 1
+
+
+@pytest.mark.parametrize(
+    "order", [{"cut": [["robot1"]]}, {"radio": {"lost": 0.2}}, {"radio": {"loss": "much"}}, {"x": 1}]
+)
+def test_an_order_that_is_none_changes_nothing(order: dict[str, object]) -> None:
+    air = Air(Radio(), Random(1))
+    assert not air.obey(order)
+    assert (air.radio, air.cuts) == (Radio(), frozenset())
+
+
+def test_what_comes_through_keeps_its_order_and_its_delay() -> None:
+    reception = Reception("robot2", Random(1))
+    early, late = Arrival(1.0, "lfa/f/robot1/pose", b"a"), Arrival(1.001, "lfa/f/robot2/sensors", b"b")
+    assert reception.air.obey({"radio": {"delay_s": 0.1}})
+    reception.put(early)
+    reception.put(late)
+    assert reception.take(1.001) == [late]
+    assert reception.next_due() == pytest.approx(1.1)
+    assert [(a.key, a.payload) for a in reception.take(1.2)] == [(early.key, b"a")]
