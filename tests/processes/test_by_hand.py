@@ -39,7 +39,7 @@ class Terminals:
         return child
 
     def world(self) -> subprocess.Popen[str]:
-        return self._start("world.cli", "straight", *self._team())
+        return self._start("world.cli", "straight", "--robots", "2", *self._team())
 
     def agent(self, robot_id: int, role: str = "follower") -> subprocess.Popen[str]:
         return self._start("agents.cli", "--role", role, "--id", str(robot_id), *self._team())
