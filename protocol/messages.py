@@ -197,6 +197,23 @@ class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):
     ranges_m: tuple[float, ...]
 
 
+class GroundProfile(Struct, frozen=True, array_like=True, tag="ground"):
+    """The floor ahead, looked down upon: heights along three lines parallel to the direction of travel.
+
+    The lines are those of the left wheel, the centre and the right wheel: what lies beside all three is not in the
+    way. Point j of line i is at x = `first_m` + j `increment_m`, y = `offsets_m[i]` in `base_link`; its height [m] is
+    relative to what the wheels stand on now, negative for a hole. In the spirit of REP-117: a bad or missing reading
+    is nan, a floor deeper than the sensor sees is -inf. Walls and bodies are no floor and do not show.
+    """
+
+    header: Header
+    first_m: float
+    increment_m: float
+    offsets_m: tuple[float, ...]
+    heights_m: tuple[tuple[float, ...], ...]
+    """One row a line."""
+
+
 class Contact(Struct, frozen=True, array_like=True, tag="contact"):
     """The bumper: direction of the touch in `base_link` [rad]."""
 
@@ -387,6 +404,7 @@ Message = (
     | Sensors
     | Localization
     | LaserScan
+    | GroundProfile
     | Contact
     | CmdVel
     | PoseStamped
@@ -431,7 +449,7 @@ def decode(payload: bytes, expected: type) -> Message:
 
 
 def _sane(message: Message) -> bool:
-    """Numbers that a core computes with are finite; a scan's ranges alone may be infinite or nan (REP-117)."""
+    """Numbers that a core computes with are finite; ranges and heights alone may be infinite or nan (REP-117)."""
     if not isfinite(message.header.stamp):
         return False
     match message:
@@ -448,6 +466,8 @@ def _sane(message: Message) -> bool:
             return _finite(message.pose_map.x, message.pose_map.y, message.pose_map.theta)
         case LaserScan():
             return _finite(message.angle_min, message.angle_increment, message.range_min_m, message.range_max_m)
+        case GroundProfile():
+            return _finite(message.first_m, message.increment_m, *message.offsets_m)
         case FormationNote():
             return all(_finite(slot.separation_m, slot.phi) for slot in message.slots)
         case ObstacleNote():

@@ -57,6 +57,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("sensors",      m.Sensors,       ("driver",),           50.0, True,  False, "real_time",  0.2),
     Topic("localization", m.Localization,  ("driver",),           10.0, True,  False, "real_time",  1.0),
     Topic("scan",         m.LaserScan,     ("driver",),           10.0, True,  False, "data",       0.35),
+    Topic("ground",       m.GroundProfile, ("driver",),           20.0, True,  False, "data",       0.25),
     Topic("contact",      m.Contact,       ("driver",),           None, False, False, "data",       None),
     Topic("truth",        m.Truth,         ("world",),            50.0, False, False, "background", None),
     Topic("clock",        m.Clock,         ("world",),            1.0,  True,  False, "background", None),
@@ -64,7 +65,7 @@ TOPICS: tuple[Topic, ...] = (
 
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
 TRUTH_OWNER = "sim"
-HARDWARE = ("sensors", "localization", "scan", "contact")
+HARDWARE = ("sensors", "localization", "scan", "ground", "contact")
 
 
 def key(fleet: str, owner: str, topic: str, to: str | None = None) -> str:

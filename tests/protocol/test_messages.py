@@ -34,6 +34,15 @@ def test_what_is_said_arrives_as_it_was_said(message: m.Message) -> None:
     assert decode(encode(message), type(message)) == message
 
 
+def test_heights_without_a_reading_arrive_as_such_and_the_lines_places_are_finite() -> None:
+    heights = ((0.0, math.nan, -math.inf), (0.01, -0.02, 0.0))
+    ground = m.GroundProfile(HEADER, 0.1, 0.05, (0.12, -0.12), heights)
+    read = decode(encode(ground), m.GroundProfile)
+    assert str(read) == str(ground)  # nan differs from itself, its name does not
+    with pytest.raises(BadMessage, match="not finite"):
+        decode(encode(m.GroundProfile(HEADER, 0.1, 0.05, (math.nan, 0.0), heights)), m.GroundProfile)
+
+
 def test_out_of_range_beams_arrive_as_infinities_and_bad_ones_as_nan() -> None:
     scan = m.LaserScan(HEADER, 0.0, 0.1, 0.05, 8.0, (math.inf, -math.inf, math.nan, 1.5))
     ranges = decode(encode(scan), m.LaserScan).ranges_m  # type: ignore[union-attr]
