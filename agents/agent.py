@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
+import msgspec
+
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
 from agents.driver import Driver
@@ -87,6 +89,10 @@ class Agent:
     @property
     def incarnation(self) -> int:
         return self._voice.incarnation
+
+    @property
+    def started_with(self) -> dict[str, Any]:
+        return {"kind": "agent", "robot_id": self._id, "mission": msgspec.to_builtins(self._given)}
 
     @property
     def interests(self) -> frozenset[str]:
@@ -178,10 +184,14 @@ class Agent:
             self._event("formation", now, {"number": note.number, "trace": note.trace})
 
     def _obey(self, note: OperatorNote, now: float, lease: Lease, driver: Driver) -> None:
-        """An operator's word; only the leader changes the formation."""
-        if note.command != "formation" or lease.role is not Role.LEADER or self._mission is None:
+        """An operator's word; only the leader changes the formation, or gives the lease to the next in the chain."""
+        if lease.role is not Role.LEADER:
             return
-        self._order(str(note.arguments.get("side")), "operator", now, lease, driver)
+        if note.command == "formation":
+            self._order(str(note.arguments.get("side")), "operator", now, lease, driver)
+        elif note.command == "handover":
+            self._command(STILL, Role.FOLLOWER, now)
+            self._apply(lease.request_handover(now), now)
 
     def _order(self, side: str, reason: str, now: float, lease: Lease, driver: Driver) -> None:
         """An orientation request to all behind this leader, with its term and the next number."""

@@ -36,7 +36,7 @@ class Row(Struct, frozen=True):
 
 def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
     """The table of processes of a run, in the order in which they are started."""
-    team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS))
+    team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
     world = ("world.cli", str(folder / SCENARIO), "--seed", str(about.seed), *team)
     return [
         Row(ROUTER_NAME, ("deploy.fleet.router", "--listen", endpoint)),

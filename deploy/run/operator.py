@@ -1,22 +1,28 @@
-"""What the operator's side says on its own topic: that a run starts and ends, and what was done to whom."""
+"""What the operator's side says on its own topics: that a run starts and ends, what was done to whom, and orders."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from protocol.messages import Event, Header
+from protocol.messages import Event, Header, OperatorNote
 from protocol.topics import OPERATOR_NAME, key
 
 
 class Operator:
-    """Numbers the events of one operator; `stamp` is its own clock [s]."""
+    """Numbers the events and orders of one operator; `stamp` is its own clock [s]."""
 
     def __init__(self, fleet: str, incarnation: int) -> None:
         self.key = key(fleet, OPERATOR_NAME, "event")
+        self.orders_key = key(fleet, OPERATOR_NAME, "operator")
         self._incarnation = incarnation
         self._seq = 0
 
     def says(self, kind: str, stamp: float, **data: Any) -> Event:
+        return Event(self._header(stamp), kind, None, data)
+
+    def orders(self, command: str, stamp: float, **arguments: Any) -> OperatorNote:
+        return OperatorNote(self._header(stamp), command, arguments)
+
+    def _header(self, stamp: float) -> Header:
         self._seq += 1
-        header = Header(OPERATOR_NAME, self._incarnation, self._seq, stamp)
-        return Event(header, kind, None, data)
+        return Header(OPERATOR_NAME, self._incarnation, self._seq, stamp)
