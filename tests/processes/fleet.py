@@ -14,7 +14,7 @@ from typing import Any
 from deploy.run.processes import Identity, identify, own_processes
 from protocol import clock
 
-SHORT = ("--set", "mission.leading.route_m=[[3.0, 0.0]]")
+SHORT = ("--set", "mission.leading.route_m=[[2.0, 0.0]]")
 PATIENCE_S = 30.0
 POLL_S = 0.02
 LFA = (sys.executable, "-c", "from deploy.cli import main; main()")

@@ -44,7 +44,7 @@ def test_the_run_folder_is_whole(tmp_path: Path) -> None:
 
 
 def test_the_next_in_chain_takes_over_within_half_a_second(tmp_path: Path) -> None:
-    killed = ("--set", "mission.leading.route_m=[[4.0, 0.0]]", "--set", 'faults=["kill leader at 3 s"]')
+    killed = ("--set", "mission.leading.route_m=[[3.0, 0.0]]", "--set", 'faults=["kill leader at 2 s"]')
     done = lfa("run", "leader_killed", *killed, "--out", str(tmp_path / "run"), "--no-figures")
     assert done.returncode == 0, done.stderr + done.stdout
     summary = read(tmp_path / "run")
@@ -64,7 +64,7 @@ def test_a_stopped_robot_goes_on_when_it_is_woken(tmp_path: Path) -> None:
 
 
 def test_a_fault_by_hand_is_no_accident(tmp_path: Path) -> None:
-    with running(tmp_path / "run", "straight", "--set", "mission.leading.route_m=[[4.0, 0.0]]") as run:
+    with running(tmp_path / "run", "straight", "--set", "mission.leading.route_m=[[3.0, 0.0]]") as run:
         run.wait_for("leader_command")
         fleet = f"straight-{run.launcher.pid}"
         done = lfa("fault", "kill", "leader", "--fleet", fleet, "--json")
