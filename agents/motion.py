@@ -74,8 +74,6 @@ class Lead:
         self._limits = limits
         self._route: Route | None = None
         self._s = 0.0
-        self._profile: list[float] = []
-        self._profile_of: tuple[Slot, ...] | None = None
 
     def track(self, pose: Pose2D) -> None:
         """Keep the progress up, leader or not."""
@@ -91,7 +89,6 @@ class Lead:
         if self._leading.motion == "point_to_point":
             self._route = Route([(pose.x, pose.y), self.goal])
             self._s = 0.0
-            self._profile_of = None
 
     @property
     def goal(self) -> Point:
@@ -153,25 +150,20 @@ class Lead:
         return Twist(0.0, IN_PLACE_RADPS if bearing > 0.0 else -IN_PLACE_RADPS)
 
     def _cruise(self, slots: Sequence[Slot]) -> float:
-        """Fastest speed here from which every bend ahead can be met at the speed that its outermost robot keeps."""
-        assert self._route is not None
-        wanted = tuple(slots)
-        if wanted != self._profile_of:
-            self._profile = self._speeds(wanted)
-            self._profile_of = wanted
-        return self._profile[self._route.segment(self._s)]
+        """Fastest speed here from which every bend ahead can be met at the speed that its outermost robot keeps.
 
-    def _speeds(self, slots: tuple[Slot, ...]) -> list[float]:
-        """Backwards over the route: each point's cap, or what still brakes to the next one's."""
+        Backwards over the way that braking from cruise takes: nothing further ahead can matter, and a new leader's
+        first command does not wait for the whole route.
+        """
         assert self._route is not None
-        route, speed = self._route, self._leading.cruise_mps
-        speeds = [speed] * len(route.points)
-        for i in range(len(route.points) - 2, -1, -1):
-            step_m = route.at_m[i + 1] - route.at_m[i]
-            brake = (speeds[i + 1] ** 2 + 2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * step_m) ** 0.5
-            cap = leader_speed_cap(slots, route.curvature[i], self._limits, PLANNED_MARGIN)
-            speeds[i] = min(self._leading.cruise_mps, cap, brake)
-        return speeds
+        route, cruise = self._route, self._leading.cruise_mps
+        braking = 2.0 * BRAKING_SHARE * self._leading.acceleration_mps2
+        first, last = route.segment(self._s), route.segment(self._s + cruise * cruise / braking)
+        speed = cruise
+        for i in range(last, first - 1, -1):
+            brake = (speed * speed + braking * (route.at_m[i + 1] - route.at_m[i])) ** 0.5
+            speed = min(cruise, leader_speed_cap(slots, route.curvature[i], self._limits, PLANNED_MARGIN), brake)
+        return speed
 
     def _first_route(self, pose: Pose2D) -> Route:
         points = list(self._leading.route_m)
