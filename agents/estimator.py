@@ -32,8 +32,8 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     fix_m: float = 0.005
     fix_rad: float = 0.0087
     per_metre_m: float = 0.002
-    per_metre_rad: float = 0.003
-    per_radian_rad: float = 0.005
+    per_metre_rad: float = 0.001
+    per_radian_rad: float = 0.003
     per_second_m: float = 0.0003
     per_second_rad: float = 0.0005
 

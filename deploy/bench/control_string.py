@@ -27,7 +27,10 @@ from protocol.mission import FormationSpec, Side
 PLACES = (3, 10, 50, 100)
 SLOW_RADPS, FAST_RADPS = (0.2, 0.5), (1.0, 2.0, 4.0, 8.0)
 SLOW_FOLLOWERS = 10
-"""|G| grows with frequency in every scheme: the slow sines, which cost most time, are run on a short chain."""
+"""|G| grows with frequency in every scheme: the slow sines, which cost most time, are run on a short chain.
+
+The worst hop is looked for there too: further back a chain that amplifies is saturated.
+"""
 PERIODS = 8
 MEASURE_S_MAX = 100.0
 """At 0.2 rad/s that is three periods."""
@@ -51,6 +54,8 @@ class Scheme(Struct, frozen=True):
     """Bars of section 6, where there are any."""
     gains: Gains = Gains()
     extrapolation_max_s: float = 0.5
+    headway_s: float = 0.02
+    """How late a hop passes on what its predecessor does."""
     slow_radps: tuple[float, ...] = SLOW_RADPS
     fast_radps: tuple[float, ...] = FAST_RADPS
 
@@ -60,7 +65,7 @@ _BUFFER = (None, 1.005, 1.01, 1.02, None)
 SCHEMES = (
     # Without feed-forward |G| is below 1 at once, and 1 only for the slowest waves. Its lag needs more than m = 0.5.
     Scheme("pose, no feed-forward", "pose",     0.0,   0.02,   0.0,   0.0,  (1.00,   1.00,   0.999,  0.998,  1.000),
-           gains=Gains(feed_forward=0.0, m_mps=0.65, b_m=0.3), extrapolation_max_s=0.0, slow_radps=(),
+           gains=Gains(feed_forward=0.0, m_mps=0.65, b_m=0.3), extrapolation_max_s=0.0, headway_s=0.8, slow_radps=(),
            fast_radps=(0.02,)),
     Scheme("pose, DR, 20 ms",       "pose",     0.0,   0.02,   0.0,   0.0,  (1.75,   3.7,    None,   None,   1.21)),
     Scheme("pose, DR, 100 ms 20 %", "pose",     0.0,   0.10,   0.0,   0.2,  (2.34,   5.8,    None,   None,   1.33)),
@@ -91,9 +96,8 @@ HEADING_RAD = 0.012
 """Amplitude of each sine of the leader's heading: small, so that they do not disturb each other."""
 WAVE_S = 20.0 * pi
 """All of `HEADING_RADPS` have whole periods in it."""
-WAVES = 2
-HOP_S = 2.5
-"""No mode passes a wave on later than this per hop (a trace: 1.2 m at 0.5 m/s)."""
+HOP_SPARE = 1.05
+"""A wave is passed on by the way k |cos phi| per hop; this much later it has settled."""
 
 
 class Mode(Struct, frozen=True):
@@ -155,7 +159,7 @@ def longitudinal(scheme: Scheme, places: Sequence[int] = PLACES) -> tuple[float,
         for index, place in enumerate(places):
             if place <= followers:
                 worst[index] = max(worst[index], deviations[place] / deviations[0])
-        worst_hop = max(worst_hop, *(b / a for a, b in pairwise(deviations)))
+        worst_hop = max(worst_hop, *(b / a for a, b in pairwise(deviations[: SLOW_FOLLOWERS + 1])))
     return *worst, worst_hop
 
 
@@ -176,7 +180,7 @@ def speed_wave(scheme: Scheme, omega: float, followers: int) -> list[float]:
     )
     amplitude, period = min(0.1, 0.5 / omega), 2.0 * pi / omega
     periods = min(PERIODS, max(1, int(MEASURE_S_MAX / period)))
-    begin = ceil((SETTLE_S + followers * max(scheme.delay_s, 0.02)) / CONTROL_PERIOD_S)
+    begin = ceil((SETTLE_S + followers * max(scheme.delay_s, scheme.headway_s)) / CONTROL_PERIOD_S)
     steps = round(periods * period / CONTROL_PERIOD_S)
     sums = [[0.0, 0.0] for _ in range(followers + 1)]
     for step in range(begin + steps):
@@ -208,26 +212,27 @@ def _lateral(mode: Mode) -> Case:
 
 
 def lateral(mode: Mode) -> tuple[float, ...]:
-    """Amplitude of each frequency of the sideways motion at each place, over the leader's."""
+    """Amplitude of each frequency of the heading at each place, over the leader's."""
     followers = max(mode.after)
     count = len(next(iter(mode.after.values())))
     omegas = HEADING_RADPS[:count]
     amplitude = HEADING_RAD if followers > 3 else 0.25 * HEADING_RAD
     slots = slots_of(FormationSpec(side=mode.side, separation_m=SEPARATION_M), range(2, followers + 2))
     chain = Chain(Setup(slots, trace=mode.trace, heading_filter_m=mode.filter_m, judged=False))
-    begin = round((SETTLE_S + HOP_S * followers) / CONTROL_PERIOD_S)
-    steps = round(WAVES * WAVE_S / CONTROL_PERIOD_S)
+    hop_s = HOP_SPARE * abs(SEPARATION_M * cos(slots[0].phi)) / CRUISE_MPS
+    begin = round((SETTLE_S + hop_s * followers) / CONTROL_PERIOD_S)
+    steps = round(WAVE_S / CONTROL_PERIOD_S)
     watched = (0, *mode.after)
     waves = {place: [0j] * count for place in watched}
     for step in range(begin + steps):
         t = step * CONTROL_PERIOD_S
         turn = sum(amplitude * omega * cos(omega * t) for omega in omegas)
-        chain.step(Twist(CRUISE_MPS, turn if t > 1.0 else 0.0))
+        chain.step(Twist(CRUISE_MPS, turn))
         if step >= begin:
             for place in watched:
-                y = (chain.leader_pose if place == 0 else chain.robots[place - 1].pose).y
+                theta = (chain.leader_pose if place == 0 else chain.robots[place - 1].pose).theta
                 for index, omega in enumerate(omegas):
-                    waves[place][index] += y * exp(-1j * omega * t)
+                    waves[place][index] += theta * exp(-1j * omega * t)
     return tuple(abs(waves[place][index]) / abs(waves[0][index]) for place in mode.after for index in range(count))
 
 
