@@ -31,13 +31,19 @@ class Acceptor:
         """The grant that is still in force."""
         return self.bond if self.bond is not None and now < self.bond.expiry else None
 
-    def prepare(self, src: Member, body: Prepare, config: Config, now: float) -> Promise | Nack | None:
-        """Phase 1. Refusing changes nothing here, so asking a bound voter is harmless: it is the pre-vote."""
+    def prepare(
+        self, src: Member, body: Prepare, config: Config, now: float, holder_gone: bool = False
+    ) -> Promise | Nack | None:
+        """Phase 1. Refusing changes nothing here, so asking a bound voter is harmless: it is the pre-vote.
+
+        E15: with `holder_gone`, a hint that the bond's holder is dead, the voter promises all the same, but tells
+        which term has to be fenced first: the hint alone frees nobody.
+        """
         if now < self.silent_until:
             return None  # E1
         bond = self.bound(now)
         foreign = bond is not None and bond.holder != src
-        if foreign or body.term < self.promised or config.version > body.version:
+        if (foreign and not holder_gone) or body.term < self.promised or config.version > body.version:
             return self.refusal(body.term, config, now)
         self.promised = body.term
         needs_fence = Grantee(bond.term, bond.holder) if bond is not None else None
@@ -49,8 +55,8 @@ class Acceptor:
             return None  # E1
         outdated = body.term < self.promised or body.term <= self.released or config.version > body.config.version
         bond = self.bound(now)
-        # E3: bound voters grant to their holder only, or when the old term can move nothing any more.
-        foreign = bond is not None and bond.holder != body.holder and bond.term not in body.fenced
+        # E3: bound voters grant to their holder or to whom it hands over (E16), or when its term can move nothing more.
+        foreign = bond is not None and bond.holder not in (body.holder, src) and bond.term not in body.fenced
         if outdated or foreign:
             return self.refusal(body.term, config, now)
         self.promised = body.term

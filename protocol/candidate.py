@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from protocol.holder import Holder
 from protocol.membership import seat
-from protocol.messages import Config, Member, Term
+from protocol.messages import Config, Grantee, Member, Term
 from protocol.quorum import electors, is_quorum
 from protocol.timing import Timing
 
@@ -20,14 +20,20 @@ class Candidate:
         self.ask_at = now
         self.holder: Holder | None = None
         """Set once the first PROPOSE has left: the term as it is being granted."""
-        self._promised: set[Member] = set()
+        self.given = False
+        """The term was handed over by its issuer (E16): this process only counts the grants."""
+        self._promised: dict[Member, Grantee | None] = {}
+        self._fenced: set[Grantee] = set()
         self._refused: set[Member] = set()
+        self._act_s = timing.act_s
+        self._fences_asked: set[Grantee] = set()
         self._pause_s = 2.0 * timing.rank_step_s
         self._pause_s_max = 2.0 * timing.heartbeat_s
 
     def asked(self, now: float) -> None:
         """A PREPARE leaves: each pause is longer than the one before, up to two heartbeats."""
         self.ask_at = now + self._pause_s
+        self._fences_asked.clear()
         self._pause_s = min(self._pause_s * PAUSE_GROWTH, self._pause_s_max)
 
     def wait_until(self, at: float) -> None:
@@ -36,10 +42,39 @@ class Candidate:
 
     @property
     def deadline(self) -> float:
-        return self.ask_at if self.holder is None else self.holder.next_round_at
+        if self.holder is None:
+            return self.ask_at
+        return self.gives_up_at if self.given else self.holder.next_round_at
 
-    def promised(self, src: Member) -> None:
-        self._promised.add(seat(src.id))
+    @property
+    def gives_up_at(self) -> float:
+        """Without a quorum's grants by then, what was granted is worth nothing any more."""
+        return float("inf") if self.holder is None else self.holder.began_at + self._act_s
+
+    def promised(self, src: Member, needs_fence: Grantee | None) -> None:
+        """The newest answer of a voter counts: a bond that it named before may have run out since."""
+        self._promised[seat(src.id)] = needs_fence
+
+    def fenced(self, robot_id: int, old: Term) -> None:
+        """The gateway of `robot_id` refuses `old`."""
+        self._fenced |= {
+            g for g in self._promised.values() if g is not None and (g.holder.id, g.term) == (robot_id, old)
+        }
+
+    def unfenced(self, me: Member) -> list[Grantee]:
+        """E15: leases that promisers are still bound to, and whose gateways have not answered yet."""
+        named = {g for g in self._promised.values() if g is not None and g.holder != me}
+        return sorted(named - self._fenced, key=_term)
+
+    def fences_to_ask(self, me: Member) -> list[Grantee]:
+        """Of these the ones not asked for since the last PREPARE."""
+        due = [grantee for grantee in self.unfenced(me) if grantee not in self._fences_asked]
+        self._fences_asked.update(due)
+        return due
+
+    @property
+    def fenced_terms(self) -> tuple[Term, ...]:
+        return tuple(sorted(grantee.term for grantee in self._fenced))
 
     def refused(self, src: Member, config: Config) -> bool:
         """`src` has promised a higher term; answers whether this one is beaten.
@@ -53,3 +88,7 @@ class Candidate:
 
     def has_quorum(self, config: Config) -> bool:
         return is_quorum(config, self._promised)
+
+
+def _term(grantee: Grantee) -> Term:
+    return grantee.term

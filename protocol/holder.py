@@ -14,13 +14,16 @@ ROUNDS_KEPT = 64
 class Holder:
     """`expiry` is None until a quorum has granted; it only grows."""
 
-    def __init__(self, me: Member, term: Term, timing: Timing, now: float) -> None:
+    def __init__(self, me: Member, term: Term, timing: Timing, now: float, fenced: tuple[Term, ...] = ()) -> None:
         self.term = term
         self.expiry: float | None = None
         self.next_round_at = now
         self.heard_at: dict[int, float] = {}
         """When each robot last gave a sign of life to this holder."""
         self.began_at = now
+        self.newest_grant: dict[int, tuple[Member, float]] = {}
+        """Of each voter the life that granted last, and the moment of its own clock that its grant carried (E16)."""
+        self._fenced = fenced
         self._me = me
         self._timing = timing
         self._round = 0
@@ -34,11 +37,18 @@ class Holder:
         self._sent_at[number] = now
         self._sent_at.pop(number - ROUNDS_KEPT, None)
         self.next_round_at = now + self._timing.heartbeat_s
-        return Propose(self.term, config, number, self._me)
+        fenced = self._fenced if now - self.began_at < self._timing.grant_s else ()
+        return Propose(self.term, config, number, self._me, fenced)
+
+    def given(self, number: int, since: float) -> None:
+        """E16: round `number` was asked by the term's issuer; it counts from `since`, a moment that we told it."""
+        self._sent_at[number] = since
+        self._round = number + 1
 
     def granted(self, src: Member, grant: Grant, config: Config, now: float) -> bool:
         """Count a grant; answers whether the lease got longer."""
         self.heard_at[src.id] = now
+        self.newest_grant[src.id] = (src, grant.nonce)
         sent_at = self._sent_at.get(grant.round)
         voter = seat(src.id)
         if sent_at is None or sent_at <= self._acked.get(voter, float("-inf")):

@@ -11,7 +11,7 @@ from protocol.acceptor import Acceptor
 from protocol.candidate import Candidate
 from protocol.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
 from protocol.holder import Holder
-from protocol.membership import ANY_LIFE, first_config, ids, is_first, led_by, rank, with_chain
+from protocol.membership import ANY_LIFE, VOTERS_MAX, first_config, ids, is_first, led_by, rank, with_chain
 from protocol.messages import (
     NO_TERM,
     Config,
@@ -81,11 +81,16 @@ class Lease:
         self._leader_until = now
         self._hello_at = now
         self._elect_at = NEVER
+        self._elect_base = now
         self._closing = False
         self._commanded_at = float("-inf")
         self._unreleased: Term | None = None
         """The term given up whose RELEASE waits for the own gateway, until `_release_at` at most."""
         self._release_at = NEVER
+        self._gift: Propose | None = None
+        """What is handed over instead of a RELEASE, once we have stopped."""
+        self._early: list[tuple[Member, Grant]] = []
+        """Grants of a term that we do not know yet."""
         self._elect_after(self._acceptor.silent_until)
 
     # --- what the agent reads ----------------------------------------------------------------------------------
@@ -120,10 +125,9 @@ class Lease:
         """A message of another process, or of this one's own gateway (FENCED: `src.id` is the gateway's robot)."""
         effects: list[Effect] = []
         self._expire(now, effects)
-        own = src.id == self.me.id
-        if own != isinstance(body, Fenced):
-            return effects  # an echo of our own, or the gateway of another robot
-        self._met.add(src.id)
+        if src.id == self.me.id and not isinstance(body, Fenced):
+            return effects  # an echo of our own
+        self._heard(src, now)
         match body:
             case Propose():
                 self._on_propose(src, body, now, effects)
@@ -140,8 +144,7 @@ class Lease:
             case Hello():
                 self._on_hello(src, body, now, effects)
             case Fenced():
-                if body.old == self._unreleased:
-                    self._send_release(now, effects)
+                self._on_fenced(src, body, now, effects)
             case Fence():
                 pass  # a gateway's matter
         return effects
@@ -151,7 +154,7 @@ class Lease:
         effects: list[Effect] = []
         self._expire(now, effects)
         if now >= self._release_at:
-            self._send_release(now, effects)
+            self._stopped(now, effects)
         if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
             self._mend(now, effects)
         if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
@@ -190,10 +193,12 @@ class Lease:
         if up:
             if incarnation >= self._down.get(id, (0, now))[0]:
                 self._down.pop(id, None)
-        else:
+        elif id != self.me.id:
             self._down[id] = (max(incarnation, self._down.get(id, (0, now))[0]), now)
             if self._holder is not None and self._candidate is None:
                 self._mend(now, effects)
+            elif self._holder is None:
+                self._on_holder_gone(now, effects)
         return effects
 
     def gateway_term(self, term: Term, now: float, latched: bool = False) -> list[Effect]:
@@ -221,10 +226,11 @@ class Lease:
         return effects
 
     def request_handover(self, now: float) -> list[Effect]:
-        """The leader is stuck: let another lead. It releases, and the next in the chain stands first."""
+        """The leader is stuck: give the lease to the next in the chain that answers; if none does, release it."""
         effects: list[Effect] = []
-        self._step_down(now, "handed_over", effects)
-        self._elect_after(now + self._timing.grant_s)
+        self._expire(now, effects)
+        if self._holder is not None:
+            self._hand_over(self._holder, now, effects)
         return effects
 
     # --- voting ------------------------------------------------------------------------------------------------
@@ -233,11 +239,13 @@ class Lease:
         self._seen = max(self._seen, body.term)
         if self.me.id not in self._voters:
             return
-        answer = self._acceptor.prepare(src, body, self.config, now)
+        answer = self._acceptor.prepare(src, body, self.config, now, self._holder_gone())
         if answer is not None:
             effects.append(Send(robot_name(src.id), answer))
         if isinstance(answer, Promise):
             self._yield_to(body.term, now, effects)
+            if self._candidate is None:
+                self._elect_after(max(now + 2.0 * self._timing.heartbeat_s, self._elect_base))
         elif answer is not None and answer.remaining_s > 0.0:
             self._pending = (src, body)  # answered again as soon as the bond ends: it may have overtaken the news
 
@@ -249,10 +257,14 @@ class Lease:
             return
         if answer is None and body.config.version < self.config.version:
             return  # who does not vote (yet) follows the newest all the same
-        if answer is not None:
+        if answer is not None and body.holder != self.me:
             effects.append(Send(robot_name(body.holder.id), answer))
         self._yield_to(body.term, now, effects)
+        if answer is not None:
+            self._step_down(now, "deposed", effects)  # its own voter let go of it: its term was fenced
         self._adopt(body.config, effects)
+        if answer is not None and body.holder == self.me:
+            self._take_over(body, answer, now, effects)
         self.leader = body.holder.id
         self._leader_until = now + self._timing.grant_s
         self._elect_after(self._leader_until)
@@ -262,9 +274,30 @@ class Lease:
             return
         self.leader = None
         self._elect_after(now)
+        self._answer_pending(now, effects)
+
+    def _on_holder_gone(self, now: float, effects: list[Effect]) -> None:
+        """E15: a hint that the holder is dead starts the next in the chain, and answers whoever was faster than it."""
+        if self._acceptor.bound(now) is not None and self._holder_gone() and self._candidate is None:
+            self._elect_after(now)
+            self._answer_pending(now, effects)
+
+    def _holder_gone(self) -> bool:
+        """The token of the holder that this voter is bound to vanished."""
+        bond = self._acceptor.bond
+        return bond is not None and bond.holder.incarnation <= self._down.get(bond.holder.id, (-1, 0.0))[0]
+
+    def _answer_pending(self, now: float, effects: list[Effect]) -> None:
         pending, self._pending = self._pending, None
         if pending is not None:
             self._on_prepare(*pending, now, effects)
+
+    def _heard(self, src: Member, now: float) -> None:
+        """A life that still speaks two heartbeats after its token vanished is not dead; until then, last words."""
+        self._met.add(src.id)
+        incarnation, since = self._down.get(src.id, (-1, now))
+        if src.incarnation >= incarnation >= 0 and now - since > 2.0 * self._timing.heartbeat_s:
+            del self._down[src.id]
 
     def _yield_to(self, term: Term, now: float, effects: list[Effect]) -> None:
         """Whoever promises or grants a higher term gives up its own lower candidacy."""
@@ -298,6 +331,7 @@ class Lease:
 
     def _elect_after(self, at: float) -> None:
         """E6: stand for election once `at` has passed, each robot its rank later than the one before it."""
+        self._elect_base = at
         can_stand = self.me.id in self._may_lead and self.me.id in self._voters and not self._closing
         self._elect_at = at + self._rank(self.me.id) * self._timing.rank_step_s if can_stand else NEVER
 
@@ -309,7 +343,7 @@ class Lease:
             self._elect_after(waits_until)
             return
         bond = self._acceptor.bound(now)
-        if bond is not None and bond.holder != self.me:
+        if bond is not None and bond.holder != self.me and not self._holder_gone():
             self._elect_after(bond.expiry)
             return
         number = max(self._seen.n, self._acceptor.promised.n) + 1
@@ -320,16 +354,16 @@ class Lease:
     def _press(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
         """The candidacy's deadline: ask (again) for promises, or (again) for grants."""
         if candidate.holder is not None:
-            if now - candidate.holder.began_at >= self._timing.act_s:
+            if now >= candidate.gives_up_at:
                 self._drop_candidate(now, effects)
                 self._elect_after(now + self._timing.rank_step_s)
-            elif now >= candidate.holder.next_round_at:
+            elif now >= candidate.holder.next_round_at and not candidate.given:
                 self._send_round(candidate.holder, now, effects)
         elif now >= candidate.ask_at:
             candidate.asked(now)
             request = Prepare(candidate.term, self.config.version)
             effects.append(Send("all", request))
-            own = self._acceptor.prepare(self.me, request, self.config, now)
+            own = self._acceptor.prepare(self.me, request, self.config, now, self._holder_gone())
             if isinstance(own, Promise):
                 self._on_promise(self.me, own, now, effects)
 
@@ -337,11 +371,27 @@ class Lease:
         candidate = self._candidate
         if candidate is None or candidate.holder is not None or body.term != candidate.term:
             return
-        candidate.promised(src)
+        candidate.promised(src, body.needs_fence)
         if candidate.has_quorum(self.config):
-            candidate.holder = Holder(self.me, candidate.term, self._timing, now)
+            self._fence_or_propose(candidate, now, effects)
+
+    def _fence_or_propose(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
+        """E15: phase 2 begins when every lease that a promiser is bound to is fenced at its holder's own gateway."""
+        for grantee in candidate.fences_to_ask(self.me):
+            effects.append(Send(gateway_of(grantee.holder.id), Fence(grantee.term, candidate.term)))
+        if not candidate.unfenced(self.me):
+            candidate.holder = Holder(self.me, candidate.term, self._timing, now, candidate.fenced_terms)
             self._adopt(led_by(self.config, self.me, candidate.term, self._is_down), effects)
             self._send_round(candidate.holder, now, effects)
+
+    def _on_fenced(self, src: Member, body: Fenced, now: float, effects: list[Effect]) -> None:
+        if src.id == self.me.id and body.old == self._unreleased:
+            self._stopped(now, effects)
+        candidate = self._candidate
+        if candidate is not None and candidate.holder is None and body.term == candidate.term:
+            candidate.fenced(src.id, body.old)
+            if candidate.has_quorum(self.config) and not candidate.unfenced(self.me):
+                self._fence_or_propose(candidate, now, effects)
 
     def _drop_candidate(self, now: float, effects: list[Effect]) -> None:
         """Give the candidacy up. Grants for it are given back, unless this robot may still move under another term."""
@@ -398,6 +448,8 @@ class Lease:
             self._count(self._candidate.holder, src, body, now, effects)
         elif self._holder is not None and self._holder.term == body.term:
             self._count(self._holder, src, body, now, effects)
+        elif body.term > self.term:
+            self._early = [*self._early[1 - VOTERS_MAX :], (src, body)]  # of a hand-over that is still on its way
 
     def _count(self, holder: Holder, src: Member, grant: Grant, now: float, effects: list[Effect]) -> None:
         if not holder.granted(src, grant, self.config, now):
@@ -406,6 +458,8 @@ class Lease:
         if holder is self._holder:
             effects.append(LeaseExtended(holder.term, expiry))
         elif now < expiry:
+            if self._candidate is not None and self._candidate.given:
+                self._adopt(led_by(self.config, self.me, holder.term, self._is_down, keep_leader=True), effects)
             self._candidate, self._holder = None, holder
             self.leader = self.me.id
             effects.append(BecomeLeader(holder.term, expiry))
@@ -435,11 +489,8 @@ class Lease:
         if self._holder is None or self._candidate is not None or src.id not in self._robots:
             return
         self._holder.heard_at[src.id] = now
-        incarnation, since = self._down.get(src.id, (ANY_LIFE, now))
-        if incarnation >= src.incarnation:
-            if now - since < self._timing.chain_silence_s:
-                return  # its last words, perhaps
-            del self._down[src.id]
+        if self._down.get(src.id, (-1, 0.0))[0] >= src.incarnation:
+            return  # its last words, perhaps
         place = next((m for m in self.config.chain if m.id == src.id), None)
         if place is None or ANY_LIFE < place.incarnation < src.incarnation:
             rest = tuple(m for m in self.config.chain if m.id != src.id)
@@ -457,8 +508,8 @@ class Lease:
             # others go first.
             self._elect_after(now + self._timing.grant_s)
 
-    def _step_down(self, now: float, cause: Cause, effects: list[Effect]) -> None:
-        """Stop, have the own gateway refuse the term, then free the voters (E4)."""
+    def _step_down(self, now: float, cause: Cause, effects: list[Effect], below: Term | None = None) -> None:
+        """Stop, have the own gateway refuse the term (all below `below`), then free the voters (E4)."""
         holder, self._holder = self._holder, None
         if holder is None:
             return
@@ -466,18 +517,68 @@ class Lease:
         self._unreleased = holder.term
         self._release_at = max(now, self._at_rest_at())
         effects.append(StepDown(holder.term, cause))
-        effects.append(Send(gateway_of(self.me.id), Fence(holder.term, _just_above(holder.term))))
+        effects.append(Send(gateway_of(self.me.id), Fence(holder.term, below or _just_above(holder.term))))
 
     def _at_rest_at(self) -> float:
         """From when on no gateway obeys the last command sent as leader, by its age alone."""
         return self._commanded_at + self._timing.deadman_s * SLOWEST
 
-    def _send_release(self, now: float, effects: list[Effect]) -> None:
+    def _stopped(self, now: float, effects: list[Effect]) -> None:
+        """The own gateway refuses the term, or its last command is too old: RELEASE, or what was to be handed over."""
         term, self._unreleased, self._release_at = self._unreleased, None, NEVER
-        if term is not None:
+        gift, self._gift = self._gift, None
+        self.released = self._closing
+        if term is None:
+            return
+        own = None if gift is None else self._acceptor.propose(self.me, gift, self.config, now)
+        if gift is not None and isinstance(own, Grant):
+            effects.append(Send("all", gift))
+            effects.append(Send(robot_name(gift.holder.id), own))
+            self.leader, self._leader_until = gift.holder.id, now + self._timing.grant_s
+        else:
             self._acceptor.release(term)
             effects.append(Send("all", Release(term)))
-        self.released = self._closing
+
+    # --- handing over ------------------------------------------------------------------------------------------
+
+    def _hand_over(self, holder: Holder, now: float, effects: list[Effect]) -> None:
+        """E16: stop, then ask the voters to bind themselves to the successor under a term of ours.
+
+        Its lease starts at a moment that it stamped itself before, so no clock but its own is needed. The config stays
+        as it is, version included: a new one is the new leader's to write, after its quorum.
+        """
+        successor = self._successor(holder, now)
+        if successor is not None:
+            life, nonce = successor
+            term = Term(max(self._seen.n, holder.term.n) + 1, self.me.id, self.me.incarnation)
+            self._seen = term
+            self._gift = Propose(term, self.config, 0, life, nonce=nonce)
+        self._drop_candidate(now, effects)
+        self._step_down(now, "handed_over", effects, None if self._gift is None else self._gift.term)
+        self._elect_after(now + self._timing.grant_s)
+
+    def _successor(self, holder: Holder, now: float) -> tuple[Member, float] | None:
+        """The first behind us that may lead and granted within t_chain: its life, and its clock's moment then."""
+        for member in self.config.chain[1:]:
+            life, nonce = holder.newest_grant.get(member.id, (member, None))
+            fit = member.id in self._may_lead and not self._is_down(member.id) and not holder.silent(member.id, now)
+            if fit and nonce is not None and member.incarnation in (ANY_LIFE, life.incarnation):
+                return life, nonce
+        return None
+
+    def _take_over(self, body: Propose, own: Grant, now: float, effects: list[Effect]) -> None:
+        """E16: a term was handed to us. Count its grants, also those that were faster than the news."""
+        if body.nonce is None or self._holder is not None or self._candidate is not None:
+            return
+        candidate = Candidate(body.term, self._timing, now)
+        candidate.given = True
+        candidate.holder = Holder(self.me, body.term, self._timing, now)
+        candidate.holder.given(body.round, body.nonce)
+        self._candidate = candidate
+        early, self._early = self._early, []
+        for src, grant in [(self.me, own), *early]:
+            if self._candidate is candidate and grant.term == body.term:
+                self._count(candidate.holder, src, grant, now, effects)
 
     # --- small -------------------------------------------------------------------------------------------------
 

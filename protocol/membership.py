@@ -49,11 +49,16 @@ def rank(config: Config, me: int, passable: Callable[[int], bool]) -> int:
     return sum(not passable(robot_id) for robot_id in before)
 
 
-def led_by(config: Config, leader: Member, term: Term, gone: Callable[[int], bool]) -> Config:
-    """`config` re-stamped `(term, 0)`: `leader`, then the old chain without its lost leader and without the gone."""
+def led_by(
+    config: Config, leader: Member, term: Term, gone: Callable[[int], bool], keep_leader: bool = False
+) -> Config:
+    """`config` re-stamped `(term, 0)`: `leader`, then the old chain without its lost leader and without the gone.
+
+    With `keep_leader` the old leader gave its lease away and goes to the tail.
+    """
     old = config.chain
     if not is_first(config) and old and old[0].id != leader.id:
-        old = old[1:]
+        old = (*old[1:], old[0]) if keep_leader else old[1:]
     rest = tuple(m for m in old if m.id != leader.id and not gone(m.id))
     return Config(Version(term, 0), config.voters, config.tie, config.previous, (leader, *rest))
 

@@ -173,9 +173,12 @@ class OneBond(_WithFences):
         self._bond: dict[Member, tuple[Term, Member, float]] = {}
         self._released: set[Term] = set()
         self._holder: dict[Term, Member] = {}
+        self._gifts: set[tuple[Member, Member]] = set()
 
     def proposes(self, at: float, who: Member, propose: Propose) -> None:
         self._holder[propose.term] = propose.holder
+        if propose.holder != who:
+            self._gifts.add((who, propose.holder))
 
     def releases(self, at: float, term: Term) -> None:
         self._released.add(term)
@@ -183,7 +186,9 @@ class OneBond(_WithFences):
     def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
         holder = self._holder[grant.term]
         term, other, its_until = self._bond.get(voter, (grant.term, holder, LONG_AGO))
-        handed_over = (grant.term.issuer, grant.term.incarnation) == (other.id, other.incarnation)
+        issued_by = (grant.term.issuer, grant.term.incarnation)
+        # The receiver's own grant of a gift is seen by nobody: it shows in its next one only.
+        handed_over = issued_by == (other.id, other.incarnation) or (other, voter) in self._gifts
         free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
         if not free and not self.fences.refuses(other.id, term, its_until):
             self.broken(at, f"{_m(voter)} granted {_t(grant.term)} to {_m(holder)}, bound to {_t(term)} of {_m(other)}")

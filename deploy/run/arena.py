@@ -194,6 +194,7 @@ class Arena:
             tell(self.now, process.member)
         if hinted:
             self._tell_token(process.member, up=False)
+            self.at(self.now + self.random.uniform(0.001, 0.005), self.latch, robot_id, process.member.incarnation)
 
     def exit(self, robot_id: int) -> None:
         """SIGTERM: the process says its last words and ends."""
@@ -239,6 +240,12 @@ class Arena:
 
     def kill_gateway(self, robot_id: int) -> None:
         self.gateways[robot_id].alive = False
+
+    def latch(self, robot_id: int, incarnation: int) -> None:
+        """The robot's gateway sees its agent's token vanish, whatever is true."""
+        host = self.gateways.get(robot_id)
+        if host is not None and host.alive:
+            host.gateway.agent_down(incarnation, host.clock.local(self.now))
 
     def hint(self, about: int, *observers: int, up: bool = False) -> None:
         """A token that comes or goes as `observers` see it, whatever is true."""

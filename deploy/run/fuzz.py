@@ -67,6 +67,8 @@ class Faults:
             case "false_hint" if target is not None:
                 seers = [i for i in fault.targets[1:] if i != target and i in arena.ids]
                 arena.hint(target, *seers)
+                if fault.value > 0.0:
+                    arena.latch(target, arena.processes[target].member.incarnation)
                 if fault.duration_s > 0.0:
                     arena.at(lasts, self._hint_back, target, arena.processes[target].member, tuple(seers))
             case "gateway" if target is not None and target != WITNESS_ID:

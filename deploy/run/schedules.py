@@ -134,7 +134,7 @@ def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> Fault:
             return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.05, 0.5))
         case "false_hint":
             observers = tuple(i for i in (*ids, 0) if random.random() < random.choice((0.3, 1.0)))
-            return Fault(at, kind, (target, *observers), lasts)
+            return Fault(at, kind, (target, *observers), lasts, float(random.random() < 0.3))
         case "pause":
             return Fault(at, kind, (target,), random.uniform(0.05, 1.0), float(random.random() < 0.3))
         case "witness":
