@@ -6,7 +6,6 @@ moment. A robot that becomes leader commands at once.
 
 from __future__ import annotations
 
-from math import pi
 from typing import Any
 
 import msgspec
@@ -14,18 +13,18 @@ import msgspec
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
 from agents.driver import Driver
-from agents.formation import named, slots_of
+from agents.orders import Orders
+from agents.reports import Reports, status
 from agents.voice import Voice
-from protocol.geometry import STILL, Pose2D, Twist
+from protocol.geometry import STILL, Twist
 from protocol.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
 from protocol.messages import (
+    NO_TERM,
     Ask,
     CmdVel,
-    Event,
     FormationNote,
     LaserScan,
     LeaseNote,
-    Level,
     Localization,
     Member,
     MissionNote,
@@ -33,10 +32,8 @@ from protocol.messages import (
     PoseStamped,
     Role,
     Sensors,
-    Status,
     TableRow,
     Term,
-    Tracking,
 )
 from protocol.mission import Mission, Refused, check_mission, robot_id_of, robot_name
 from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
@@ -44,12 +41,6 @@ from protocol.timing import timing_of
 from protocol.topics import TOPIC, alive_key
 
 ASK_S = 0.5
-TABLE_ROBOTS_FULL_RATE = 16
-TRACKING_EVERY = 2
-FORMATION_S = 1.0
-BEND_CHECK_S = 0.5
-BEND_AHEAD_M = 5.0
-"""Far enough ahead for a chain of four to fall into column at cruise speed."""
 
 
 class Agent:
@@ -64,19 +55,12 @@ class Agent:
         self._beliefs = Beliefs()
         self._lease: Lease | None = None
         self._driver: Driver | None = None
+        self._orders: Orders | None = None
+        self._reports: Reports | None = None
         self._next_ask = 0.0
         self._next_control = 0.0
-        self._next_table = 0.0
-        self._next_formation = 0.0
-        self._formation_number = -1
-        self._steps = 0
-        self._oriented = 0
-        self._next_bend_check = 0.0
         self._arrived = False
-        self._detouring: str | None = None
         self._stopping = False
-        self._vitals: Vitals | None = None
-        self._out: list[Envelope] = []
         self._interests = self._wanted()
         self.refusal: str | None = None
 
@@ -113,14 +97,14 @@ class Agent:
                 self._begin(self._given, now)
             elif now >= self._next_ask:
                 self._next_ask = now + ASK_S
-                self._say("ask", Ask(self._voice.header("ask", now), "mission"))
-            return self._spoken()
+                self._voice.say("ask", Ask(self._voice.header("ask", now), "mission"))
+            return self._voice.spoken()
         if now >= self._lease.next_deadline():
             self._apply(self._lease.tick(now), now)
         if now >= self._next_control:
             self._next_control = _next_on_grid(self._next_control, now, CONTROL_PERIOD_S)
             self._control(now)
-        return self._spoken()
+        return self._voice.spoken()
 
     def receive(self, received: Received) -> list[Envelope]:
         now, message = received.at, received.message
@@ -129,13 +113,15 @@ class Agent:
                 if self._lease is None:
                     self._begin(message.mission, now)
             case Vitals():
-                self._vitals = message
-                self._status(now)
+                role, term = (
+                    (Role.WAITING, NO_TERM) if self._lease is None else (self._role(self._lease), self._lease.term)
+                )
+                status(self._voice, message, self._driver, role, term, now)
             case Stop():
                 self._stop(now)
             case _ if self._lease is not None and self._driver is not None:
                 self._hear(message, now, self._lease, self._driver)
-        return self._spoken()
+        return self._voice.spoken()
 
     # --- inputs ---------------------------------------------------------------------------------------------------
 
@@ -160,14 +146,15 @@ class Agent:
             case TableRow():
                 self._hear_row(message, now, driver)
             case FormationNote():
-                self._request(message, now, driver)
+                if driver.formation.request(message):
+                    self._event("formation", now, {"number": message.number, "trace": message.trace})
             case PeerUp() | PeerDown():
                 peer = robot_id_of(message.name)
                 if peer is not None:
                     up = isinstance(message, PeerUp)
                     self._apply(lease.hint(peer, message.incarnation, up, now), now)
             case OperatorNote():
-                self._obey(message, now, lease, driver)
+                self._obey(message, now, lease)
 
     def _hear_row(self, row: TableRow, now: float, driver: Driver) -> None:
         robot = robot_id_of(row.header.sender)
@@ -179,35 +166,16 @@ class Agent:
                 if delay.robot == self._id:
                     driver.predecessor.clock.reported(delay.least_s, now)
 
-    def _request(self, note: FormationNote, now: float, driver: Driver) -> None:
-        if driver.formation.request(note):
-            self._event("formation", now, {"number": note.number, "trace": note.trace})
-
-    def _obey(self, note: OperatorNote, now: float, lease: Lease, driver: Driver) -> None:
+    def _obey(self, note: OperatorNote, now: float, lease: Lease) -> None:
         """An operator's word; only the leader changes the formation, or gives the lease to the next in the chain."""
         if lease.role is not Role.LEADER:
             return
         if note.command == "formation":
-            self._order(str(note.arguments.get("side")), "operator", now, lease, driver)
+            assert self._orders is not None
+            self._orders.order(str(note.arguments.get("side")), "operator", lease.chain[1:], lease.term, now)
         elif note.command == "handover":
             self._command(STILL, Role.FOLLOWER, now)
             self._apply(lease.request_handover(now), now)
-
-    def _order(self, side: str, reason: str, now: float, lease: Lease, driver: Driver) -> None:
-        """An orientation request to all behind this leader, with its term and the next number."""
-        assert self._mission is not None
-        try:
-            spec = named(side, self._mission.formation)
-        except Refused:
-            return
-        self._formation_number += 1
-        header = self._voice.header("formation", now)
-        slots = slots_of(spec, lease.chain[1:])
-        note = FormationNote(header, lease.term, self._formation_number, slots, driver.formation.trace)
-        if driver.formation.request(note):
-            self._say("formation", note)
-            self._next_formation = now + FORMATION_S
-            self._event("formation", now, {"number": note.number, "side": side, "by": reason}, note.term)
 
     # --- beginning and ending ---------------------------------------------------------------------------------------
 
@@ -222,6 +190,8 @@ class Agent:
             self.refusal = str(refused)
             return
         self._mission = mission
+        self._orders = Orders(self._voice, mission, self._driver.formation)
+        self._reports = Reports(self._voice, len(mission.robots))
         me = Member(self._id, self.incarnation)
         self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor)
         self._next_control = now
@@ -243,12 +213,12 @@ class Agent:
         for effect in effects:
             match effect:
                 case Send(to, body):
-                    note = LeaseNote(self._voice.header("lease", now), body)
-                    self._out.append(Envelope(self._voice.key("lease", to), note))
+                    self._voice.say("lease", LeaseNote(self._voice.header("lease", now), body), to)
                 case BecomeLeader(term, _):
                     self._event("lease", now, {"change": "acquired"}, term)
                     self._event("role", now, {"role": Role.LEADER.value, "leader": self._id}, term)
-                    self._lead_on(now)
+                    assert self._orders is not None and self._driver is not None
+                    self._orders.begin(self._driver.lead.progress_m, now)
                     self._control(now)
                 case StepDown(term, cause):
                     self._event("lease", now, {"change": cause}, term)
@@ -258,13 +228,6 @@ class Agent:
                     self._event("chain", now, {"chain": chain, "seq": config.version.seq}, config.version.term)
                 case LeaseExtended():
                     pass
-
-    def _lead_on(self, now: float) -> None:
-        """A reign begins: its requests count from 0, and what the route asked for so far has been asked for."""
-        assert self._driver is not None and self._mission is not None
-        self._formation_number, self._next_formation = 0, now
-        progress_m = self._driver.lead.progress_m
-        self._oriented = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
 
     def _adopt(self, now: float) -> None:
         """Follow whoever the newest config puts ahead."""
@@ -284,6 +247,7 @@ class Agent:
     def _control(self, now: float) -> None:
         """One control step: where am I, what am I, where to, and say it."""
         assert self._lease is not None and self._driver is not None
+        assert self._reports is not None and self._orders is not None
         lease, driver = self._lease, self._driver
         known = driver.estimator.pose_at(now)
         if known is None:
@@ -294,29 +258,13 @@ class Agent:
             role = Role.WAITING
         command = driver.drive(role, lease.chain, pose, twist, now)
         self._command(command, role, now)
-        self._speak(role, pose, twist, now)
+        self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, twist, now)
+        self._reports.decision(driver.decision, lease.term, now)
         if role is Role.LEADER:
-            self._orient(now, lease, driver)
-        self._tell_decision(now)
+            self._orders.lead(driver.lead, lease.chain[1:], lease.term, now)
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
-
-    def _orient(self, now: float, lease: Lease, driver: Driver) -> None:
-        """The mission's changes of formation as the route comes to them; column before a bend too tight for others."""
-        assert self._mission is not None
-        orientations = self._mission.leading.orientations
-        progress_m = driver.lead.progress_m
-        while self._oriented < len(orientations) and orientations[self._oriented].at_m <= progress_m:
-            self._order(orientations[self._oriented].side, "mission", now, lease, driver)
-            self._oriented += 1
-        if now >= self._next_bend_check:
-            self._next_bend_check = now + BEND_CHECK_S
-            slots = [driver.formation.slot_of(robot) for robot in lease.chain[1:]]
-            column = all(abs(abs(slot.phi) - pi) < 1e-6 for slot in slots)
-            ahead_m = None if column or driver.formation.trace else driver.lead.narrow_bend_m(slots, BEND_AHEAD_M)
-            if ahead_m is not None:
-                self._order("column", f"bend in {ahead_m:.1f} m", now, lease, driver)
 
     def _role(self, lease: Lease) -> Role:
         if lease.role is Role.LEADER:
@@ -337,91 +285,12 @@ class Agent:
         term = self._lease.term if as_leader else self._lease.config.version.term
         holder = self._id if as_leader else (self._lease.chain[0] if self._lease.chain else 0)
         header = self._voice.header("cmd_vel", now)
-        self._say("cmd_vel", CmdVel(header, twist, term, holder, as_leader, sensors.gateway))
-
-    # --- speech -----------------------------------------------------------------------------------------------------
-
-    def _speak(self, role: Role, pose: Pose2D, twist: Twist, now: float) -> None:
-        assert self._driver is not None and self._lease is not None
-        voice, odometer = self._voice, self._driver.estimator.odometer_m
-        self._say("pose", PoseStamped(
-            voice.header("pose", now), pose.x, pose.y, 0.0, pose.theta, twist, odometer, role, self._lease.term
-        ))  # fmt: skip
-        self._steps += 1
-        if role is Role.FOLLOWER and self._steps % TRACKING_EVERY == 0:
-            self._tell_tracking(now)
-        if now >= self._next_table:
-            self._next_table = now + self._table_period_s()
-            delays = self._beliefs.delays(self._neighbours(), now)
-            row = TableRow(voice.header("table", now), pose.x, pose.y, 0.0, pose.theta, odometer, role, delays)
-            self._say("table", row)
-        if role is Role.LEADER and now >= self._next_formation:
-            self._next_formation = now + FORMATION_S
-            formation = self._driver.formation
-            slots = tuple(formation.slot_of(robot) for robot in self._lease.chain[1:])
-            header = voice.header("formation", now)
-            note = FormationNote(header, self._lease.term, self._formation_number, slots, formation.trace)
-            formation.request(note)
-            self._say("formation", note)
-
-    def _tell_tracking(self, now: float) -> None:
-        assert self._driver is not None
-        driver = self._driver
-        if driver.predecessor is None:
-            return
-        r = driver.follower.readout
-        self._say("tracking", Tracking(
-            self._voice.header("tracking", now), driver.predecessor.robot, r.separation_m, r.phi, r.chi, r.heading,
-            r.slot_map, r.error_m, driver.decision is not None, r.state.value,
-        ))  # fmt: skip
-
-    def _tell_decision(self, now: float) -> None:
-        assert self._driver is not None
-        decision = self._driver.decision
-        action = None if decision is None else decision.action
-        if action != self._detouring:
-            self._detouring = action
-            if decision is None:
-                self._event("decision", now, {"class": "obstacle", "action": "resume"})
-            else:
-                free_m, direction = round(min(decision.free_m, 99.0), 3), round(decision.bearing, 3)
-                data = {"class": "obstacle", "action": action, "free_m": free_m, "bearing_rad": direction}
-                self._event("decision", now, data)
-
-    def _status(self, now: float) -> None:
-        vitals, lease, driver = self._vitals, self._lease, self._driver
-        if vitals is None:
-            return
-        counters: dict[str, float] = {
-            "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
-            "dropped": vitals.dropped,
-            "undecodable": vitals.undecodable,
-            "cpu_percent": round(vitals.cpu_percent, 2),
-            "rss_mib": round(vitals.rss_mib, 1),
-        }
-        text, role, level = "waiting for the mission", Role.WAITING, Level.WARN
-        term = Term()
-        if lease is not None and driver is not None:
-            role, term = self._role(lease), lease.term
-            ready = driver.estimator.ready
-            text, level = (role.value, Level.OK) if ready else ("waiting for sensors", Level.WARN)
-            counters |= {"outliers": driver.estimator.outliers, "refused": driver.estimator.refused}
-            if driver.predecessor is not None:
-                counters["predecessor_clock_offset_s"] = driver.predecessor.clock.offset(now)
-                counters["predecessor_refused"] = driver.predecessor.refused
-        self._say("status", Status(self._voice.header("status", now), level, text, role, term, counters))
+        self._voice.say("cmd_vel", CmdVel(header, twist, term, holder, as_leader, sensors.gateway))
 
     def _event(self, kind: str, now: float, data: dict[str, Any], term: Term | None = None) -> None:
         if term is None and self._lease is not None:
             term = self._lease.term
-        self._say("event", Event(self._voice.header("event", now), kind, term, data))
-
-    def _say(self, topic: str, message: Any) -> None:
-        self._out.append(Envelope(self._voice.key(topic), message))
-
-    def _spoken(self) -> list[Envelope]:
-        out, self._out = self._out, []
-        return out
+        self._voice.event(kind, now, term, data)
 
     # --- whom it hears ------------------------------------------------------------------------------------------------
 
@@ -444,10 +313,6 @@ class Agent:
             return ()
         place = chain.index(self._id)
         return chain[max(0, place - 1) : place] + chain[place + 1 : place + 2]
-
-    def _table_period_s(self) -> float:
-        assert self._mission is not None
-        return max(0.5, len(self._mission.robots) * 0.5 / TABLE_ROBOTS_FULL_RATE)
 
 
 def _next_on_grid(deadline: float, now: float, period: float) -> float:

@@ -1,9 +1,12 @@
-"""How an agent speaks: headers, sequence numbers and keys, so that no other file counts or spells them."""
+"""How an agent speaks: headers, sequence numbers and keys, and what is still to be sent."""
 
 from __future__ import annotations
 
-from protocol.messages import Header
+from typing import Any
+
+from protocol.messages import Event, Header, Message, Term
 from protocol.mission import robot_name
+from protocol.node import Envelope
 from protocol.topics import TOPIC, key
 
 
@@ -16,12 +19,26 @@ class Voice:
         self.incarnation = incarnation
         self._seq: dict[str, int] = {}
         self._keys = {topic: key(fleet, self.name, topic) for topic in TOPIC}
+        self._out: list[Envelope] = []
 
     def header(self, topic: str, now: float) -> Header:
         """The next header on `topic`."""
         seq = self._seq[topic] = self._seq.get(topic, -1) + 1
         return Header(self.name, self.incarnation, seq, now)
 
-    def key(self, topic: str, to: str | None = None) -> str:
+    def key(self, topic: str) -> str:
+        """This robot's own key of `topic`."""
+        return self._keys[topic]
+
+    def say(self, topic: str, message: Message, to: str | None = None) -> None:
         own = self._keys[topic]
-        return own if to is None else f"{own}/{to}"
+        self._out.append(Envelope(own if to is None else f"{own}/{to}", message))
+
+    def event(self, kind: str, now: float, term: Term | None, data: dict[str, Any]) -> None:
+        """A line for `events.jsonl`."""
+        self.say("event", Event(self.header("event", now), kind, term, data))
+
+    def spoken(self) -> list[Envelope]:
+        """All that was said since the last call."""
+        out, self._out = self._out, []
+        return out

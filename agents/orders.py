@@ -1,0 +1,76 @@
+"""The leader's orientation requests: which formation, when, with its term and a number (control.md section 4).
+
+The mission's own changes come as the route comes to them; an operator may ask; and before a bend in which the outermost
+robot could not keep up, the chain falls into column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+from agents.formation import Formation, named, slots_of
+from agents.motion import Lead
+from agents.voice import Voice
+from protocol.messages import FormationNote, Slot, Term
+from protocol.mission import Mission, Refused
+
+REPEAT_S = 1.0
+BEND_CHECK_S = 0.5
+BEND_AHEAD_M = 5.0
+"""Far enough ahead for a chain of four to fall into column at cruise speed."""
+
+
+class Orders:
+    """One robot's side of it while it leads; `begin` starts a reign."""
+
+    def __init__(self, voice: Voice, mission: Mission, formation: Formation) -> None:
+        self._voice = voice
+        self._mission = mission
+        self._formation = formation
+        self._number = 0
+        self._given = 0
+        self._repeat_at = 0.0
+        self._check_at = 0.0
+
+    def begin(self, progress_m: float, now: float) -> None:
+        """What the route asked for so far has been asked for; requests of this term count from 0."""
+        self._number, self._repeat_at = 0, now
+        self._given = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
+
+    def lead(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
+        """One control step of the leader: what is due by the route, and the standing request once a second."""
+        orientations = self._mission.leading.orientations
+        while self._given < len(orientations) and orientations[self._given].at_m <= lead.progress_m:
+            self.order(orientations[self._given].side, "mission", followers, term, now)
+            self._given += 1
+        if now >= self._check_at:
+            self._check_at = now + BEND_CHECK_S
+            self._column_before_bend(lead, followers, term, now)
+        if now >= self._repeat_at:
+            self._say(tuple(self._formation.slot_of(robot) for robot in followers), term, now)
+
+    def order(self, side: str, reason: str, followers: Sequence[int], term: Term, now: float) -> None:
+        """A new request to all followers; an unknown side is ignored."""
+        try:
+            spec = named(side, self._mission.formation)
+        except Refused:
+            return
+        self._number += 1
+        self._say(slots_of(spec, followers), term, now)
+        self._voice.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
+
+    def _column_before_bend(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
+        slots = [self._formation.slot_of(robot) for robot in followers]
+        if self._formation.trace or all(abs(abs(slot.phi) - pi) < 1e-6 for slot in slots):
+            return
+        ahead_m = lead.narrow_bend_m(slots, BEND_AHEAD_M)
+        if ahead_m is not None:
+            self.order("column", f"bend in {ahead_m:.1f} m", followers, term, now)
+
+    def _say(self, slots: tuple[Slot, ...], term: Term, now: float) -> None:
+        header = self._voice.header("formation", now)
+        note = FormationNote(header, term, self._number, slots, self._formation.trace)
+        self._formation.request(note)
+        self._voice.say("formation", note)
+        self._repeat_at = now + REPEAT_S

@@ -1,0 +1,82 @@
+"""What an agent tells of itself: its place, how it stands to its slot, what it decided, how it fares."""
+
+from __future__ import annotations
+
+from agents.beliefs import Beliefs
+from agents.driver import Driver
+from agents.strategy import Decision
+from agents.voice import Voice
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import Level, PoseStamped, Role, Status, TableRow, Term, Tracking
+from protocol.node import Vitals
+
+TRACKING_EVERY = 2
+TABLE_S = 0.5
+TABLE_ROBOTS_FULL_RATE = 16
+"""Larger teams say their rows less often: the table's traffic grows with their square."""
+FAR_M = 99.0
+
+
+class Reports:
+    """Keeps the rates of one robot's reports."""
+
+    def __init__(self, voice: Voice, robots: int) -> None:
+        self._voice = voice
+        self._table_s = TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
+        self._next_table = 0.0
+        self._steps = 0
+        self._action: str | None = None
+
+    def place(
+        self, driver: Driver, beliefs: Beliefs, near: tuple[int, ...], role: Role, term: Term,
+        pose: Pose2D, twist: Twist, now: float,
+    ) -> None:  # fmt: skip
+        """After each control step: pose; less often tracking and the table's row. `near` are its neighbours' ids."""
+        voice, odometer_m = self._voice, driver.estimator.odometer_m
+        header = voice.header("pose", now)
+        voice.say("pose", PoseStamped(header, pose.x, pose.y, 0.0, pose.theta, twist, odometer_m, role, term))
+        self._steps += 1
+        if role is Role.FOLLOWER and driver.predecessor is not None and self._steps % TRACKING_EVERY == 0:
+            self._tracking(driver, driver.predecessor.robot, now)
+        if now >= self._next_table:
+            self._next_table = now + self._table_s
+            header, delays = voice.header("table", now), beliefs.delays(near, now)
+            voice.say("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays))
+
+    def decision(self, decision: Decision | None, term: Term, now: float) -> None:
+        """Each change of what a robot does about its surroundings, with the values that decided it."""
+        action = None if decision is None else decision.action
+        if action == self._action:
+            return
+        self._action = action
+        data: dict[str, object] = {"class": "obstacle", "action": "resume"}
+        if decision is not None:
+            free_m, bearing = round(min(decision.free_m, FAR_M), 3), round(decision.bearing, 3)
+            data |= {"action": action, "free_m": free_m, "bearing_rad": bearing}
+        self._voice.event("decision", now, term, data)
+
+    def _tracking(self, driver: Driver, predecessor: int, now: float) -> None:
+        r = driver.follower.readout
+        self._voice.say("tracking", Tracking(
+            self._voice.header("tracking", now), predecessor, r.separation_m, r.phi, r.chi, r.heading,
+            r.slot_map, r.error_m, driver.decision is not None, r.state.value,
+        ))  # fmt: skip
+
+
+def status(voice: Voice, vitals: Vitals, driver: Driver | None, role: Role, term: Term, now: float) -> None:
+    """Diagnostics in the sense of ROS; `driver` is None before the mission is known."""
+    counters: dict[str, float] = {
+        "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
+        "dropped": vitals.dropped,
+        "undecodable": vitals.undecodable,
+        "cpu_percent": round(vitals.cpu_percent, 2),
+        "rss_mib": round(vitals.rss_mib, 1),
+    }
+    text, level = "waiting for the mission", Level.WARN
+    if driver is not None:
+        text, level = (role.value, Level.OK) if driver.estimator.ready else ("waiting for sensors", Level.WARN)
+        counters |= {"outliers": driver.estimator.outliers, "refused": driver.estimator.refused}
+        if driver.predecessor is not None:
+            counters["predecessor_clock_offset_s"] = driver.predecessor.clock.offset(now)
+            counters["predecessor_refused"] = driver.predecessor.refused
+    voice.say("status", Status(voice.header("status", now), level, text, role, term, counters))
