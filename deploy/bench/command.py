@@ -1,6 +1,6 @@
 """`lfa bench NAME`: one module a name in this package, each with `run(as_json, ...) -> exit code`.
 
-What else a bench takes (`rows`, `jobs`, `processes`) is what its `run` has parameters for.
+What else a bench takes (`rows`, `jobs`, `processes`, `kills`, `full`, `minutes`) is what its `run` has parameters for.
 """
 
 from __future__ import annotations
@@ -26,6 +26,9 @@ def command(
     processes: Annotated[
         bool, typer.Option("--processes", help="Also with real processes, against their bars.")
     ] = False,
+    kills: Annotated[int | None, typer.Option(help="Rounds of each fault.")] = None,
+    full: Annotated[bool, typer.Option("--full", help="Many more rounds, with their tails.")] = False,
+    minutes: Annotated[float | None, typer.Option(help="How long to look on.")] = None,
 ) -> int:
     """Exit code 1 when a row does not reach its bar."""
     names = _names()
@@ -33,12 +36,17 @@ def command(
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
     run = import_module(f"deploy.bench.{name}").run
     given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None}
+    given |= {"kills": kills, "full": full or None, "minutes": minutes}
     given = {option: value for option, value in given.items() if value is not None}
     for option in given:
         if option not in signature(run).parameters:
             raise Refused(f"lfa bench {name} takes no --{option}")
     if jobs is not None and jobs < 1:
         raise Refused(f"--jobs {jobs}: must be at least 1")
+    if kills is not None and kills < 1:
+        raise Refused(f"--kills {kills}: must be at least 1")
+    if minutes is not None and not 0.0 < minutes < float("inf"):
+        raise Refused(f"--minutes {minutes}: must be above 0")
     code: int = run(as_json, **given)
     return code
 

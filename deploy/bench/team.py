@@ -1,0 +1,222 @@
+"""A live team kept running under a bench or a test: real processes, faults at its hand, and what it says heard.
+
+All processes of one machine read one clock (`protocol.clock`), and every header carries its sender's: moments of
+different processes can be subtracted here, and only here.
+"""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import tempfile
+from collections.abc import Callable, Sequence
+from math import cos, pi, sin
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from msgspec import structs
+
+from deploy.run.crew import ROUTER_NAME, Crew, Row, rows
+from deploy.run.folder import About, make
+from deploy.run.operator import Operator
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Tracking, decode, encode
+from protocol.mission import Following, Leading, Mission, Profile, robot_id_of, robot_name
+from protocol.radio import WEATHER
+from protocol.topics import RECORDER_NAME, TOPIC, WORLD_NAME, address, key
+from protocol.zenoh_bus import ZenohBus, answers
+from world.scenario import Scenario
+
+POLL_S = 0.001
+START_S_MAX = 20.0
+SPEAKING_S = 0.15
+"""Whoever has sent no pose for this long is not there."""
+SETTLED_S = 0.5
+EVENTS_MAX = 4096
+TOPICS = ("event", "tracking", "pose")
+
+
+class Broken(Exception):
+    """The team did not become what was waited for."""
+
+
+def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
+    """A slow round course of half an hour: nothing on it ends a bench."""
+    radius_m, corners = 10.0, 16
+    turns = (2.0 * pi * n / corners for n in range(1, corners * laps - corners // 2))
+    route_m = tuple((radius_m * sin(turn), radius_m * (1.0 - cos(turn))) for turn in turns)
+    leading = Leading(route_m=route_m, cruise_mps=0.1)
+    mission = Mission(robots=tuple(range(1, robots + 1)), profile=profile, leading=leading, following=Following())
+    return Scenario("A bench's endless course", mission, 1e6, name="endless")
+
+
+class Team:
+    """Router, world and agents of `scenario`; on leaving the block none of them is left, nor anything on disk."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.folder = Path(tempfile.mkdtemp(prefix="lfa-"))
+        run = make(self.folder / "run", scenario)
+        self._endpoint = f"unixsock-stream/{self.folder / 'router.sock'}"
+        self._about = About(scenario.name, "processes", 0, f"bench{clock.wall_ms()}")
+        self._rows = {row.name: row for row in rows(run, self._about, self._endpoint, scenario.mission, "")}
+        self._crew = Crew(run)
+        self._inbox = Inbox(every=True)
+        self._bus: ZenohBus | None = None
+        self._operator = Operator(self._about.fleet, clock.wall_ms())
+        self.events: list[Event] = []
+        self.tracking: list[Tracking] = []
+        self._poses: dict[int, PoseStamped] = {}
+        self._chains: dict[int, tuple[tuple[Any, ...], tuple[int, ...]]] = {}
+
+    def __enter__(self) -> Team:
+        try:
+            self._crew.start(self._rows[ROUTER_NAME])
+            self.wait_until(lambda: answers(self._endpoint), "the router does not answer")
+            self._bus = ZenohBus(self._endpoint, self._inbox)
+            self._bus.follow(frozenset(key(self._about.fleet, "*", topic) for topic in TOPICS))
+            for name, row in self._rows.items():
+                if name not in (ROUTER_NAME, RECORDER_NAME):
+                    self._crew.start(row)
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _tb: TracebackType | None) -> None:
+        self._end()
+
+    def _end(self) -> None:
+        if self._bus is not None:
+            self._bus.close()
+        self._crew.kill_all()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    # --- what can be done to it ------------------------------------------------------------------------------------
+
+    def signal(self, robot: int, number: signal.Signals) -> float:
+        """Signal an agent; the moment just before."""
+        at = clock.now()
+        if not self._crew.signal(robot_name(robot), number):
+            raise Broken(f"robot {robot} is not there to be signalled")
+        return at
+
+    def restart(self, *robots: int) -> None:
+        """Start agents again that have ended, with empty memory."""
+        for robot in robots:
+            name = robot_name(robot)
+            if not self._crew.wait([name], START_S_MAX):
+                raise Broken(f"{name} does not end")
+            self._crew.start(self._rows[name].restarted())
+
+    def start(self, row: Row) -> None:
+        self._crew.start(row)
+
+    def row(self, name: str) -> Row:
+        return self._rows[name]
+
+    def order(self, command: str, **arguments: Any) -> float:
+        """Say an operator's word to all; the moment just before."""
+        assert self._bus is not None
+        at = clock.now()
+        self._bus.publish(self._operator.orders_key, encode(self._operator.orders(command, at, **arguments)))
+        return at
+
+    def cut_off(self, *robots: int) -> float:
+        """No message passes between `robots` and everybody else, world included; the moment just before."""
+        inside = [robot_name(robot) for robot in robots]
+        outside = [robot_name(r) for r in self.scenario.mission.robots if r not in robots] + [WORLD_NAME]
+        pairs = [pair for a in inside for b in outside for pair in ((a, b), (b, a))]
+        return self.order(WEATHER, cut=pairs)
+
+    def heal(self) -> float:
+        return self.order(WEATHER, heal=True)
+
+    # --- what is heard of it ---------------------------------------------------------------------------------------
+
+    def listen(self) -> None:
+        for arrival in self._inbox.take():
+            where = address(arrival.key)
+            if not isinstance(arrival.payload, bytes) or where is None:
+                continue
+            try:
+                self._hear(decode(arrival.payload, TOPIC[where.topic].type))
+            except BadMessage:
+                continue
+        del self.events[:-EVENTS_MAX], self.tracking[:-EVENTS_MAX]
+
+    def _hear(self, message: Message) -> None:
+        robot = robot_id_of(message.header.sender)
+        match message:
+            case PoseStamped() if robot is not None:
+                self._poses[robot] = message
+            case Tracking():
+                self.tracking.append(message)
+            case Event():
+                self.events.append(message)
+                if message.kind == "chain" and robot is not None and message.term is not None:
+                    version = (structs.astuple(message.term), message.data.get("seq"))
+                    self._chains[robot] = (version, tuple(message.data["chain"]))
+
+    def wait_until(self, holds: Callable[[], bool], complaint: str, within_s: float = START_S_MAX) -> None:
+        until = clock.now() + within_s
+        while True:
+            self.listen()
+            if holds():
+                return
+            if clock.now() > until:
+                raise Broken(f"{complaint} within {within_s:g} s")
+            clock.sleep(POLL_S)
+
+    def chain(self) -> tuple[int, ...]:
+        """The chain that all of its speaking members agree on; empty when they do not, or not all of it speaks."""
+        speaking = [robot for robot in self.scenario.mission.robots if self._speaks(robot)]
+        said = {self._chains.get(robot) for robot in speaking}
+        if len(said) != 1 or (agreed := said.pop()) is None:
+            return ()
+        chain = agreed[1]
+        return chain if set(chain) <= set(speaking) and self._leads() == chain[0] else ()
+
+    def _speaks(self, robot: int) -> bool:
+        pose = self._poses.get(robot)
+        return pose is not None and clock.now() - pose.header.stamp < SPEAKING_S
+
+    def _leads(self) -> int | None:
+        leaders = [robot for robot, pose in self._poses.items() if pose.role is Role.LEADER and self._speaks(robot)]
+        return leaders[0] if len(leaders) == 1 else None
+
+    def await_chain(self, length: int, within_s: float = START_S_MAX) -> tuple[int, ...]:
+        """The chain, once it has been one and the same of `length` robots for `SETTLED_S`."""
+        since = clock.now()
+        last: tuple[int, ...] = ()
+
+        def settled() -> bool:
+            nonlocal since, last
+            chain, now = self.chain(), clock.now()
+            if chain != last or len(chain) != length:
+                since, last = now, chain
+            return now - since >= SETTLED_S
+
+        self.wait_until(settled, f"no settled chain of {length}, but {self.describe()}", within_s)
+        return last
+
+    def describe(self) -> str:
+        roles = {r: str(p.role) for r, p in sorted(self._poses.items()) if self._speaks(r)}
+        chains = {robot: chain for robot, (_, chain) in sorted(self._chains.items())}
+        return f"roles {roles}, chains {chains}"
+
+    def first(self, kind: str, since: float, fits: Callable[[Event], bool]) -> float | None:
+        """When the first fitting event since then was, by the clock of its sender."""
+        stamps = [e.header.stamp for e in self.events if e.kind == kind and e.header.stamp >= since and fits(e)]
+        return min(stamps, default=None)
+
+    def adopted(self, since: float, robots: Sequence[int], fits: Callable[[Sequence[int]], bool]) -> float | None:
+        """When the last of `robots` adopted a chain that fits; None while one of them has not."""
+        first: dict[str, float] = {}
+        for event in self.events:
+            if event.kind == "chain" and event.header.stamp >= since and fits(event.data["chain"]):
+                first.setdefault(event.header.sender, event.header.stamp)
+        at = [first.get(robot_name(robot), float("inf")) for robot in robots]
+        return max(at) if at and max(at) < float("inf") else None
