@@ -7,7 +7,7 @@ as Envelopes. The same calls in the same order give the same answers: that is wh
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 from msgspec import Struct
 
@@ -74,6 +74,10 @@ class Node(Protocol):
     @property
     def incarnation(self) -> int:
         """Which start of this name it is: grows from start to start."""
+
+    @property
+    def started_with(self) -> dict[str, Any]:
+        """As plain data, what it was started with: `kind` and what else a replay needs to start it again."""
 
     @property
     def interests(self) -> frozenset[str]:

@@ -125,7 +125,8 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             if bus is None:
                 return 0
             _refuse_double(bus, inbox, options.fleet, node)
-            heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, {"fleet": options.fleet})
+            started_with = {"fleet": options.fleet, **node.started_with}
+            heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
             seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading), weather_key))
             bus.announce(options.fleet, node.name, node.incarnation)
         gc.collect()

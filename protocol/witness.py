@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from protocol.effects import Effect, Send
 from protocol.lease import Lease
 from protocol.messages import (
@@ -42,6 +44,7 @@ class Witness:
         )
         self.finished = False
         self.refusal: str | None = None
+        self.started_with = {"kind": "witness", "mission": msgspec.to_builtins(mission)}
         self._fleet = fleet
         self._floor = floor
         self._mission = mission

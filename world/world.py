@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from math import floor, inf
 
+import msgspec
+
 from protocol.messages import (
     Ask,
     Clock,
@@ -59,6 +61,13 @@ class World:
         self.refusal: str | None = None
         self.slowed_s = 0.0
         """How long [s] the world's time has stood still because ticks came too late."""
+        self.started_with = {
+            "kind": "world",
+            "scenario": msgspec.to_builtins(scenario),
+            "seed": seed,
+            "start_at": start_at,
+            "bodies": bodies.__name__,
+        }
         self._fleet = fleet
         self._scenario = scenario
         self._seed = seed

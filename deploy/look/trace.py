@@ -74,7 +74,14 @@ def read(folder: Path) -> Trace:
 def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, float, Any]]:
     """Owner, topic, time [s] and content (an object with the wire type's fields) of every message on `topics`."""
     decoders = {t: msgspec.json.Decoder(channels.shape(TOPIC[t].type)) for t in topics}
-    wanted: dict[int, tuple[str, str]] = {}
+    for channel, t, body in recorded(folder, topics):
+        _, owner, topic, *_ = channel.split("/")
+        yield owner, topic, t, decoders[topic].decode(body)
+
+
+def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
+    """Channel (`/robot1/pose`), time [s] and JSON of every message on `topics`, in the order of the recording."""
+    wanted: dict[int, str] = {}
     if not (folder / RECORDING).exists():
         return
     with (folder / RECORDING).open("rb") as stream:
@@ -82,14 +89,12 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
             for opcode, body in _records(chunk):
                 if opcode == Opcode.CHANNEL:
                     channel = Channel.read(ReadDataStream(BytesIO(body)))
-                    _, owner, topic, *_ = channel.topic.split("/")
-                    if topic in topics:
-                        wanted[channel.id] = (owner, topic)
+                    if channel.topic.split("/")[2] in topics:
+                        wanted[channel.id] = channel.topic
                 elif opcode == Opcode.MESSAGE:
                     channel_id, _, log_time = _MESSAGE.unpack_from(body)
                     if channel_id in wanted:
-                        owner, topic = wanted[channel_id]
-                        yield owner, topic, log_time / 1e9, decoders[topic].decode(body[_MESSAGE.size :])
+                        yield wanted[channel_id], log_time / 1e9, body[_MESSAGE.size :]
 
 
 _RECORD = struct.Struct("<BQ")  # opcode, length of what follows

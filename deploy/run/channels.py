@@ -54,6 +54,37 @@ def plain(value: Any) -> Any:
     return fields if tag is None else {"type": tag, **fields}
 
 
+def restore(body: bytes, kind: type[Struct]) -> Any:
+    """The message of type `kind` that `encode` made `body` of. Raises msgspec.DecodeError when it is none."""
+    return _restored(msgspec.json.decode(body, type=shape(kind)), kind)
+
+
+def _restored(value: Any, annotation: Any) -> Any:
+    if value is None or annotation is Any:
+        return value
+    if annotation is float:
+        return float(value)
+    if isinstance(annotation, type) and issubclass(annotation, Struct):
+        hints = _hints(annotation)
+        return annotation(**{name: _restored(getattr(value, name), hints[name]) for name in hints})
+    arguments, origin = get_args(annotation), get_origin(annotation)
+    if origin in (Union, UnionType):
+        structs = {shape(a): a for a in arguments if isinstance(a, type) and issubclass(a, Struct)}
+        other = next((a for a in arguments if a is not type(None)), Any)
+        return _restored(value, structs.get(type(value), other))
+    if origin is tuple:
+        kinds = [arguments[0]] * len(value) if arguments[-1] is Ellipsis else arguments
+        return tuple(_restored(item, kind) for item, kind in zip(value, kinds, strict=True))
+    if origin is dict:
+        return {name: _restored(item, arguments[1]) for name, item in value.items()}
+    return value
+
+
+@cache  # bounded by the number of types in the program
+def _hints(kind: type[Struct]) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
 @cache  # bounded by the number of types in the program
 def _fields(kind: type[Struct]) -> tuple[str | None, tuple[str, ...]]:
     return kind.__struct_config__.tag, kind.__struct_fields__  # type: ignore[return-value]

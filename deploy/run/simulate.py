@@ -137,7 +137,8 @@ class _Run:
         self._recorder.record(now, self._operator.key, self._operator.says(kind, now, **data))
 
     def _add(self, node: Node) -> None:
-        heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, 0, {"fleet": FLEET})
+        started_with = {"fleet": FLEET, **node.started_with}
+        heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, node.incarnation, started_with)
         journal = Journal(self._journal_folder, heading)
         self._journals[f"{node.name}-{node.incarnation}"] = journal
         self._simulator.add(node, journal)

@@ -1,0 +1,133 @@
+"""A node's life once more: its core is started as its journal says, fed what the journal holds, and compared call by
+call with what it returned then. The regression test for every refactor: same inputs, same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from agents.agent import Agent
+from protocol import journal
+from protocol.host import Host, Sent
+from protocol.journal import JOURNAL_VERSION, Entry, Heading, Journal, digest
+from protocol.messages import BadMessage, decode
+from protocol.mission import Mission, Refused
+from protocol.node import Local, Node
+from protocol.topics import TOPIC, address
+from protocol.witness import Witness
+from world.kinematic import Kinematic
+from world.physics import Physics
+from world.spec import Scenario
+from world.world import World
+
+BODIES: dict[str, type[Physics] | type[Kinematic]] = {"Physics": Physics, "Kinematic": Kinematic}
+_local_decoder = msgspec.msgpack.Decoder(Local)
+
+
+class Difference(Struct, frozen=True):
+    """The first call that did not return what it returned then: its number from 1, what it was, what it says now."""
+
+    call: int
+    at: float
+    what: str
+    now_returns: list[str]
+
+
+class Comparison(Struct, frozen=True):
+    """One journal, compared. `difference` None: every call returned the same bytes."""
+
+    journal: str
+    calls: int
+    difference: Difference | None = None
+
+    @property
+    def equal(self) -> bool:
+        return self.difference is None
+
+
+def compare(path: Path) -> Comparison:
+    """Run the node of the journal at `path` again, up to the last whole entry or the first difference.
+
+    Raises Refused when the file is no journal of this version.
+    """
+    try:
+        heading, entries = journal.read(path)
+    except (OSError, ValueError) as error:
+        raise Refused(f"{path}: cannot be replayed ({error}): must be a journal of a run folder") from None
+    host = Host(_node(path, heading), Journal(None, heading))
+    calls = 0
+    for entry in entries:
+        calls += 1
+        sent = _call(host, entry)
+        if digest(sent) != entry.digest:
+            return Comparison(path.name, calls, Difference(calls, entry.at, _what(entry), _said(sent)))
+    return Comparison(path.name, calls)
+
+
+def _call(host: Host, entry: Entry) -> Sent:
+    match entry.kind:
+        case "tick":
+            return host.tick(entry.at)
+        case "local":
+            return host.deliver(entry.at, "", _local_decoder.decode(entry.payload), b"")
+        case _:
+            return host.message(entry.at, entry.key, entry.payload)
+
+
+def _node(path: Path, heading: Heading) -> Node:
+    """The node as it was before its first call."""
+    if heading.version != JOURNAL_VERSION:
+        raise Refused(
+            f"{path}: version {heading.version}: must be {JOURNAL_VERSION}, replay it with the lfa of its time"
+        )
+    make = _MAKE.get(str(heading.config.get("kind")))
+    if make is None:
+        known = ", ".join(_MAKE)
+        raise Refused(f"{path}: kind {heading.config.get('kind')!r} of node: must be one of {known}")
+    try:
+        return make(heading, heading.config)
+    except (KeyError, msgspec.ValidationError) as error:
+        raise Refused(f"{path}: heading without what a {heading.config['kind']} is started with ({error})") from None
+
+
+def _agent(heading: Heading, told: dict[str, Any]) -> Node:
+    return Agent(told["robot_id"], heading.incarnation, told["fleet"], heading.floor, _mission(told))
+
+
+def _witness(heading: Heading, told: dict[str, Any]) -> Node:
+    return Witness(told["fleet"], heading.incarnation, heading.floor, _mission(told))
+
+
+def _world(heading: Heading, told: dict[str, Any]) -> Node:
+    scenario = msgspec.convert(told["scenario"], Scenario)
+    bodies = BODIES[told["bodies"]]
+    return World(told["fleet"], scenario, told["seed"], heading.incarnation, told["start_at"], bodies)
+
+
+def _mission(told: dict[str, Any]) -> Mission | None:
+    return msgspec.convert(told["mission"], Mission | None)
+
+
+_MAKE: dict[str, Callable[[Heading, dict[str, Any]], Node]] = {"agent": _agent, "witness": _witness, "world": _world}
+
+
+def _what(entry: Entry) -> str:
+    return "tick" if entry.kind == "tick" else f"{entry.kind} {entry.key}".rstrip()
+
+
+def _said(sent: Sent) -> list[str]:
+    """What the node says now, readable: one text a message."""
+    texts = []
+    for to, payload in sent:
+        where = address(to)
+        try:
+            said = repr(decode(payload, TOPIC[where.topic].type)) if where is not None else ""
+        except BadMessage as error:
+            said = str(error)
+        texts.append(f"{to}: {said}")
+    return texts

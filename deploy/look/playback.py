@@ -1,0 +1,58 @@
+"""A recording back onto a bus, message by message at the times it holds: views see it as they would a running fleet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from deploy.look.trace import recorded
+from deploy.run import channels
+from deploy.run.record import RECORDING
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.messages import encode
+from protocol.mission import Refused
+from protocol.topics import TOPIC
+from protocol.zenoh_bus import ZenohBus, answers, default_endpoint, open_router
+
+AHEAD_S_MIN = 0.002
+"""Shorter waits are not worth a sleep."""
+
+
+def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
+    """Publish all that `folder` holds as `fleet`, `speed` times as fast. Raises Refused; needs no router to run."""
+    if not speed > 0.0:
+        raise Refused(f"--speed {speed:g}: must be a number above 0")
+    if not (folder / RECORDING).is_file():
+        raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
+    with _bus(endpoint or default_endpoint(), may_open=endpoint is None) as bus:
+        print(f"plays {folder} as fleet {fleet}; look at it with: lfa watch --fleet {fleet}", flush=True)
+        begun, count, t = clock.now(), 0, 0.0
+        for channel, t, body in recorded(folder, frozenset(TOPIC)):
+            ahead_s = t / speed - (clock.now() - begun)
+            if ahead_s > AHEAD_S_MIN:
+                clock.sleep(ahead_s)
+            message = channels.restore(body, TOPIC[channel.split("/")[2]].type)
+            bus.publish(f"lfa/{fleet}{channel}", encode(message))
+            count += 1
+    print(f"{count} messages, {t:.1f} s in {clock.now() - begun:.1f} s")
+    return 0
+
+
+@contextmanager
+def _bus(endpoint: str, *, may_open: bool) -> Iterator[ZenohBus]:
+    """A session at `endpoint`; where nobody answers, and if it may, with a router of its own."""
+    here = answers(endpoint)
+    if not here and not may_open:
+        raise Refused(f"--connect {endpoint}: no router answers there, start one with lfa-router")
+    close = None if here else open_router([endpoint])
+    try:
+        bus = ZenohBus(endpoint, Inbox())
+        try:
+            yield bus
+        finally:
+            bus.close()
+    finally:
+        if close is not None:
+            close()

@@ -1,0 +1,66 @@
+"""`lfa replay`: run the cores of a run again on their journals and compare; or play its recording back onto a bus."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+
+from protocol.mission import Refused, robot_name
+
+if TYPE_CHECKING:
+    from deploy.look.again import Comparison
+
+PLAYBACK_FLEET = "replay"
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    robot: Annotated[str | None, typer.Option(help="Compare: a robot's id, world, witness or all.")] = None,
+    speed: Annotated[float, typer.Option(help="Play back: how much faster than it was.")] = 1.0,
+    fleet: Annotated[str, typer.Option(help="Play back: the fleet to speak as.")] = PLAYBACK_FLEET,
+    connect: Annotated[str | None, typer.Option(help="Play back: the router's endpoint.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Compare: print the result as JSON.")] = False,
+) -> int:
+    if robot is not None:
+        return _compare(folder, robot, as_json)
+    from deploy.look.playback import play
+
+    return play(folder, speed, fleet, connect)
+
+
+def journals(folder: Path, robot: str) -> list[Path]:
+    """The journals of every life of `robot`: an id, a name, or `all`. Raises Refused when there is none."""
+    name = robot_name(int(robot)) if robot.isdecimal() else robot
+    found = sorted((folder / "journal").glob("*.bin"))
+    lives = [path for path in found if name in ("all", path.stem.rpartition("-")[0])]
+    if not lives:
+        names = sorted({path.stem.rpartition("-")[0] for path in found})
+        if not names:
+            raise Refused(f"{folder}: holds no journal: must be a run folder")
+        raise Refused(f"--robot {robot}: has no journal in {folder}, must be all or one of {', '.join(names)}")
+    return lives
+
+
+def _compare(folder: Path, robot: str, as_json: bool) -> int:
+    """0 when all returned the same."""
+    from deploy.look.again import compare
+
+    found = [compare(path) for path in journals(folder, robot)]
+    if as_json:
+        print(msgspec.json.encode(found).decode())
+    else:
+        print("\n".join(_text(comparison) for comparison in found))
+    return 0 if all(comparison.equal for comparison in found) else 1
+
+
+def _text(comparison: Comparison) -> str:
+    difference = comparison.difference
+    if difference is None:
+        return f"{comparison.journal}: all {comparison.calls} calls return what they returned"
+    head = (
+        f"{comparison.journal}: call {difference.call} ({difference.what} at {difference.at:.6f} s) returns otherwise:"
+    )
+    return "\n".join([head, *(f"  {said}" for said in difference.now_returns or ["nothing"])])
