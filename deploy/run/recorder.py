@@ -90,6 +90,8 @@ class _Tape:
         self._incarnation = clock.wall_ms()
         self._key = key(fleet, RECORDER_NAME, "event")
         self._seq = 0
+        self._recorded = 0
+        self._undecodable = 0
         self._time = WorldTime()
         self._operator = Operator(fleet, self._incarnation)
         self._recorder = Recorder(Path(task.folder), task.about.metadata())
@@ -107,6 +109,7 @@ class _Tape:
             if isinstance(message, Truth):
                 self._time.see(arrival.at, message.time_s)
             self._recorder.record(self._time.of(arrival.at), where, message)
+            self._recorded += 1
         self._recorder.flush_when_due(self._time.of(clock.now()))
 
     def close(self, verdict: Verdict) -> None:
@@ -115,6 +118,7 @@ class _Tape:
         self._recorder.record(self._time.of(now), self._operator.key, end)
         self._recorder.close()
         self._bus.close()
+        print(f"{self._recorded} recorded, {self._undecodable} undecodable, {self._inbox.dropped} dropped")
 
     def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
         """Key and message to be recorded; a liveliness change is an event of the recorder's own."""
@@ -129,7 +133,7 @@ class _Tape:
                 try:
                     return (arrival.key, decode(payload, topic.type)) if topic is not None else None
                 except BadMessage:
-                    return None
+                    self._undecodable += 1
         return None
 
     def _says(self, kind: str, name: str, life: int) -> Event:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from deploy.look import trace
 from deploy.look.summary import read
+from protocol.bus import Inbox
+from protocol.messages import Clock, Header, encode
+from protocol.topics import TOPICS
+from protocol.zenoh_bus import ZenohBus
 from tests.processes.fleet import SHORT, eventually, lfa, running
 
 pytestmark = pytest.mark.processes
@@ -82,3 +87,25 @@ def test_an_agent_that_dies_by_itself_is_named_and_the_run_goes_on(tmp_path: Pat
         eventually(lambda: any(line["kind"] == "died" for line in run.events()), "robot 4's death was not told")
         assert run.launcher.wait(60.0) == 0
         assert [robot.alive for robot in read(run.folder).robots] == [True, True, True, False]
+
+
+def test_junk_on_every_key_stops_nobody(tmp_path: Path) -> None:
+    """Random, empty, truncated, foreign and misdirected bytes: counted and dropped (seeded: 1)."""
+    random = Random(1)
+    with running(tmp_path / "run", "straight", *SHORT, "--robots", "2") as run:
+        run.wait_for("leader_command")
+        fleet = f"straight-{run.launcher.pid}"
+        bus = ZenohBus(run.crew()["router"].arguments[-1], Inbox())
+        whole = encode(Clock(Header("sim", 1, 1, 0.0), 1.0))
+        for owner in ("robot1", "robot2", "world", "witness", "operator", "sim", "robot99", "nobody"):
+            for topic in TOPICS:
+                to = "/all" if topic.name == "lease" else ""
+                for payload in (b"", random.randbytes(40), whole[:-2], whole, b"\x91" * 30000):
+                    if topic.type is not Clock or payload != whole:
+                        bus.publish(f"lfa/{fleet}/{owner}/{topic.name}{to}", payload)
+        assert run.launcher.wait(60.0) == 0
+        bus.close()
+        summary = read(run.folder)
+        assert summary.outcome == "goal_reached"
+        assert all(robot.alive for robot in summary.robots)
+        assert "0 undecodable" not in (run.folder / "logs" / "recorder.log").read_text()
