@@ -28,6 +28,8 @@ COMMANDS = (
           "lfa run paper_path1 --robots 4 --fault 'kill leader at 20 s'"),
     Entry("sim", "deploy.run.simulate", "The same in one process, in virtual time; the same run folder.",
           "lfa sim paper_path1 --seed 7 --set world.lidar.beams=90"),
+    Entry("fuzz", "deploy.run.fuzz", "Hunt for schedules of faults that break the lease protocol.",
+          "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v"),
     Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",
           "lfa fault kill leader"),
     Entry("list", "deploy.look.scenarios", "The shipped scenarios.",

@@ -425,6 +425,7 @@ class Lease:
                 self._stand(now, effects)  # E10
         elif newer and candidate is None and holder is None:
             self._adopt(body.config, effects)
+            self._elect_after(now + self._timing.grant_s)
 
     # --- leading -----------------------------------------------------------------------------------------------
 

@@ -19,7 +19,20 @@ from protocol.effects import AdoptChain, BecomeLeader, Effect, Send, StepDown
 from protocol.gateway import Gateway
 from protocol.geometry import Twist
 from protocol.lease import Lease
-from protocol.messages import NO_TERM, CmdVel, Fence, Grant, Header, LeaseBody, Member, Promise, Propose, Release
+from protocol.messages import (
+    NO_TERM,
+    CmdVel,
+    Fence,
+    Grant,
+    Header,
+    Hello,
+    LeaseBody,
+    Member,
+    Promise,
+    Propose,
+    Release,
+    Term,
+)
 from protocol.mission import WITNESS_ID, Leading, Mission, Profile, robot_id_of, robot_name
 from protocol.timing import CONTROL_PERIOD_S, timing_of
 
@@ -90,6 +103,10 @@ Filter = Callable[[int, int, LeaseBody], float | None]
 """(from, to, body) -> extra delay [s]; None loses the message. Gateways are addressed as minus their robot's id."""
 
 
+Trace = Callable[[float, int, str], None]
+"""(true time [s], id, what it did): for people."""
+
+
 class Arena:
     def __init__(
         self,
@@ -115,6 +132,7 @@ class Arena:
         self.timing = timing_of(self.mission.profile)
         self.weather = weather or Weather()
         self.filter: Filter | None = None
+        self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
         """Directed pairs of ids between which nothing passes."""
         self.ids = ((WITNESS_ID,) if self.mission.witness else ()) + self.mission.robots
@@ -176,6 +194,8 @@ class Arena:
         lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor=round(self.now * 1000.0))
         process = Process(member, lease, clock)
         self.processes[robot_id] = process
+        if self.trace is not None:
+            self.trace(self.now, robot_id, f"starts, life {self._lives}")
         self._tell_token(member, up=True)
         if robot_id != WITNESS_ID:
             self.at(self.now + self.random.uniform(0.0, FOLLOW_PERIOD_S), self._follow, process)
@@ -190,6 +210,8 @@ class Arena:
         if not process.alive:
             return
         process.alive = False
+        if self.trace is not None:
+            self.trace(self.now, robot_id, "dies")
         for tell in self._tell["leads_no_more"]:
             tell(self.now, process.member)
         if hinted:
@@ -197,9 +219,9 @@ class Arena:
             self.at(self.now + self.random.uniform(0.001, 0.005), self.latch, robot_id, process.member.incarnation)
 
     def exit(self, robot_id: int) -> None:
-        """SIGTERM: the process says its last words and ends."""
+        """SIGTERM: the process says its last words and ends. One that is paused does not hear it."""
         process = self.processes[robot_id]
-        if process.alive:
+        if process.alive and not process.paused:
             self._carry_out(process, process.lease.request_release(process.clock.local(self.now)))
 
     def hand_over(self, robot_id: int) -> None:
@@ -353,6 +375,8 @@ class Arena:
 
     def _carry_out(self, process: Process, effects: list[Effect]) -> None:
         for effect in effects:
+            if self.trace is not None:
+                self.trace(self.now, process.id, told(effect))
             if isinstance(effect, Send):
                 self._send(process, effect)
             elif isinstance(effect, AdoptChain):
@@ -372,6 +396,8 @@ class Arena:
                         self._lead(process)
         if process.lease.released:
             process.alive = False
+            if self.trace is not None:
+                self.trace(self.now, process.id, "exits")
             for tell in self._tell["leads_no_more"]:
                 tell(self.now, process.member)
             self._tell_token(process.member, up=False)
@@ -483,3 +509,26 @@ class Arena:
 
     def lease_of(self, robot_id: int) -> Lease:
         return self.processes[robot_id].lease
+
+
+def told(effect: Effect) -> str:
+    """An effect in the few words that a column has room for."""
+    match effect:
+        case Send(to=to, body=body):
+            detail = f" r{body.round}" if isinstance(body, Propose | Grant) else ""
+            return f"{type(body).__name__.lower()} {body_term(body)}{detail} > {to}"
+        case BecomeLeader(term=term):
+            return f"LEADS {short(term)}"
+        case StepDown(term=term, cause=cause):
+            return f"STOPS {short(term)} {cause}"
+        case AdoptChain(config=config):
+            return f"chain {[m.id for m in config.chain]} v{short(config.version.term)}.{config.version.seq}"
+    return "extends"
+
+
+def body_term(body: LeaseBody) -> str:
+    return "" if isinstance(body, Hello) else short(body.term)
+
+
+def short(term: Term) -> str:
+    return f"{term.n}.{term.issuer}"

@@ -1,182 +1,185 @@
-"""`lfa fuzz`: schedules of faults against lease and gateway cores, in virtual time, with every invariant watched."""
+"""`lfa fuzz`: hunt for schedules that break an invariant; shrink, trace and reproduce them.
+
+A seed is a schedule is a run: the same seed on the same commit fails the same way.
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import time
 from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Annotated
 
-from msgspec import Struct, structs
+import typer
+from msgspec import Struct
 
-from deploy.look.checkers import SAFETY, Checker, Violation
-from deploy.run.arena import Arena
-from deploy.run.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Fault, Schedule
-from protocol.membership import is_first
-from protocol.messages import Member
-from protocol.mission import WITNESS_ID
-from protocol.quorum import is_quorum
+from deploy.look.checkers import Violation
+from deploy.run.arena import Trace
+from deploy.run.chaos import play
+from deploy.run.schedules import KINDS, Schedule, draw, without
+from protocol.mission import Refused
 
-
-class Played(Struct):
-    """What one schedule came to."""
-
-    schedule: Schedule
-    violations: list[Violation]
-    counts: Counter[str]
-    """Faults that took effect, by kind."""
-    elections: int
-    lines: list[str]
-
-
-class Faults:
-    """Carries out a schedule's faults on an arena, counts those that took effect, and heals."""
-
-    def __init__(self, arena: Arena, schedule: Schedule) -> None:
-        self.arena = arena
-        self.schedule = schedule
-        self.counts: Counter[str] = Counter()
-        for fault in schedule.faults:
-            arena.at(fault.at, self._do, fault)
-        arena.at(FAULTS_UNTIL_S, self.heal)
-
-    def _target(self, fault: Fault) -> int | None:
-        """The id meant, None when nobody is there to be hit."""
-        target = fault.targets[0] if fault.targets else WITNESS_ID
-        if target == LEADER:
-            leaders = self.arena.leaders()
-            return leaders[0] if leaders else None
-        process = self.arena.processes.get(target)
-        return target if process is not None and process.alive else None
-
-    def _do(self, fault: Fault) -> None:
-        target = self._target(fault)
-        arena, lasts = self.arena, self.arena.now + fault.duration_s
-        done = True
-        match fault.kind:
-            case "kill" if target is not None:
-                arena.kill(target, hinted=arena.random.random() < 0.8)
-            case "restart" | "witness" if target is not None:
-                arena.kill(target)
-                arena.at(lasts, self._start, target)
-            case "exit" if target is not None:
-                arena.exit(target)
-                arena.at(lasts + 0.3, self._start, target)
-            case "pause" if target is not None:
-                arena.pause(target)
-                arena.at(lasts, arena.resume, target, fault.value > 0.0)
-            case "hand_over" if target is not None:
-                arena.hand_over(target)
-            case "false_hint" if target is not None:
-                seers = [i for i in fault.targets[1:] if i != target and i in arena.ids]
-                arena.hint(target, *seers)
-                if fault.value > 0.0:
-                    arena.latch(target, arena.processes[target].member.incarnation)
-                if fault.duration_s > 0.0:
-                    arena.at(lasts, self._hint_back, target, arena.processes[target].member, tuple(seers))
-            case "gateway" if target is not None and target != WITNESS_ID:
-                arena.kill_gateway(target)
-                arena.at(lasts, arena.start_gateway, target)
-            case "cut" | "cut_one_way" | "cut_pair":
-                pairs = self._pairs(fault, target)
-                arena.cuts |= pairs
-                arena.at(lasts, self._mend, pairs)
-                done = bool(pairs)
-            case "loss" | "burst" | "duplicate" | "tail":
-                name = "loss" if fault.kind == "burst" else fault.kind
-                setattr(arena.weather, name, fault.value)
-                arena.at(lasts, self._calm, name)
-            case _:
-                done = False
-        self.counts[fault.kind] += done
-
-    def _pairs(self, fault: Fault, target: int | None) -> set[tuple[int, int]]:
-        ids = set(self.arena.ids)
-        if fault.kind == "cut_pair":
-            other = fault.targets[1]
-            return set() if target is None or target == other else {(target, other), (other, target)}
-        side = {target if i == LEADER else i for i in fault.targets} & ids
-        there = {(a, b) for a in side for b in ids - side}
-        return there if fault.kind == "cut_one_way" else there | {(b, a) for a, b in there}
-
-    def _mend(self, pairs: set[tuple[int, int]]) -> None:
-        self.arena.cuts -= pairs
-
-    def _calm(self, name: str) -> None:
-        setattr(self.arena.weather, name, getattr(self.schedule.weather, name))
-
-    def _start(self, target: int) -> None:
-        if not self.arena.processes[target].alive:
-            self.arena.start(target)
-
-    def _hint_back(self, target: int, member: Member, seers: tuple[int, ...]) -> None:
-        if self.arena.processes[target].member == member and self.arena.processes[target].alive:
-            self.arena.hint(target, *seers, up=True)
-
-    def heal(self) -> None:
-        """The faults are over: everyone is connected, and a quorum lives (all do when nobody remembers a leader)."""
-        arena = self.arena
-        arena.cuts.clear()
-        calm = self.schedule.weather
-        arena.weather.loss, arena.weather.tail, arena.weather.duplicate = 0.0, 0.0, calm.duplicate
-        self.schedule.weather.loss = self.schedule.weather.tail = 0.0
-        for robot_id in arena.mission.robots:
-            if not arena.gateways[robot_id].alive:
-                arena.start_gateway(robot_id)
-        for process in list(arena.processes.values()):
-            if process.paused:
-                arena.resume(process.id)
-        for target in sorted(arena.processes):
-            if not arena.processes[target].alive and (self.schedule.revive_all or not self._quorum_lives()):
-                arena.start(target)
-
-    def _quorum_lives(self) -> bool:
-        living = [p for p in self.arena.processes.values() if p.alive]
-        newest = max((p.lease.config for p in living), key=lambda c: c.version, default=None)
-        seats = {Member(p.id, 0) for p in living}
-        return newest is not None and not is_first(newest) and is_quorum(newest, seats)
+CHUNK = 50
+"""Seeds that one worker plays at a time."""
+KINDS_CLAIM_SEEDS = 200
+"""From this many seeds on every kind of fault must have taken effect."""
+FAILURES_SHOWN_MAX = 5
+COLUMN = 30
+SKIPPED = ("extends", "hello", "grant", "nack")
+"""What happens all the time and explains little; `propose` is told for a term's first rounds only."""
 
 
-def play(schedule: Schedule, *, core: dict[str, type] | None = None) -> Played:
-    """Run one schedule. `core` replaces parts of the protocol by broken ones, in tests only."""
-    schedule = _copied(schedule)
-    arena = Arena(
-        schedule.robots,
-        seed=schedule.seed,
-        profile=schedule.profile,
-        witness=schedule.witness,
-        rates=schedule.rates,
-        weather=_copied(schedule).weather,
-        gateways_at_world=schedule.gateways_at_world,
-        **(core or {}),
-    )
-    checkers: list[Checker] = [checker(arena.timing) for checker in SAFETY]
-    arena.listen(checkers)
-    faults = Faults(arena, schedule)
-    arena.start_all()
-    arena.run(DURATION_S)
-    violations = [v for checker in checkers for v in checker.violations]
-    violations += _liveness(arena)
-    elections = sum(1 for _, _, effect in arena.log if type(effect).__name__ == "BecomeLeader")
-    return Played(schedule, violations, faults.counts, elections, [])
+class Tally(Struct):
+    """What a number of seeds came to."""
+
+    seeds: int = 0
+    elections: int = 0
+    faults: dict[str, int] = {}
+    failed: dict[int, list[str]] = {}
+    """Violations by seed."""
+
+    def add(self, other: Tally) -> None:
+        self.seeds += other.seeds
+        self.elections += other.elections
+        self.faults = dict(Counter(self.faults) + Counter(other.faults))
+        self.failed = {**self.failed, **other.failed}
 
 
-def _liveness(arena: Arena) -> list[Violation]:
-    """L1-L4 at the end of a schedule."""
-    at, leaders = arena.now, arena.leaders()
-    if len(leaders) != 1:
-        return [Violation("L1", at, f"leaders: {leaders}")]
-    found = []
-    lease = arena.lease_of(leaders[0])
-    living = sorted(p.id for p in arena.processes.values() if p.alive)
-    robots = [i for i in living if i != WITNESS_ID]
-    if sorted(lease.chain) != robots:
-        found.append(Violation("L2", at, f"chain {lease.chain}, alive {robots}"))
-    versions = {i: arena.lease_of(i).config.version for i in living}
-    if len(set(versions.values())) != 1:
-        found.append(Violation("L3", at, f"versions {versions}"))
-    last = arena.accepted[-1][0] if arena.accepted else 0.0
-    if last < at - 0.1:
-        found.append(Violation("L4", at, f"last leader command obeyed at {last:.3f}"))
-    return found
+def command(
+    seeds: Annotated[str, typer.Option(help="How many (1000), or which (5000..5999).")] = "1000",
+    seed: Annotated[int | None, typer.Option(help="Play this one only.")] = None,
+    verbose: Annotated[
+        bool, typer.Option("-v", "--verbose", help="With --seed: the trace, robots in columns.")
+    ] = False,
+    jobs: Annotated[int, typer.Option(help="Processes that play at once.")] = 1,
+    out: Annotated[Path, typer.Option(help="Where traces of failed seeds are written.")] = Path("runs/fuzz"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the tally as JSON.")] = False,
+) -> int:
+    if seed is not None:
+        return _one(seed, verbose)
+    return _hunt(parse_seeds(seeds), jobs, out, as_json)
 
 
-def _copied(schedule: Schedule) -> Schedule:
-    return structs.replace(schedule, weather=structs.replace(schedule.weather))
+def parse_seeds(text: str) -> range:
+    """`1000` or `5000..5999`. Raises Refused for anything else."""
+    first, dots, last = text.partition("..")
+    if not all(part.isdecimal() for part in ((first, last) if dots else (first,))):
+        raise Refused(f"--seeds {text}: must be a number (1000) or a range (5000..5999)")
+    chosen = range(int(first), int(last) + 1) if dots else range(int(first))
+    if not chosen:
+        raise Refused(f"--seeds {text}: must name at least one seed")
+    return chosen
+
+
+def _one(seed: int, verbose: bool) -> int:
+    lines: list[str] = []
+    played = play(draw(seed), columns(lines, draw(seed)) if verbose else None)
+    typer.echo(describe(played.schedule))
+    for line in lines:
+        typer.echo(line)
+    for violation in played.violations:
+        typer.echo(said(violation))
+    typer.echo(f"seed {seed}: {len(played.violations)} violations, {played.elections} elections")
+    return 1 if played.violations else 0
+
+
+def _hunt(seeds: range, jobs: int, out: Path, as_json: bool) -> int:
+    if jobs < 1:
+        raise Refused(f"--jobs {jobs}: must be 1 or more")
+    began, tally = time.perf_counter(), Tally()
+    for part in _played(seeds, jobs):
+        tally.add(part)
+    minutes = (time.perf_counter() - began) / 60.0
+    missing = [kind for kind in KINDS if kind not in tally.faults] if len(seeds) >= KINDS_CLAIM_SEEDS else []
+    for seed in sorted(tally.failed)[:FAILURES_SHOWN_MAX]:
+        typer.echo(f"seed {seed}: {tally.failed[seed][0]}  reproduce: lfa fuzz --seed {seed} -v", err=True)
+        typer.echo(f"  shrunk trace: {_explain(seed, out)}", err=True)
+    if missing:
+        typer.echo(f"faults that never took effect: {', '.join(missing)}", err=True)
+    if as_json:
+        facts = {"seeds": tally.seeds, "elections": tally.elections, "faults": tally.faults}
+        rate = {"per_minute": round(tally.seeds / minutes), "jobs": jobs}
+        failed = {str(s): what for s, what in tally.failed.items()}
+        typer.echo(json.dumps({**facts, **rate, "failed": failed, "missing": missing}))
+    else:
+        typer.echo(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in KINDS))
+        rate_text = f"{tally.seeds / minutes:.0f} a minute with {jobs} jobs"
+        typer.echo(f"{tally.seeds} schedules ({rate_text}), {tally.elections} elections, {len(tally.failed)} failed")
+    return 1 if tally.failed or missing else 0
+
+
+def _played(seeds: range, jobs: int) -> Iterator[Tally]:
+    parts = [seeds[i : i + CHUNK] for i in range(0, len(seeds), CHUNK)]
+    if jobs == 1:
+        yield from map(_play_part, parts)
+        return
+    with ProcessPoolExecutor(min(jobs, os.cpu_count() or 1)) as pool:
+        yield from pool.map(_play_part, parts)
+
+
+def _play_part(seeds: range) -> Tally:
+    tally = Tally()
+    for seed in seeds:
+        played = play(draw(seed))
+        failed = {seed: [said(v) for v in played.violations]} if played.violations else {}
+        tally.add(Tally(1, played.elections, dict(played.counts), failed))
+    return tally
+
+
+def shrink(schedule: Schedule, name: str) -> Schedule:
+    """Fewer faults that still break invariant `name`: halves, then quarters, ..., then single ones are left out."""
+    size = max(len(schedule.faults) // 2, 1)
+    while True:
+        index, smaller = 0, False
+        while index < len(schedule.faults):
+            tried = without(schedule, *range(index, index + size))
+            if any(v.name == name for v in play(tried).violations):
+                schedule, smaller = tried, True
+            else:
+                index += size
+        if size == 1 and not smaller:
+            return schedule
+        size = max(size // 2, 1)
+
+
+def _explain(seed: int, out: Path) -> Path:
+    """Write the shrunk schedule of a failed seed and its trace."""
+    small = shrink(draw(seed), play(draw(seed)).violations[0].name)
+    lines: list[str] = []
+    played = play(small, columns(lines, small))
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{seed}.txt"
+    text = [describe(small), *lines, *(said(v) for v in played.violations)]
+    path.write_text("\n".join(text) + "\n")
+    return path
+
+
+def columns(lines: list[str], schedule: Schedule) -> Trace:
+    """A trace that fills `lines`: time in milliseconds, then one column for the witness and one for each robot."""
+    ids = range(schedule.robots + 1)
+    lines.append("      ms  " + "".join(f"{'witness' if i == 0 else f'robot{i}':<{COLUMN}}" for i in ids).rstrip())
+
+    def trace(at: float, who: int, what: str) -> None:
+        if not what.startswith(SKIPPED) and not (what.startswith("propose") and " r" in what and " r0" not in what):
+            lines.append(f"{at * 1000.0:8.1f}  {' ' * (COLUMN * who)}{what}")
+
+    return trace
+
+
+def describe(schedule: Schedule) -> str:
+    """A schedule's weather in one line, its faults in one line each."""
+    calm = schedule.weather
+    head = f"{schedule.robots} robots, witness {schedule.witness}, {schedule.profile}, delay <= {calm.delay_max} s"
+    lines = [f"{head}, loss {calm.loss}, duplicate {calm.duplicate}, tail {calm.tail}"]
+    for fault in schedule.faults:
+        targets = ", ".join("leader" if t < 0 else str(t) for t in fault.targets)
+        lines.append(f"{fault.at * 1000.0:8.1f}  {fault.kind} {targets} ({fault.duration_s:.3f} s, {fault.value:.2f})")
+    return "\n".join(lines)
+
+
+def said(violation: Violation) -> str:
+    return f"{violation.name} at {violation.at:.4f} s: {violation.text}"

@@ -1,0 +1,69 @@
+"""`lfa fuzz`: reproducible, sees planted bugs, shrinks, and refuses bad input in one line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from deploy.run.chaos import play
+from deploy.run.fuzz import parse_seeds, shrink
+from deploy.run.schedules import Fault, draw, without
+from protocol.acceptor import Acceptor
+from protocol.mission import Refused
+
+
+@pytest.mark.parametrize("start", range(0, 60, 20))
+def test_schedules_keep_every_invariant(start: int) -> None:
+    for seed in range(start, start + 20):
+        assert play(draw(seed)).violations == [], f"reproduce: lfa fuzz --seed {seed} -v"
+
+
+def test_one_seed_is_one_run_under_any_hash_seed() -> None:
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", "from deploy.run.fuzz import _one; _one(5, True)"],
+            env={**os.environ, "PYTHONHASHSEED": number},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for number in ("1", "2")
+    ]
+    assert told[0] == told[1]
+    assert len(told[0].splitlines()) > 100
+
+
+def test_a_planted_bug_is_found_shrunk_and_still_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A voter that forgets its bond: two leases within few seeds, and few faults are enough."""
+    honest = Acceptor.propose
+
+    def careless(self: Acceptor, *arguments: object) -> object:
+        self.bond = None
+        return honest(self, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Acceptor, "propose", careless)
+    monkeypatch.setattr(Acceptor, "bound", lambda self, now: None)
+    bad = next(seed for seed in range(50) if play(draw(seed)).violations)
+    name = play(draw(bad)).violations[0].name
+    small = shrink(draw(bad), name)
+    assert len(small.faults) < len(draw(bad).faults)
+    assert any(v.name == name for v in play(small).violations)
+
+
+def test_faults_can_be_left_out_one_by_one() -> None:
+    schedule = draw(3)
+    assert len(without(schedule, 0, 2).faults) == len(schedule.faults) - 2
+    assert all(isinstance(fault, Fault) for fault in schedule.faults)
+
+
+@pytest.mark.parametrize(("text", "seeds"), [("3", range(3)), ("5000..5002", range(5000, 5003))])
+def test_seeds_are_a_number_or_a_range(text: str, seeds: range) -> None:
+    assert parse_seeds(text) == seeds
+
+
+@pytest.mark.parametrize("text", ["", "many", "-3", "0", "5..", "9..5", "1.5"])
+def test_other_seeds_are_refused(text: str) -> None:
+    with pytest.raises(Refused, match="--seeds"):
+        parse_seeds(text)
