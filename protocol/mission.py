@@ -15,7 +15,7 @@ WITNESS_ID = 0
 WITNESS_NAME = "witness"
 
 Side = Literal["left", "right", "column", "zigzag"]
-Motion = Literal["path_following", "point_to_point"]
+Motion = Literal["path_following", "point_to_point", "explore"]
 Profile = Literal["fast", "std", "wifi"]
 
 
@@ -80,6 +80,8 @@ class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     goal_tolerance_m: float = 0.10
     orientations: tuple[Orientation, ...] = ()
     """In the order of the route."""
+    keepout_m: tuple[tuple[float, float, float, float], ...] = ()
+    """Boxes x1, y1, x2, y2 in `map` that `explore` plans no route through."""
 
 
 class Mission(Struct, frozen=True, forbid_unknown_fields=True):

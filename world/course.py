@@ -29,13 +29,16 @@ def starts_of(scenario: Scenario) -> tuple[Pose2D, ...]:
     return tuple(poses)
 
 
-def _slot(mission: Mission, hop: int) -> Pose2D:
-    """The place of the follower number `hop` in its predecessor's `base_link` (control.md section 4)."""
-    formation = mission.formation
-    left = pi - formation.angle_rad
+def slot_bearing(mission: Mission, hop: int) -> float:
+    """phi^d [rad] of the follower number `hop` in its predecessor's `base_link` (control.md section 4)."""
+    left = pi - mission.formation.angle_rad
     sides = {"left": left, "right": -left, "column": pi, "zigzag": left if hop % 2 == 0 else -left}
-    phi = sides[formation.side]
-    return Pose2D(formation.separation_m * cos(phi), formation.separation_m * sin(phi), 0.0)
+    return sides[mission.formation.side]
+
+
+def _slot(mission: Mission, hop: int) -> Pose2D:
+    k, phi = mission.formation.separation_m, slot_bearing(mission, hop)
+    return Pose2D(k * cos(phi), k * sin(phi), 0.0)
 
 
 class Way:

@@ -19,6 +19,7 @@ from msgspec.structs import replace
 from protocol.mission import Refused
 from protocol.radio import Radio
 from world.course import check_course, draw, starts_of
+from world.mapped import on_map
 from world.spec import (
     Body,
     Lidar,
@@ -50,6 +51,13 @@ __all__ = [
 ]
 
 SCENARIOS = Path(__file__).parent / "scenarios"
+SHORT_FORMS = {
+    "map": "world.map",
+    "keepout": "world.keepout",
+    "start": "world.start",
+    "goal": "mission.leading.route_m",
+}
+"""What `--set` knows by a shorter name; `goal=[x, y]` is a route of one point."""
 FILE_BYTES_MAX = 4 * 1024 * 1024
 NUMBER_MAX = 1e9
 
@@ -74,7 +82,7 @@ def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = 
     try:
         _refuse_unknown(document)
         _refuse_endless(document)
-        scenario = replace(_convert(document), name=path.stem)
+        scenario = on_map(replace(_convert(document), name=path.stem), path.parent)
         return check_course(check_scenario(scenario))
     except Refused as refused:
         raise Refused(f"{_source(str(refused), keys, robots, path)}: {refused}") from None
@@ -113,6 +121,11 @@ def _override(document: dict[str, Any], override: str) -> str:
     """Put `a.b=value` or `a.b[0].c=value` into `document`; the key that it sets."""
     key, equals, text = override.partition("=")
     key, text = key.strip(), text.strip()
+    if key in ("start", "goal") and not text.startswith("["):
+        text = f"[{text}]"
+    if key == "goal":
+        text = f"[{text}]"
+    key = SHORT_FORMS.get(key, key)
     if not equals or not re.fullmatch(r"\w+(\.\w+|\[\d+\])*", key):
         raise Refused(f"--set {override!r}: must be key=value, such as world.lidar.beams=360")
     *way, last = (int(part) if part.isdecimal() else part for part in re.findall(r"\w+", key))

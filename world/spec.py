@@ -77,6 +77,12 @@ class Vary(Struct, frozen=True, forbid_unknown_fields=True):
 class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     starts: tuple[tuple[float, float, float], ...] | None = None
     """x [m], y [m], theta [rad] of each robot in `map`; None: the leader at (0, 0, 0), the others in their slots."""
+    start: tuple[float, ...] | None = None
+    """x, y [m] and perhaps theta [rad] of the first robot; the others stand behind it, where walls leave room."""
+    map: str | None = None
+    """A ROS `map.yaml`, relative to the scenario's file: its occupied cells become walls when the scenario is read."""
+    keepout: str | None = None
+    """Another `map.yaml`, whose occupied cells a leader that plans its own route stays out of."""
     walls_m: tuple[tuple[float, float, float, float], ...] = ()
     """Segments x1, y1, x2, y2."""
     obstacles: tuple[Obstacle, ...] = ()

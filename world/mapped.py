@@ -1,0 +1,133 @@
+"""A scenario on a ROS map: its walls, what its keepout mask forbids, and where a chain can stand at the start."""
+
+from __future__ import annotations
+
+from math import atan2, ceil, cos, hypot, inf, pi, sin
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from protocol.geometry import TAU, Pose2D, wrap
+from protocol.mission import Mission, Refused
+from world import maps
+from world.course import slot_bearing
+from world.maps import Map, Room
+from world.spec import Scenario
+
+MARGIN_M = 0.10
+"""Kept from walls where the chain is laid out."""
+BEND_STEP_RAD = pi / 18
+HEADINGS = 24
+LINE_STEP_M = 0.05
+LAY_OUT_TRIES_MAX = 20_000
+
+
+def on_map(scenario: Scenario, folder: Path) -> Scenario:
+    """`scenario` with the walls and starts that its map gives: what it holds then needs no map any more.
+
+    Paths are relative to `folder`. Raises Refused for a map that cannot be read, and for a start or goal without room.
+    """
+    world, mission = scenario.world, scenario.mission
+    if world.start is not None and len(world.start) not in (2, 3):
+        raise Refused(f"world.start = {list(world.start)}: must be [x, y] or [x, y, theta]")
+    if world.keepout is not None:
+        leading = replace(mission.leading, keepout_m=_keepout(folder / world.keepout))
+        mission = replace(mission, leading=leading)
+    room = None
+    if world.map is not None:
+        drawn = maps.read(folder / world.map)
+        world, room = replace(world, walls_m=(*world.walls_m, *maps.walls(drawn))), Room(drawn)
+        _check_goal(scenario, drawn, room)
+    if world.starts is None or world.start is not None:
+        starts = _starts(scenario, room)
+        world = replace(world, starts=tuple((pose.x, pose.y, pose.theta) for pose in starts) if starts else None)
+    return replace(scenario, mission=mission, world=replace(world, map=None, keepout=None, start=None))
+
+
+def _keepout(path: Path) -> tuple[tuple[float, float, float, float], ...]:
+    mask = maps.read(path)
+    if mask.origin[2] != 0.0:
+        raise Refused(f"{path}: origin = {list(mask.origin)}: must have yaw 0 in a keepout mask")
+    return maps.boxes(mask)
+
+
+def _check_goal(scenario: Scenario, drawn: Map, room: Room) -> None:
+    if not scenario.mission.leading.route_m:
+        return
+    (x, y), radius_m = scenario.mission.goal_m, scenario.mission.radius_m
+    where = f"mission.leading.route_m = ... [{x:g}, {y:g}]: the goal"
+    cell = drawn.cell_of(x, y)
+    if cell is None:
+        raise Refused(f"{where} is outside of the map {scenario.world.map}: must be within it")
+    if drawn.occupied[cell]:
+        raise Refused(f"{where} is inside a wall of the map {scenario.world.map}: must be on free ground")
+    if room.clearance_m(x, y) < radius_m:
+        right = f"must be {radius_m:g} m (the robots' radius) clear of them"
+        raise Refused(f"{where} is {room.clearance_m(x, y):.2f} m from the walls of {scenario.world.map}: {right}")
+
+
+def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
+    """The first robot at `start`, each other in its slot or, where walls leave none, bent round as little as works."""
+    start, mission = scenario.world.start, scenario.mission
+    if start is None and room is None:
+        return None
+    x, y = (start[0], start[1]) if start is not None else (0.0, 0.0)
+    if room is not None and room.clearance_m(x, y) < mission.radius_m:
+        what = "inside a wall" if room.clearance_m(x, y) < 0.0 else f"{room.clearance_m(x, y):.2f} m from a wall"
+        raise Refused(f"world.start = {[x, y]}: {what} of the map {scenario.world.map}: must have room for a robot")
+    if (start is not None and len(start) == 3) or not mission.leading.route_m:
+        headings = [start[2] if start is not None and len(start) == 3 else 0.0]
+    else:
+        towards = atan2(mission.goal_m[1] - y, mission.goal_m[0] - x)
+        headings = [wrap(towards + n * TAU / HEADINGS) for n in _outwards(HEADINGS // 2)]
+    found = [laid for laid in (_lay_out(mission, Pose2D(x, y, theta), room) for theta in headings) if laid is not None]
+    if not found:
+        right = f"must have room behind it for {len(mission.robots)} robots, {mission.formation.separation_m:g} m apart"
+        raise Refused(f"world.start = {[round(x, 2), round(y, 2)]}: {right}")
+    return min(found, key=lambda laid: (laid[0], abs(wrap(laid[1][0].theta - headings[0]))))[1]
+
+
+def _lay_out(mission: Mission, first: Pose2D, room: Room | None) -> tuple[float, list[Pose2D]] | None:
+    """Depth first, straightest first: how much the chain is bent in all [rad], and the poses."""
+    tries = 0
+
+    def after(poses: list[Pose2D], bent: float) -> tuple[float, list[Pose2D]] | None:
+        nonlocal tries
+        hop = len(poses) - 1
+        if hop == len(mission.robots) - 1:
+            return bent, poses
+        for n in _outwards(9):
+            tries += 1
+            if tries > LAY_OUT_TRIES_MAX:
+                return None
+            pose = _behind(poses[-1], slot_bearing(mission, hop), n * BEND_STEP_RAD, mission.formation.separation_m)
+            if _stands(mission, poses, pose, room):
+                done = after([*poses, pose], bent + abs(n) * BEND_STEP_RAD)
+                if done is not None:
+                    return done
+        return None
+
+    return after([first], 0.0)
+
+
+def _behind(ahead: Pose2D, phi: float, bend: float, separation_m: float) -> Pose2D:
+    angle = ahead.theta + phi + bend
+    return Pose2D(ahead.x + separation_m * cos(angle), ahead.y + separation_m * sin(angle), wrap(ahead.theta + bend))
+
+
+def _stands(mission: Mission, others: list[Pose2D], pose: Pose2D, room: Room | None) -> bool:
+    """There is room at `pose` and on the straight way from it to the one ahead, and nobody else is near."""
+    apart = min(hypot(pose.x - other.x, pose.y - other.y) for other in others)
+    if apart < 0.9 * mission.formation.separation_m:
+        return False
+    if room is None:
+        return True
+    ahead = others[-1]
+    steps = max(1, ceil(hypot(ahead.x - pose.x, ahead.y - pose.y) / LINE_STEP_M))
+    line = ((pose.x + (ahead.x - pose.x) * n / steps, pose.y + (ahead.y - pose.y) * n / steps) for n in range(steps))
+    return min((room.clearance_m(*point) for point in line), default=inf) >= mission.radius_m + MARGIN_M
+
+
+def _outwards(most: int) -> list[int]:
+    """0, 1, -1, 2, -2 ... up to `most` on either side."""
+    return [0, *(side * n for n in range(1, most + 1) for side in (1, -1))]

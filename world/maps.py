@@ -1,0 +1,292 @@
+"""ROS occupancy maps in and out: `map.yaml` beside its image (pgm or png), and what a map means in metres.
+
+Cells are read as Nav2's map server reads them: p = 1 - shade/255 (shade/255 with `negate`), occupied above
+`occupied_thresh`, free below `free_thresh`. Row 0 of the image is the top, `origin` the lower left corner and its yaw.
+In memory row 0 is the bottom, so that cell (row, column) lies at (column, row) times the resolution.
+"""
+
+from __future__ import annotations
+
+import re
+from math import cos, isfinite, sin
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from msgspec import Struct
+
+from protocol.mission import Refused
+
+UNKNOWN = -1
+OCCUPIED = 100
+CELLS_MAX = 64_000_000
+YAML_BYTES_MAX = 64 * 1024
+MODES = ("trinary", "scale", "raw")
+
+Cells = npt.NDArray[np.int16]
+Shades = npt.NDArray[np.uint8]
+Segment = tuple[float, float, float, float]
+Point = tuple[float, float]
+
+
+class Map(Struct, frozen=True):
+    """Occupancy in percent (0 free, 100 occupied, -1 unknown) of square cells; row 0 is the bottom."""
+
+    cells: Cells
+    resolution_m: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Pose [m, m, rad] of the lower left corner in `map`."""
+    occupied_thresh: float = 0.65
+
+    @property
+    def occupied(self) -> npt.NDArray[np.bool_]:
+        return self.cells >= 100.0 * self.occupied_thresh
+
+    def cell_of(self, x: float, y: float) -> tuple[int, int] | None:
+        """Row and column of a point in `map`; None outside of the image."""
+        c, s = cos(self.origin[2]), sin(self.origin[2])
+        dx, dy = x - self.origin[0], y - self.origin[1]
+        column = int((c * dx + s * dy) // self.resolution_m)
+        row = int((c * dy - s * dx) // self.resolution_m)
+        inside = 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1]
+        return (row, column) if inside else None
+
+    def to_map(self, x: float, y: float) -> Point:
+        """A point from the image's axes ([m] from its lower left corner) in `map`."""
+        c, s = cos(self.origin[2]), sin(self.origin[2])
+        return self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y
+
+
+def read(path: Path) -> Map:
+    """The map of a `map.yaml`. Raises Refused with one line: file, key, value, what would be right."""
+    fields = _fields(path)
+    image = fields.get("image")
+    if not image:
+        raise Refused(f"{path}: image is missing: must name a pgm or png file")
+    resolution_m = _number(path, fields, "resolution", None)
+    if not 1e-4 <= resolution_m <= 100.0:
+        raise Refused(f"{path}: resolution = {resolution_m:g}: must be from 0.0001 to 100 m a cell")
+    occupied_thresh = _number(path, fields, "occupied_thresh", 0.65)
+    free_thresh = _number(path, fields, "free_thresh", 0.25)
+    if not 0.0 <= free_thresh <= occupied_thresh <= 1.0:
+        value = f"{free_thresh:g}, occupied_thresh = {occupied_thresh:g}"
+        raise Refused(f"{path}: free_thresh = {value}: must be 0 <= free <= occupied <= 1")
+    mode = fields.get("mode", "trinary")
+    if mode not in MODES:
+        raise Refused(f"{path}: mode = {mode}: must be one of {', '.join(MODES)}")
+    negate = fields.get("negate", "0").lower()
+    if negate not in ("0", "1", "true", "false"):
+        raise Refused(f"{path}: negate = {negate}: must be 0 or 1")
+    shades, opaque = _image(path, path.parent / image)
+    cells = _occupancy(shades, mode, negate in ("1", "true"), free_thresh, occupied_thresh)
+    if opaque is not None:
+        cells[~opaque] = UNKNOWN
+    return Map(cells[::-1].copy(), resolution_m, _origin(path, fields), occupied_thresh)
+
+
+def write(path: Path, drawn: Map) -> None:
+    """`path` (a .yaml) and the .pgm beside it, trinary: 0 occupied, 254 free, 205 unknown."""
+    image = path.with_suffix(".pgm")
+    shades = np.full(drawn.cells.shape, 254, dtype=np.uint8)
+    shades[drawn.cells == UNKNOWN] = 205
+    shades[drawn.occupied] = 0
+    rows, columns = drawn.cells.shape
+    x, y, yaw = drawn.origin
+    image.write_bytes(b"P5\n%d %d\n255\n" % (columns, rows) + shades[::-1].tobytes())
+    path.write_text(
+        f"image: {image.name}\nmode: trinary\nresolution: {drawn.resolution_m:g}\n"
+        f"origin: [{x:.6f}, {y:.6f}, {yaw:.6f}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+
+
+def walls(drawn: Map) -> tuple[Segment, ...]:
+    """The outlines of occupied cells as segments in `map`, one for each straight run of cell edges."""
+    padded = np.pad(drawn.occupied, 1).astype(np.int8)
+    found: list[Segment] = []
+    for row, low, high in _runs(np.diff(padded, axis=0)[:, 1:-1]):
+        found.append((low, row, high, row))
+    for column, low, high in _runs(np.diff(padded, axis=1)[1:-1].T):
+        found.append((column, low, column, high))
+    r = drawn.resolution_m
+    return tuple(
+        (*_rounded(drawn.to_map(r * x1, r * y1)), *_rounded(drawn.to_map(r * x2, r * y2))) for x1, y1, x2, y2 in found
+    )
+
+
+def boxes(drawn: Map) -> tuple[Segment, ...]:
+    """The occupied cells of a mask without yaw as few boxes x1, y1, x2, y2 in `map`: runs that equal the row below."""
+    r = drawn.resolution_m
+    open_runs: dict[tuple[int, int], int] = {}
+    found: list[tuple[int, int, int, int]] = []
+    rows = [*drawn.occupied.astype(np.int8), np.zeros(drawn.cells.shape[1], dtype=np.int8)]
+    for row, line in enumerate(rows):
+        runs = {(low, high) for _, low, high in _runs(line[None, :])}
+        for run in sorted(open_runs.keys() - runs):
+            found.append((*run, open_runs.pop(run), row))
+        for run in sorted(runs - open_runs.keys()):
+            open_runs[run] = row
+    return tuple(
+        (*_rounded(drawn.to_map(r * x1, r * y1)), *_rounded(drawn.to_map(r * x2, r * y2))) for x1, x2, y1, y2 in found
+    )
+
+
+class Room:
+    """How far it is from any point to the nearest wall of a map."""
+
+    def __init__(self, drawn: Map) -> None:
+        rows, columns = np.nonzero(drawn.occupied)
+        r = drawn.resolution_m
+        c, s = cos(drawn.origin[2]), sin(drawn.origin[2])
+        x, y = (columns + 0.5) * r, (rows + 0.5) * r
+        self._x = drawn.origin[0] + c * x - s * y
+        self._y = drawn.origin[1] + s * x + c * y
+        self._half_m = 0.5 * r
+
+    def clearance_m(self, x: float, y: float) -> float:
+        """Distance [m] to the nearest occupied cell's edge, to half a cell; negative inside, inf with no walls."""
+        if not len(self._x):
+            return float("inf")
+        return float(np.sqrt(np.min((self._x - x) ** 2 + (self._y - y) ** 2))) - self._half_m
+
+
+def _rounded(point: Point) -> Point:
+    return round(point[0], 6), round(point[1], 6)
+
+
+def _runs(edges: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
+    """Line, first and last+1 place of each run of equal non-zero values along the lines of `edges`."""
+    padded = np.pad(edges, ((0, 0), (1, 1)))
+    lines, places = np.nonzero(np.diff(padded, axis=1))
+    found = []
+    for n in range(len(lines) - 1):
+        line, low, high = int(lines[n]), int(places[n]), int(places[n + 1])
+        if lines[n + 1] == line and edges[line, low] != 0:
+            found.append((line, low, high))
+    return found
+
+
+def _fields(path: Path) -> dict[str, str]:
+    """The flat `key: value` lines of a map.yaml: what ROS writes, and nothing of YAML beyond it."""
+    try:
+        with path.open("rb") as file:
+            text = file.read(YAML_BYTES_MAX + 1).decode()
+    except OSError as error:
+        raise Refused(f"{path}: cannot be read ({error.strerror or error}): must be a map.yaml") from None
+    except UnicodeDecodeError:
+        raise Refused(f"{path}: no text: must be a map.yaml") from None
+    fields: dict[str, str] = {}
+    for number, line in enumerate(re.sub(r"\n\s*-\s+", r" - ", text).splitlines(), start=1):
+        stripped = re.sub(r"(^|\s)#.*$", "", line).strip()
+        if not stripped or stripped in ("---", "..."):
+            continue
+        match = re.fullmatch(r"(\w+)\s*:\s*(.*)", stripped)
+        if match is None or len(text) > YAML_BYTES_MAX:
+            raise Refused(f"{path} line {number}: {stripped[:40]!r}: must be `key: value` as in a ROS map.yaml")
+        fields[match[1]] = match[2].strip().strip("'\"")
+    return fields
+
+
+def _number(path: Path, fields: dict[str, str], key: str, default: float | None) -> float:
+    text = fields.get(key)
+    if text is None and default is not None:
+        return default
+    try:
+        value = float(text or "nothing")
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value):
+        raise Refused(f"{path}: {key} = {text}: must be a number")
+    return value
+
+
+def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
+    """`[x, y, yaw]`, also as a YAML list of lines."""
+    text = fields.get("origin", "[0, 0, 0]")
+    try:
+        values = [
+            float(part) for part in re.split(r"[,\s]+|(?:^|\s)-\s", text.strip("[] ")) if part not in (None, "", "-")
+        ]
+    except ValueError:
+        values = []
+    if len(values) not in (2, 3) or not all(isfinite(value) for value in values):
+        raise Refused(f"{path}: origin = {text}: must be [x, y, yaw] in metres and radians")
+    return values[0], values[1], values[2] if len(values) == 3 else 0.0
+
+
+def _occupancy(shades: Shades, mode: str, negate: bool, free: float, occupied: float) -> Cells:
+    if mode == "raw":
+        raw = shades.astype(np.int16)
+        return np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int16)
+    p = shades / 255.0 if negate else 1.0 - shades / 255.0
+    between = np.full(shades.shape, UNKNOWN, dtype=np.int16)
+    if mode == "scale" and occupied > free:
+        between = np.clip(np.rint(100.0 * (p - free) / (occupied - free)), 0, 99).astype(np.int16)
+        between = np.minimum(between, np.int16(100.0 * occupied - 0.5))
+    return np.where(p > occupied, OCCUPIED, np.where(p < free, 0, between)).astype(np.int16)
+
+
+# --- images --------------------------------------------------------------------------------------------------
+
+
+def _image(yaml: Path, path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
+    """Shades from 0 to 255, row 0 the top, and which cells an image with transparency shows."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise Refused(f"{yaml}: image = {path.name}: cannot be read ({error.strerror or error})") from None
+    if data[:2] in (b"P2", b"P5"):
+        return _pgm(path, data), None
+    if data[:8] == b"\x89PNG\r\n\x1a\n":
+        return _png(path)
+    raise Refused(f"{path}: neither pgm (P2, P5) nor png: must be one of them")
+
+
+def _pgm(path: Path, data: bytes) -> Shades:
+    """P5 (bytes) or P2 (numbers), with comments; at most 255 shades."""
+    match = re.match(rb"(P[25])" + 3 * rb"(?:\s+|#[^\n]*\n)+(\d{1,9})" + rb"(?:[ \t]*#[^\n]*)?\s", data)
+    if match is None:
+        raise Refused(f"{path}: no pgm header: must be P5 or P2, width, height and 255")
+    columns, rows, top = int(match[2]), int(match[3]), int(match[4])
+    _check_size(path, columns, rows)
+    if not 1 <= top <= 255:
+        bits = " (16-bit)" if top <= 65535 else ""
+        raise Refused(f"{path}: largest shade {top}{bits}: must be an 8-bit pgm, at most 255")
+    body = data[match.end() :]
+    if match[1] == b"P5":
+        shades = np.frombuffer(body[: rows * columns], dtype=np.uint8)
+    else:
+        words = re.sub(rb"#[^\n]*", b"", body).split()[: rows * columns]
+        if not all(word.isdigit() and len(word) < 4 and int(word) <= top for word in words):
+            raise Refused(f"{path}: a shade that is no number from 0 to {top}: the file is corrupt")
+        shades = np.array([int(word) for word in words], dtype=np.uint8)
+    if shades.size != rows * columns:
+        right = f"{columns} x {rows} = {columns * rows} by its header"
+        raise Refused(f"{path}: {shades.size} cells: must be {right}; the file is cut off")
+    if shades.size and int(shades.max()) > top:
+        raise Refused(f"{path}: a shade of {int(shades.max())} above its largest {top}: the file is corrupt")
+    scaled = shades if top == 255 else np.rint(shades * (255.0 / top)).astype(np.uint8)
+    return scaled.reshape(rows, columns)
+
+
+def _png(path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
+    """Shade is the mean of the colours; what is transparent is unknown."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            _check_size(path, *image.size)
+            if image.mode.startswith(("I", "F")):
+                raise Refused(f"{path}: png of mode {image.mode} (16-bit): must be 8-bit")
+            pixels = np.asarray(image.convert("RGBA"))
+    except (OSError, UnidentifiedImageError, SyntaxError, ValueError) as error:
+        if isinstance(error, Refused):
+            raise
+        raise Refused(f"{path}: no png that can be read ({error})") from None
+    opaque = pixels[:, :, 3] == 255
+    shades = np.rint(pixels[:, :, :3].mean(axis=2)).astype(np.uint8)
+    return shades, None if opaque.all() else opaque
+
+
+def _check_size(path: Path, columns: int, rows: int) -> None:
+    if columns < 1 or rows < 1 or columns * rows > CELLS_MAX:
+        raise Refused(f"{path}: {columns} x {rows} cells: must be from 1 to {CELLS_MAX} in all")
