@@ -60,6 +60,10 @@ def link_of(key: str, receiver: str) -> Link | None:
     return None if sender == place else (sender, place)
 
 
+def _links(pairs: tuple[Link, ...]) -> frozenset[Link]:
+    return frozenset((_place(sender), _place(receiver)) for sender, receiver in pairs)
+
+
 def _place(name: str) -> str:
     return WORLD_NAME if name == WITNESS_NAME else name
 
@@ -89,18 +93,24 @@ class Air:
     def obey(self, arguments: Mapping[str, Any]) -> bool:
         """Change the weather by an operator's word; False, and no change, when the word is none.
 
-        `cut`: pairs (from, to) of places that from now on do not reach each other, besides those cut already;
-        `radio`: fields of `Radio`; `heal`: true ends all cuts and brings the first weather back.
+        `cut`: pairs (from, to) of places that from now on do not reach each other, besides those cut already; `mend`:
+        pairs that do again; `radio`: fields of `Radio`; `fair`: true brings the first weather back; `heal`: true does
+        that and ends all cuts.
         """
         try:
             order = msgspec.convert(dict(arguments), type=_Order)
-            if order.heal:
-                self.cuts, self.radio = frozenset(), self._fair
-            self.radio = msgspec.convert(structs.asdict(self.radio) | order.radio, type=Radio)
+            radio = self._fair if order.heal or order.fair else self.radio
+            self.radio = msgspec.convert(structs.asdict(radio) | order.radio, type=Radio)
         except msgspec.ValidationError:
             return False
-        self.cuts |= frozenset((_place(sender), _place(receiver)) for sender, receiver in order.cut)
+        cuts = frozenset() if order.heal else self.cuts
+        self.cuts = (cuts | _links(order.cut)) - _links(order.mend)
         return True
+
+    @property
+    def orders(self) -> dict[str, Any]:
+        """What brings another one's weather to this."""
+        return {"cut": sorted(self.cuts), "radio": structs.asdict(self.radio)}
 
     def _lost(self, sender: str, receiver: str) -> bool:
         """Gilbert's channel: leaves a fade with 1/burst, enters one so that the mean loss is `loss`.
@@ -119,7 +129,9 @@ class Air:
 
 class _Order(Struct, forbid_unknown_fields=True):
     cut: tuple[Link, ...] = ()
+    mend: tuple[Link, ...] = ()
     radio: dict[str, float] = {}
+    fair: bool = False
     heal: bool = False
 
 

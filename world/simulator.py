@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from protocol.host import Host, Sent
 from protocol.journal import Journal
-from protocol.messages import Message
+from protocol.messages import Message, decode
 from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
 from protocol.radio import Air, Radio, link_of
 from protocol.topics import TOPIC, address, alive_key, matches
@@ -118,6 +118,14 @@ class Simulator:
         """Do `action` at true time `when`."""
         self._order += 1
         heapq.heappush(self._heap, (when, self._order, action))
+
+    def say(self, key: str, payload: bytes) -> None:
+        """An outsider's message to all that follow `key`: an operator's, heard by the taps too."""
+        message = decode(payload, TOPIC[key.split("/")[3]].type)
+        for tap in self.taps:
+            tap(self.now, key, payload, message)
+        for seat in self._route(key):
+            self._deliver_later(seat, key, message, payload, LOCAL_DELAY_S)
 
     def run(self, until: float, over: Callable[[], bool] | None = None) -> None:
         """Advance to true time `until`, or until `over()` holds."""

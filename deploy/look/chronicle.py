@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from deploy.run.record import EVENTS
 
-ENDING_FAULTS = ("kill", "terminate", "stop")
+ENDING_FAULTS = ("kill", "terminate", "stop", "cut")
 Line = dict[str, Any]
 
 
@@ -46,7 +46,8 @@ class Failover(Struct):
 class FaultDone(Struct):
     at_s: float
     kind: str
-    target: int
+    target: int | str
+    """A robot's id, or whom a cut parts, or what share is lost."""
 
 
 class Violation(Struct):
@@ -107,12 +108,12 @@ def failovers(events: Sequence[Line], reigns: Sequence[Reign]) -> list[Failover]
         found.append(
             Failover(
                 cause=fault.kind,
-                victim=fault.target,
+                victim=reign.robot_id,
                 at_s=fault.at_s,
                 leader=leader,
                 lease_ms=_ms(fault.at_s, acquired[0] if acquired else None),
                 first_command_ms=_ms(fault.at_s, None if successor is None else successor.from_s),
-                chain_ms=_ms(fault.at_s, _chain_closed(later, fault.target)),
+                chain_ms=_ms(fault.at_s, _chain_closed(later, reign.robot_id)),
             )
         )
     return found

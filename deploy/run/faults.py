@@ -1,4 +1,4 @@
-"""What can be done to a running fleet, said as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'.
+"""What can be done to a running fleet, said as one would say it: 'kill leader at 20 s', 'cut 1,2 at 5 s for 3 s'.
 
 One grammar for a scenario's `faults`, `--fault` and `lfa fault`; what a fault then is, a signal or a node taken out
 of virtual time, is the business of whoever runs the fleet.
@@ -13,9 +13,10 @@ from typing import Literal, cast
 
 from msgspec import Struct
 
+from deploy.run.weather import order
 from protocol.mission import Mission, Refused
 
-Deed = Literal["kill", "stop", "continue", "terminate", "restart"]
+Deed = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
 
 #            deed          what it is
 DEEDS: dict[str, str] = {
@@ -24,6 +25,10 @@ DEEDS: dict[str, str] = {
     "continue":  "SIGCONT: wakes up with old beliefs",
     "terminate": "SIGTERM: leaves in good order",
     "restart":   "starts again after a kill or terminate, with a new incarnation",
+    "cut":       "no radio between sides: 3, or 1-2, or 1,2-3,w, or one way 1>2 (w: the world with its witness)",
+    "heal":      "ends a cut, or all of them and all loss",
+    "loss":      "every receiver loses this share of messages: 0.2; without a share as at first",
+    "handover":  "the leader gives its lease to the next in the chain",
 }  # fmt: skip
 
 SIGNALS: dict[str, signal.Signals] = {
@@ -33,10 +38,15 @@ SIGNALS: dict[str, signal.Signals] = {
     "terminate": signal.SIGTERM,
 }
 
+ORDERS = ("cut", "heal", "loss", "handover")
+"""Deeds that are an operator's word to all, and no signal to one."""
+LASTING: dict[str, Deed] = {"stop": "continue", "cut": "heal", "loss": "loss"}
+"""What can be for a while, and what ends it."""
+
 LEADER = "leader"
-RIGHT = "'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' (kill, stop, continue, terminate, restart)"
+RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"
 _SENTENCE = re.compile(
-    r"(?P<deed>\w+) +(?P<target>\w+)"
+    r"(?P<deed>\w+)(?: +(?!at )(?P<target>[\w.,>-]+))?"
     r"(?: +at +(?P<at>\d+(?:\.\d+)?) *s)?"
     r"(?: +for +(?P<duration>\d+(?:\.\d+)?) *s)?",
     re.ASCII,
@@ -44,16 +54,17 @@ _SENTENCE = re.compile(
 
 
 class Fault(Struct, frozen=True):
-    """`target` is a robot's id, or `leader` for whoever leads at that moment; `at_s` is world time."""
+    """`target` is a robot's id, or `leader` for whoever leads at that moment, or what an order says; `at_s` is world
+    time."""
 
     deed: Deed
-    target: int | Literal["leader"]
+    target: int | str
     at_s: float
     for_s: float | None = None
 
     def __str__(self) -> str:
         lasting = "" if self.for_s is None else f" for {self.for_s:g} s"
-        return f"{self.deed} {self.target} at {self.at_s:g} s{lasting}"
+        return " ".join(word for word in (self.deed, str(self.target), f"at {self.at_s:g} s{lasting}") if word)
 
 
 def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
@@ -61,10 +72,13 @@ def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
     match = _SENTENCE.fullmatch(text.strip())
     if match is None or match["deed"] not in DEEDS or match["at"] is None:
         raise Refused(f"{where} {text!r}: must be like {RIGHT}")
-    target = _target(match["target"], text, mission, where)
+    if match["deed"] in ORDERS:
+        target = _ordered(match["deed"], match["target"] or "", text, mission, where)
+    else:
+        target = _target(match["target"] or "", text, mission, where)
     for_s = None if match["duration"] is None else float(match["duration"])
-    if for_s is not None and match["deed"] != "stop":
-        raise Refused(f"{where} {text!r}: only 'stop' can be 'for' a while")
+    if for_s is not None and match["deed"] not in LASTING:
+        raise Refused(f"{where} {text!r}: only {', '.join(LASTING)} can be 'for' a while")
     if match["deed"] in ("restart", "continue") and target == LEADER:
         raise Refused(f"{where} {text!r}: {match['deed']} needs an id, one of {_ids(mission)}")
     return Fault(cast(Deed, match["deed"]), target, float(match["at"]), for_s)
@@ -82,24 +96,38 @@ class Schedule:
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.pending = sorted(faults, key=_at_s)
 
-    def due(self, now: float, leader: int | None) -> list[tuple[Deed, int]]:
+    def due(self, now: float, leader: int | None) -> list[tuple[Deed, int | str]]:
         """What to do to whom at world time `now` [s]. One that means the leader waits until somebody leads."""
-        deeds: list[tuple[Deed, int]] = []
+        deeds: list[tuple[Deed, int | str]] = []
         while self.pending and self.pending[0].at_s <= now:
             fault = self.pending[0]
             victim = leader if fault.target == LEADER else fault.target
-            if not isinstance(victim, int):
+            if victim is None:
                 break
             self.pending.pop(0)
             deeds.append((fault.deed, victim))
             if fault.for_s is not None:
-                self.pending.append(Fault("continue", victim, now + fault.for_s))
+                undone = "" if fault.deed == "loss" else victim
+                self.pending.append(Fault(LASTING[fault.deed], undone, now + fault.for_s))
                 self.pending.sort(key=_at_s)
         return deeds
 
 
 def _at_s(fault: Fault) -> float:
     return fault.at_s
+
+
+def _ordered(deed: str, word: str, text: str, mission: Mission, where: str) -> int | str:
+    """What an order is about: nothing, whoever leads, one robot, or its own words."""
+    if deed == "handover" and word not in ("", LEADER):
+        raise Refused(f"{where} {text!r}: only the leader hands over")
+    if deed == "handover" or (deed == "cut" and word == LEADER):
+        return LEADER
+    try:
+        order(deed, word, mission.robots)
+    except Refused as refused:
+        raise Refused(f"{where} {text!r}: {refused}") from None
+    return int(word) if deed in ("cut", "heal") and word.isdecimal() else word
 
 
 def _target(word: str, text: str, mission: Mission, where: str) -> int | Literal["leader"]:

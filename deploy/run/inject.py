@@ -1,4 +1,4 @@
-"""`lfa fault`: do something to a robot of a fleet that runs on this machine, however it was started.
+"""`lfa fault`: do something to a robot, or to the air, of a fleet that runs on this machine, however it was started.
 
 Agents are found in the process table by what they were told (`--id`, `--fleet`); the signal goes only to exactly the
 process that was found: same pid, start time, user and command line.
@@ -14,9 +14,10 @@ import typer
 from msgspec import Struct
 
 from deploy.run import processes
-from deploy.run.faults import DEEDS, LEADER, SIGNALS
+from deploy.run.faults import DEEDS, LEADER, ORDERS, SIGNALS
 from deploy.run.operator import Operator
 from deploy.run.processes import Identity
+from deploy.run.weather import note
 from protocol import clock
 from protocol.bus import Inbox
 from protocol.messages import BadMessage, PoseStamped, Role, decode, encode
@@ -38,16 +39,20 @@ class Running(Struct, frozen=True):
 
 
 def command(
-    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(SIGNALS)}.")],
-    target: Annotated[str, typer.Argument(help="A robot's id, or leader.")],
+    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join((*SIGNALS, *ORDERS))}.")],
+    target: Annotated[
+        str, typer.Argument(help="A robot's id, or leader; of a cut 3, 1-2, 1,2-3,w or 1>2; of loss a share.")
+    ] = "",
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was done as JSON.")] = False,
 ) -> int:
-    if deed not in SIGNALS:
-        raise Refused(f"{deed!r}: must be one of {', '.join(SIGNALS)}")
+    if deed not in (*SIGNALS, *ORDERS):
+        raise Refused(f"{deed!r}: must be one of {', '.join((*SIGNALS, *ORDERS))}")
     team = _one_fleet(agents(), fleet)
     inbox = Inbox()
     bus = _bus(team[0], inbox)
+    if deed in ORDERS:
+        return _order(deed, target, team, bus, inbox, as_json)
     try:
         victim = _victim(target, team, bus, inbox)
         operator = Operator(victim.fleet, clock.wall_ms())
@@ -62,6 +67,27 @@ def command(
     facts = {"deed": deed, "robot": victim.robot, "fleet": victim.fleet, "pid": victim.identity.pid}
     said = f"{deed} robot {victim.robot} of {victim.fleet} (process {victim.identity.pid}): {DEEDS[deed]}"
     print(msgspec.json.encode(facts).decode() if as_json else said)
+    return 0
+
+
+def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
+    """An operator's word to all of the fleet. Raises Refused when it makes no sense, or nobody would obey it."""
+    fleet, robots = team[0].fleet, tuple(sorted(agent.robot for agent in team))
+    try:
+        if deed != "handover" and not all("--faults" in agent.identity.arguments for agent in team):
+            raise Refused(f"fleet {fleet} does not obey weather: its processes were started without --faults")
+        whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
+        operator = Operator(fleet, clock.wall_ms())
+        said = note(operator, clock.now(), deed, whom, robots)
+        event = operator.says("fault", clock.now(), deed=deed, robot=int(whom) if whom.isdecimal() else whom)
+        bus.publish(operator.key, encode(event))
+        bus.publish(operator.orders_key, encode(said))
+        clock.sleep(SENT_S)
+    finally:
+        bus.close()
+    facts = {"deed": deed, "target": whom, "fleet": fleet}
+    line = f"{deed} {whom} in {fleet}: {DEEDS[deed]}"
+    print(msgspec.json.encode(facts).decode() if as_json else line)
     return 0
 
 

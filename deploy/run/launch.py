@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from random import Random
 from typing import Annotated
 
 import msgspec
@@ -18,18 +19,20 @@ import typer
 
 from deploy.run.crew import ROUTER_NAME, Crew, rows
 from deploy.run.ending import Ended, Interrupts, finish, report, reread
-from deploy.run.faults import SIGNALS, Deed, Fault, Schedule, parse_all
+from deploy.run.faults import ORDERS, SIGNALS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import About, make
 from deploy.run.operator import Operator
 from deploy.run.progress import Progress, progress
 from deploy.run.recorder import LastWord, Task
 from deploy.run.referee import Referee, Verdict
 from deploy.run.standing import Standing
+from deploy.run.weather import note
 from deploy.run.worldtime import WorldTime
 from protocol import clock
 from protocol.bus import Inbox
-from protocol.messages import BadMessage, Event, Message, Truth, decode, encode
+from protocol.messages import BadMessage, Event, Message, OperatorNote, Truth, decode, encode
 from protocol.mission import robot_name
+from protocol.radio import CLEAR, WEATHER, Air
 from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
 from protocol.zenoh_bus import ZenohBus, answers
 from world.scenario import Scenario, draw, load
@@ -38,6 +41,7 @@ STEP_S = 0.01
 SHOW_EVERY_S = 0.2
 START_S_MAX = 20.0
 SILENCE_S_MAX = 5.0
+NEWS_S = 2.0  # how long a robot that starts again is told the weather
 RECORDER_S_MAX = 30.0  # to read the recording back and sum it up
 
 
@@ -99,6 +103,9 @@ class _Launch:
         self._operator = Operator(about.fleet, clock.wall_ms())
         self._inbox = Inbox()
         self._bus: ZenohBus | None = None
+        self._air = Air(CLEAR, Random(0))
+        """The weather as ordered, by whomever: one that starts again during it is told."""
+        self._repeat_weather_until = 0.0
         self.summed_up = False
         """The recorder has written `summary.json`."""
 
@@ -143,7 +150,7 @@ class _Launch:
         self._await(router.name, lambda: answers(self._endpoint), interrupts)
         self._crew.start(recorder)
         self._bus = bus = ZenohBus(self._endpoint, self._inbox)
-        wanted = {key(self._about.fleet, "*", topic) for topic in ("event", "tracking", "status", "truth")}
+        wanted = {key(self._about.fleet, "*", topic) for topic in ("event", "tracking", "status", "truth", "operator")}
         bus.follow(frozenset(wanted))
         fleet = self._about.fleet
         self._await(recorder.name, lambda: bool(bus.living(fleet, RECORDER_NAME)), interrupts)
@@ -182,6 +189,8 @@ class _Launch:
             self._time.see(at, message.time_s)
         elif isinstance(message, Event) and message.header.sender == OPERATOR_NAME:
             self._expect(message)
+        elif isinstance(message, OperatorNote) and message.command == WEATHER:
+            self._air.obey(message.arguments)
         self._referee.see(message)
         self._standing.see(message)
 
@@ -220,12 +229,21 @@ class _Launch:
             return
         for deed, victim in self._schedule.due(self._time.of(clock.now()), self._referee.leader):
             if self._do(deed, victim):
-                view.note(self._standing, f"fault: {deed} robot {victim}")
+                view.note(self._standing, f"fault: {deed} {f'robot {victim}' if isinstance(victim, int) else victim}")
             else:
                 self._undone.append(f"{deed} {victim}")
+        if self._repeat_weather_until > clock.now() and (self._air.cuts or self._air.radio != CLEAR):
+            again = self._operator.orders(WEATHER, clock.now(), **self._air.orders)
+            self._publish(self._operator.orders_key, again)
 
-    def _do(self, deed: Deed, victim: int) -> bool:
+    def _do(self, deed: Deed, victim: int | str) -> bool:
         """False when there is nobody to do it to, or somebody already."""
+        if deed in ORDERS or isinstance(victim, str):
+            self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
+            self._publish(
+                self._operator.orders_key, note(self._operator, clock.now(), deed, victim, self._mission.robots)
+            )
+            return True
         name = robot_name(victim)
         if self._crew.runs(name) == (deed == "restart"):
             return False
@@ -234,14 +252,18 @@ class _Launch:
             self._doomed.discard(name)
             self._standing.gone.discard(victim)
             self._crew.start(next(row for row in self._rows if row.name == name).restarted())
+            self._repeat_weather_until = clock.now() + NEWS_S
             return True
         if deed in ("kill", "terminate"):
             self._doomed.add(name)
         return self._crew.signal(name, SIGNALS[deed])
 
     def _say(self, kind: str, **data: object) -> None:
+        self._publish(self._operator.key, self._operator.says(kind, clock.now(), **data))
+
+    def _publish(self, to: str, message: Message) -> None:
         if self._bus is not None:
-            self._bus.publish(self._operator.key, encode(self._operator.says(kind, clock.now(), **data)))
+            self._bus.publish(to, encode(message))
 
     # --- the end ---------------------------------------------------------------------------------------------------
 

@@ -11,15 +11,17 @@ import typer
 
 from agents.agent import Agent
 from deploy.run.ending import Ended, Interrupts, finish, report
-from deploy.run.faults import Deed, Fault, Schedule, parse_all
+from deploy.run.faults import ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
 from deploy.run.operator import Operator
 from deploy.run.record import Recorder
 from deploy.run.referee import Referee, Verdict
+from deploy.run.weather import note
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Message
+from protocol.messages import Message, encode
 from protocol.mission import robot_name
 from protocol.node import Node
+from protocol.radio import WEATHER
 from protocol.topics import WORLD_NAME
 from protocol.witness import Witness
 from world.scenario import Scenario, draw, load
@@ -109,8 +111,11 @@ class _Run:
                 return verdict
         return Verdict("aborted", "the world fell silent")
 
-    def _do(self, deed: Deed, victim: int) -> None:
+    def _do(self, deed: Deed, victim: int | str) -> None:
         """A deed on one that is not there, or is there already, does nothing, as a signal would."""
+        if deed in ORDERS or isinstance(victim, str):
+            self._order(deed, victim)
+            return
         name = robot_name(victim)
         present = name in self._simulator.names
         if present == (deed == "restart"):
@@ -127,6 +132,17 @@ class _Run:
                 self._simulator.terminate(name)
             case "restart":
                 self._add(self._agent(victim))
+
+    def _order(self, deed: Deed, target: int | str) -> None:
+        """An operator's word: about the weather it goes to the air, else to all agents."""
+        now = self._simulator.now
+        self._say("fault", deed=deed, robot=target, t=now)
+        said = note(self._operator, now, deed, target, self._scenario.mission.robots)
+        if said.command == WEATHER:
+            self._simulator.air.obey(said.arguments)
+            self._recorder.record(now, self._operator.orders_key, said)
+        else:
+            self._simulator.say(self._operator.orders_key, encode(said))
 
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
         self._recorder.record(now, key, message)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from deploy.run.faults import Fault, Schedule, parse, parse_all
+from deploy.run.weather import links
 from protocol.mission import Mission, Refused
 
 MISSION = Mission()
@@ -18,6 +19,15 @@ MISSION = Mission()
         (" terminate  3 at 9.5 s ", Fault("terminate", 3, 9.5)),
         ("stop robot2 at 5 s for 3 s", Fault("stop", 2, 5.0, 3.0)),
         ("restart 2 at 12 s", Fault("restart", 2, 12.0)),
+        ("cut 3 at 5 s for 4 s", Fault("cut", 3, 5.0, 4.0)),
+        ("cut leader at 5 s", Fault("cut", "leader", 5.0)),
+        ("cut 1,2-3,4,w at 5 s", Fault("cut", "1,2-3,4,w", 5.0)),
+        ("cut 1>2 at 5 s", Fault("cut", "1>2", 5.0)),
+        ("heal at 9 s", Fault("heal", "", 9.0)),
+        ("heal 1>2 at 9 s", Fault("heal", "1>2", 9.0)),
+        ("loss 0.2 at 5 s for 3 s", Fault("loss", "0.2", 5.0, 3.0)),
+        ("loss at 5 s", Fault("loss", "", 5.0)),
+        ("handover at 5 s", Fault("handover", "leader", 5.0)),
     ],
 )
 def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
@@ -30,6 +40,8 @@ def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
     [
         "", "kill", "kill leader", "kill leader at noon", "kill leader at -1 s", "kill leader at 20", "kill 5 at 1 s",
         "kill 0 at 1 s", "hug leader at 20 s", "kill 2 at 1 s for 3 s", "restart leader at 2 s",
+        "cut at 1 s", "cut 5 at 1 s", "cut 1,2-2 at 1 s", "cut 1>w>2 at 1 s", "loss 2 at 1 s", "loss some at 1 s",
+        "handover 2 at 1 s", "heal at 1 s for 2 s", "cut leader-2 at 1 s", "kill 1,2 at 1 s", "kill at 1 s",
         "kill leader at 1 s or so", "kill \u0662 at 1 s", "kill leader at 1e3 s",
     ],
 )  # fmt: skip
@@ -63,3 +75,23 @@ def test_who_is_stopped_for_a_while_is_woken_even_if_another_leads_by_then() -> 
     assert schedule.due(1.0, 1) == [("stop", 1)]
     assert schedule.due(2.9, 2) == []
     assert schedule.due(3.0, 2) == [("continue", 1)]
+
+
+def test_a_cut_for_a_while_heals_only_itself() -> None:
+    schedule = Schedule([parse("cut leader at 1 s for 2 s", MISSION), parse("loss 0.1 at 1 s for 1 s", MISSION)])
+    assert schedule.due(1.0, 1) == [("cut", 1), ("loss", "0.1")]
+    assert schedule.due(3.0, 2) == [("loss", ""), ("heal", 1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "parted"),
+    [
+        ("1>2", {("robot1", "robot2")}),
+        ("1-2", {("robot1", "robot2"), ("robot2", "robot1")}),
+        ("2-w", {("robot2", "world"), ("world", "robot2")}),
+        ("1,2", {(a, b) for one in ("robot1", "robot2") for other in ("robot3", "world")
+                 for a, b in ((one, other), (other, one))}),
+    ],
+)  # fmt: skip
+def test_a_cut_parts_sides_one_way_or_both(text: str, parted: set[tuple[str, str]]) -> None:
+    assert set(links(text, (1, 2, 3))) == parted

@@ -1,0 +1,73 @@
+"""What an operator orders of the air: whom a cut parts, how much is lost. Sides are ids joined by commas; `w` is the
+world with its witness, which is on nobody's robot.
+
+    3       robot 3 from everybody else      1-2      1 and 2 from each other
+    1,2     both of them from the rest       1,2-3,w  one side from the other
+    1>2     2 does not hear 1
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from deploy.run.operator import Operator
+from protocol.messages import OperatorNote
+from protocol.mission import Refused, robot_name
+from protocol.radio import WEATHER, Link
+from protocol.topics import WORLD_NAME
+
+WORLD_WORD = "w"
+SIDES = re.compile(r"(?P<one>[\dw,]+)(?:(?P<way>[->])(?P<other>[\dw,]+))?", re.ASCII)
+
+
+def links(text: str, robots: tuple[int, ...]) -> tuple[Link, ...]:
+    """The links, one a direction, that the cut `text` parts in a team of `robots`. Raises Refused."""
+    match = SIDES.fullmatch(text)
+    right = f"such as 3, 1-2, 1,2-3,w or 1>2, of ids {', '.join(map(str, robots))} and w for the world"
+    if match is None:
+        raise Refused(f"cut {text!r}: must be {right}")
+    one = _side(match["one"], robots, right)
+    everybody = [*(robot_name(robot) for robot in robots), WORLD_NAME]
+    rest = [place for place in everybody if place not in one]
+    other = rest if match["other"] is None else _side(match["other"], robots, right)
+    if set(one) & set(other):
+        raise Refused(f"cut {text!r}: nobody may be on both sides")
+    there = tuple((a, b) for a in one for b in other)
+    return there if match["way"] == ">" else there + tuple((b, a) for a, b in there)
+
+
+def _side(text: str, robots: tuple[int, ...], right: str) -> list[str]:
+    words = text.split(",")
+    if not all(word == WORLD_WORD or (word.isdecimal() and int(word) in robots) for word in words):
+        raise Refused(f"cut side {text!r}: must be {right}")
+    return [WORLD_NAME if word == WORLD_WORD else robot_name(int(word)) for word in words]
+
+
+def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, dict[str, Any]]:
+    """The operator's command and its arguments for `cut`, `heal`, `loss` and `handover`. Raises Refused."""
+    text = str(target)
+    match deed:
+        case "cut":
+            return WEATHER, {"cut": links(text, robots)}
+        case "heal":
+            return WEATHER, {"mend": links(text, robots)} if text else {"heal": True}
+        case "loss":
+            return WEATHER, {"radio": {"loss": _share(text)}} if text else {"fair": True}
+        case _:
+            return deed, {}
+
+
+def note(operator: Operator, now: float, deed: str, target: int | str, robots: tuple[int, ...]) -> OperatorNote:
+    command, arguments = order(deed, target, robots)
+    return operator.orders(command, now, **arguments)
+
+
+def _share(text: str) -> float:
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 0.0 <= share <= 1.0:
+        raise Refused(f"loss {text!r}: must be a share from 0 to 1, such as 0.2")
+    return share
