@@ -1,4 +1,4 @@
-"""Robots that go exactly where their wheels turn and pass through everything: the world without an engine.
+"""Robots that go exactly where their wheels turn, pass through everything and over any terrain: no engine.
 
 The same shape as `physics.Physics`, for fuzzing what robots say to each other at the speed of arithmetic; and the
 parts that both share: a drive with its limits, and the way of a moving obstacle.
@@ -78,3 +78,7 @@ class Kinematic:
         """The pose in `map` of each obstacle that is not nailed down, by its place in the scenario's list."""
         time_s = self._steps * self._dt_s
         return {n: Pose2D(*way.at(time_s), 0.0) for n, way in self._ways.items()}
+
+    def standing_m(self) -> list[float]:
+        """Height [m] of what each robot stands on: the floor, whatever the terrain."""
+        return [0.0] * len(self.poses)

@@ -3,6 +3,7 @@
 A robot that touches nothing follows equation (1) exactly: the engine moves a body along a straight line for one
 step, so it is given the chord of the arc, which has the arc's ends. A robot in touch with something is driven by
 what its wheels can push at most; where that is not enough the wheels slip, and odometry goes astray as it should.
+Terrain lets a wheel over its edges or not (`wheels.py`), and holds as hard as it needs to.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from protocol.mission import robot_name
 from world.course import Way, reach_of, starts_of
 from world.kinematic import Drive, Touch
 from world.spec import Obstacle, Scenario
+from world.wheels import Floor
 
 GRAVITY_MPS2 = 9.81
 GROUND_FRICTION = 0.4
@@ -57,6 +59,11 @@ class Physics:
         self._mass_kg, self._push_n, self._torque_nm = mass_kg, world.body.push_n, world.body.push_n * radius_m
         self._robots = [self._add_robot(n, robot_name(robot_id), radius_m) for n, robot_id in enumerate(mission.robots)]
         self._velocity = [(0.0, 0.0, 0.0)] * len(self._robots)
+        self._floor = Floor(scenario)
+        self._rolls: list[Twist] = [STILL] * len(self._robots)
+        """What the ground lets each robot's body do."""
+        self._jolted = [False] * len(self._robots)
+        """Lost speed at an edge in the last step."""
         self._touching = [0] * len(self._robots)
         self._parted_at: dict[tuple[int, str], int] = {}
         self._touches: list[Touch] = []
@@ -73,15 +80,18 @@ class Physics:
         """One step of 1/physics_hz with these commanded twists, one a robot; the touches that began in it."""
         dt_s = self._dt_s
         self._steps += 1
+        near = [self._floor.near(n, pose) for n, pose in enumerate(self.poses)]
         for n, drive in enumerate(self._drives):
-            self._push(n, drive.step(wanted[n], dt_s))
+            self.wheels[n] = self._rolls[n] = drive.step(wanted[n], dt_s)
+            held_hard = near[n] and self._touching[n] == 0 and self._roll(n, drive)
+            self._push(n, self._rolls[n], held_hard)
         for _, body, way in self._moving:
             (x, y), (to_x, to_y) = body.position, way.at(self._steps * dt_s)
             body.velocity = ((to_x - x) / dt_s, (to_y - y) / dt_s)
         held = [touching > 0 for touching in self._touching]
         self._space.step(dt_s)
         for n, body in enumerate(self._robots):
-            self._read(n, body, held[n] or self._touching[n] > 0)
+            self._read(n, body, held[n] or self._touching[n] > 0, near[n])
         touches, self._touches = self._touches, []
         touches.sort(key=lambda touch: (touch.robot, touch.other))
         return touches
@@ -92,9 +102,19 @@ class Physics:
         poses.update((n, Pose2D(*body.position, wrap(body.angle))) for n, body in self._pushable.items())
         return dict(sorted(poses.items()))
 
-    def _push(self, n: int, twist: Twist) -> None:
-        """Bring robot `n` to what its wheels turn for, as far as their grip on the floor allows."""
-        self.wheels[n] = twist
+    def standing_m(self) -> list[float]:
+        """Height [m] of what each robot stands on."""
+        return [self._floor.standing_m(n) for n in range(len(self._robots))]
+
+    def _roll(self, n: int, drive: Drive) -> bool:
+        """Let the ground have its say about where robot `n` rolls; whether an edge holds or slows it."""
+        wheels, jolted = drive.twist, self._jolted[n]
+        self._rolls[n], drive.twist = self._floor.roll(n, self.poses[n], wheels, self.twists[n])
+        self._jolted[n] = drive.twist is not wheels
+        return jolted or self._rolls[n] is not wheels
+
+    def _push(self, n: int, twist: Twist, held_hard: bool) -> None:
+        """Bring robot `n` to `twist`, as far as its wheels' grip on the floor allows, or an edge makes it."""
         touching = self._touching[n] > 0
         now = self._velocity[n]
         if twist is STILL and not touching and now == (0.0, 0.0, 0.0):
@@ -104,8 +124,9 @@ class Physics:
         middle = self.poses[n].theta + 0.5 * turn
         dx, dy, dw = chord * cos(middle) - now[0], chord * sin(middle) - now[1], twist.angular_z - now[2]
         dv_max, dw_max = self._push_n / self._mass_kg * self._dt_s, self._torque_nm / self._inertia * self._dt_s
-        grip = min(1.0, dv_max / max(hypot(dx, dy), 1e-12))
-        dx, dy, dw = grip * dx, grip * dy, max(-dw_max, min(dw_max, dw))
+        if not held_hard:
+            grip = min(1.0, dv_max / max(hypot(dx, dy), 1e-12))
+            dx, dy, dw = grip * dx, grip * dy, max(-dw_max, min(dw_max, dw))
         body = self._robots[n]
         if touching:
             # As a force, so that the contact answers it within the step: a speed given now would first be a way
@@ -117,14 +138,21 @@ class Physics:
             body.velocity = self._velocity[n][:2]
             body.angular_velocity = self._velocity[n][2]
 
-    def _read(self, n: int, body: pymunk.Body, touched: bool) -> None:
+    def _read(self, n: int, body: pymunk.Body, touched: bool, near: bool) -> None:
         if not touched and self._velocity[n] == (0.0, 0.0, 0.0):
             self.twists[n] = STILL
             return
         x, y = body.position
-        self.poses[n] = Pose2D(x, y, wrap(body.angle))
+        pose = Pose2D(x, y, wrap(body.angle))
+        if near and not self._floor.settle(n, pose, self.twists[n]):
+            # Pushed, or sliding, against an edge that it does not get over.
+            body.position, body.angle = (self.poses[n].x, self.poses[n].y), self.poses[n].theta
+            body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
+            self._velocity[n], self.twists[n] = (0.0, 0.0, 0.0), STILL
+            return
+        self.poses[n] = pose
         if not touched:
-            self.twists[n] = self.wheels[n]
+            self.twists[n] = self._rolls[n]
             return
         (vx, vy), w, theta = body.velocity, body.angular_velocity, self.poses[n].theta
         self._velocity[n] = (vx, vy, w)

@@ -10,6 +10,7 @@ from protocol.messages import (
     CmdVel,
     Contact,
     Fence,
+    GroundProfile,
     Header,
     LaserScan,
     LeaseNote,
@@ -23,7 +24,7 @@ from protocol.node import Envelope
 from protocol.timing import timing_of
 from protocol.topics import TO_ALL, WORLD_NAME, key
 from world.lidar import ANGLE_MIN, Floats
-from world.sensors import Localizer, RangeNoise, WheelOdometry
+from world.sensors import HeightNoise, Localizer, RangeNoise, WheelOdometry
 from world.spec import Scenario
 
 REFUSAL_EVERY_S = 0.2
@@ -40,8 +41,9 @@ class Robot:
         self.gateway = Gateway(robot_id, incarnation, timing_of(scenario.mission.profile), now)
         self.odometry = WheelOdometry(noise, seed, robot_id)
         self._localizer = Localizer(noise, seed, robot_id)
-        self._range_noise = RangeNoise(noise, seed, robot_id)
-        self._lidar = scenario.world.lidar
+        self._range_noise = RangeNoise(noise, scenario.world.lidar, seed, robot_id)
+        self._height_noise = HeightNoise(noise, seed, robot_id)
+        self._lidar, self._ground = scenario.world.lidar, scenario.world.ground
         self._fleet = fleet
         self._incarnation = incarnation
         self._seq: dict[str, int] = {}
@@ -99,6 +101,17 @@ class Robot:
             self._range_noise.apply(ranges),
         )
         return self._envelope("scan", message)
+
+    def ground(self, stamp: float, offsets_m: tuple[float, ...], heights: Floats) -> Envelope:
+        """The exact `heights` [m], one row a line at `offsets_m`, as this robot's ground sensor measures them."""
+        message = GroundProfile(
+            self._header("ground", stamp),
+            self._ground.first_m,
+            self._ground.increment_m,
+            offsets_m,
+            self._height_noise.apply(heights),
+        )
+        return self._envelope("ground", message)
 
     def contact(self, stamp: float, pose_map: Pose2D, x: float, y: float) -> Envelope:
         """The bumper was touched at (x, y) in `map`."""

@@ -1,4 +1,4 @@
-"""What a robot's own hardware would say: odometry, localisation, scan; with noise and drop-out.
+"""What a robot's own hardware would say: odometry, localisation, scan, ground; with noise, drop-out and outliers.
 
 Each robot and sensor has its own generator, derived from the scenario's seed: a sensor more, or a robot that is asked
 more often, changes nobody else's noise. Standard deviations come from `Noise`; with all at zero, nothing is drawn.
@@ -6,14 +6,19 @@ more often, changes nobody else's noise. Standard deviations come from `Noise`; 
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from random import Random
 
 import numpy as np
 
 from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 from world.lidar import Floats
-from world.spec import Noise
+from world.spec import Lidar, Noise
+
+HEIGHT_OUTLIER_M = 0.1
+"""A bad height is off by up to this much."""
+HEIGHT_DIGITS = 4
+"""The ground sensor resolves 0.1 mm."""
 
 
 def chance_of(seed: int, robot_id: int, sensor: str) -> Random:
@@ -71,19 +76,43 @@ class Localizer:
 
 
 class RangeNoise:
-    """What a real scanner makes of exact ranges: jitter on each, and beams that do not come back (+inf)."""
+    """What a real scanner makes of exact ranges: jitter on each, wrong ones, and beams that do not come back (+inf)."""
 
-    def __init__(self, noise: Noise, seed: int, robot_id: int) -> None:
+    def __init__(self, noise: Noise, lidar: Lidar, seed: int, robot_id: int) -> None:
         self._noise = noise
+        self._limits_m = lidar.range_min_m, lidar.range_max_m
         self._chance = np.random.default_rng(chance_of(seed, robot_id, "scan").getrandbits(64))
 
     def apply(self, ranges: Floats) -> tuple[float, ...]:
-        """The ranges [m] as measured; what was out of range stays so."""
+        """The ranges [m] as measured; what was out of range stays so, but for outliers."""
         noise, chance = self._noise, self._chance
         if noise.range_m > 0.0:
             finite = np.isfinite(ranges)
             jitter = chance.normal(0.0, noise.range_m, len(ranges))
             ranges = np.where(finite, np.maximum(ranges + jitter, 0.0), ranges)
+        if noise.range_outlier > 0.0:
+            wrong = chance.uniform(*self._limits_m, len(ranges))
+            ranges = np.where(chance.random(len(ranges)) < noise.range_outlier, wrong, ranges)
         if noise.range_dropout > 0.0:
             ranges = np.where(chance.random(len(ranges)) < noise.range_dropout, inf, ranges)
         return tuple(ranges.tolist())
+
+
+class HeightNoise:
+    """What a real range sensor makes of exact heights: jitter on each, wrong ones, and missing ones (nan)."""
+
+    def __init__(self, noise: Noise, seed: int, robot_id: int) -> None:
+        self._noise = noise
+        self._chance = np.random.default_rng(chance_of(seed, robot_id, "ground").getrandbits(64))
+
+    def apply(self, heights: Floats) -> tuple[tuple[float, ...], ...]:
+        """The heights [m], one row a line, as measured; too deep (-inf) stays so, but for missing ones."""
+        noise, chance, shape = self._noise, self._chance, heights.shape
+        if noise.ground_m > 0.0:
+            heights = heights + chance.normal(0.0, noise.ground_m, shape)
+        if noise.ground_outlier > 0.0:
+            wrong = chance.uniform(-HEIGHT_OUTLIER_M, HEIGHT_OUTLIER_M, shape)
+            heights = np.where(chance.random(shape) < noise.ground_outlier, heights + wrong, heights)
+        if noise.ground_dropout > 0.0:
+            heights = np.where(chance.random(shape) < noise.ground_dropout, nan, heights)
+        return tuple(map(tuple, heights.round(HEIGHT_DIGITS).tolist()))

@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from protocol.mission import Mission, Refused, check_mission
 from protocol.radio import Radio
+from world.terrain import Bump, Ditch, Pothole, check_feature, features
 
 Point = tuple[float, float]
 ROBOTS_MAX = 500
@@ -41,7 +42,8 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 
     mass_kg: float = 5.0
     push_n: float = 40.0
-    """Largest force of the wheels on the ground: what a robot can push."""
+    """Largest force of the wheels on the ground: what a robot can push, and how steep a contact it climbs."""
+    wheel_radius_m: float = 0.05
 
 
 class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
@@ -49,6 +51,16 @@ class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
     range_min_m: float = 0.05
     range_max_m: float = 8.0
     rate_hz: float = 10.0
+
+
+class Ground(Struct, frozen=True, forbid_unknown_fields=True):
+    """The downward-looking range sensor: points along three lines ahead of the robot's centre, 20 times a second."""
+
+    first_m: float = 0.1
+    reach_m: float = 1.5
+    increment_m: float = 0.05
+    depth_m: float = 1.0
+    """A floor that lies deeper is not seen."""
 
 
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
@@ -62,6 +74,12 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     """Of the wheels' speed, as a fraction."""
     range_m: float = 0.0
     range_dropout: float = 0.0
+    range_outlier: float = 0.0
+    """Probability that a beam reads anything between its limits."""
+    ground_m: float = 0.0
+    ground_dropout: float = 0.0
+    ground_outlier: float = 0.0
+    """Probability that a height is off by anything up to 0.1 m either way."""
 
 
 class Vary(Struct, frozen=True, forbid_unknown_fields=True):
@@ -86,8 +104,12 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     walls_m: tuple[tuple[float, float, float, float], ...] = ()
     """Segments x1, y1, x2, y2."""
     obstacles: tuple[Obstacle, ...] = ()
+    potholes: tuple[Pothole, ...] = ()
+    bumps: tuple[Bump, ...] = ()
+    ditches: tuple[Ditch, ...] = ()
     body: Body = Body()
     lidar: Lidar = Lidar()
+    ground: Ground = Ground()
     noise: Noise = Noise()
     vary: Vary = Vary()
     physics_hz: float = 100.0
@@ -119,6 +141,8 @@ def check_scenario(scenario: Scenario) -> Scenario:
         _require(low <= value <= high, where, value, f"a number from {low:g} to {high:g}")
     for index, obstacle in enumerate(scenario.world.obstacles):
         _check_obstacle(f"world.obstacles[{index}]", obstacle)
+    for key, feature in features(scenario.world):
+        check_feature(f"world.{key}", feature)
     for index, wall in enumerate(scenario.world.walls_m):
         where = f"world.walls_m[{index}]"
         long_enough = hypot(wall[2] - wall[0], wall[3] - wall[1]) >= LENGTH_M_MIN
@@ -128,22 +152,31 @@ def check_scenario(scenario: Scenario) -> Scenario:
 
 def _ranges(scenario: Scenario) -> list[tuple[str, float, float, float]]:
     world, radio = scenario.world, scenario.radio
-    noise, vary, lidar = world.noise, world.vary, world.lidar
+    noise, vary, lidar, ground = world.noise, world.vary, world.lidar, world.ground
     return [
         ("time_limit_s", scenario.time_limit_s, 1.0, 1e6),
         ("world.physics_hz", world.physics_hz, PHYSICS_HZ_MIN, PHYSICS_HZ_MAX),
         ("world.body.mass_kg", world.body.mass_kg, 0.1, 1e4),
         ("world.body.push_n", world.body.push_n, 0.1, 1e6),
+        ("world.body.wheel_radius_m", world.body.wheel_radius_m, 0.005, 1.0),
         ("world.lidar.beams", lidar.beams, 4, 4096),
         ("world.lidar.range_min_m", lidar.range_min_m, 0.0, lidar.range_max_m),
         ("world.lidar.range_max_m", lidar.range_max_m, 0.1, 1e3),
         ("world.lidar.rate_hz", lidar.rate_hz, 0.1, world.physics_hz),
+        ("world.ground.first_m", ground.first_m, 0.0, ground.reach_m),
+        ("world.ground.reach_m", ground.reach_m, 0.05, 10.0),
+        ("world.ground.increment_m", ground.increment_m, 0.01, 1.0),
+        ("world.ground.depth_m", ground.depth_m, 0.01, 10.0),
         ("world.noise.localization_m", noise.localization_m, 0.0, 10.0),
         ("world.noise.localization_rad", noise.localization_rad, 0.0, 3.0),
         ("world.noise.localization_dropout", noise.localization_dropout, 0.0, 1.0),
         ("world.noise.odometry", noise.odometry, 0.0, 1.0),
         ("world.noise.range_m", noise.range_m, 0.0, 10.0),
         ("world.noise.range_dropout", noise.range_dropout, 0.0, 1.0),
+        ("world.noise.range_outlier", noise.range_outlier, 0.0, 1.0),
+        ("world.noise.ground_m", noise.ground_m, 0.0, 1.0),
+        ("world.noise.ground_dropout", noise.ground_dropout, 0.0, 1.0),
+        ("world.noise.ground_outlier", noise.ground_outlier, 0.0, 1.0),
         ("world.vary.obstacles_m", vary.obstacles_m, 0.0, 10.0),
         ("world.vary.starts_m", vary.starts_m, 0.0, 10.0),
         ("world.vary.starts_rad", vary.starts_rad, 0.0, pi),

@@ -28,6 +28,7 @@ from protocol.messages import (
 from protocol.mission import robot_name
 from protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
 from protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
+from world.ground import Profiler
 from world.kinematic import Kinematic, Touch
 from world.lidar import Scanner
 from world.physics import Physics
@@ -73,6 +74,7 @@ class World:
         self._seed = seed
         self._bodies = bodies(scenario)
         self._scanner = Scanner(scenario)
+        self._profiler = Profiler(scenario)
         self._robots: list[Robot] = []
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
@@ -195,6 +197,9 @@ class World:
         if self._is_due(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, self._bodies.moved())
             sent += [robot.scan(stamp, ranges[n]) for n, robot in enumerate(self._robots)]
+        if self._is_due(TOPIC["ground"].rate_hz):
+            heights = self._profiler.profile(poses, self._bodies.standing_m())
+            sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in enumerate(self._robots)]
         if self._is_due(TOPIC["truth"].rate_hz):
             sent.append(self._truth(stamp))
         if self._is_due(TOPIC["clock"].rate_hz):

@@ -14,7 +14,7 @@ import pytest
 from protocol.geometry import Pose2D, Twist, along_arc, distance
 from world import sensors
 from world.sensors import Localizer, RangeNoise, WheelOdometry
-from world.spec import Noise
+from world.spec import Lidar, Noise
 
 NOISY = Noise(
     localization_m=0.005,
@@ -29,7 +29,7 @@ NOISY = Noise(
 def readings(seed: int, robot_id: int) -> tuple[object, ...]:
     """A few readings of every noisy sensor of one robot."""
     odometry, localizer = WheelOdometry(NOISY, seed, robot_id), Localizer(NOISY, seed, robot_id)
-    ranges = RangeNoise(NOISY, seed, robot_id)
+    ranges = RangeNoise(NOISY, Lidar(), seed, robot_id)
     for _ in range(20):
         odometry.redraw()
         odometry.turn(Twist(0.5, 0.1), 0.02)
@@ -103,7 +103,7 @@ def test_fixes_scatter_as_stated_and_some_are_missing() -> None:
 
 
 def test_scan_noise_leaves_inf_alone_and_dropped_beams_are_inf() -> None:
-    noise = RangeNoise(NOISY, 1, 1)
+    noise = RangeNoise(NOISY, Lidar(), 1, 1)
     measured = noise.apply(np.array([inf, -inf, *[2.0] * 2000]))
     assert measured[0] == inf
     assert measured[1] in (-inf, inf)
@@ -114,4 +114,4 @@ def test_scan_noise_leaves_inf_alone_and_dropped_beams_are_inf() -> None:
 
 
 def test_a_clean_scan_is_exact() -> None:
-    assert RangeNoise(Noise(), 1, 1).apply(np.array([1.25, inf])) == (1.25, inf)
+    assert RangeNoise(Noise(), Lidar(), 1, 1).apply(np.array([1.25, inf])) == (1.25, inf)

@@ -1,0 +1,179 @@
+"""The ground: potholes, bumps and ditches as a scenario gives them, and as patches of floor at another height.
+
+The floor is at 0 and flat. A patch lies lower or higher, with an upright edge all round: what that does to wheels
+is `wheels.py`, how it looks from above `ground.py`. Where patches overlap the deepest counts, then the highest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, hypot, inf, sin, sqrt
+from typing import Protocol
+
+from msgspec import Struct
+
+from protocol.mission import Refused
+
+Point = tuple[float, float]
+PATCH_WIDTH_M_MIN = 0.02
+"""Two steps of a robot with 1 m/s: no edge falls between two points of the world's time."""
+
+
+class Pothole(Struct, frozen=True, forbid_unknown_fields=True):
+    """A hole: round with diameter `width_m`, or rectangular with `length_m` too."""
+
+    center_m: Point
+    width_m: float
+    """Along `theta`."""
+    depth_m: float
+    length_m: float | None = None
+    """Across `theta`."""
+    theta: float = 0.0
+
+
+class Bump(Struct, frozen=True, forbid_unknown_fields=True):
+    """A bar on the floor, as a speed bump: mostly crossed along `theta`."""
+
+    center_m: Point
+    width_m: float
+    """Along `theta`."""
+    length_m: float
+    """Across `theta`."""
+    height_m: float
+    theta: float = 0.0
+
+
+class Ditch(Struct, frozen=True, forbid_unknown_fields=True):
+    """A strip between two points."""
+
+    ends_m: tuple[Point, Point]
+    width_m: float
+    depth_m: float
+
+
+class Terrain(Protocol):
+    """The part of a world that is ground."""
+
+    @property
+    def potholes(self) -> tuple[Pothole, ...]: ...
+    @property
+    def bumps(self) -> tuple[Bump, ...]: ...
+    @property
+    def ditches(self) -> tuple[Ditch, ...]: ...
+
+
+class Patch(Struct, frozen=True, gc=False):
+    """A circle (`radius_m` above 0) or a rectangle (x along `theta`) of floor at `height_m`, in `map`."""
+
+    x: float
+    y: float
+    height_m: float
+    radius_m: float = 0.0
+    half_x_m: float = 0.0
+    half_y_m: float = 0.0
+    c: float = 1.0
+    """cos(theta)"""
+    s: float = 0.0
+    """sin(theta)"""
+
+    @property
+    def reach_m(self) -> float:
+        """Distance [m] of the outermost point from the centre."""
+        return self.radius_m or hypot(self.half_x_m, self.half_y_m)
+
+    @property
+    def corners_m(self) -> tuple[Point, ...]:
+        """Of a rectangle, in `map`, counter-clockwise."""
+        a, b = self.half_x_m, self.half_y_m
+        corners = ((a, -b), (a, b), (-a, b), (-a, -b))
+        return tuple((self.x + self.c * u - self.s * v, self.y + self.s * u + self.c * v) for u, v in corners)
+
+    def covers(self, x: float, y: float) -> bool:
+        dx, dy = x - self.x, y - self.y
+        if self.radius_m > 0.0:
+            return dx * dx + dy * dy <= self.radius_m * self.radius_m
+        return abs(self.c * dx + self.s * dy) <= self.half_x_m and abs(self.c * dy - self.s * dx) <= self.half_y_m
+
+    def gap_m(self, x: float, y: float) -> float:
+        """Distance [m] from (x, y) to the patch, zero on it."""
+        dx, dy = x - self.x, y - self.y
+        if self.radius_m > 0.0:
+            return max(0.0, hypot(dx, dy) - self.radius_m)
+        beside = max(0.0, abs(self.c * dx + self.s * dy) - self.half_x_m)
+        return hypot(beside, max(0.0, abs(self.c * dy - self.s * dx) - self.half_y_m))
+
+    def chord_m(self, x: float, y: float, ahead_x: float, ahead_y: float) -> float:
+        """How much of the straight line through (x, y) along the unit vector (ahead_x, ahead_y) lies in the patch."""
+        dx, dy = x - self.x, y - self.y
+        if self.radius_m > 0.0:
+            beside = ahead_x * dy - ahead_y * dx
+            return 2.0 * sqrt(max(0.0, self.radius_m * self.radius_m - beside * beside))
+        enter, leave = -inf, inf
+        along = (self.c * dx + self.s * dy, self.c * ahead_x + self.s * ahead_y, self.half_x_m)
+        across = (self.c * dy - self.s * dx, self.c * ahead_y - self.s * ahead_x, self.half_y_m)
+        for start, rate, half in (along, across):
+            if abs(rate) > 1e-9:
+                a, b = (-half - start) / rate, (half - start) / rate
+                enter, leave = max(enter, min(a, b)), min(leave, max(a, b))
+            elif abs(start) > half:
+                return 0.0
+        return max(0.0, leave - enter)
+
+
+Feature = Pothole | Bump | Ditch
+
+
+def features(terrain: Terrain) -> Iterator[tuple[str, Feature]]:
+    """All of it with the key under which the scenario gives it, `potholes[0]` first."""
+    kinds: tuple[tuple[str, tuple[Feature, ...]], ...] = (
+        ("potholes", terrain.potholes),
+        ("bumps", terrain.bumps),
+        ("ditches", terrain.ditches),
+    )
+    for kind, several in kinds:
+        for n, feature in enumerate(several):
+            yield f"{kind}[{n}]", feature
+
+
+def patches_of(terrain: Terrain) -> tuple[Patch, ...]:
+    """All patches, in the order in which they count where they overlap."""
+    patches = (patch_of(feature) for _, feature in features(terrain))
+    return tuple(sorted(patches, key=lambda patch: (patch.height_m > 0.0, -abs(patch.height_m))))
+
+
+def patch_of(feature: Feature) -> Patch:
+    """The piece of floor that `feature` is."""
+    if isinstance(feature, Ditch):
+        (x1, y1), (x2, y2) = feature.ends_m
+        length_m = hypot(x2 - x1, y2 - y1)
+        c, s = (y2 - y1) / length_m, (x1 - x2) / length_m
+        half_x, half_y, height = 0.5 * feature.width_m, 0.5 * length_m, -feature.depth_m
+        return Patch(0.5 * (x1 + x2), 0.5 * (y1 + y2), height, 0.0, half_x, half_y, c, s)
+    (x, y), half_x, turned = feature.center_m, 0.5 * feature.width_m, (cos(feature.theta), sin(feature.theta))
+    if isinstance(feature, Bump):
+        return Patch(x, y, feature.height_m, 0.0, half_x, 0.5 * feature.length_m, *turned)
+    if feature.length_m is None:
+        return Patch(x, y, -feature.depth_m, half_x)
+    return Patch(x, y, -feature.depth_m, 0.0, half_x, 0.5 * feature.length_m, *turned)
+
+
+def check_feature(where: str, feature: Feature) -> None:
+    """Refuses with the key, the value and what would be right when no ground can be made of `feature`."""
+    if isinstance(feature, Ditch):
+        (a, b), high = feature.ends_m, feature.depth_m
+        length_m, key = hypot(b[0] - a[0], b[1] - a[1]), "depth_m"
+        _require(length_m >= PATCH_WIDTH_M_MIN, f"{where}.ends_m", [list(a), list(b)], "two different points")
+    elif isinstance(feature, Bump):
+        length_m, key, high = feature.length_m, "height_m", feature.height_m
+    else:
+        length_m = feature.width_m if feature.length_m is None else feature.length_m
+        key, high = "depth_m", feature.depth_m
+    right = f"a number from {PATCH_WIDTH_M_MIN:g} to 1000"
+    _require(PATCH_WIDTH_M_MIN <= feature.width_m <= 1e3, f"{where}.width_m", feature.width_m, right)
+    _require(PATCH_WIDTH_M_MIN <= length_m <= 1e3, f"{where}.length_m", length_m, right)
+    _require(0.001 <= high <= 10.0, f"{where}.{key}", high, "a number from 0.001 to 10")
+
+
+def _require(fine: bool, where: str, value: object, right: str) -> None:
+    if not fine:
+        raise Refused(f"{where} = {value}: must be {right}")
