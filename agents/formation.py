@@ -95,7 +95,9 @@ class Formation:
 
     @classmethod
     def of(cls, mission: Mission) -> Formation:
-        return cls(mission.formation, mission.robots, 2.0 * mission.radius_m + 0.1)
+        formation = cls(mission.formation, mission.robots, 2.0 * mission.radius_m + 0.1)
+        formation.trace = mission.following.trace
+        return formation
 
     def request(self, note: FormationNote) -> bool:
         """Take a leader's request. False for an old one, a repetition, or one that cannot be obeyed (counted)."""

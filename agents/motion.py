@@ -19,6 +19,9 @@ from protocol.mission import Leading, Limits
 CORNER_RADIUS_M = 2.5
 SPACING_M = 0.1
 LOOK_AHEAD_M = 0.6
+PLANNED_LOOK_AHEAD_M = 0.35
+PLANNED_CORNER_RADIUS_M = 0.8
+"""A planned route is already round, and its clearance holds for the way itself."""
 DETOUR_AHEAD_M = 2.0
 WINDOW_M = 0.5
 BRAKING_SHARE = 0.6
@@ -33,8 +36,8 @@ Point = tuple[float, float]
 class Route:
     """A polyline in `map` with rounded corners, its arc length and curvature."""
 
-    def __init__(self, points: Sequence[Point]) -> None:
-        self.points = _resampled(_rounded(points, CORNER_RADIUS_M), SPACING_M)
+    def __init__(self, points: Sequence[Point], corner_radius_m: float = CORNER_RADIUS_M) -> None:
+        self.points = _resampled(_rounded(points, corner_radius_m), SPACING_M)
         self.at_m = [0.0]
         for a, b in pairwise(self.points):
             self.at_m.append(self.at_m[-1] + hypot(b[0] - a[0], b[1] - a[1]))
@@ -73,10 +76,14 @@ class Lead:
         self._leading = leading
         self._limits = limits
         self._route: Route | None = None
+        self._planned = leading.motion == "explore"
+        self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
         self._s = 0.0
 
     def track(self, pose: Pose2D) -> None:
         """Keep the progress up, leader or not."""
+        if self._route is None and self._planned:
+            return
         if self._route is None:
             self._route = self._first_route(pose)
             self._s = self._route.nearest(pose.x, pose.y)
@@ -89,6 +96,12 @@ class Lead:
         if self._leading.motion == "point_to_point":
             self._route = Route([(pose.x, pose.y), self.goal])
             self._s = 0.0
+
+    def take(self, points: Sequence[Point], pose: Pose2D) -> None:
+        """Go on along a route of one's own making (`explore`), from the point of it that is nearest."""
+        self._route = Route(points, PLANNED_CORNER_RADIUS_M)
+        self._s = self._route.nearest(pose.x, pose.y, 0.0, 2.0 * WINDOW_M)
+        self._profile_of = None
 
     @property
     def goal(self) -> Point:
@@ -129,12 +142,13 @@ class Lead:
         """The wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
         self.track(pose)
         route = self._route
-        assert route is not None
+        if route is None:
+            return Twist(0.0, 0.0)
         straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
         if straight <= 0.3 * self._leading.goal_tolerance_m:
             return Twist(0.0, 0.0)
-        near_end = route.length_m - self._s < LOOK_AHEAD_M
-        target = _in_base(pose, self.goal if near_end else route.point(self._s + LOOK_AHEAD_M))
+        near_end = route.length_m - self._s < self._look_ahead_m
+        target = _in_base(pose, self.goal if near_end else route.point(self._s + self._look_ahead_m))
         braking = (2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5
         v = min(self._cruise(slots), braking, speed_max_mps, abs(twist.linear_x) + 0.05)
         bearing = atan2(target[1], target[0])
