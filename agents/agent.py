@@ -6,6 +6,7 @@ moment. A robot that becomes leader commands at once.
 
 from __future__ import annotations
 
+from math import floor, inf
 from typing import Any
 
 import msgspec
@@ -16,7 +17,7 @@ from agents.driver import Driver
 from agents.orders import Orders
 from agents.reports import Reports, status
 from agents.voice import Voice
-from protocol.geometry import STILL, Twist
+from protocol.geometry import STILL, Pose2D, Twist
 from protocol.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
 from protocol.messages import (
     NO_TERM,
@@ -41,6 +42,10 @@ from protocol.timing import timing_of
 from protocol.topics import TOPIC, alive_key
 
 ASK_S = 0.5
+HANDOVER_S = 2.0
+"""At least between two hand-overs that a stuck leader asks for."""
+PLACE_M = 1.0
+"""Side of the cell within which being stuck twice is being stuck in the same place."""
 
 
 class Agent:
@@ -60,6 +65,9 @@ class Agent:
         self._next_ask = 0.0
         self._next_control = 0.0
         self._arrived = False
+        self._stuck: str | None = None
+        self._next_handover = 0.0
+        self._given_up: list[tuple[int, int]] = []
         self._stopping = False
         self._interests = self._wanted()
         self.refusal: str | None = None
@@ -260,11 +268,29 @@ class Agent:
         self._command(command, role, now)
         self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, twist, now)
         self._reports.decision(driver.decision, lease.term, now)
+        self._mind_stuck(role, pose, now, lease, driver)
         if role is Role.LEADER:
             self._orders.lead(driver.lead, lease.chain[1:], lease.term, now)
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
+
+    def _mind_stuck(self, role: Role, pose: Pose2D, now: float, lease: Lease, driver: Driver) -> None:
+        """A stuck robot says so; a leader gives the lease to the next in chain, once for each place (section 7)."""
+        if driver.stuck != self._stuck:
+            self._stuck = driver.stuck
+            self._event("stuck", now, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
+        if driver.stuck is None or role is not Role.LEADER or now < self._next_handover:
+            return
+        self._next_handover = now + HANDOVER_S
+        place = (floor(pose.x / PLACE_M), floor(pose.y / PLACE_M))
+        if place in self._given_up or len(lease.chain) == 1:
+            self._event("failed", now, {"reason": f"robot {self._id} is stuck again: {driver.stuck}"})
+            self._next_handover = inf
+            return
+        self._given_up.append(place)
+        self._command(STILL, Role.FOLLOWER, now)
+        self._apply(lease.request_handover(now), now)
 
     def _role(self, lease: Lease) -> Role:
         if lease.role is Role.LEADER:

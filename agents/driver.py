@@ -6,11 +6,17 @@ knows of terms or keys.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, hypot, sin
+
+from msgspec import structs
 
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
+from agents.crossing import Crossing
 from agents.estimator import Estimator
+from agents.explore import Explore
+from agents.features import Feature, Tracker
 from agents.following import follower_of, predecessor_of
 from agents.formation import Formation
 from agents.motion import Lead
@@ -18,6 +24,7 @@ from agents.perception import Point, Surroundings, without
 from agents.predecessor import Predecessor
 from agents.safety import safe
 from agents.strategy import Decision, Detour
+from agents.stuck import Stuck
 from protocol.geometry import STILL, Pose2D, Twist, bearing, distance, wrap
 from protocol.messages import LaserScan, Role
 from protocol.mission import Mission
@@ -33,6 +40,12 @@ LEADER_OMEGA_MAX_RADPS = 0.6
 TRACK_EVERY = 5
 """Control periods between a follower's looks at its place on the route."""
 DT_MIN_S = 0.002
+ON_TRACE_M = 0.3
+"""Nearer than this to its place on a trace, a follower goes where its predecessor has gone: no detour is better."""
+MATE_M = 0.6
+"""A thing nearer than this to where a team-mate should be is that team-mate: the table's rows are half a second old."""
+OWN_M = 0.15
+"""A point nearer than this to the surface of what moves belongs to it."""
 
 
 class Driver:
@@ -49,7 +62,14 @@ class Driver:
         self.lead = Lead(mission.leading, mission.limits)
         self.predecessor: Predecessor | None = None
         self._surroundings = Surroundings()
+        self._tracker = Tracker()
         self._detour = Detour(mission.radius_m, mission.limits)
+        self._crossing = Crossing()
+        self._stuck = Stuck()
+        self.stuck: str | None = None
+        """Why this robot is stuck, None when it is not."""
+        self.explore = Explore(mission) if mission.leading.motion == "explore" else None
+        """A map of one's own and the route through it, where the mission asks for it."""
         self._role = Role.WAITING
         self._last = STILL
         self._driven_at: float | None = None
@@ -58,8 +78,8 @@ class Driver:
 
     @property
     def decision(self) -> Decision | None:
-        """The detour that is being made, None on the wanted way."""
-        return self._detour.decision
+        """What is being done about the surroundings, None on the wanted way."""
+        return self._crossing.decision or self._detour.decision
 
     @property
     def last(self) -> Twist:
@@ -68,7 +88,12 @@ class Driver:
     def see(self, scan: LaserScan, now: float) -> None:
         known = self.estimator.pose_at(now)
         if known is not None:
-            self._surroundings.scan(scan, known[0], now)
+            pose = known[0]
+            self._surroundings.scan(scan, pose, now)
+            mates = [(mate.x, mate.y) for mate in self._mates(now)]
+            self._tracker.update(self._surroundings.points_map, (pose.x, pose.y), mates, MATE_M, now)
+            if self.explore is not None:
+                self.explore.see(scan, pose, known[1], mates)
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Whose successor this robot is from now on; None for nobody's."""
@@ -85,15 +110,23 @@ class Driver:
         if role != self._role:
             self._change(role, pose, twist)
         points = self._surroundings.points(pose, LOOK_M)
+        mates = [(mate.x, mate.y) for mate in self._mates(now)] if self.explore is not None else []
+        if self.explore is not None and self.explore.work(role is Role.LEADER, pose, mates, now):
+            self.lead.take(self.explore.route, pose)
+        moving = self._tracker.moving(now)
+        still = points if not moving else [p for p in points if not _belongs(p, pose, moving)]
         if role is Role.LEADER:
-            wanted = self._leading(chain, points, pose, twist, now)
+            wanted = self._leading(chain, still, pose, now)
         elif role is Role.FOLLOWER:
             self._steps += 1
             if self._steps % TRACK_EVERY == 0:
                 self.lead.track(pose)
-            wanted = self._following(points, pose, twist, dt, now)
+            wanted = self._following(still, pose, twist, dt, now)
         else:
             wanted = STILL
+        if role is not Role.WAITING:
+            wanted = self._crossing.give_way(moving, pose, wanted, now)
+        self._watch(role, pose, wanted, now)
         limits = self._mission.limits
         self._last = safe(wanted, self._last, points, self._mission.radius_m, limits, dt)
         self.follower.overridden(self._last)
@@ -104,8 +137,9 @@ class Driver:
 
     def _change(self, role: Role, pose: Pose2D, twist: Twist) -> None:
         self._role = role
-        self._detour.decision = None
+        self._detour.decision = self._crossing.decision = None
         self._waiting_since = None
+        self._stuck.reset()
         omega_max = self._mission.limits.omega_max_radps
         self._detour.omega_max_radps = min(LEADER_OMEGA_MAX_RADPS, omega_max) if role is Role.LEADER else omega_max
         if role is Role.LEADER:
@@ -113,14 +147,53 @@ class Driver:
         elif role is Role.FOLLOWER:
             self.follower.rejoin(pose, twist)
 
-    def _leading(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, twist: Twist, now: float) -> Twist:
+    def _watch(self, role: Role, pose: Pose2D, wanted: Twist, now: float) -> None:
+        """Whether the robot is stuck on its way; not when it stands where it belongs or waits for its team."""
+        rests = role is Role.WAITING or self._waiting_since is not None or self.lead.arrived(pose, self._last)
+        if rests:
+            self._stuck.reset()
+            self.stuck = None
+            return
+        decision = self.decision
+        action = None if decision is None else decision.action
+        self.stuck = self._stuck.watch(pose, wanted, action, self.estimator.age_s(now), now)
+
+    def _mates(self, now: float) -> list[Pose2D]:
+        """Where the team-mates are, as far as known: the predecessor by its poses, the others by the table."""
+        places = [self._beliefs.pose_of(robot, now) for robot in self._mission.robots if robot != self._id]
+        if self.predecessor is not None:
+            sighting = self.predecessor.at(now)
+            places.append(None if sighting is None else sighting.pose)
+        return [place for place in places if place is not None]
+
+    def _leading(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
         leading = self._mission.leading
         slots = [] if self.formation.trace else [self.formation.slot_of(robot) for robot in chain[1:]]
         speed = leading.cruise_mps * self._patience(chain, pose, now)
         wanted = self.lead.step(pose, self._last, slots, speed)
+        if self.explore is not None:
+            return wanted if self.explore.route else STILL
         reach = min(LOOK_M, self.lead.remaining_m(pose))
-        around = self._detour.steer(points, self.lead.ahead(pose, reach), wanted, 0.7 * speed, now)
+        around = self._steer(points, self.lead.ahead(pose, reach), wanted, 0.7 * speed, pose, now)
         return wanted if around is None else around
+
+    def _steer(
+        self, points: list[Point], target: Point, wanted: Twist, speed: float, pose: Pose2D, now: float
+    ) -> Twist | None:
+        """A detour, if one is needed; what it goes round is named once, when it begins."""
+        before = self._detour.decision
+        around = self._detour.steer(points, target, wanted, speed, now)
+        decision = self._detour.decision
+        if decision is not None:
+            kind = before.kind if before is not None else self._kind_ahead(pose, now)
+            self._detour.decision = structs.replace(decision, kind=kind)
+        return around
+
+    def _kind_ahead(self, pose: Pose2D, now: float) -> str:
+        """Class of the nearest thing."""
+        features = self._tracker.features(now)
+        nearest = min(features, key=lambda f: hypot(f.x - pose.x, f.y - pose.y) - f.radius_m, default=None)
+        return "stationary" if nearest is None else nearest.kind
 
     def _following(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
         sighting = None if self.predecessor is None else self.predecessor.at(now)
@@ -128,12 +201,14 @@ class Driver:
         wanted = self.follower.step(sighting, slot, pose, twist, dt, on_trace=self.formation.trace)
         if sighting is None or sighting.age_s > CONTROL_PERIOD_S * 25:
             return wanted
+        if self.formation.trace and self.follower.readout.error_m < ON_TRACE_M:
+            return wanted
         seen = without(points, _in_base(pose, sighting.pose), self._mission.radius_m + 0.1)
         readout = self.follower.readout
         target = _in_base(pose, readout.slot_map)
         speed = min(self._mission.limits.v_max_mps, abs(sighting.twist.linear_x) + CATCH_UP_PER_S * hypot(*target))
         was_detour = self._detour.decision is not None
-        around = self._detour.steer(points if was_detour else seen, target, wanted, speed, now)
+        around = self._steer(points if was_detour else seen, target, wanted, speed, pose, now)
         if around is None:
             if was_detour:
                 self.follower.rejoin(pose, self._last)
@@ -155,6 +230,13 @@ class Driver:
         if self._waiting_since is None:
             self._waiting_since = now
         return 0.0 if now - self._waiting_since < GAP_WAIT_S_MAX else 0.5
+
+
+def _belongs(point: Point, pose: Pose2D, moving: Sequence[Feature]) -> bool:
+    """The point (in `base_link`) is one of what moves."""
+    c, s = cos(pose.theta), sin(pose.theta)
+    x, y = pose.x + c * point[0] - s * point[1], pose.y + s * point[0] + c * point[1]
+    return any(hypot(x - f.x, y - f.y) < f.radius_m + OWN_M for f in moving)
 
 
 def _in_base(pose: Pose2D, point: Pose2D) -> Point:

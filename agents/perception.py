@@ -33,6 +33,11 @@ class Surroundings:
         ]
         self.seen_at = now
 
+    @property
+    def points_map(self) -> list[Point]:
+        """The newest scan's points in `map`, in beam order."""
+        return self._points_map
+
     def points(self, pose_map: Pose2D, within_m: float = SIGHT_M) -> list[Point]:
         """The points nearer than `within_m`, in `base_link`."""
         x, y, c, s = pose_map.x, pose_map.y, cos(pose_map.theta), sin(pose_map.theta)

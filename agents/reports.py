@@ -25,7 +25,7 @@ class Reports:
         self._table_s = TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
         self._next_table = 0.0
         self._steps = 0
-        self._action: str | None = None
+        self._met: tuple[str, str] | None = None
 
     def place(
         self, driver: Driver, beliefs: Beliefs, near: tuple[int, ...], role: Role, term: Term,
@@ -45,14 +45,14 @@ class Reports:
 
     def decision(self, decision: Decision | None, term: Term, now: float) -> None:
         """Each change of what a robot does about its surroundings, with the values that decided it."""
-        action = None if decision is None else decision.action
-        if action == self._action:
+        met = None if decision is None else (decision.kind, decision.action)
+        if met == self._met:
             return
-        self._action = action
-        data: dict[str, object] = {"class": "obstacle", "action": "resume"}
+        before, self._met = self._met, met
+        data: dict[str, object] = {"class": before[0] if before is not None else "", "action": "resume"}
         if decision is not None:
             free_m, bearing = round(min(decision.free_m, FAR_M), 3), round(decision.bearing, 3)
-            data |= {"action": action, "free_m": free_m, "bearing_rad": bearing}
+            data |= {"class": decision.kind, "action": decision.action, "free_m": free_m, "bearing_rad": bearing}
         self._voice.event("decision", now, term, data)
 
     def _tracking(self, driver: Driver, predecessor: int, now: float) -> None:

@@ -36,11 +36,13 @@ class Decision(Struct, frozen=True):
     """What a detour does now, with the values that it was decided by, for the log."""
 
     action: str
-    """`left`, `right`, `u_turn` or `wait`."""
+    """`left`, `right`, `u_turn`, `blocked`; of what moves: `slow`, `wait`, `back`."""
     free_m: float
     """Clear way along the motion that was wanted."""
     bearing: float
     """Chosen direction in `base_link` [rad]."""
+    kind: str = "stationary"
+    """Class of what is met: `stationary`, `moving` or `wall`."""
 
 
 class Detour:
@@ -98,7 +100,7 @@ class Detour:
             if bearing is not None:
                 break
         if bearing is None:
-            self.decision = Decision("wait", free_m, towards)
+            self.decision = Decision("blocked", free_m, towards)
             return Twist(0.0, 0.0)
         offset = wrap(bearing - towards)
         self._side = self._side if offset == 0.0 else (1.0 if offset > 0.0 else -1.0)

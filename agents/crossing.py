@@ -1,0 +1,77 @@
+"""What moves across the way: slow down, wait or make room, by the closest approach predicted (control.md 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot, inf
+
+from agents.features import Feature
+from agents.strategy import Decision
+from protocol.geometry import STILL, Pose2D, Twist, along_arc
+
+CLEARANCE_M = 0.6
+"""From the robot's centre to the surface of what moves; nearer within the horizon is a conflict."""
+HORIZON_S = 3.0
+STEP_S = 0.25
+SLOW_SHARE = 0.4
+BACK_MPS = 0.25
+WAIT_S_MAX = 5.0
+"""After so long what moves is gone round as if it stood."""
+HOLD_S = 1.0
+"""A robot stays slow at least so long after the last conflict."""
+WORTH_M = 0.1
+"""Backing off must win this much clearance over waiting."""
+
+
+class Crossing:
+    """Gives way to what moves, for a bounded time."""
+
+    def __init__(self) -> None:
+        self.decision: Decision | None = None
+        self._waiting_since: float | None = None
+        self._held_until = 0.0
+
+    def give_way(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, now: float) -> Twist:
+        """`wanted`, or less of it. `moving` as of now, in `map` like `pose`."""
+        near = _closest(moving, pose, wanted)
+        if near >= CLEARANCE_M:
+            if self._held_until > now and self.decision is not None:
+                return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
+            self.decision, self._waiting_since = None, None
+            return wanted
+        self._held_until = now + HOLD_S
+        if self._waiting_since is None:
+            self._waiting_since = now
+        if now - self._waiting_since > WAIT_S_MAX:
+            self.decision = None
+            return wanted
+        action, twist = self._less(moving, pose, wanted)
+        self.decision = Decision(action, near, 0.0, "moving")
+        return twist
+
+    def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist) -> tuple[str, Twist]:
+        slow = Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
+        if _closest(moving, pose, slow) >= CLEARANCE_M:
+            return "slow", slow
+        back = Twist(-BACK_MPS, 0.0)
+        standing, backing = _closest(moving, pose, STILL), _closest(moving, pose, back)
+        if standing >= CLEARANCE_M or standing + WORTH_M >= backing:
+            return "wait", STILL
+        return "back", back
+
+
+def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist) -> float:
+    """Least distance [m] between the robot's centre and a surface within the horizon, from now on.
+
+    What is already that near and moves away is no conflict: only approaches count.
+    """
+    least = inf
+    for feature in moving:
+        first = hypot(feature.x - pose.x, feature.y - pose.y)
+        for n in range(1, round(HORIZON_S / STEP_S) + 1):
+            later = n * STEP_S
+            there, (x, y) = along_arc(pose, twist, later), feature.at(later)
+            apart = hypot(x - there.x, y - there.y)
+            if apart < first:
+                least = min(least, apart - feature.radius_m)
+    return least

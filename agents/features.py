@@ -1,0 +1,143 @@
+"""What the points of a scan belong to: stationary obstacles, walls, and obstacles that move, with their velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+from typing import Literal
+
+from msgspec import Struct
+
+from agents.perception import SIGHT_M, Point
+
+Kind = Literal["stationary", "moving", "wall"]
+
+GAP_M = 0.3
+"""Neighbouring beams' points farther apart than this belong to two things."""
+WALL_M = 1.2
+"""What is wider than this is a wall."""
+SAME_M = 0.5
+"""A thing is taken for the one that was seen nearer than this to where it should be by now."""
+FORGET_S = 1.0
+ALPHA, BETA = 0.5, 0.25
+MOVING_MPS = 0.12
+ANCHOR_S = 1.0
+"""It moves when it is that fast now and was so on average over at least this long."""
+EDGE_M = 0.1
+"""What reaches to within this of the end of sight is seen in part only: its centre would seem to move."""
+TRACKS_MAX = 64
+
+
+class Feature(Struct, frozen=True, gc=False):
+    """One thing in `map`: centre [m], radius of the circle that holds it [m], velocity [m/s]."""
+
+    kind: Kind
+    x: float
+    y: float
+    radius_m: float
+    vx: float = 0.0
+    vy: float = 0.0
+
+    def at(self, later_s: float) -> Point:
+        """Where it is `later_s` from now."""
+        return self.x + self.vx * later_s, self.y + self.vy * later_s
+
+
+class _Track(Struct):
+    x: float
+    y: float
+    radius_m: float
+    seen_at: float
+    anchors: list[tuple[float, float, float]]
+    """Where it was when: now and then, the newest last."""
+    vx: float = 0.0
+    vy: float = 0.0
+
+    def moves(self) -> bool:
+        at, x, y = self.anchors[0]
+        lasted = self.seen_at - at
+        far_m = hypot(self.x - x, self.y - y)
+        return lasted >= ANCHOR_S and far_m > MOVING_MPS * lasted and hypot(self.vx, self.vy) > MOVING_MPS
+
+
+class Tracker:
+    """Features of the newest scan, and the tracks of what may move."""
+
+    def __init__(self) -> None:
+        self._tracks: list[_Track] = []
+        self._walls: list[Feature] = []
+
+    def update(
+        self, points_map: Sequence[Point], eye: Point, mates: Sequence[Point], mate_m: float, now: float
+    ) -> None:
+        """Points of one scan in beam order, seen from `eye`; what is within `mate_m` of a team-mate is left out."""
+        self._walls = []
+        self._tracks = [track for track in self._tracks if now - track.seen_at <= FORGET_S]
+        for cluster in _clusters(points_map):
+            x, y, radius_m = _circle(cluster, eye)
+            if 2.0 * radius_m > WALL_M:
+                self._walls.append(Feature("wall", x, y, radius_m))
+            elif any(hypot(px - eye[0], py - eye[1]) > SIGHT_M - EDGE_M for px, py in (cluster[0], cluster[-1])):
+                continue
+            elif not any(hypot(x - mx, y - my) < mate_m for mx, my in mates):
+                self._follow(x, y, radius_m, now)
+
+    def features(self, now: float) -> list[Feature]:
+        """All things as of `now`."""
+        return self._walls + [_feature(track, now) for track in self._tracks]
+
+    def moving(self, now: float) -> list[Feature]:
+        return [_feature(track, now) for track in self._tracks if track.moves()]
+
+    def _follow(self, x: float, y: float, radius_m: float, now: float) -> None:
+        best, best_m = None, SAME_M
+        for track in self._tracks:
+            dt = now - track.seen_at
+            apart = hypot(x - track.x - track.vx * dt, y - track.y - track.vy * dt)
+            if dt > 0.0 and apart < best_m:
+                best, best_m = track, apart
+        if best is None:
+            if len(self._tracks) < TRACKS_MAX:
+                self._tracks.append(_Track(x, y, radius_m, now, [(now, x, y)]))
+            return
+        dt = now - best.seen_at
+        rx, ry = x - best.x - best.vx * dt, y - best.y - best.vy * dt
+        best.x, best.y = x - (1.0 - ALPHA) * rx, y - (1.0 - ALPHA) * ry
+        best.vx, best.vy = best.vx + BETA * rx / dt, best.vy + BETA * ry / dt
+        best.radius_m = 0.7 * best.radius_m + 0.3 * radius_m
+        best.seen_at = now
+        if now - best.anchors[-1][0] >= ANCHOR_S:
+            best.anchors = [best.anchors[-1], (now, best.x, best.y)]
+
+
+def _clusters(points: Sequence[Point]) -> list[list[Point]]:
+    """Runs of neighbouring points; the last run joins the first when they touch."""
+    runs: list[list[Point]] = []
+    for point in points:
+        if runs and hypot(point[0] - runs[-1][-1][0], point[1] - runs[-1][-1][1]) < GAP_M:
+            runs[-1].append(point)
+        else:
+            runs.append([point])
+    if len(runs) > 1 and hypot(runs[0][0][0] - runs[-1][-1][0], runs[0][0][1] - runs[-1][-1][1]) < GAP_M:
+        runs[0] = runs.pop() + runs[0]
+    return runs
+
+
+def _circle(cluster: Sequence[Point], eye: Point) -> tuple[float, float, float]:
+    """Centre and radius of the thing behind the visible points: half their width, as far behind the nearest one."""
+    (ax, ay), (bx, by) = cluster[0], cluster[-1]
+    radius_m = max(0.5 * hypot(bx - ax, by - ay), 0.02)
+    mx, my = 0.5 * (ax + bx) - eye[0], 0.5 * (ay + by) - eye[1]
+    nearest_m = min(hypot(x - eye[0], y - eye[1]) for x, y in cluster)
+    far = hypot(mx, my)
+    if far < 1e-6:
+        return ax, ay, radius_m
+    reach = (nearest_m + radius_m) / far
+    return eye[0] + mx * reach, eye[1] + my * reach, radius_m
+
+
+def _feature(track: _Track, now: float) -> Feature:
+    dt = now - track.seen_at
+    if not track.moves():
+        return Feature("stationary", track.x, track.y, track.radius_m)
+    return Feature("moving", track.x + track.vx * dt, track.y + track.vy * dt, track.radius_m, track.vx, track.vy)

@@ -1,0 +1,73 @@
+"""When a robot is stuck: conditions S1 to S5 of control.md section 7, each with the reason in words."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import floor, hypot
+
+from protocol.geometry import Pose2D, Twist
+
+STILL_S, STILL_M = 3.0, 0.10
+WANTED_MPS = 0.05
+BLOCKED_S = 1.5
+TURNS, TURNS_S = 3, 10.0
+CELL_M, CELL_ENTRIES, CELL_S = 0.5, 3, 30.0
+WAITING_S = 10.0
+POSE_LOST_S = 1.0
+TURNING = ("u_turn", "back")
+
+
+class Stuck:
+    """Watches one robot on its way; `reset` when it arrives, waits for its team, or starts anew."""
+
+    def __init__(self) -> None:
+        self._moved: deque[tuple[float, float, float]] = deque()
+        self._action: str | None = None
+        self._since = 0.0
+        self._turns: deque[float] = deque(maxlen=TURNS)
+        self._cell: tuple[int, int] | None = None
+        self._entries: dict[tuple[int, int], deque[float]] = {}
+
+    def reset(self) -> None:
+        self.__init__()  # type: ignore[misc]
+
+    def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> str | None:
+        """The reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before limits."""
+        self._note(pose, action, now)
+        if pose_age_s > POSE_LOST_S:
+            return "S5: own pose lost"
+        if action == "wait" and now - self._since > WAITING_S:
+            return "S4: waited too long for what moves"
+        if action == "blocked" and now - self._since > BLOCKED_S:
+            return "S2: blocked on all sides"
+        if len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
+            return "S3: turned round again and again"
+        if self._entries_of_cell(now) >= CELL_ENTRIES:
+            return "S3: in the same place again and again"
+        return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
+
+    def _note(self, pose: Pose2D, action: str | None, now: float) -> None:
+        if action != self._action:
+            self._action, self._since = action, now
+            if action in TURNING:
+                self._turns.append(now)
+        cell = (floor(pose.x / CELL_M), floor(pose.y / CELL_M))
+        if cell != self._cell:
+            self._cell = cell
+            self._entries.setdefault(cell, deque(maxlen=CELL_ENTRIES)).append(now)
+            if len(self._entries) > 256:
+                self._entries.pop(next(iter(self._entries)))
+
+    def _entries_of_cell(self, now: float) -> int:
+        entries = self._entries.get(self._cell, ()) if self._cell is not None else ()
+        return sum(now - at <= CELL_S for at in entries)
+
+    def _does_not_move(self, pose: Pose2D, wanted: Twist, now: float) -> bool:
+        if abs(wanted.linear_x) < WANTED_MPS:
+            self._moved.clear()
+            return False
+        self._moved.append((now, pose.x, pose.y))
+        while self._moved[0][0] < now - STILL_S:
+            self._moved.popleft()
+        first_at, x, y = self._moved[0]
+        return now - first_at >= STILL_S - 0.1 and hypot(pose.x - x, pose.y - y) < STILL_M

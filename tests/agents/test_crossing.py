@@ -1,0 +1,61 @@
+"""What moves across the way is given way to, for a bounded time."""
+
+from agents.crossing import HOLD_S, WAIT_S_MAX, Crossing
+from agents.features import Feature
+from protocol.geometry import STILL, Pose2D, Twist, along_arc
+
+AHEAD = Twist(0.5, 0.0)
+
+
+def crosser(x: float, y: float, vx: float, vy: float) -> list[Feature]:
+    return [Feature("moving", x, y, 0.25, vx, vy)]
+
+
+def test_what_passes_far_off_changes_nothing() -> None:
+    crossing = Crossing()
+    assert crossing.give_way(crosser(1.0, 3.0, 0.3, 0.0), Pose2D(), AHEAD, 0.0) == AHEAD
+    assert crossing.decision is None
+
+
+def test_what_moves_away_is_no_conflict() -> None:
+    assert Crossing().give_way(crosser(0.7, 0.0, 0.8, 0.0), Pose2D(), AHEAD, 0.0) == AHEAD
+
+
+def test_what_crosses_is_let_pass() -> None:
+    crossing = Crossing()
+    twist = crossing.give_way(crosser(1.2, -0.8, 0.0, 0.3), Pose2D(), AHEAD, 0.0)
+    assert twist.linear_x < AHEAD.linear_x
+    assert crossing.decision is not None
+    assert crossing.decision.kind == "moving"
+
+
+def test_the_robot_stays_slow_for_a_while_after_the_conflict() -> None:
+    crossing = Crossing()
+    crossing.give_way(crosser(1.2, -0.8, 0.0, 0.3), Pose2D(), AHEAD, 0.0)
+    assert crossing.give_way([], Pose2D(), AHEAD, 0.5 * HOLD_S).linear_x < AHEAD.linear_x
+    assert crossing.give_way([], Pose2D(), AHEAD, 1.1 * HOLD_S) == AHEAD
+
+
+def test_what_comes_straight_at_a_standing_robot_makes_it_back_off() -> None:
+    assert Crossing().give_way(crosser(1.2, 0.0, -0.2, 0.0), Pose2D(), STILL, 0.0).linear_x < 0.0
+
+
+def test_after_the_longest_wait_the_robot_goes_on() -> None:
+    crossing = Crossing()
+    now = 0.0
+    while now <= WAIT_S_MAX:
+        crossing.give_way(crosser(0.8, -0.3, 0.0, 0.15), Pose2D(), AHEAD, now)
+        now += 0.02
+    assert crossing.give_way(crosser(0.8, -0.3, 0.0, 0.15), Pose2D(), AHEAD, now) == AHEAD
+
+
+def test_no_slower_crosser_is_touched_whenever_it_comes() -> None:
+    """A robot on a straight way and one obstacle across it at 0.3 m/s, at many phases."""
+    for phase in range(20):
+        crossing, pose, y, least = Crossing(), Pose2D(), -2.0 - 0.1 * phase, 9.0
+        for n in range(600):
+            twist = crossing.give_way(crosser(2.0, y, 0.0, 0.3), pose, AHEAD, 0.02 * n)
+            pose = along_arc(pose, twist, 0.02)
+            y += 0.3 * 0.02
+            least = min(least, ((2.0 - pose.x) ** 2 + (y - pose.y) ** 2) ** 0.5 - 0.25 - 0.15)
+        assert least > 0.0, f"touched at phase {phase}"

@@ -1,0 +1,62 @@
+"""What the points of a scan belong to, and what moves."""
+
+from math import atan2, cos, hypot, pi, sin
+
+import pytest
+
+from agents.features import Tracker
+from agents.perception import SIGHT_M, Point
+
+
+def arc(x: float, y: float, r: float, eye: Point) -> list[Point]:
+    """The visible half of a circle, in beam order."""
+    facing = pi + (0.0 if (x, y) == eye else atan2(y - eye[1], x - eye[0]))
+    return [(x + r * cos(facing + n * pi / 20), y + r * sin(facing + n * pi / 20)) for n in range(9, -10, -1)]
+
+
+def seen(positions: list[Point], eyes: list[Point], mates: list[Point] | None = None) -> Tracker:
+    """Ten scans a second of one round thing of radius 0.25 m."""
+    tracker = Tracker()
+    for n, ((x, y), eye) in enumerate(zip(positions, eyes, strict=True)):
+        tracker.update(arc(x, y, 0.25, eye), eye, mates or [], 0.5, 0.1 * n)
+    return tracker
+
+
+def test_a_thing_that_stands_is_stationary_where_it_stands() -> None:
+    [feature] = seen([(2.0, 0.3)] * 20, [(0.0, 0.0)] * 20).features(1.9)
+    assert feature.kind == "stationary"
+    assert hypot(feature.x - 2.0, feature.y - 0.3) < 0.05
+    assert feature.radius_m == pytest.approx(0.25, abs=0.03)
+
+
+def test_a_thing_that_the_robot_drives_past_does_not_move() -> None:
+    eyes = [(0.05 * n, 0.0) for n in range(40)]
+    assert seen([(1.0, 0.6)] * 40, eyes).moving(3.9) == []
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.4])
+def test_a_thing_that_moves_is_told_with_its_velocity(speed: float) -> None:
+    positions = [(1.5, -1.0 + speed * 0.1 * n) for n in range(30)]
+    [feature] = seen(positions, [(0.0, 0.0)] * 30).moving(2.9)
+    assert feature.vx == pytest.approx(0.0, abs=0.05)
+    assert feature.vy == pytest.approx(speed, abs=0.05)
+
+
+def test_what_is_wide_is_a_wall() -> None:
+    tracker = Tracker()
+    tracker.update([(1.5, -1.0 + 0.1 * n) for n in range(21)], (0.0, 0.0), [], 0.5, 0.0)
+    assert [feature.kind for feature in tracker.features(0.0)] == ["wall"]
+
+
+def test_a_team_mate_is_no_obstacle() -> None:
+    assert seen([(1.5, 0.0)] * 5, [(0.0, 0.0)] * 5, mates=[(1.6, 0.1)]).features(0.4) == []
+
+
+def test_what_is_cut_off_by_the_end_of_sight_is_not_tracked() -> None:
+    assert seen([(SIGHT_M, 0.0)] * 5, [(0.0, 0.0)] * 5).features(0.4) == []
+
+
+def test_what_is_no_longer_seen_is_forgotten() -> None:
+    tracker = seen([(1.5, 0.0)] * 5, [(0.0, 0.0)] * 5)
+    tracker.update([], (0.0, 0.0), [], 0.5, 2.0)
+    assert tracker.features(2.0) == []

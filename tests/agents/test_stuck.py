@@ -1,0 +1,62 @@
+"""S1 to S5: when a robot is stuck, and when it only waits."""
+
+from agents.stuck import CELL_ENTRIES, STILL_S, TURNS, WAITING_S, Stuck
+from protocol.geometry import STILL, Pose2D, Twist
+
+AHEAD = Twist(0.4, 0.0)
+
+
+def watched(seconds: float, wanted: Twist = AHEAD, action: str | None = None, speed: float = 0.0) -> str | None:
+    stuck, reason = Stuck(), None
+    for n in range(round(seconds / 0.02)):
+        reason = stuck.watch(Pose2D(speed * 0.02 * n, 0.0, 0.0), wanted, action, 0.0, 0.02 * n)
+    return reason
+
+
+def test_S1_commanded_to_move_and_did_not() -> None:
+    assert str(watched(STILL_S + 0.2)).startswith("S1")
+    assert watched(STILL_S - 0.5) is None
+    assert watched(10.0, speed=0.2) is None
+
+
+def test_who_is_not_asked_to_move_is_not_stuck() -> None:
+    assert watched(20.0, wanted=STILL) is None
+
+
+def test_S2_blocked_on_all_sides() -> None:
+    assert str(watched(2.0, STILL, "blocked")).startswith("S2")
+    assert watched(1.0, STILL, "blocked") is None
+
+
+def test_S3_turned_round_again_and_again() -> None:
+    stuck, reason = Stuck(), None
+    for n in range(TURNS):
+        stuck.watch(Pose2D(), STILL, "left", 0.0, 2.0 * n)
+        reason = stuck.watch(Pose2D(), STILL, "u_turn", 0.0, 2.0 * n + 1.0)
+    assert str(reason).startswith("S3")
+
+
+def test_S3_in_the_same_place_again_and_again() -> None:
+    stuck, reason = Stuck(), None
+    for n in range(CELL_ENTRIES):
+        reason = stuck.watch(Pose2D(0.1, 0.1, 0.0), AHEAD, None, 0.0, 4.0 * n)
+        if n < CELL_ENTRIES - 1:
+            assert reason is None
+            stuck.watch(Pose2D(1.1, 0.1, 0.0), AHEAD, None, 0.0, 4.0 * n + 2.0)
+    assert str(reason).startswith("S3")
+
+
+def test_S4_waited_too_long_for_what_moves() -> None:
+    assert str(watched(WAITING_S + 0.2, STILL, "wait")).startswith("S4")
+
+
+def test_S5_own_pose_lost() -> None:
+    assert str(Stuck().watch(Pose2D(), STILL, None, 2.0, 0.0)).startswith("S5")
+
+
+def test_a_reset_forgets() -> None:
+    stuck = Stuck()
+    for n in range(200):
+        stuck.watch(Pose2D(), AHEAD, None, 0.0, 0.02 * n)
+    stuck.reset()
+    assert stuck.watch(Pose2D(), AHEAD, None, 0.0, 4.02) is None
