@@ -199,7 +199,10 @@ class Team:
                 since, last = now, chain
             return now - since >= SETTLED_S
 
-        self.wait_until(settled, f"no settled chain of {length}, but {self.describe()}", within_s)
+        try:
+            self.wait_until(settled, f"no settled chain of {length}", within_s)
+        except Broken as broken:
+            raise Broken(f"{broken}: {self.describe()}") from None
         return last
 
     def describe(self) -> str:

@@ -1,0 +1,141 @@
+"""How often the lease changes hands while nothing is wrong: on a busy machine, and on a radio that loses a fifth.
+
+Two of the three are real processes for as long as is looked on; the third is the same agents in virtual time.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
+
+from agents.agent import Agent
+from deploy.bench.rows import Quantity, Row, row, show
+from deploy.bench.team import Broken, Team, endless
+from protocol import clock
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import Event, Message
+from protocol.node import Node
+from protocol.radio import WEATHER, Radio
+from protocol.witness import Witness
+from world.kinematic import Kinematic
+from world.scenario import Scenario
+from world.simulator import Simulator
+from world.world import World
+
+ROBOTS = 4
+MINUTES = 10.0
+BUSY_CORES = 2
+LOSS = 0.2
+WARM_UP_S = 5.0
+LOOK_S = 0.05
+START_S = 60.0
+"""For a chain to come together in bad weather."""
+BUSY = "import os\nwhile os.getppid() == {parent}:\n    sum(range(20000))"
+
+
+class Watch:
+    """Counts changes of the robot that leads, and of the chain, from the accepted leader commands and chains told."""
+
+    def __init__(self) -> None:
+        self.holder_changes = 0
+        self.chain_changes = 0
+        self._holder: int | None = None
+        self._chain: list[int] | None = None
+        self._version: tuple[object, ...] = ()
+
+    def see(self, event: Event) -> None:
+        match event.kind:
+            case "leader_command":
+                robot = event.data["robot"]
+                self.holder_changes += self._holder not in (None, robot)
+                self._holder = robot
+            case "chain" if event.term is not None:
+                version = (event.term, event.data["seq"])
+                if not self._version or version > self._version:
+                    self.chain_changes += self._chain not in (None, event.data["chain"])
+                    self._chain, self._version = event.data["chain"], version
+
+
+def run(as_json: bool, rows: str = "*", minutes: float = MINUTES) -> int:
+    """Print the rows; 0 when the lease never changed hands. Takes twice `minutes` and a little more."""
+    return show(_rows(rows, 60.0 * minutes), as_json)
+
+
+def _rows(glob: str, duration_s: float) -> Iterator[list[Row]]:
+    if fnmatchcase("busy", glob.split("/")[0]):
+        with _busy(BUSY_CORES):
+            yield _counted(f"busy, std, {ROBOTS} processes", duration_s, _live(endless(ROBOTS), duration_s, loss=0.0))
+    if fnmatchcase("loss", glob.split("/")[0]):
+        yield _counted(f"loss {LOSS:g}, std, simulated", duration_s, _simulated(endless(ROBOTS), duration_s))
+        wifi = endless(ROBOTS, "wifi")
+        yield _counted(f"loss {LOSS:g}, wifi, {ROBOTS} processes", duration_s, _live(wifi, duration_s, loss=LOSS))
+
+
+def _counted(name: str, duration_s: float, watch: Watch) -> list[Row]:
+    minutes = duration_s / 60.0
+    return [
+        row(name, Quantity(f"holder changes in {minutes:g} min", "times", 0.0), float(watch.holder_changes)),
+        row(name, Quantity("chain changes a minute", "1/min"), watch.chain_changes / minutes),
+    ]
+
+
+def _live(scenario: Scenario, duration_s: float, loss: float) -> Watch:
+    watch = Watch()
+    with Team(scenario) as team:
+        team.await_chain(ROBOTS, START_S)
+        if loss > 0.0:
+            team.order(WEATHER, radio={"loss": loss})
+        _look_on(team, WARM_UP_S)
+        team.events.clear()
+        until = clock.now() + duration_s
+        while clock.now() < until:
+            _look_on(team, LOOK_S)
+            for event in team.events:
+                watch.see(event)
+            team.events.clear()
+        if not team.chain() and loss == 0.0:
+            raise Broken(f"the chain is not whole at the end: {team.describe()}")
+    return watch
+
+
+def _look_on(team: Team, for_s: float) -> None:
+    until = clock.now() + for_s
+    while clock.now() < until:
+        team.listen()
+        clock.sleep(LOOK_S)
+
+
+def _simulated(scenario: Scenario, duration_s: float) -> Watch:
+    """Whole agents in virtual time, on bodies without an engine."""
+    watch, since = Watch(), WARM_UP_S
+    simulator = Simulator(Radio(loss=LOSS), seed=1)
+
+    def hear(now: float, _key: str, _payload: bytes, message: Message) -> None:
+        if now >= since and isinstance(message, Event):
+            watch.see(message)
+
+    simulator.taps.append(hear)
+    world = World("bench", scenario, 1, 1, start_at=0.0, bodies=Kinematic)
+    agents = [Agent(robot, 1, "bench", 1) for robot in scenario.mission.robots]
+    nodes: list[Node] = [world, Witness("bench", 1, 1), *agents]
+    for node in nodes:
+        simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 1, {})))
+    simulator.run(since + duration_s)
+    return watch
+
+
+@contextmanager
+def _busy(cores: int) -> Iterator[None]:
+    """So many processes that do nothing but compute; they end with us, however we end."""
+    command = [sys.executable, "-c", BUSY.format(parent=os.getpid())]
+    burners = [subprocess.Popen(command) for _ in range(cores)]
+    try:
+        yield
+    finally:
+        for burner in burners:
+            burner.kill()
+            burner.wait()
