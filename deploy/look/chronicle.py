@@ -25,7 +25,8 @@ class Reign(Struct):
     until_s: float | None
     """When the next one led, or when a fault ended this one; None: to the end."""
     cause: str
-    """`start`, the fault that ended the one before, `handover`, or `reelection` of the same robot."""
+    """`start`; or how the one before ended: the fault, the word of its holder's lease event (`expired`, `released`),
+    `reelection` of the same robot, `handover`."""
 
 
 class Failover(Struct):
@@ -84,7 +85,8 @@ def reigns(events: Sequence[Line]) -> list[Reign]:
         ended = _ending(done, found[-1], at_s) if found else None
         if found:
             found[-1].until_s = at_s if ended is None else ended.at_s
-        found.append(Reign(term, robot, at_s, None, _cause(found[-1] if found else None, ended, robot)))
+        cause = "start" if not found else ended.kind if ended is not None else _given_up(events, found[-1], robot)
+        found.append(Reign(term, robot, at_s, None, cause))
     if found:
         last = _ending(done, found[-1], float("inf"))
         found[-1].until_s = None if last is None else last.at_s
@@ -119,6 +121,13 @@ def failovers(events: Sequence[Line], reigns: Sequence[Reign]) -> list[Failover]
     return found
 
 
+def last_chain(events: Sequence[Line]) -> list[int]:
+    """The chain of the newest config that anybody spoke of; empty when nobody did."""
+    spoken = [line for line in of_kind(events, "chain") if line["term"] is not None]
+    newest = max(spoken, key=lambda line: (line["term"], line.get("seq", 0)), default=None)
+    return [] if newest is None else list(newest["chain"])
+
+
 def terms_that_went_back(events: Sequence[Line]) -> list[Violation]:
     """I2: over all gateways, no leader command of an older term is accepted after one of a newer term."""
     newest: tuple[int, ...] = ()
@@ -144,12 +153,12 @@ def _ended_by(fault: FaultDone, reign: Reign) -> bool:
     return fault.kind in ENDING_FAULTS and fault.target == reign.robot_id and fault.at_s >= reign.from_s
 
 
-def _cause(before: Reign | None, ended: FaultDone | None, robot: int) -> str:
-    if before is None:
-        return "start"
-    if ended is not None:
-        return ended.kind
-    return "reelection" if before.robot_id == robot else "handover"
+def _given_up(events: Sequence[Line], before: Reign, successor: int) -> str:
+    """How `before`, which no fault ended, came to its end."""
+    if before.robot_id == successor:
+        return "reelection"
+    said = [e for e in of_kind(events, "lease") if e["robot"] == before.robot_id and e["t"] >= before.from_s]
+    return next((str(e["change"]) for e in said if e.get("change") not in (None, "acquired")), "handover")
 
 
 def _ending(done: Sequence[FaultDone], reign: Reign, before_s: float) -> FaultDone | None:

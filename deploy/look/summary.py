@@ -18,6 +18,7 @@ from deploy.run.referee import Verdict
 from world.scenario import Outcome
 
 SUMMARY = "summary.json"
+LEFT_BEHIND_M = 0.5
 OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
 
 
@@ -65,6 +66,8 @@ class Summary(Struct, kw_only=True):
     sim_duration_s: float
     real_time_factor: float
     robots: list[RobotSummary]
+    left_behind: list[int] = []
+    """Alive at the end, but out of the chain or more than `LEFT_BEHIND_M` out of place in it."""
     leaders: list[Reign]
     failovers: list[Failover]
     faults: list[FaultDone]
@@ -80,6 +83,8 @@ class Summary(Struct, kw_only=True):
 def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, faults_left: Sequence[str]) -> Summary:
     """Read the run in `folder` back and say what it came to. `faults_left`: those that the run ended before."""
     seen, events = trace.read(folder), chronicle.lines(folder)
+    robots = [_robot(robot, seen, events) for robot in scenario_of(folder).mission.robots]
+    chain = chronicle.last_chain(events)
     reigns = chronicle.reigns(events)
     violations = chronicle.terms_that_went_back(events)
     return Summary(
@@ -91,7 +96,8 @@ def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, f
         duration_s=round(duration_s, 3),
         sim_duration_s=round(seen.end_s, 3),
         real_time_factor=round(seen.end_s / duration_s, 2) if duration_s > 0.0 else 0.0,
-        robots=[_robot(robot, seen, events) for robot in scenario_of(folder).mission.robots],
+        robots=robots,
+        left_behind=[robot.id for robot in robots if robot.alive and _left_behind(robot, chain)],
         leaders=reigns,
         failovers=chronicle.failovers(events, reigns),
         faults=chronicle.faults(events),
@@ -130,6 +136,12 @@ def _robot(robot: int, seen: Trace, events: Sequence[Line]) -> RobotSummary:
     if followed is not None:
         _fill_errors(summary, followed)
     return summary
+
+
+def _left_behind(robot: RobotSummary, chain: Sequence[int]) -> bool:
+    follows = robot.id in chain[1:] and robot.final_distance_error_m is not None
+    out_of_place = follows and abs(robot.final_distance_error_m or 0.0) > LEFT_BEHIND_M
+    return robot.id not in chain or out_of_place
 
 
 def _fill_errors(summary: RobotSummary, e: Errors) -> None:

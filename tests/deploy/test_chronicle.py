@@ -57,6 +57,12 @@ def test_a_hand_over_is_no_failover() -> None:
     assert chronicle.failovers(events, reigns) == []
 
 
+def test_a_lease_that_ran_out_is_named_as_the_cause() -> None:
+    expired = _line(5.9, 1, "lease", FIRST, change="expired")
+    events = [KILLED[0], expired, _line(6.0, 2, "leader_command", SECOND)]
+    assert chronicle.reigns(events)[1].cause == "expired"
+
+
 def test_the_same_robot_elected_again_is_no_hand_over() -> None:
     events = [KILLED[0], _line(6.0, 1, "leader_command", (3, 1, 1))]
     assert [reign.cause for reign in chronicle.reigns(events)] == ["start", "reelection"]
@@ -67,3 +73,9 @@ def test_I2_an_older_leader_command_after_a_newer_one_is_a_violation() -> None:
     (violation,) = chronicle.terms_that_went_back(events)
     assert (violation.invariant, violation.at_s) == ("I2", 1.1)
     assert chronicle.terms_that_went_back(KILLED) == []
+
+
+def test_the_last_chain_is_the_newest_configs() -> None:
+    late = [_line(9.0, 3, "chain", SECOND, chain=[2, 3, 1], seq=1), _line(9.1, 2, "chain", SECOND, chain=[2, 3], seq=0)]
+    assert chronicle.last_chain([*KILLED, *late]) == [2, 3, 1]
+    assert chronicle.last_chain([]) == []
