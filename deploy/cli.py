@@ -38,6 +38,8 @@ COMMANDS = (
           "lfa validate my_course.toml --set mission.leading.cruise_mps=0.3"),
     Entry("plot", "deploy.look.plots", "Draw the figures of a run folder.",
           "lfa plot runs/paper_path1-20260101-120000"),
+    Entry("report", "deploy.look.report", "One HTML page about a run, or about two side by side.",
+          "lfa report runs/paper_path1-20260101-120000"),
     Entry("replay", "deploy.look.replay", "Run cores again on their journals and compare; or play a recording back.",
           "lfa replay runs/paper_path1-20260101-120000 --robot 2"),
     Entry("bench", "deploy.bench.command", "Measure, beside the bar to be reached.",

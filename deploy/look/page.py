@@ -1,0 +1,295 @@
+"""The report's page: sections of tables and figures, one below the other; of two runs, side by side."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable, Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from deploy.look import chronicle, figures, summary
+from deploy.look.figures import FIGURES, Run
+from deploy.look.summary import RobotSummary, Summary
+from deploy.look.trace import messages
+from deploy.run.folder import SCENARIO
+
+CSS = Path(__file__).with_name("report.css")
+ROWS_MAX = 150
+Cells = Sequence[object]
+NONE = "–"
+
+
+def of(runs: Sequence[Run]) -> str:
+    """The whole page."""
+    sums = [summary.read(run.folder) for run in runs]
+    title = " and ".join(f"{s.scenario}, seed {s.seed}" for s in sums)
+    parts = [_side_by_side(runs, sums, lambda run, s: _head(run, s))]
+    if len(runs) == 2:
+        parts.append(f'<h2 id="compared">Compared</h2>{_compared(*sums)}')
+    for name, section in SECTIONS:
+        parts.append(f'<h2 id="{_id(name)}">{escape(name)}</h2>{_side_by_side(runs, sums, section)}')
+    links = "".join(f'<a href="#{_id(name)}">{escape(name)}</a>' for name, _ in SECTIONS)
+    two = ' class="two"' if len(runs) == 2 else ""
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>lfa: {escape(title)}</title>'
+        f'<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
+        f"<style>{CSS.read_text()}</style></head>"
+        f"<body{two}><nav>{links}</nav>{''.join(parts)}</body></html>\n"
+    )
+
+
+def _side_by_side(runs: Sequence[Run], sums: Sequence[Summary], section: Callable[[Run, Summary], str]) -> str:
+    told = [section(run, s) for run, s in zip(runs, sums, strict=True)]
+    return told[0] if len(told) == 1 else f'<div class="columns">{"".join(f"<div>{t}</div>" for t in told)}</div>'
+
+
+# --- sections -------------------------------------------------------------------------------------------------------
+
+
+def _head(run: Run, s: Summary) -> str:
+    good = s.exit_code == 0
+    badge = f'<span class="badge {"ok" if good else "bad"}">{"✓" if good else "✗"} {escape(s.outcome)}</span>'
+    reason = "" if s.reason is None else f' <span class="soft">{escape(s.reason)}</span>'
+    worst = max((r.distance_error_rms_m for r in s.robots if r.distance_error_rms_m is not None), default=None)
+    took = [f.first_command_ms for f in s.failovers if f.first_command_ms is not None]
+    tiles = (
+        ("duration", f"{s.sim_duration_s:.1f} s"),
+        ("times real time", f"{s.real_time_factor:g}"),
+        ("largest rms distance error", _mm(worst)),
+        ("leaders", len(s.leaders)),
+        ("slowest failover", f"{max(took):.0f} ms" if took else NONE),
+        ("contacts", sum(r.contacts for r in s.robots)),
+    )
+    shown = "".join(f'<div class="tile"><b>{escape(str(value))}</b>{name}</div>' for name, value in tiles)
+    about = f"{s.scenario}, {s.mode}, seed {s.seed}, {len(s.robots)} robots, in {run.folder.name}"
+    return (
+        f"<h1>{escape(run.scenario.title)}</h1><p class='soft'>{escape(about)}</p>"
+        f'<p>{badge}{reason}</p><div class="tiles">{shown}</div>{_assertions(s)}'
+    )
+
+
+def _assertions(s: Summary) -> str:
+    rows = [("✓" if a.ok else "✗", a.name, getattr(a, "text", "")) for a in s.assertions]
+    rows += [("✗", v.invariant, f"at {v.at_s:.3f} s: {v.text}") for v in s.violations]
+    return _table(("", "what must hold", ""), rows, text=(1, 2))
+
+
+def _robots(_run: Run, s: Summary) -> str:
+    heads = ("robot", "at the end", "distance error rms", "largest", "orientation rms", "to body (paper)",
+             "heading rms", "settled after", "contacts", "obstacles met")  # fmt: skip
+    return _table(heads, [_robot(r) for r in s.robots], text=(1, 9)) + (
+        "<p class='soft'>Rms values from when a follower had settled, with avoidance and formation changes left out; "
+        "the largest with nothing left out.</p>"
+    )
+
+
+def _robot(r: RobotSummary) -> Cells:
+    met = ", ".join(f"{count} {kind}" for kind, count in r.obstacles_met.items() if count)
+    angles = (r.bearing_error_rms_rad, r.bearing_error_body_rms_rad, r.heading_error_rms_rad)
+    return (r.id, r.role_at_end if r.alive else "gone", _mm(r.distance_error_rms_m), _mm(r.distance_error_max_m),
+            *(_deg(angle) for angle in angles), _s(r.settled_after_s), r.contacts, met or NONE)  # fmt: skip
+
+
+def _figure(name: str) -> Callable[[Run, Summary], str]:
+    def draw(run: Run, _s: Summary) -> str:
+        data = b64encode(figures.svg(figures.drawn(name, run))).decode()
+        title = next(title for known, _, title, _ in FIGURES if known == name)
+        return f'<figure><img alt="{escape(title)}" src="data:image/svg+xml;base64,{data}"></figure>'
+
+    return draw
+
+
+def _leaders(run: Run, s: Summary) -> str:
+    reigns = _table(
+        ("robot", "term", "from", "until", "because of"),
+        [(r.robot_id, r.term[0], _s(r.from_s), _s(r.until_s), r.cause) for r in s.leaders],
+        text=(4,),
+    )
+    failovers = _table(
+        ("lost", "by", "at", "next", "lease held after", "first command after", "chain closed after"),
+        [
+            (f.victim, f.cause, _s(f.at_s), f.leader or NONE, _ms(f.lease_ms), _ms(f.first_command_ms), _ms(f.chain_ms))
+            for f in s.failovers
+        ],
+    )
+    return _figure("leader_timeline")(run, s) + reigns + ("<h3>Failovers</h3>" + failovers if s.failovers else "")
+
+
+def _faults(run: Run, s: Summary) -> str:
+    if not s.faults:
+        return "<p>None.</p>"
+    rows = [(_s(f.at_s), f.kind, f.target, *_recovery(run, f)) for f in s.faults]
+    return _table(("at", "what", "robot", "chain without it after", "back in the chain after"), rows, text=(1,))
+
+
+def _recovery(run: Run, fault: chronicle.FaultDone) -> tuple[str, str]:
+    """When a chain without the victim was first spoken of, and when one with it again; from the fault on."""
+    without: float | None = None
+    for line in chronicle.of_kind([e for e in run.events if e["t"] >= fault.at_s], "chain"):
+        member = fault.target in line.get("chain", [])
+        if without is None and not member:
+            without = line["t"] - fault.at_s
+        elif without is not None and member:
+            return _ms(1000.0 * without), _s(line["t"] - fault.at_s)
+    return (NONE if without is None else _ms(1000.0 * without)), NONE
+
+
+def _decisions(run: Run, _s: Summary) -> str:
+    wanted = ("decision", "formation", "goal", "contact", "failed", "died", "slowed")
+    lines = [line for line in run.events if line["kind"] in wanted]
+    rows = [(f"{line['t']:.2f} s", line["robot"] or NONE, line["kind"], _details(line)) for line in lines[:ROWS_MAX]]
+    rest = f"<p class='soft'>{len(lines) - ROWS_MAX} more in events.jsonl.</p>" if len(lines) > ROWS_MAX else ""
+    opened = f"<details><summary>{len(lines)} lines</summary>"
+    return f"{opened}{_table(('at', 'robot', 'kind', 'what'), rows, text=(2, 3))}{rest}</details>"
+
+
+def _details(line: chronicle.Line) -> str:
+    left_out = ("t", "robot", "term", "kind", "from")
+    return ", ".join(f"{name} {_short(value)}" for name, value in line.items() if name not in left_out)
+
+
+def _processes(run: Run, _s: Summary) -> str:
+    """What each process said about itself, and how regularly its commands came."""
+    said: dict[str, list[dict[str, float]]] = {}
+    for owner, _, _, status in messages(run.folder, frozenset({"status"})):
+        said.setdefault(owner, []).append({name: float(value) for name, value in status.counters.items()})
+    rows = []
+    for owner in sorted(said):
+        own = said[owner]
+        commands = run.seen.cmd_vel.get(int(owner.removeprefix("robot"))) if owner.startswith("robot") else None
+        gaps = np.diff(commands[:, 0]) if commands is not None and commands.shape[0] > 1 else np.array([])
+        rows.append((
+            owner, _largest(own, "loop_lag_ms", "ms"), _largest(own, "cpu_percent", "%"),
+            _largest(own, "rss_mib", "MiB"),            _largest(own, "dropped", ""), _largest(own, "undecodable", ""),
+            f"{1.0 / gaps.mean():.1f} Hz" if gaps.size else NONE, _ms(1000.0 * gaps.max()) if gaps.size else NONE,
+        ))  # fmt: skip
+    heads = (
+        "process",
+        "largest loop lag",
+        "largest CPU share",
+        "memory",
+        "dropped",
+        "undecodable",
+        "commands",
+        "longest gap",
+    )
+    return _table(heads, rows, text=(0,))
+
+
+def _radio(run: Run, _s: Summary) -> str:
+    radio = run.scenario.radio
+    rows = [
+        ("delay", _ms(1000.0 * radio.delay_s)),
+        ("jitter", _ms(1000.0 * radio.jitter_s)),
+        ("loss", f"{100.0 * radio.loss:g} %"),
+        ("mean losses in a row", f"{radio.loss_burst:g}"),
+        ("duplication", f"{100.0 * radio.duplication:g} %"),
+    ]
+    return _table(("between robots", "as configured"), rows, text=(0,))
+
+
+def _configuration(run: Run, _s: Summary) -> str:
+    text = escape((run.folder / SCENARIO).read_text())
+    return f"<details><summary>{SCENARIO}, every field, as the seed drew it</summary><pre>{text}</pre></details>"
+
+
+SECTIONS: tuple[tuple[str, Callable[[Run, Summary], str]], ...] = (
+    ("Robots", _robots),
+    ("Paths over the map", _figure("fig09_path_flow")),
+    ("Distance error", _figure("fig07_distance_error")),
+    ("Orientation error", _figure("fig08_orientation_error")),
+    ("Tracking controller", _figure("fig11_tracking")),
+    ("String stability", _figure("string_stability")),
+    ("Leaders", _leaders),
+    ("Faults and recoveries", _faults),
+    ("Decisions", _decisions),
+    ("Processes", _processes),
+    ("Radio", _radio),
+    ("Configuration", _configuration),
+)
+
+
+# --- two runs -------------------------------------------------------------------------------------------------------
+
+
+def _compared(a: Summary, b: Summary) -> str:
+    """Figures of both, and the second less the first."""
+    rows: list[Cells] = [
+        ("outcome", a.outcome, b.outcome, NONE if a.outcome == b.outcome else "differs"),
+        _row("duration [s]", a.sim_duration_s, b.sim_duration_s, 1),
+        _row("contacts", sum(r.contacts for r in a.robots), sum(r.contacts for r in b.robots), 0),
+    ]
+    took = [[f.first_command_ms for f in s.failovers if f.first_command_ms is not None] for s in (a, b)]
+    rows.append(_row("slowest failover [ms]", max(took[0], default=None), max(took[1], default=None), 1))
+    theirs = {r.id: r for r in b.robots}
+    for r in a.robots:
+        other = theirs.get(r.id)
+        if other is None or (r.distance_error_rms_m is None and other.distance_error_rms_m is None):
+            continue
+        rows += [
+            _row(f"robot {r.id}: {name}", _scaled(r, field, scale), _scaled(other, field, scale), 2)
+            for name, field, scale in (
+                ("distance error rms [mm]", "distance_error_rms_m", 1000.0),
+                ("orientation error rms [deg]", "bearing_error_rms_rad", 57.2958),
+                ("settled after [s]", "settled_after_s", 1.0),
+            )
+        ]
+    return _table(("", "first", "second", "second − first"), rows, text=(0,))
+
+
+def _scaled(r: RobotSummary, field: str, scale: float) -> float | None:
+    value = getattr(r, field)
+    return None if value is None else value * scale
+
+
+def _row(name: str, a: float | None, b: float | None, digits: int) -> Cells:
+    both = a is not None and b is not None
+    texts = [NONE if value is None else f"{value:.{digits}f}" for value in (a, b)]
+    return (name, *texts, f"{b - a:+.{digits}f}" if both else NONE)  # type: ignore[operator]
+
+
+# --- words and numbers ----------------------------------------------------------------------------------------------
+
+
+def _table(heads: Cells, rows: Sequence[Cells], text: Sequence[int] = ()) -> str:
+    """`text`: columns of words, which stand to the left."""
+    if not rows:
+        return "<p>None.</p>"
+
+    def line(cells: Cells, tag: str) -> str:
+        marks = (' class="text"' if n in text else "" for n in range(len(cells)))
+        return "".join(f"<{tag}{m}>{escape(str(c))}</{tag}>" for c, m in zip(cells, marks, strict=True))
+
+    body = "".join(f"<tr>{line(row, 'td')}</tr>" for row in rows)
+    return f'<div class="scroll"><table><thead><tr>{line(heads, "th")}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _id(name: str) -> str:
+    return name.lower().replace(" ", "-")
+
+
+def _short(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _largest(own: Sequence[dict[str, float]], name: str, unit: str) -> str:
+    values = [counters[name] for counters in own if name in counters]
+    return f"{max(values):g} {unit}".rstrip() if values else NONE
+
+
+def _mm(value_m: float | None) -> str:
+    return NONE if value_m is None else f"{1000.0 * value_m:.1f} mm"
+
+
+def _deg(value_rad: float | None) -> str:
+    return NONE if value_rad is None else f"{57.2958 * value_rad:.2f}°"
+
+
+def _s(value_s: float | None) -> str:
+    return NONE if value_s is None else f"{value_s:.2f} s"
+
+
+def _ms(value_ms: float | None) -> str:
+    return NONE if value_ms is None else f"{value_ms:.1f} ms"

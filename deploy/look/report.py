@@ -1,0 +1,40 @@
+"""`lfa report`: a run, or two side by side, as one HTML page that needs nothing else: no network, no script."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from protocol.mission import Refused
+
+REPORT = "report.html"
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    other: Annotated[Path | None, typer.Argument(metavar="[RUN2]", help="Another one, to stand beside it.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Where to; default report.html in the (first) run folder.")] = None,
+) -> int:
+    folders = [folder] if other is None else [folder, other]
+    path = out or folder / (REPORT if other is None else f"report-vs-{other.resolve().name}.html")
+    page = html(folders)
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise Refused(f"--out {path}: cannot be written ({error.strerror})") from None
+    print(path)
+    return 0
+
+
+def html(folders: list[Path]) -> str:
+    """The page about these runs (one or two). Raises Refused for what is no finished run folder."""
+    from deploy.look import page
+    from deploy.look.figures import Run
+
+    for folder in folders:
+        for needed in ("summary.json", "recording.mcap", "scenario.toml"):
+            if not (folder / needed).is_file():
+                raise Refused(f"{folder}: no finished run, it has no {needed}")
+    return page.of([Run(folder) for folder in folders])

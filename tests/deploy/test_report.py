@@ -1,0 +1,97 @@
+"""`lfa report`: one page with everything on it, that needs nothing else, in a real browser as well."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from base64 import b64decode
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from deploy.look import page, report
+from deploy.look.figures import FIGURES, Run
+from deploy.run.faults import parse_all
+from deploy.run.simulate import run
+from protocol.mission import Refused
+from world.scenario import load
+
+BYTES_MAX = 3_000_000
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SECTIONS = [name for name, _ in page.SECTIONS]
+
+
+def _ran(folder: Path, seed: int, robots: int = 4) -> Path:
+    scenario = load("paper_path1" if robots == 4 else "straight", ["time_limit_s=6.0"], robots)
+    return run(scenario, seed, folder, parse_all(scenario.mission, (), ["kill leader at 3 s"])).folder
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _ran(tmp_path_factory.mktemp("runs") / "one", 1)
+
+
+def _images(html: str) -> list[str]:
+    return [b64decode(data).decode() for data in re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', html)]
+
+
+def test_every_section_and_figure_is_on_the_page(folder: Path) -> None:
+    html = report.html([folder])
+    assert [name for name in SECTIONS if f">{name}</h2>" not in html] == []
+    images = _images(html)
+    assert len(images) == len(FIGURES)
+    assert all(ElementTree.fromstring(image).tag.endswith("svg") for image in images)
+    assert len(html.encode()) < BYTES_MAX
+
+
+def test_the_failover_and_the_fault_are_told(folder: Path) -> None:
+    html = report.html([folder])
+    assert "first command after" in html
+    assert re.search(r"<td>3\.00 s</td><td class=\"text\">kill</td><td>1</td>", html)
+
+
+def test_the_page_asks_for_nothing_from_elsewhere(folder: Path) -> None:
+    html = report.html([folder])
+    assert not re.search(r'(src|href)="(?!data:|#)', html)
+    assert "<script" not in html
+    assert "url(" not in html
+
+
+def test_two_runs_stand_side_by_side_and_are_subtracted(folder: Path, tmp_path: Path) -> None:
+    html = report.html([folder, _ran(tmp_path / "two", 2)])
+    assert "second − first" in html
+    assert len(_images(html)) == 2 * len(FIGURES)
+
+
+def test_a_large_team_stays_small_on_the_page(tmp_path: Path) -> None:
+    html = report.html([_ran(tmp_path / "many", 1, robots=20)])
+    assert len(html.encode()) < BYTES_MAX
+    run = Run(tmp_path / "many")
+    assert sum(run.label(robot) is not None for robot in run.robots) <= 12
+
+
+def test_what_is_no_finished_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match=r"no finished run, it has no summary\.json"):
+        report.html([tmp_path])
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
+def test_a_browser_shows_it_without_a_complaint(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(report.html([folder]), encoding="utf-8")
+    assert BROWSER is not None
+    quiet = (
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--enable-logging=stderr",
+        f"--user-data-dir={tmp_path}/chrome",
+    )
+    shown = subprocess.run(
+        [BROWSER, *quiet, "--dump-dom", path.as_uri()], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert shown.stdout.count("<img") == len(FIGURES)
+    assert shown.stdout.count("<table") >= 5
+    assert [line for line in shown.stderr.splitlines() if "CONSOLE" in line] == []
