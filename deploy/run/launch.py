@@ -17,6 +17,7 @@ from typing import Annotated
 import msgspec
 import typer
 
+from deploy.run.chosen import choose
 from deploy.run.crew import ROUTER_NAME, Crew, rows
 from deploy.run.ending import Ended, Interrupts, finish, report, reread
 from deploy.run.faults import ORDERS, SIGNALS, Deed, Fault, Schedule, parse_all
@@ -35,12 +36,13 @@ from protocol.mission import robot_name
 from protocol.radio import CLEAR, WEATHER, Air
 from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
 from protocol.zenoh_bus import ZenohBus, answers
-from world.scenario import Scenario, draw, load
+from world.scenario import Scenario, draw
 
 STEP_S = 0.01
 SHOW_EVERY_S = 0.2
 START_S_MAX = 20.0
 SILENCE_S_MAX = 5.0
+SOCKET_FOLDER_MAX = 60
 NEWS_S = 2.0  # how long a robot that starts again is told the weather
 RECORDER_S_MAX = 30.0  # to read the recording back and sum it up
 
@@ -55,7 +57,7 @@ def command(
     figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
-    chosen = load(scenario, overrides or (), robots)
+    chosen = choose(scenario, overrides or (), robots)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     ended = run(chosen, seed, out, faults)
     return report(ended, figures=figures and ended.signal is None, as_json=as_json)
@@ -66,7 +68,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
     about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}")
-    sockets = Path(tempfile.mkdtemp(prefix="lfa-"))
+    sockets = _socket_folder()
     try:
         with Interrupts() as interrupts:
             launch = _Launch(drawn, folder, about, sockets, faults)
@@ -76,6 +78,12 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
             return reread(folder, interrupts.signal)
     finally:
         shutil.rmtree(sockets, ignore_errors=True)
+
+
+def _socket_folder() -> Path:
+    """A new private folder with a short name: a socket's path must not have more than 107 bytes."""
+    usual = tempfile.gettempdir()
+    return Path(tempfile.mkdtemp(prefix="lfa-", dir=usual if len(usual) <= SOCKET_FOLDER_MAX else "/tmp"))
 
 
 class _Aborted(Exception):

@@ -92,6 +92,8 @@ class _Tape:
         self._seq = 0
         self._recorded = 0
         self._undecodable = 0
+        self._missing = 0
+        self._last_seq: dict[tuple[str, str, int], int] = {}
         self._time = WorldTime()
         self._operator = Operator(fleet, self._incarnation)
         self._recorder = Recorder(Path(task.folder), task.about.metadata())
@@ -110,7 +112,16 @@ class _Tape:
                 self._time.see(arrival.at, message.time_s)
             self._recorder.record(self._time.of(arrival.at), where, message)
             self._recorded += 1
+            self._count_missing(where, message.header)
         self._recorder.flush_when_due(self._time.of(clock.now()))
+
+    def _count_missing(self, where: str, header: Header) -> None:
+        """A gap in a sender's numbers is messages that never came: the recorder should lose none."""
+        owner_and_topic = "/".join(where.split("/")[2:4])
+        stream = (owner_and_topic, header.sender, header.incarnation)
+        before = self._last_seq.get(stream, header.seq - 1)
+        self._missing += max(0, header.seq - before - 1)
+        self._last_seq[stream] = max(before, header.seq)
 
     def close(self, verdict: Verdict) -> None:
         now = clock.now()
@@ -118,7 +129,8 @@ class _Tape:
         self._recorder.record(self._time.of(now), self._operator.key, end)
         self._recorder.close()
         self._bus.close()
-        print(f"{self._recorded} recorded, {self._undecodable} undecodable, {self._inbox.dropped} dropped")
+        lost = f"{self._missing} missing, {self._inbox.dropped} dropped"
+        print(f"{self._recorded} recorded, {self._undecodable} undecodable, {lost}")
 
     def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
         """Key and message to be recorded; a liveliness change is an event of the recorder's own."""
