@@ -15,6 +15,7 @@ from msgspec import Struct
 from protocol.host import Host, Sent
 from protocol.journal import Journal
 from protocol.messages import Message, decode
+from protocol.mission import Refused
 from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
 from protocol.radio import Air, Radio, link_of
 from protocol.topics import TOPIC, address, alive_key, matches
@@ -163,6 +164,8 @@ class Simulator:
             self._publish(seat, key, payload)
         if node.interests is not seat.interests:
             self._refresh(seat)
+        if node.refusal is not None:
+            raise Refused(node.refusal)
         if node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
             self._leave(seat)
         else:

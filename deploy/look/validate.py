@@ -7,9 +7,10 @@ from typing import Annotated
 import msgspec
 import typer
 
+from deploy.run.chosen import choose
 from deploy.run.faults import parse_all
 from deploy.run.folder import toml
-from world.scenario import draw, load
+from world.scenario import draw
 
 
 def command(
@@ -19,7 +20,7 @@ def command(
     robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON instead of TOML.")] = False,
 ) -> int:
-    chosen = load(scenario, overrides or (), robots)
+    chosen = choose(scenario, overrides or (), robots)
     parse_all(chosen.mission, chosen.faults, ())
     drawn = draw(chosen, seed)
     print(msgspec.json.encode(drawn).decode() if as_json else toml(drawn), end="\n" if as_json else "")

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from agents.agent import Agent
+from deploy.run.chosen import choose
 from deploy.run.ending import Ended, Interrupts, finish, report
 from deploy.run.faults import ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
@@ -24,7 +25,7 @@ from protocol.node import Node
 from protocol.radio import WEATHER
 from protocol.topics import WORLD_NAME
 from protocol.witness import Witness
-from world.scenario import Scenario, draw, load
+from world.scenario import Scenario, draw
 from world.simulator import Simulator
 from world.world import World
 
@@ -44,7 +45,7 @@ def command(
     figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
-    chosen = load(scenario, overrides or (), robots)
+    chosen = choose(scenario, overrides or (), robots)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     ended = run(chosen, seed, out, faults)
     return report(ended, figures=figures, as_json=as_json)
