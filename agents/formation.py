@@ -207,9 +207,10 @@ class SlotMotion:
         self.x, self.y = x, y
 
     def step(self, slot: Slot, predecessor: Pose2D, twist: Twist, dt: float) -> None:
-        """Move on by `dt`, towards the commanded `slot`."""
+        """Move on by `dt`, towards the commanded `slot`; `predecessor` is where it is at the end of that time."""
         theta, v = predecessor.theta, twist.linear_x
         if self.heading_filter_m > 0.0:
+            self.chi = wrap(self.chi + self.chi_rate * dt)
             limit = self._gains.chi_rate_max_radps
             rate = abs(v) / self.heading_filter_m * wrap(theta - self.chi)
             self.chi_rate = limit if rate > limit else -limit if rate < -limit else rate
@@ -226,8 +227,6 @@ class SlotMotion:
         self.x = predecessor.x + behind_x + self.offset_x
         self.y = predecessor.y + behind_y + self.offset_y
         self.settled = self._blend(slot, c, s, dt)
-        if self.heading_filter_m > 0.0:
-            self.chi = wrap(self.chi + self.chi_rate * dt)
 
     def step_on(self, trace: Trace, travelled_m: float, slot: Slot, predecessor: Pose2D, v: float, dt: float) -> None:
         """Move on by `dt` along the predecessor's trace, `slot.separation_m` of path behind it (5.5)."""

@@ -176,7 +176,6 @@ class Chain:
                 robot.heading = bearing(Pose2D(), Pose2D(sign * slot.vx, sign * slot.vy))
             pose = robot.pose
             apart = hypot(pose.x - ahead_pose.x, pose.y - ahead_pose.y)
-            # chi has already moved on by one period; the slot itself has not.
             side = bearing(ahead_pose, Pose2D(slot.x, slot.y))
             commanded_m = hypot(slot.x - ahead_pose.x, slot.y - ahead_pose.y)
             self._errors.append(

@@ -69,9 +69,9 @@ SCHEMES = (
            fast_radps=(0.02,)),
     Scheme("pose, DR, 20 ms",       "pose",     0.0,   0.02,   0.0,   0.0,  (1.75,   3.7,    None,   None,   1.21)),
     Scheme("pose, DR, 100 ms 20 %", "pose",     0.0,   0.10,   0.0,   0.2,  (2.34,   5.8,    None,   None,   1.33)),
-    Scheme("vel, DR, 20 ms",        "velocity", 0.0,   0.02,   0.0,   0.0,  (1.09,   1.34,   None,   None,   1.030),
+    Scheme("vel, DR, 20 ms",        "velocity", 0.0,   0.02,   0.0,   0.0,  (1.09,   1.34,   3.2,    5.8,    1.030),
            (None, None, None, None, 1.035)),
-    Scheme("vel, DR, 20 ms 20 %",   "velocity", 0.0,   0.02,   0.0,   0.2,  (1.11,   1.42,   None,   None,   1.044)),
+    Scheme("vel, DR, 20 ms 20 %",   "velocity", 0.0,   0.02,   0.0,   0.2,  (1.11,   1.42,   3.8,    None,   1.044)),
     Scheme("vel, DR, 100 ms",       "velocity", 0.0,   0.10,   0.0,   0.0,  (1.51,   3.2,    None,   None,   1.148)),
     Scheme("vel, 40 ms",            "velocity", 0.04,  0.02,   0.0,   0.0,  (1.0004, 1.0002, 1.0003, 1.0003, 1.0002),
            _BUFFER),
@@ -92,8 +92,6 @@ SCHEMES = (
 )  # fmt: skip
 
 HEADING_RADPS = (0.2, 0.4, 0.8, 1.5, 3.0)
-HEADING_RAD = 0.012
-"""Amplitude of each sine of the leader's heading: small, so that they do not disturb each other."""
 WAVE_S = 20.0 * pi
 """All of `HEADING_RADPS` have whole periods in it."""
 HOP_SPARE = 1.05
@@ -107,24 +105,27 @@ class Mode(Struct, frozen=True):
     side: Side
     filter_m: float
     trace: bool
-    after: dict[int, tuple[float, ...]]
+    after: dict[int, tuple[float | None, ...]]
+    """None where a reference is that of a saturated chain."""
+    amplitude_rad: float = 0.012
+    """Of each sine of the leader's heading: small, so that they do not disturb each other."""
 
 
 MODES = (
     Mode("column L=k/2", "column", 0.6, False,
-         {3: (1.00, 1.002, 1.02, 1.07, 1.08), 100: (1.006, 1.08, 1.98, 29.0, 4.0)}),
+         {3: (1.00, 1.002, 1.02, 1.07, 1.08), 100: (1.006, 1.08, 1.98, None, None)}, 0.001),
     Mode("column L=0.6k", "column", 0.72, False,
          {3: (0.94, 0.80, 0.57, 0.41, 0.33), 100: (0.11, 0.001, 0.0, 0.0, 0.0)}),
     Mode("zigzag L=0.30", "zigzag", 0.30, False,
          {3: (1.00, 1.00, 1.00, 0.99, 0.90), 100: (1.00, 1.001, 0.995, 0.75, 0.04)}),
     Mode("zigzag L=0.36", "zigzag", 0.36, False,
-         {3: (0.98, 0.94, 0.80, 0.57, 0.34), 100: (0.57, 0.11, 0.001, 0.0, 0.05)}),
+         {3: (0.98, 0.94, 0.80, 0.57, 0.34), 100: (0.57, 0.11, 0.001, 0.0, 0.0)}),
     Mode("zigzag L=0.60", "zigzag", 0.60, False,
          {3: (0.92, 0.73, 0.38, 0.12, 0.02), 100: (0.06, 0.0, 0.0, 0.0, 0.0)}),
     Mode("trace", "column", 0.0, True,
          {3: (1.000, 1.000, 1.002, 1.010, 1.04), 100: (1.000, 1.003, 1.015, 1.075, 1.25)}),
-    Mode("column rigid", "column", 0.0, False, {3: (1.37, 2.7, 10.0)}),
-    Mode("zigzag rigid", "zigzag", 0.0, False, {3: (1.09, 1.37, 2.7)}),
+    Mode("column rigid", "column", 0.0, False, {3: (1.37, 2.7, 10.0)}, 0.003),
+    Mode("zigzag rigid", "zigzag", 0.0, False, {3: (1.09, 1.37, 2.7)}, 0.003),
 )  # fmt: skip
 
 TRACE_LAP_M = 20.0
@@ -216,7 +217,6 @@ def lateral(mode: Mode) -> tuple[float, ...]:
     followers = max(mode.after)
     count = len(next(iter(mode.after.values())))
     omegas = HEADING_RADPS[:count]
-    amplitude = HEADING_RAD if followers > 3 else 0.25 * HEADING_RAD
     slots = slots_of(FormationSpec(side=mode.side, separation_m=SEPARATION_M), range(2, followers + 2))
     chain = Chain(Setup(slots, trace=mode.trace, heading_filter_m=mode.filter_m, judged=False))
     hop_s = HOP_SPARE * abs(SEPARATION_M * cos(slots[0].phi)) / CRUISE_MPS
@@ -226,7 +226,7 @@ def lateral(mode: Mode) -> tuple[float, ...]:
     waves = {place: [0j] * count for place in watched}
     for step in range(begin + steps):
         t = step * CONTROL_PERIOD_S
-        turn = sum(amplitude * omega * cos(omega * t) for omega in omegas)
+        turn = sum(mode.amplitude_rad * omega * cos(omega * t) for omega in omegas)
         chain.step(Twist(CRUISE_MPS, turn))
         if step >= begin:
             for place in watched:
