@@ -84,18 +84,21 @@ def check_slot(slot: Slot, separation_min_m: float) -> Slot:
 class Formation:
     """The orientation requests: the highest (term, number) counts, whatever comes late, twice or never."""
 
-    def __init__(self, spec: FormationSpec, robots: Sequence[int], separation_min_m: float) -> None:
-        """`robots` in the order of the first chain; `spec` gives their slots until a leader asks otherwise."""
+    def __init__(
+        self, spec: FormationSpec, robots: Sequence[int], separation_min_m: float, *, trace: bool = False
+    ) -> None:
+        """`robots` in the order of the first chain; `spec` and `trace` count until a leader asks otherwise."""
         self._separation_min_m = separation_min_m
         self._spec = spec
         self._slots = {slot.robot: slot for slot in slots_of(spec, robots[1:])}
-        self.trace = False
+        self.trace = trace
+        """Whether followers keep to the path of their predecessor, k^d of it behind."""
         self.version: tuple[Term, int] = (NO_TERM, -1)
         self.refused = 0
 
     @classmethod
     def of(cls, mission: Mission) -> Formation:
-        formation = cls(mission.formation, mission.robots, 2.0 * mission.radius_m + 0.1)
+        formation = cls(mission.formation, mission.robots, 2.0 * mission.radius_m + 0.1, trace=mission.following.trace)
         formation.trace = mission.following.trace
         return formation
 
