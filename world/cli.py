@@ -14,6 +14,7 @@ from protocol.node import Node
 from protocol.runtime import Options, run
 from protocol.witness import Witness
 from protocol.zenoh_bus import default_endpoint
+from world import memory
 from world.scenario import draw, load
 from world.world import World
 
@@ -31,13 +32,18 @@ def start(
     connect: Annotated[str | None, typer.Option(help="Router's endpoint, like tcp/127.0.0.1:7447.")] = None,
     journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
     witness: Annotated[bool, typer.Option(help="Hold the mission's witness here.")] = True,
+    state: Annotated[Path | None, typer.Option(help="Run folder to keep the bodies' state in, for --resume.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Run folder whose world goes on from its last state.")] = None,
     faults: Annotated[bool, typer.Option("--faults", help="Obey an operator's radio weather: for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
     drawn = draw(load(scenario, set_ or (), robots), seed)
     options = Options(_fleet(fleet), connect or default_endpoint(), journal, faults)
     wall_ms = clock.wall_ms()
-    nodes: list[Node] = [World(fleet, drawn, seed, wall_ms, start_at=clock.now())]
+    known = None if resume is None else memory.read(resume)
+    placed = drawn if known is None else memory.resumed(drawn, known)
+    world = World(fleet, placed, seed, wall_ms, start_at=clock.now(), memory=known)
+    nodes: list[Node] = [world if state is None else memory.Remembering(world, state)]
     if witness and drawn.mission.witness:
         nodes.append(Witness(fleet, wall_ms, wall_ms))
     return run(nodes, options, wall_ms)

@@ -64,6 +64,10 @@ class Kinematic:
         self.wheels: list[Twist] = [STILL] * len(self.poses)
         """What each robot's wheels turn for; differs from `twists` where they slip."""
 
+    def advance(self, steps: int) -> None:
+        """Begin at that step: robots stand where the scenario says, obstacles on their ways are further."""
+        self._steps = steps
+
     def step(self, wanted: Sequence[Twist]) -> list[Touch]:
         """One step of 1/physics_hz with these commanded twists, one a robot."""
         self._steps += 1

@@ -10,7 +10,9 @@ from __future__ import annotations
 from math import floor, inf
 
 import msgspec
+from msgspec import Struct
 
+from protocol.geometry import Pose2D
 from protocol.messages import (
     Ask,
     Clock,
@@ -41,10 +43,30 @@ ROUNDING = 1e-6
 """Of a step: a tick may come this much early."""
 
 
+class Remembered(Struct, frozen=True):
+    """One robot at rest: where its body is, and what its odometry has counted so far."""
+
+    id: int
+    pose: Pose2D
+    pose_odom: Pose2D
+    odometer_m: float
+
+
+class Memory(Struct, frozen=True):
+    """All of a world that outlives its process (`memory.py`)."""
+
+    step: int
+    """Of the grid of time."""
+    robots: tuple[Remembered, ...]
+    things: dict[int, Pose2D]
+    """Obstacles that are not nailed down, by their place in the scenario."""
+
+
 class World:
     """All of a drawn `scenario` but its agents; `seed` draws the sensors' noise. Obeys the Node interface.
 
-    Its time begins with its first tick, which is asked for at `start_at` or at once.
+    Its time begins with its first tick, which is asked for at `start_at` or at once; with a `memory` of an earlier
+    life, whose places `scenario` must have (`memory.resumed`), it goes on from there.
     """
 
     def __init__(
@@ -55,6 +77,7 @@ class World:
         incarnation: int,
         start_at: float | None = None,
         bodies: type[Physics] | type[Kinematic] = Physics,
+        memory: Memory | None = None,
     ) -> None:
         self.name = WORLD_NAME
         self.incarnation = incarnation
@@ -68,6 +91,7 @@ class World:
             "seed": seed,
             "start_at": start_at,
             "bodies": bodies.__name__,
+            "memory": msgspec.to_builtins(memory),
         }
         self._fleet = fleet
         self._scenario = scenario
@@ -79,10 +103,14 @@ class World:
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
         self._cut_off = False
-        self._t0 = -inf if start_at is None else start_at
         self._dt_s = 1.0 / scenario.world.physics_hz
-        self._step = 0
+        self._step = 0 if memory is None else memory.step
         """Number of the next point of the grid."""
+        self._first = self._step
+        self._begun = False
+        self._remembered = {} if memory is None else {robot.id: robot for robot in memory.robots}
+        self._t0 = -inf if start_at is None else start_at - self._step * self._dt_s
+        self._bodies.advance(self._step)
         self._seq: dict[str, int] = {}
         self._led: tuple[int, Term] | None = None
         """Whose leader command was obeyed last, over all gateways: a change back to an older term shows (I2)."""
@@ -128,8 +156,9 @@ class World:
             return []
         sent: list[Envelope] = []
         self._switch_on(now)
-        if self._step == 0 and now >= self._t0:
-            self._t0 = now
+        if not self._begun and now >= self.next_deadline():
+            self._begun = True
+            self._t0 = now - self._step * self._dt_s
             sent.append(self._mission(now))
         due = floor((now - self._t0) / self._dt_s + ROUNDING) - self._step + 1
         if due > CATCH_UP_STEPS_MAX:
@@ -140,10 +169,18 @@ class World:
             sent.append(self._event("slowed", None, news, now))
         for _ in range(min(due, CATCH_UP_STEPS_MAX)):
             stamp = self._t0 + self._step * self._dt_s
-            touches = self._move(now) if self._step > 0 else []
+            touches = self._move(now) if self._step > self._first else []
             sent += self._speak(stamp, now, touches)
             self._step += 1
         return sent
+
+    def memory(self) -> Memory:
+        """What a next life can go on from."""
+        robots = tuple(
+            Remembered(robot.id, pose, robot.odometry.pose_odom, robot.odometry.odometer_m)
+            for robot, pose in zip(self._robots, self._bodies.poses, strict=True)
+        )
+        return Memory(self._step, robots, self._bodies.moved())
 
     def _switch_on(self, now: float) -> None:
         """Gateways come to life with the first moment that the world is told of."""
@@ -153,6 +190,10 @@ class World:
                 Robot(self._fleet, robot_id, self._scenario, self._seed, self.incarnation, now)
                 for robot_id in mission.robots
             ]
+            for robot in self._robots:
+                if robot.id in self._remembered:
+                    known = self._remembered[robot.id]
+                    robot.odometry.pose_odom, robot.odometry.odometer_m = known.pose_odom, known.odometer_m
 
     def _command(self, at_key: str, cmd: CmdVel, now: float) -> list[Envelope]:
         where = address(at_key)
@@ -231,7 +272,7 @@ class World:
         return Envelope(key(self._fleet, WORLD_NAME, "event"), event)
 
     def _time_of(self, now: float) -> float:
-        return now - self._t0 if self._step > 0 else 0.0
+        return now - self._t0 if self._begun else self._step * self._dt_s
 
     def _header(self, topic: str, stamp: float) -> Header:
         seq = self._seq[topic] = self._seq.get(topic, 0) + 1

@@ -23,7 +23,7 @@ from protocol.witness import Witness
 from world.kinematic import Kinematic
 from world.physics import Physics
 from world.spec import Scenario
-from world.world import World
+from world.world import Memory, World
 
 BODIES: dict[str, type[Physics] | type[Kinematic]] = {"Physics": Physics, "Kinematic": Kinematic}
 _local_decoder = msgspec.msgpack.Decoder(Local)
@@ -106,7 +106,8 @@ def _witness(heading: Heading, told: dict[str, Any]) -> Node:
 def _world(heading: Heading, told: dict[str, Any]) -> Node:
     scenario = msgspec.convert(told["scenario"], Scenario)
     bodies = BODIES[told["bodies"]]
-    return World(told["fleet"], scenario, told["seed"], heading.incarnation, told["start_at"], bodies)
+    memory = msgspec.convert(told.get("memory"), Memory | None)
+    return World(told["fleet"], scenario, told["seed"], heading.incarnation, told["start_at"], bodies, memory)
 
 
 def _mission(told: dict[str, Any]) -> Mission | None:

@@ -1,0 +1,105 @@
+"""What a world remembers over its own death: a state file in the run folder, written ten times a second.
+
+A world that resumes goes on from there: time, where everybody and everything pushable stands, what odometry has
+counted. Bodies are at rest then, as robots are whose driver died; gateways are new ones, and shut for T_grant.
+"""
+
+from __future__ import annotations
+
+import os
+from math import cos, sin
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from protocol.geometry import Pose2D
+from protocol.mission import Refused
+from protocol.node import Envelope, Received
+from world.spec import Obstacle, Scenario
+from world.world import Memory, World
+
+STATE = "state.json"
+EVERY_S = 0.1
+
+
+def read(run: Path) -> Memory:
+    """The state last written of the run in that folder. Raises Refused when there is none."""
+    path = run / STATE if run.is_dir() else run
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Memory)
+    except OSError as error:
+        raise Refused(f"--resume {path}: cannot be read ({error.strerror}), must be a run folder with one") from None
+    except msgspec.DecodeError as error:
+        raise Refused(f"--resume {path}: no state of a world ({error})") from None
+
+
+def resumed(scenario: Scenario, memory: Memory) -> Scenario:
+    """The drawn `scenario` with everybody and everything where `memory` has it. Raises Refused for another team."""
+    robots = scenario.mission.robots
+    if set(robots) != {robot.id for robot in memory.robots}:
+        ids = sorted(robot.id for robot in memory.robots)
+        raise Refused(f"--resume: the state is of robots {ids}, the scenario has {list(robots)}")
+    at = {robot.id: robot.pose for robot in memory.robots}
+    starts = tuple((at[robot].x, at[robot].y, at[robot].theta) for robot in robots)
+    obstacles = tuple(
+        obstacle if obstacle.mass_kg is None or n not in memory.things else _put(obstacle, memory.things[n])
+        for n, obstacle in enumerate(scenario.world.obstacles)
+    )
+    return replace(scenario, world=replace(scenario.world, starts=starts, obstacles=obstacles))
+
+
+def _put(obstacle: Obstacle, pose: Pose2D) -> Obstacle:
+    c, s = cos(pose.theta), sin(pose.theta)
+    corners = obstacle.corners_m
+    turned = None if corners is None else tuple((c * x - s * y, s * x + c * y) for x, y in corners)
+    return replace(obstacle, center_m=(pose.x, pose.y), corners_m=turned)
+
+
+class Remembering:
+    """A World whose state is kept in a file. Obeys the Node interface."""
+
+    def __init__(self, world: World, run: Path) -> None:
+        self._world = world
+        self._path = run / STATE
+        self._next_at = float("-inf")
+
+    def receive(self, received: Received) -> list[Envelope]:
+        return self._world.receive(received)
+
+    def tick(self, now: float) -> list[Envelope]:
+        sent = self._world.tick(now)
+        if now >= self._next_at:
+            self._next_at = now + EVERY_S
+            fresh = self._path.with_suffix(".new")
+            fresh.write_bytes(msgspec.json.encode(self._world.memory()))
+            os.replace(fresh, self._path)  # whoever reads finds one whole state or the other
+        return sent
+
+    def next_deadline(self) -> float:
+        return self._world.next_deadline()
+
+    @property
+    def name(self) -> str:
+        return self._world.name
+
+    @property
+    def incarnation(self) -> int:
+        return self._world.incarnation
+
+    @property
+    def started_with(self) -> dict[str, Any]:
+        return self._world.started_with
+
+    @property
+    def interests(self) -> frozenset[str]:
+        return self._world.interests
+
+    @property
+    def finished(self) -> bool:
+        return self._world.finished
+
+    @property
+    def refusal(self) -> str | None:
+        return self._world.refusal
