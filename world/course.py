@@ -11,6 +11,8 @@ from msgspec.structs import replace
 from protocol.geometry import TAU, Pose2D, compose
 from protocol.mission import Mission, Refused
 from world.spec import Obstacle, Point, Scenario
+from world.terrain import Ditch, Feature, features, patch_of, patches_of
+from world.ways import way_of
 
 DRAW_MARGIN_M = 0.5
 """What is drawn stays this far from the robots' starts and from the goal."""
@@ -41,29 +43,6 @@ def _slot(mission: Mission, hop: int) -> Pose2D:
     return Pose2D(k * cos(phi), k * sin(phi), 0.0)
 
 
-class Way:
-    """Where a moving obstacle is: to and fro along `center_m` -> `waypoints_m` at constant speed."""
-
-    def __init__(self, obstacle: Obstacle) -> None:
-        stops = (obstacle.center_m, *obstacle.waypoints_m)
-        self._legs = [(a, b, hypot(b[0] - a[0], b[1] - a[1])) for a, b in pairwise(stops) if a != b]
-        self._length_m = sum(leg[2] for leg in self._legs)
-        self._start_m = obstacle.phase * 2.0 * self._length_m
-        self._speed_mps = obstacle.speed_mps
-
-    def at(self, time_s: float) -> Point:
-        """Position [m] in `map` at the world's time."""
-        along = (self._start_m + self._speed_mps * time_s) % (2.0 * self._length_m)
-        along = min(along, 2.0 * self._length_m - along)
-        leg = 0
-        while along > self._legs[leg][2] and leg < len(self._legs) - 1:
-            along -= self._legs[leg][2]
-            leg += 1
-        a, b, length_m = self._legs[leg]
-        part = min(along / length_m, 1.0)
-        return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
-
-
 def check_course(scenario: Scenario) -> Scenario:
     """`scenario`, or `Refused` when a start or the goal cannot be stood on."""
     mission, world = scenario.mission, scenario.world
@@ -88,9 +67,13 @@ def check_course(scenario: Scenario) -> Scenario:
 def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
     radius_m = scenario.mission.radius_m
     for index, obstacle in enumerate(scenario.world.obstacles):
-        center_m = Way(obstacle).at(0.0) if obstacle.waypoints_m else obstacle.center_m
+        center_m = way_of(obstacle).at(0.0) if obstacle.moves else obstacle.center_m
         if gap_to(place, replace(obstacle, center_m=center_m)) < radius_m:
             raise Refused(f"world.obstacles[{index}] = at {list(center_m)}: must be clear of {whose}")
+    for key, feature in features(scenario.world):
+        patch = patch_of(feature)
+        if patch.gap_m(*place) < radius_m:
+            raise Refused(f"world.{key} = at {[patch.x, patch.y]}: must be clear of {whose}")
     for index, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
         if to_segment(place, (x1, y1), (x2, y2)) < radius_m:
             raise Refused(f"world.walls_m[{index}] = {[x1, y1, x2, y2]}: must be clear of {whose}")
@@ -107,9 +90,14 @@ def draw(scenario: Scenario, seed: int) -> Scenario:
     margin_m = scenario.mission.radius_m + vary.starts_m + DRAW_MARGIN_M
     obstacles = tuple(
         _draw_obstacle(obstacle, vary.obstacles_m, vary.moving_phase, anchors, margin_m, Random(f"{seed}/obstacle{n}"))
-        for n, obstacle in enumerate(world.obstacles)
+        for n, obstacle in enumerate(_draw_walks(world.obstacles, seed))
     )
-    drawn = replace(scenario, world=replace(world, obstacles=obstacles, vary=type(vary)()))
+    ground: dict[str, list[Feature]] = {"potholes": [], "bumps": [], "ditches": []}
+    for key, feature in features(world):
+        moved = _draw_feature(feature, vary.obstacles_m, anchors, margin_m, Random(f"{seed}/{key}"))
+        ground[key.partition("[")[0]].append(moved)
+    terrain = {kind: tuple(several) for kind, several in ground.items()}
+    drawn = replace(scenario, world=replace(world, obstacles=obstacles, **terrain, vary=type(vary)()))
     starts: list[Pose2D] = []
     for robot_id, pose in zip(scenario.mission.robots, starts_of(scenario), strict=True):
         starts.append(
@@ -119,12 +107,23 @@ def draw(scenario: Scenario, seed: int) -> Scenario:
     return replace(drawn, world=replace(drawn.world, starts=poses))
 
 
+def _draw_walks(obstacles: tuple[Obstacle, ...], seed: int) -> tuple[Obstacle, ...]:
+    """Walks are the seed's even in a scenario that varies nothing."""
+    return tuple(
+        obstacle if obstacle.walk_m is None else replace(obstacle, walk_seed=Random(f"{seed}/walk{n}").getrandbits(32))
+        for n, obstacle in enumerate(obstacles)
+    )
+
+
 def _draw_obstacle(
     obstacle: Obstacle, within_m: float, phased: bool, anchors: list[Point], margin_m: float, chance: Random
 ) -> Obstacle:
     if phased and obstacle.waypoints_m:
         speed_mps = obstacle.speed_mps * chance.uniform(0.8, 1.2)
         obstacle = replace(obstacle, phase=chance.random(), speed_mps=speed_mps)
+    elif phased and obstacle.velocity_mps is not None:
+        (vx, vy), faster = obstacle.velocity_mps, chance.uniform(0.8, 1.2)
+        obstacle = replace(obstacle, velocity_mps=(faster * vx, faster * vy))
     if within_m == 0.0:
         return obstacle
     for _ in range(DRAWS_MAX):
@@ -139,14 +138,31 @@ def _draw_obstacle(
     return obstacle
 
 
+def _draw_feature(feature: Feature, within_m: float, anchors: list[Point], margin_m: float, chance: Random) -> Feature:
+    if within_m == 0.0:
+        return feature
+    for _ in range(DRAWS_MAX):
+        dx, dy = _in_disc(within_m, chance)
+        moved: Feature
+        if isinstance(feature, Ditch):
+            (x1, y1), (x2, y2) = feature.ends_m
+            moved = replace(feature, ends_m=((x1 + dx, y1 + dy), (x2 + dx, y2 + dy)))
+        else:
+            moved = replace(feature, center_m=(feature.center_m[0] + dx, feature.center_m[1] + dy))
+        if all(patch_of(moved).gap_m(*anchor) >= margin_m for anchor in anchors):
+            return moved
+    return feature
+
+
 def _draw_start(
     scenario: Scenario, pose: Pose2D, within_m: float, within_rad: float, placed: list[Pose2D], chance: Random
 ) -> Pose2D:
-    radius_m = scenario.mission.radius_m
+    radius_m, patches = scenario.mission.radius_m, patches_of(scenario.world)
     for _ in range(DRAWS_MAX):
         dx, dy = _in_disc(within_m, chance)
         drawn = Pose2D(pose.x + dx, pose.y + dy, pose.theta + chance.uniform(-within_rad, within_rad))
         free = all(hypot(drawn.x - other.x, drawn.y - other.y) > 2.0 * radius_m for other in placed)
+        free = free and all(patch.gap_m(drawn.x, drawn.y) > radius_m for patch in patches)
         if free and all(to_segment((drawn.x, drawn.y), w[:2], w[2:]) > radius_m for w in scenario.world.walls_m):
             return drawn
     return pose
@@ -177,7 +193,9 @@ def reach_of(obstacle: Obstacle) -> float:
 
 def _swept_gap(place: Point, obstacle: Obstacle) -> float:
     """The least distance [m] ever, wherever on its way a moving obstacle is."""
-    if not obstacle.waypoints_m:
+    if obstacle.walk_m is not None:
+        return gap_to(place, obstacle) - obstacle.walk_m
+    if not obstacle.waypoints_m:  # one that goes straight on comes by once, and late
         return gap_to(place, obstacle)
     legs = pairwise((obstacle.center_m, *obstacle.waypoints_m))
     return min(to_segment(place, a, b) for a, b in legs if a != b) - reach_of(obstacle)

@@ -12,8 +12,9 @@ from msgspec import Struct
 
 from protocol.geometry import STILL, Pose2D, Twist, along_arc
 from protocol.mission import Limits
-from world.course import Way, starts_of
+from world.course import starts_of
 from world.spec import Scenario
+from world.ways import way_of
 
 
 class Touch(Struct, frozen=True, gc=False):
@@ -56,7 +57,7 @@ class Kinematic:
         self._dt_s = 1.0 / scenario.world.physics_hz
         self._steps = 0
         self._drives = [Drive(scenario.mission.limits) for _ in scenario.mission.robots]
-        self._ways = {n: Way(o) for n, o in enumerate(scenario.world.obstacles) if o.waypoints_m}
+        self._ways = {n: way_of(o) for n, o in enumerate(scenario.world.obstacles) if o.moves}
         self.poses: list[Pose2D] = list(starts_of(scenario))
         """Of each robot's `base_link` in `map`."""
         self.twists: list[Twist] = [STILL] * len(self.poses)

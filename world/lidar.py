@@ -34,7 +34,7 @@ class Scanner:
         self._lidar = scenario.world.lidar
         self._radius_m = scenario.mission.radius_m
         self._obstacles = scenario.world.obstacles
-        fixed = [o for o in self._obstacles if o.mass_kg is None and not o.waypoints_m]
+        fixed = [o for o in self._obstacles if o.mass_kg is None and not o.moves]
         circles, segments = outline((obstacle, Pose2D(*obstacle.center_m)) for obstacle in fixed)
         self._circles = np.array(circles, dtype=float).reshape(-1, 3)
         self._segments = np.array([*scenario.world.walls_m, *segments], dtype=float).reshape(-1, 4)

@@ -15,9 +15,10 @@ import pymunk
 
 from protocol.geometry import STILL, Pose2D, Twist, sinc, wrap
 from protocol.mission import robot_name
-from world.course import Way, reach_of, starts_of
+from world.course import reach_of, starts_of
 from world.kinematic import Drive, Touch
 from world.spec import Obstacle, Scenario
+from world.ways import Way, way_of
 from world.wheels import Floor
 
 GRAVITY_MPS2 = 9.81
@@ -179,9 +180,9 @@ class Physics:
 
     def _add_obstacle(self, n: int, obstacle: Obstacle) -> None:
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
-        if obstacle.waypoints_m:
+        if obstacle.moves:
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-            way = Way(obstacle)
+            way = way_of(obstacle)
             body.position = way.at(0.0)
             self._moving.append((n, body, way))
         else:

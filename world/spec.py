@@ -35,6 +35,16 @@ class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
     speed_mps: float = 0.0
     phase: float = 0.0
     """Where on its way there and back it starts: 0 at `center_m`, 0.5 at the last way-point."""
+    velocity_mps: Point | None = None
+    """Another way of moving: straight on, for ever."""
+    walk_m: float | None = None
+    """Another: a random walk at `speed_mps` within this of `center_m`, drawn by the seed."""
+    walk_seed: int = 0
+    """Set by `draw`."""
+
+    @property
+    def moves(self) -> bool:
+        return bool(self.waypoints_m) or self.velocity_mps is not None or self.walk_m is not None
 
 
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
@@ -201,13 +211,22 @@ def _check_obstacle(where: str, obstacle: Obstacle) -> None:
     if mass_kg is not None:
         _require(0.01 <= mass_kg <= 1e4, f"{where}.mass_kg", mass_kg, "a number from 0.01 to 10000")
     _require(0.0 <= obstacle.phase < 1.0, f"{where}.phase", obstacle.phase, "from 0 up to, not including, 1")
-    moving = bool(obstacle.waypoints_m)
-    low = 0.001 if moving else 0.0
-    right = "above 0 with waypoints_m, and 0 without"
-    _require(low <= obstacle.speed_mps <= (10.0 if moving else 0.0), f"{where}.speed_mps", obstacle.speed_mps, right)
-    _require(not (moving and mass_kg is not None), f"{where}.mass_kg", mass_kg, "left out with waypoints_m")
-    still = moving and all(point == obstacle.center_m for point in obstacle.waypoints_m)
+    ways = (("waypoints_m", obstacle.waypoints_m), ("velocity_mps", obstacle.velocity_mps), ("walk_m", obstacle.walk_m))
+    given = [name for name, way in ways if way not in ((), None)]
+    _require(len(given) <= 1, where, " and ".join(given), "one way of moving")
+    _require(not (given and mass_kg is not None), f"{where}.mass_kg", mass_kg, f"left out with {''.join(given)}")
+    paced = given not in ([], ["velocity_mps"])
+    low, high = (0.001, 10.0) if paced else (0.0, 0.0)
+    right = "above 0 with waypoints_m or walk_m, and 0 without"
+    _require(low <= obstacle.speed_mps <= high, f"{where}.speed_mps", obstacle.speed_mps, right)
+    still = bool(obstacle.waypoints_m) and all(point == obstacle.center_m for point in obstacle.waypoints_m)
     _require(not still, f"{where}.waypoints_m", list(obstacle.center_m), "a place other than center_m")
+    if obstacle.velocity_mps is not None:
+        fast_enough = 0.001 <= hypot(*obstacle.velocity_mps) <= 10.0
+        _require(fast_enough, f"{where}.velocity_mps", list(obstacle.velocity_mps), "from 0.001 to 10 m/s")
+    if obstacle.walk_m is not None:
+        right = "a number from speed_mps (the way of one second) to 1000"
+        _require(obstacle.speed_mps <= obstacle.walk_m <= 1e3, f"{where}.walk_m", obstacle.walk_m, right)
 
 
 def _convex(corners_m: tuple[Point, ...]) -> bool:

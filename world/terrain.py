@@ -159,18 +159,15 @@ def patch_of(feature: Feature) -> Patch:
 
 def check_feature(where: str, feature: Feature) -> None:
     """Refuses with the key, the value and what would be right when no ground can be made of `feature`."""
-    if isinstance(feature, Ditch):
-        (a, b), high = feature.ends_m, feature.depth_m
-        length_m, key = hypot(b[0] - a[0], b[1] - a[1]), "depth_m"
-        _require(length_m >= PATCH_WIDTH_M_MIN, f"{where}.ends_m", [list(a), list(b)], "two different points")
-    elif isinstance(feature, Bump):
-        length_m, key, high = feature.length_m, "height_m", feature.height_m
-    else:
-        length_m = feature.width_m if feature.length_m is None else feature.length_m
-        key, high = "depth_m", feature.depth_m
     right = f"a number from {PATCH_WIDTH_M_MIN:g} to 1000"
     _require(PATCH_WIDTH_M_MIN <= feature.width_m <= 1e3, f"{where}.width_m", feature.width_m, right)
-    _require(PATCH_WIDTH_M_MIN <= length_m <= 1e3, f"{where}.length_m", length_m, right)
+    if isinstance(feature, Ditch):
+        a, b = feature.ends_m
+        apart = PATCH_WIDTH_M_MIN <= hypot(b[0] - a[0], b[1] - a[1]) <= 1e3
+        _require(apart, f"{where}.ends_m", [list(a), list(b)], "two different points, at most 1000 m apart")
+    elif feature.length_m is not None:
+        _require(PATCH_WIDTH_M_MIN <= feature.length_m <= 1e3, f"{where}.length_m", feature.length_m, right)
+    key, high = ("height_m", feature.height_m) if isinstance(feature, Bump) else ("depth_m", feature.depth_m)
     _require(0.001 <= high <= 10.0, f"{where}.{key}", high, "a number from 0.001 to 10")
 
 

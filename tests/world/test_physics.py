@@ -10,10 +10,10 @@ from random import Random
 import pytest
 
 from protocol.geometry import STILL, Pose2D, Twist, distance, wrap
-from world.course import Way
 from world.kinematic import Kinematic, Touch
 from world.physics import Physics
 from world.scenario import Obstacle, load
+from world.ways import ToAndFro
 
 HZ = 100
 ALONE = ["mission.robots=[1]"]
@@ -172,7 +172,7 @@ def test_a_moving_obstacle_keeps_its_course_whatever_it_meets() -> None:
 
 @pytest.mark.parametrize(("phase", "place"), [(0.0, 0.0), (0.25, 1.0), (0.5, 2.0), (0.75, 1.0)])
 def test_phase_is_a_part_of_the_way_there_and_back(phase: float, place: float) -> None:
-    way = Way(Obstacle(center_m=(0, 0), radius_m=0.2, waypoints_m=((1, 0), (1, 1)), speed_mps=0.1, phase=phase))
+    way = ToAndFro(Obstacle(center_m=(0, 0), radius_m=0.2, waypoints_m=((1, 0), (1, 1)), speed_mps=0.1, phase=phase))
     x, y = way.at(0.0)
     assert x + y == pytest.approx(place)
 
