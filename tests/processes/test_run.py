@@ -60,6 +60,8 @@ def test_the_next_in_chain_takes_over_within_half_a_second(tmp_path: Path) -> No
     assert 0.0 < failover.first_command_ms < FIRST_COMMAND_MS_MAX
     assert summary.violations == []
     assert [robot.alive for robot in summary.robots] == [False, True, True, True]
+    recorded = (tmp_path / "run" / "logs" / "recorder.log").read_text()
+    assert " 0 missing, 0 dropped" in recorded, "the recorder loses nothing when a robot is killed"
 
 
 def test_a_stopped_robot_goes_on_when_it_is_woken(tmp_path: Path) -> None:
