@@ -29,6 +29,7 @@ from protocol.messages import (
     Localization,
     Member,
     MissionNote,
+    ObstacleNote,
     OperatorNote,
     PoseStamped,
     Role,
@@ -139,23 +140,18 @@ class Agent:
                 self._beliefs.hear_sensors(message, now)
                 driver.estimator.sensors(message, now)
                 self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
-            case PoseStamped():
-                robot = robot_id_of(message.header.sender)
-                if driver.predecessor is not None and robot == driver.predecessor.robot:
-                    driver.predecessor.heard(message, now)
-            case LeaseNote():
-                source = robot_id_of(message.header.sender)
-                if source is not None:
-                    self._apply(lease.receive(Member(source, message.header.incarnation), message.body, now), now)
             case Localization():
                 driver.estimator.localization(message, now)
             case LaserScan():
                 driver.see(message, now)
-            case TableRow():
-                self._hear_row(message, now, driver)
-            case FormationNote():
-                if driver.formation.request(message):
-                    self._event("formation", now, {"number": message.number, "trace": message.trace})
+            case LeaseNote():
+                source = robot_id_of(message.header.sender)
+                if source is not None:
+                    self._apply(lease.receive(Member(source, message.header.incarnation), message.body, now), now)
+            case PoseStamped() | TableRow() | ObstacleNote() | FormationNote():
+                robot = robot_id_of(message.header.sender)
+                if robot is not None and robot != self._id:
+                    self._hear_robot(robot, message, now, driver)
             case PeerUp() | PeerDown():
                 peer = robot_id_of(message.name)
                 if peer is not None:
@@ -164,15 +160,25 @@ class Agent:
             case OperatorNote():
                 self._obey(message, now, lease)
 
-    def _hear_row(self, row: TableRow, now: float, driver: Driver) -> None:
-        robot = robot_id_of(row.header.sender)
-        if robot is None or robot == self._id:
-            return
-        self._beliefs.hear_row(robot, row, now)
-        if driver.predecessor is not None and robot == driver.predecessor.robot:
-            for delay in row.delays:
-                if delay.robot == self._id:
-                    driver.predecessor.clock.reported(delay.least_s, now)
+    def _hear_robot(
+        self, robot: int, message: PoseStamped | TableRow | ObstacleNote | FormationNote, now: float, driver: Driver
+    ) -> None:
+        """What another robot tells the team."""
+        ahead = driver.predecessor if driver.predecessor is not None and driver.predecessor.robot == robot else None
+        match message:
+            case PoseStamped():
+                if ahead is not None:
+                    ahead.heard(message, now)
+            case TableRow():
+                self._beliefs.hear_row(robot, message, now)
+                least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
+                if ahead is not None and least_s is not None:
+                    ahead.clock.reported(least_s, now)
+            case ObstacleNote():
+                self._beliefs.hear_obstacle(robot, message, now)
+            case FormationNote():
+                if driver.formation.request(message):
+                    self._event("formation", now, {"number": message.number, "trace": message.trace})
 
     def _obey(self, note: OperatorNote, now: float, lease: Lease) -> None:
         """An operator's word; only the leader changes the formation, or gives the lease to the next in the chain."""
@@ -268,6 +274,7 @@ class Agent:
         self._command(command, role, now)
         self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, twist, now)
         self._reports.decision(driver.decision, lease.term, now)
+        self._reports.obstacle(driver, pose, now)
         self._mind_stuck(role, pose, now, lease, driver)
         if role is Role.LEADER:
             self._orders.lead(driver.lead, lease.chain[1:], lease.term, now)
@@ -325,7 +332,7 @@ class Agent:
         common = {f"lfa/{fleet}/*/mission", f"lfa/{fleet}/*/operator"}
         if self._lease is None or self._driver is None:
             return frozenset(common)
-        others = {f"lfa/{fleet}/*/{topic}" for topic in ("table", "formation")}
+        others = {f"lfa/{fleet}/*/{topic}" for topic in ("table", "formation", "obstacles")}
         lease = {f"lfa/{fleet}/*/lease/all", f"lfa/{fleet}/*/lease/{own}", alive_key(fleet, "*", "*")}
         hardware = {self._voice.key(topic) for topic in ("sensors", "localization", "scan")}
         ahead = self._driver.predecessor

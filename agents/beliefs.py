@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 from agents.clocks import ClockOffset
+from agents.features import SAME_M, Feature
 from protocol.geometry import Pose2D
-from protocol.messages import Delay, Sensors, TableRow
+from protocol.messages import Delay, ObstacleNote, Sensors, TableRow
 from protocol.topics import TOPIC
 
 ROBOTS_MAX = 512
+TOLD_S = 1.0
+"""What another robot saw moving is believed so long."""
 
 
 class Beliefs:
@@ -18,6 +23,7 @@ class Beliefs:
         self.sensors_at = -1.0
         self._table: dict[int, tuple[TableRow, float]] = {}
         self._clocks: dict[int, ClockOffset] = {}
+        self._told: dict[int, tuple[ObstacleNote, float]] = {}
 
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
         self.sensors, self.sensors_at = sensors, at
@@ -49,6 +55,22 @@ class Beliefs:
         """Least (receive - send) of these robots' rows: their half of a round trip (control.md 3.3)."""
         clocks = [(robot, self._clocks.get(robot)) for robot in robots]
         return tuple(Delay(robot, clock.least(now)) for robot, clock in clocks if clock is not None and clock.known)
+
+    def hear_obstacle(self, robot: int, note: ObstacleNote, at: float) -> None:
+        """The last thing that `robot` saw moving."""
+        if note.kind == "moving" and (robot in self._told or len(self._told) < ROBOTS_MAX):
+            self._told[robot] = (note, at)
+
+    def moving(self, seen: list[Feature], now: float) -> list[Feature]:
+        """`seen`, and what others saw moving elsewhere, as of `now`."""
+        known = list(seen)
+        for note, at in self._told.values():
+            if now - at <= TOLD_S:
+                vx, vy = note.twist_map
+                x, y = note.x + vx * (now - at), note.y + vy * (now - at)
+                if all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
+                    known.append(Feature("moving", x, y, note.radius_m, vx, vy))
+        return known
 
 
 def _order(row: TableRow) -> tuple[int, int]:

@@ -113,7 +113,7 @@ class Driver:
         mates = [(mate.x, mate.y) for mate in self._mates(now)] if self.explore is not None else []
         if self.explore is not None and self.explore.work(role is Role.LEADER, pose, mates, now):
             self.lead.take(self.explore.route, pose)
-        moving = self._tracker.moving(now)
+        moving = self._beliefs.moving(self._tracker.moving(now), now)
         still = points if not moving else [p for p in points if not _belongs(p, pose, moving)]
         if role is Role.LEADER:
             wanted = self._leading(chain, still, pose, now)
@@ -189,10 +189,13 @@ class Driver:
             self._detour.decision = structs.replace(decision, kind=kind)
         return around
 
+    def met(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
+        """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
+        return _nearest([f for f in self._tracker.features(now) if f.kind == kind], pose)
+
     def _kind_ahead(self, pose: Pose2D, now: float) -> str:
         """Class of the nearest thing."""
-        features = self._tracker.features(now)
-        nearest = min(features, key=lambda f: hypot(f.x - pose.x, f.y - pose.y) - f.radius_m, default=None)
+        nearest = _nearest(self._tracker.features(now), pose)
         return "stationary" if nearest is None else nearest.kind
 
     def _following(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
@@ -230,6 +233,10 @@ class Driver:
         if self._waiting_since is None:
             self._waiting_since = now
         return 0.0 if now - self._waiting_since < GAP_WAIT_S_MAX else 0.5
+
+
+def _nearest(features: Sequence[Feature], pose: Pose2D) -> Feature | None:
+    return min(features, key=lambda f: hypot(f.x - pose.x, f.y - pose.y) - f.radius_m, default=None)
 
 
 def _belongs(point: Point, pose: Pose2D, moving: Sequence[Feature]) -> bool:

@@ -7,10 +7,11 @@ from agents.driver import Driver
 from agents.strategy import Decision
 from agents.voice import Voice
 from protocol.geometry import Pose2D, Twist
-from protocol.messages import Level, PoseStamped, Role, Status, TableRow, Term, Tracking
+from protocol.messages import Level, ObstacleNote, PoseStamped, Role, Status, TableRow, Term, Tracking
 from protocol.node import Vitals
 
 TRACKING_EVERY = 2
+OBSTACLE_S = 0.5
 TABLE_S = 0.5
 TABLE_ROBOTS_FULL_RATE = 16
 """Larger teams say their rows less often: the table's traffic grows with their square."""
@@ -24,6 +25,7 @@ class Reports:
         self._voice = voice
         self._table_s = TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
         self._next_table = 0.0
+        self._next_obstacle = 0.0
         self._steps = 0
         self._met: tuple[str, str] | None = None
 
@@ -54,6 +56,21 @@ class Reports:
             free_m, bearing = round(min(decision.free_m, FAR_M), 3), round(decision.bearing, 3)
             data |= {"class": decision.kind, "action": decision.action, "free_m": free_m, "bearing_rad": bearing}
         self._voice.event("decision", now, term, data)
+
+    def obstacle(self, driver: Driver, pose: Pose2D, now: float) -> None:
+        """What this robot is dealing with, for all: at once when it changes, and while it lasts twice a second."""
+        decision = driver.decision
+        if decision is None:
+            self._next_obstacle = 0.0
+            return
+        if now < self._next_obstacle:
+            return
+        feature = driver.met(pose, decision.kind, now)
+        if feature is not None:
+            self._next_obstacle = now + OBSTACLE_S
+            header, velocity = self._voice.header("obstacles", now), (feature.vx, feature.vy)
+            note = ObstacleNote(header, feature.kind, feature.x, feature.y, feature.radius_m, velocity)
+            self._voice.say("obstacles", note)
 
     def _tracking(self, driver: Driver, predecessor: int, now: float) -> None:
         r = driver.follower.readout

@@ -1,0 +1,50 @@
+"""What a robot has heard of others is fresh, stale, or not believed."""
+
+from agents.beliefs import TOLD_S, Beliefs
+from agents.features import Feature
+from protocol.messages import Header, ObstacleNote, Role, TableRow
+
+
+def row(seq: int, x: float, life: int = 1) -> TableRow:
+    return TableRow(Header("robot2", life, seq, 0.1 * seq), x, 0.0, 0.0, 0.0, 0.0, Role.FOLLOWER)
+
+
+def told(kind: str, x: float) -> ObstacleNote:
+    return ObstacleNote(Header("robot2", 1, 0, 0.0), kind, x, 0.0, 0.25, (0.2, 0.0))
+
+
+def test_the_newest_row_of_the_newest_life_counts() -> None:
+    beliefs = Beliefs()
+    for heard in (row(3, 3.0), row(2, 2.0), row(3, 9.0), row(0, 5.0, life=2), row(9, 9.0, life=1)):
+        beliefs.hear_row(2, heard, 1.0)
+    pose = beliefs.pose_of(2, 1.0)
+    assert pose is not None
+    assert pose.x == 5.0
+
+
+def test_a_stale_row_is_no_place() -> None:
+    beliefs = Beliefs()
+    beliefs.hear_row(2, row(1, 1.0), 1.0)
+    assert beliefs.pose_of(2, 3.9) is not None
+    assert beliefs.pose_of(2, 4.1) is None
+
+
+def test_what_another_saw_moving_moves_on_and_is_forgotten() -> None:
+    beliefs = Beliefs()
+    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
+    [feature] = beliefs.moving([], 0.5)
+    assert feature.x == 1.1
+    assert beliefs.moving([], TOLD_S + 0.1) == []
+
+
+def test_what_one_sees_oneself_counts_once() -> None:
+    beliefs = Beliefs()
+    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
+    own = Feature("moving", 1.2, 0.1, 0.25, 0.2, 0.0)
+    assert beliefs.moving([own], 0.0) == [own]
+
+
+def test_what_another_saw_standing_does_not_move() -> None:
+    beliefs = Beliefs()
+    beliefs.hear_obstacle(2, told("stationary", 1.0), 0.0)
+    assert beliefs.moving([], 0.1) == []
