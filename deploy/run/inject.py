@@ -48,7 +48,7 @@ def command(
 ) -> int:
     if deed not in (*SIGNALS, *ORDERS):
         raise Refused(f"{deed!r}: must be one of {', '.join((*SIGNALS, *ORDERS))}")
-    team = _one_fleet(agents(), fleet)
+    team = one_fleet(agents(), fleet)
     inbox = Inbox()
     bus = _bus(team[0], inbox)
     if deed in ORDERS:
@@ -119,7 +119,7 @@ def _option(words: Sequence[str], name: str, default: str) -> str:
     return default
 
 
-def _one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
+def one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
     fleets = sorted({agent.fleet for agent in running})
     if not fleets:
         raise Refused("no agent of yours runs on this machine: start one with lfa run, or lfa-agent")

@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from tests.processes.fleet import lfa
+from protocol.zenoh_bus import answers
+from tests.processes.fleet import LFA, eventually, lfa, running
+
+
+@contextmanager
+def router(endpoint: str) -> Iterator[None]:
+    process = subprocess.Popen([sys.executable, "-m", "deploy.fleet.router", "--listen", endpoint])
+    try:
+        eventually(lambda: answers(endpoint), "no router came up")
+        yield
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_every_core_returns_the_same_again(tmp_path: Path) -> None:
@@ -14,3 +31,48 @@ def test_every_core_returns_the_same_again(tmp_path: Path) -> None:
     again = lfa("replay", folder, "--robot", "all")
     assert again.returncode == 0, again.stdout + again.stderr
     assert len(again.stdout.splitlines()) == 7, "five lives of four robots, the witness and the world"
+
+
+def test_an_operator_sees_a_fleet_and_changes_its_formation(tmp_path: Path) -> None:
+    with running(tmp_path / "run", "straight", "--robots", "3") as run:
+        run.wait_for("leader_command")
+        fleet = ("--fleet", f"straight-{run.launcher.pid}")
+        watched = json.loads(lfa("watch", "--json", *fleet).stdout)
+        assert [row["role"] for row in watched["robots"]] == ["leader", "follower", "follower"]
+        assert "leader" in lfa("watch", "--once", *fleet).stdout
+
+        heard = json.loads(lfa("topic", "echo", "robot2/pose", "--count", "1", *fleet).stdout)
+        assert (heard["channel"], heard["message"]["header"]["sender"]) == ("robot2/pose", "robot2")
+        rates = {
+            rate["channel"]: rate["hz"] for rate in json.loads(lfa("topic", "hz", "pose", "--json", *fleet).stdout)
+        }
+        assert set(rates) == {"robot1/pose", "robot2/pose", "robot3/pose"}
+
+        asked = lfa("formation", "column", *fleet)
+        assert asked.returncode == 0, asked.stdout + asked.stderr
+        assert "ordered by robot1" in asked.stdout
+        assert [line["side"] for line in run.events() if line.get("by") == "operator"] == ["column"]
+
+
+def test_a_recording_played_back_is_seen_like_a_fleet(tmp_path: Path) -> None:
+    folder, endpoint = str(tmp_path / "run"), f"unixsock-stream/{tmp_path}/r.sock"
+    lfa("sim", "straight", "--set", "time_limit_s=20.0", "--out", folder, "--no-figures")
+    with router(endpoint):
+        player = subprocess.Popen([*LFA, "replay", folder, "--connect", endpoint], stdout=subprocess.DEVNULL)
+        try:
+            heard = lfa("topic", "echo", "robot2/pose", "--count", "1", "--fleet", "replay", "--connect", endpoint)
+        finally:
+            player.kill()
+            player.wait()
+    assert json.loads(heard.stdout)["message"]["type"] == "pose"
+
+
+def test_what_is_not_there_is_said_in_one_line() -> None:
+    for arguments in (["watch", "--once"], ["topic", "list"], ["formation", "left"]):
+        done = lfa(*arguments, "--fleet", "nobody", "--connect", "unixsock-stream//nonexistent/r.sock")
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert "no router answers at" in done.stderr
+    piped = lfa("watch")
+    assert (piped.returncode, piped.stderr) == (2, "lfa: watch needs a terminal: use --once or --json\n")
+    assert lfa("formation", "circle").stderr == "lfa: formation = circle: must be one of left, right, column, zigzag\n"

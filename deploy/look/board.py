@@ -1,0 +1,137 @@
+"""What `lfa watch` shows: how every robot of a fleet stands, who led in the last minute, and what happened. Pure: times
+come with the messages, by the onlooker's own clock."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from msgspec import Struct
+
+from protocol.messages import Event, Message, PoseStamped, Role, Status, Tracking
+from protocol.mission import robot_id_of
+
+STALE_S = 1.0  # an older pose is not a robot's present one
+LEADER_STEP_S = 1.0
+LEADERS_KEPT = 300
+EVENTS_KEPT = 50
+DULL = ("peer_up", "peer_down")
+
+
+class Row(Struct, frozen=True):
+    """One robot. None: it has not said."""
+
+    robot: int
+    role: str
+    term: int | None
+    predecessor: int | None
+    error_m: float | None
+    """How far from its slot, by its own knowledge."""
+    speed_mps: float | None
+    pose_age_s: float | None
+    state: str
+    loop_lag_ms: float | None
+    cpu_percent: float | None
+    rss_mib: float | None
+
+
+class Happened(Struct, frozen=True):
+    at: float
+    who: str
+    what: str
+
+
+class Board:
+    """Feed it what comes; read `rows`, `leaders` and `events`."""
+
+    def __init__(self, robots: tuple[int, ...] = ()) -> None:
+        self._poses: dict[int, tuple[float, PoseStamped]] = {}
+        self._tracking: dict[int, tuple[float, Tracking]] = {}
+        self._status: dict[int, Status] = {}
+        self._robots = set(robots)
+        self._sampled_at: float | None = None
+        self.leaders: deque[int | None] = deque(maxlen=LEADERS_KEPT)
+        """Who led, a sample each `LEADER_STEP_S`, newest last; None: nobody."""
+        self.events: deque[Happened] = deque(maxlen=EVENTS_KEPT)
+
+    def see(self, at: float, message: Message) -> None:
+        robot = robot_id_of(message.header.sender)
+        if isinstance(message, Event):
+            self._happened(at, message)
+        if not robot:
+            return
+        self._robots.add(robot)
+        match message:
+            case PoseStamped():
+                self._poses[robot] = (at, message)
+            case Tracking():
+                self._tracking[robot] = (at, message)
+            case Status():
+                self._status[robot] = message
+
+    def sample(self, now: float) -> None:
+        """Note who leads at the moment, once each step of the timeline."""
+        if self._sampled_at is None or now >= self._sampled_at + LEADER_STEP_S:
+            self._sampled_at = now
+            self.leaders.append(self.leader(now))
+
+    def leader(self, now: float) -> int | None:
+        """Of those who call themselves leader and are heard, the one of the highest term."""
+        claims = [
+            (pose.term, robot)
+            for robot, (at, pose) in self._poses.items()
+            if pose.role is Role.LEADER and now - at < STALE_S
+        ]
+        return max(claims)[1] if claims else None
+
+    def rows(self, now: float) -> list[Row]:
+        return [self._row(robot, now) for robot in sorted(self._robots)]
+
+    def _row(self, robot: int, now: float) -> Row:
+        at, pose = self._poses.get(robot, (None, None))
+        heard_at, tracking = self._tracking.get(robot, (0.0, None))
+        status = self._status.get(robot)
+        age_s = None if at is None else max(0.0, now - at)
+        if age_s is None or age_s > STALE_S or pose is None:
+            role, tracking = ("silent" if pose is not None else "unheard"), None
+        else:
+            role = pose.role.value
+        if tracking is not None and (role != "follower" or now - heard_at > STALE_S):
+            tracking = None
+        counters = {} if status is None else status.counters
+        return Row(
+            robot=robot,
+            role=role,
+            term=None if pose is None else pose.term.n,
+            predecessor=None if tracking is None else tracking.predecessor,
+            error_m=None if tracking is None else float(tracking.error_m),
+            speed_mps=None if pose is None else pose.twist.linear_x,
+            pose_age_s=age_s,
+            state=_state(role, tracking, status),
+            loop_lag_ms=counters.get("loop_lag_ms"),
+            cpu_percent=counters.get("cpu_percent"),
+            rss_mib=counters.get("rss_mib"),
+        )
+
+    def _happened(self, at: float, event: Event) -> None:
+        if event.kind in DULL:
+            return
+        data = {name: value for name, value in event.data.items() if name != "t"}
+        told = ", ".join(f"{name} {_short(value)}" for name, value in data.items())
+        self.events.append(Happened(at, event.header.sender, f"{event.kind} {told}".strip()))
+
+
+def _state(role: str, tracking: Tracking | None, status: Status | None) -> str:
+    if tracking is not None:
+        return f"{tracking.state}, avoids" if tracking.avoiding else tracking.state
+    if role in ("silent", "unheard") or status is None or status.text == role:
+        return ""
+    return status.text
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    if isinstance(value, list | tuple):
+        return "-".join(_short(item) for item in value)
+    return str(value)

@@ -1,0 +1,87 @@
+"""Looking at a running fleet: which one, where its router is, and what comes from it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from msgspec import Struct
+
+from deploy.run.inject import Running, agents, one_fleet
+from protocol.bus import Arrival, Inbox
+from protocol.messages import BadMessage, Message, decode
+from protocol.mission import Refused
+from protocol.topics import TOPIC, address
+from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
+
+INBOX_SIZE_MAX = 65536
+
+
+class Fleet(Struct, frozen=True):
+    """A fleet, the endpoint where it meets, and those of its agents that are this user's own and run here."""
+
+    name: str
+    endpoint: str
+    team: tuple[Running, ...]
+
+
+def find(fleet: str | None, connect: str | None) -> Fleet:
+    """The fleet that is meant: one that runs here, or any by its name and its router. Raises Refused."""
+    running = agents()
+    if connect is None and running and (fleet is None or any(agent.fleet == fleet for agent in running)):
+        team = one_fleet(running, fleet)
+        return Fleet(team[0].fleet, team[0].endpoint, tuple(team))
+    if fleet is None:
+        raise Refused("no agent of yours runs on this machine: say --fleet NAME, and --connect for another router")
+    return Fleet(fleet, connect or default_endpoint(), ())
+
+
+class Ear:
+    """What comes from one fleet. `wait` sleeps until something wakes it or the time is over."""
+
+    def __init__(self, fleet: Fleet, bus: ZenohBus, inbox: Inbox, wake: threading.Event) -> None:
+        self.fleet = fleet
+        self.bus = bus
+        self._inbox = inbox
+        self._wake = wake
+
+    @property
+    def dropped(self) -> int:
+        return self._inbox.dropped
+
+    def wait(self, timeout_s: float) -> None:
+        self._wake.wait(timeout_s)
+        self._wake.clear()
+
+    def take(self) -> list[tuple[Arrival, Message]]:
+        """What has come since the last call; what is no message of ours is left out."""
+        found = ((arrival, _message(arrival)) for arrival in self._inbox.take())
+        return [(arrival, message) for arrival, message in found if message is not None]
+
+
+@contextmanager
+def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iterator[Ear]:
+    """An ear for the key expressions `topics` (`*/pose`) of `fleet`; `every`: all values of states, not the newest."""
+    wake = threading.Event()
+    inbox = Inbox(wake, INBOX_SIZE_MAX, every=every)
+    try:
+        bus = ZenohBus(fleet.endpoint, inbox)
+    except RouterAbsent:
+        raise Refused(f"no router answers at {fleet.endpoint}: must be the router of fleet {fleet.name}") from None
+    try:
+        bus.follow(frozenset(f"lfa/{fleet.name}/{topic}" for topic in topics))
+        yield Ear(fleet, bus, inbox, wake)
+    finally:
+        bus.close()
+
+
+def _message(arrival: Arrival) -> Message | None:
+    where = address(arrival.key)
+    topic = TOPIC.get(where.topic) if where is not None else None
+    if topic is None or not isinstance(arrival.payload, bytes):
+        return None
+    try:
+        return decode(arrival.payload, topic.type)
+    except BadMessage:
+        return None

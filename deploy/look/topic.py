@@ -1,0 +1,101 @@
+"""`lfa topic`: what travels in a running fleet, how often, and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+import msgspec
+import typer
+from msgspec import Struct
+
+from deploy.look.onlooker import find, listen
+from deploy.run import channels
+from protocol import clock
+from protocol.mission import Refused
+from protocol.topics import TOPIC
+
+POLL_S = 0.1
+
+
+class Rate(Struct, frozen=True):
+    """One channel as it was heard: messages a second, what the table of topics wants, bytes a message."""
+
+    channel: str
+    type: str
+    hz: float
+    table_hz: float | None
+    bytes_mean: float
+
+
+def command(
+    action: Annotated[Literal["list", "echo", "hz"], typer.Argument(help="What to do.")],
+    topic: Annotated[str, typer.Argument(help="robot2/pose, robot2, pose, or nothing for all.")] = "",
+    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    count: Annotated[int, typer.Option(help="Echo: end after so many messages; 0 goes on.")] = 0,
+    seconds: Annotated[float, typer.Option(help="List and hz: how long to listen.")] = 2.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON; echo always does.")] = False,
+) -> int:
+    wanted = expressions(topic)
+    if action == "echo":
+        return _echo(find(fleet, connect).name, connect, wanted, count)
+    rates = _rates(find(fleet, connect).name, connect, wanted, seconds)
+    if as_json:
+        print(msgspec.json.encode(rates).decode())
+    else:
+        print("\n".join(_lines(rates, with_rates=action == "hz")))
+    return 0 if rates else 1
+
+
+def expressions(text: str) -> frozenset[str]:
+    """The key expressions, after the fleet's part, that `robot2/pose`, `robot2` or `pose` means. Raises Refused."""
+    owner, _, name = text.partition("/")
+    if not name and owner in TOPIC:
+        owner, name = "*", owner
+    if name and name not in TOPIC:
+        raise Refused(f"topic {name!r}: must be one of {', '.join(TOPIC)}")
+    return frozenset({f"{owner or '*'}/{name or '*'}", f"{owner or '*'}/{name or '*'}/*"})
+
+
+def _echo(fleet: str, connect: str | None, wanted: frozenset[str], count: int) -> int:
+    """Every message as one line of JSON, with its channel."""
+    left = count
+    with listen(find(fleet, connect), wanted, every=True) as ear:
+        while True:
+            ear.wait(POLL_S)
+            for arrival, message in ear.take():
+                channel = msgspec.json.encode(arrival.key.split("/", 2)[2]).decode()
+                print(f'{{"channel":{channel},"message":{channels.encode(message).decode()}}}', flush=True)
+                left -= 1
+                if left == 0:
+                    return 0
+
+
+def _rates(fleet: str, connect: str | None, wanted: frozenset[str], seconds: float) -> list[Rate]:
+    heard: dict[str, tuple[int, int]] = {}
+    with listen(find(fleet, connect), wanted, every=True) as ear:
+        begun = clock.now()
+        while clock.now() < begun + seconds:
+            ear.wait(min(POLL_S, seconds))
+            for arrival, _ in ear.take():
+                channel = arrival.key.split("/", 2)[2]
+                number, size = heard.get(channel, (0, 0))
+                heard[channel] = (number + 1, size + len(arrival.payload))  # type: ignore[arg-type]
+        lasted_s = clock.now() - begun
+    return [_rate(channel, *heard[channel], lasted_s) for channel in sorted(heard)]
+
+
+def _rate(channel: str, number: int, size: int, lasted_s: float) -> Rate:
+    topic = TOPIC[channel.split("/")[1]]
+    return Rate(channel, topic.type.__name__, round(number / lasted_s, 2), topic.rate_hz, round(size / number, 1))
+
+
+def _lines(rates: Iterable[Rate], *, with_rates: bool) -> list[str]:
+    rows = [("channel", "type", "Hz", "of", "bytes") if with_rates else ("channel", "type")]
+    for rate in rates:
+        wanted = "events" if rate.table_hz is None else f"{rate.table_hz:g}"
+        row = (rate.channel, rate.type)
+        rows.append((*row, f"{rate.hz:.1f}", wanted, f"{rate.bytes_mean:.0f}") if with_rates else row)
+    widths = [max(len(row[n]) for row in rows) for n in range(len(rows[0]))]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

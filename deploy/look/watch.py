@@ -1,0 +1,221 @@
+"""`lfa watch`: a table that lives, on a terminal of 80 columns; keys do things to the robots of an own fleet."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import select
+import shutil
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+
+from deploy.look.board import Board, Row
+from deploy.look.onlooker import Ear, find, listen
+from deploy.run import formation, inject
+from protocol import clock
+from protocol.mission import Refused
+
+if TYPE_CHECKING:
+    from rich.console import Group, RenderableType
+
+REFRESH_S = 0.5
+FIRST_S = 1.3  # each process has told its status by then
+WIDTH_MIN, HEIGHT_MIN = 60, 12
+TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"})
+SIDES = ("left", "right", "column", "zigzag")
+#        key   deed
+DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
+HELP = "1-9 robot, k kill, s stop, c continue, x cut, h heal, f formation, q quit"
+ROLE_STYLES = {"leader": "bold green", "follower": "", "waiting": "yellow", "silent": "bold red", "unheard": "dim"}
+
+
+def command(
+    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    once: Annotated[bool, typer.Option("--once", help="Print the table once and end.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the rows once, as JSON.")] = False,
+) -> int:
+    if not (once or as_json):
+        _check_terminal()
+    found = find(fleet, connect)
+    board = Board(tuple(agent.robot for agent in found.team))
+    with listen(found, TOPICS) as ear:
+        if not (once or as_json):
+            return _live(ear, board)
+        _hear_for(ear, board, FIRST_S)
+        rows = board.rows(clock.now())
+    if as_json:
+        print(msgspec.json.encode({"fleet": found.name, "robots": rows}).decode())
+    else:
+        from rich.console import Console
+
+        Console(width=max(WIDTH_MIN, shutil.get_terminal_size().columns)).print(_table(rows, None))
+    return 0 if any(row.pose_age_s is not None for row in rows) else 1
+
+
+def _check_terminal() -> None:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise Refused("watch needs a terminal: use --once or --json")
+    size = shutil.get_terminal_size()
+    if size.columns < WIDTH_MIN or size.lines < HEIGHT_MIN:
+        right = f"must be at least {WIDTH_MIN} x {HEIGHT_MIN}, or use --once"
+        raise Refused(f"terminal of {size.columns} x {size.lines} characters: {right}")
+
+
+def _hear_for(ear: Ear, board: Board, duration_s: float) -> None:
+    until = clock.now() + duration_s
+    while clock.now() < until:
+        clock.sleep(0.1)
+        _hear(ear, board)
+
+
+def _hear(ear: Ear, board: Board) -> None:
+    for arrival, message in ear.take():
+        board.see(arrival.at, message)
+    board.sample(clock.now())
+
+
+def _live(ear: Ear, board: Board) -> int:
+    from rich.console import Console
+    from rich.live import Live
+
+    hand = Hand(ear)
+    console = Console()
+    with _raw_keys(), Live(console=console, screen=True, auto_refresh=False) as live:
+        while True:
+            _hear(ear, board)
+            live.update(_screen(ear, board, hand, console.width, console.height), refresh=True)
+            for key in _keys(REFRESH_S):
+                if key == "q":
+                    return 0
+                hand.press(key)
+
+
+class Hand:
+    """What the keys do: digits choose a robot, letters do something to it. `said` is how the last one went."""
+
+    def __init__(self, ear: Ear) -> None:
+        self._ear = ear
+        self.chosen: int | None = None
+        self.said = "" if ear.fleet.team else "this fleet is not yours to command: keys other than q do nothing"
+        self._side = 0
+
+    def press(self, key: str) -> None:
+        if not self._ear.fleet.team:
+            return
+        if key.isdecimal():
+            self.chosen = int(key)
+            self.said = f"robot {key} is chosen"
+        elif key == "f":
+            self._side = (self._side + 1) % len(SIDES)
+            formation.say(self._ear, SIDES[self._side])
+            self.said = f"formation {SIDES[self._side]} asked for"
+        elif key in DEEDS:
+            self._do(DEEDS[key])
+
+    def _do(self, deed: str) -> None:
+        if self.chosen is None and deed != "heal":
+            self.said = f"{deed}: choose a robot first, by its digit"
+            return
+        target = "" if deed == "heal" else str(self.chosen)
+        told = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(told):
+                inject.command(deed, target, fleet=self._ear.fleet.name, as_json=False)
+        except Refused as refused:
+            self.said = str(refused)
+        else:
+            self.said = told.getvalue().strip()
+
+
+def _screen(ear: Ear, board: Board, hand: Hand, width: int, height: int) -> Group:
+    from rich.console import Group
+    from rich.text import Text
+
+    rows = board.rows(clock.now())
+    shown = rows[: max(1, height - 9)]
+    leader = board.leader(clock.now())
+    who = "nobody leads" if leader is None else f"robot {leader} leads"
+    left = height - len(shown) - 7
+    more = f", {len(rows) - len(shown)} more robots" if len(shown) < len(rows) else ""
+    events = list(board.events)[-left:] if left > 0 else []
+    return Group(
+        Text(f"fleet {ear.fleet.name}: {who}{more}", style="bold", no_wrap=True),
+        _table(shown, hand.chosen),
+        _timeline(board, width),
+        *(Text(f" {_ago(e.at):>6} {e.who:<9} {e.what}", no_wrap=True, overflow="ellipsis") for e in events),
+        Text(hand.said, style="cyan", no_wrap=True, overflow="ellipsis"),
+        Text(HELP, style="dim", no_wrap=True, overflow="ellipsis"),
+    )
+
+
+def _table(rows: list[Row], chosen: int | None) -> RenderableType:
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    heads = ("robot", "role", "term", "ahead", "off slot", "speed", "pose", "lag", "CPU", "mem", "state")
+    for head in heads:
+        left = head in ("role", "state")
+        table.add_column(head, justify="left" if left else "right", no_wrap=True, overflow="ellipsis")
+    for row in rows:
+        table.add_row(*_cells(row), style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, ""))
+    return table
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    """Units in the cells. Of a term number the last four digits: neighbours differ there."""
+    return (
+        str(row.robot),
+        row.role,
+        "" if row.term is None else f"{row.term % 10000}",
+        "" if row.predecessor is None else str(row.predecessor),
+        "" if row.error_m is None else f"{1000.0 * row.error_m:.0f} mm",
+        "" if row.speed_mps is None else f"{row.speed_mps:.2f} m/s",
+        "" if row.pose_age_s is None else _age(row.pose_age_s),
+        "" if row.loop_lag_ms is None else f"{row.loop_lag_ms:.0f} ms",
+        "" if row.cpu_percent is None else f"{row.cpu_percent:.0f} %",
+        "" if row.rss_mib is None else f"{row.rss_mib:.0f} M",
+        row.state,
+    )
+
+
+def _timeline(board: Board, width: int) -> RenderableType:
+    """One character a second: the digit of who led, a dot for nobody."""
+    from rich.text import Text
+
+    room = max(10, width - 14)
+    samples = list(board.leaders)[-room:]
+    line = "".join("." if leader is None else str(leader % 10) for leader in samples)
+    return Text(f"lease -{len(samples):>3} s {line}", style="green", no_wrap=True)
+
+
+def _age(age_s: float) -> str:
+    return f"{1000.0 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.0f} s"
+
+
+def _ago(at: float) -> str:
+    return f"{max(0.0, clock.now() - at):.0f} s"
+
+
+@contextlib.contextmanager
+def _raw_keys() -> Iterator[None]:
+    """Keys come one by one and unseen; the terminal is as before when this ends."""
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _keys(within_s: float) -> str:
+    """What was pressed; waits that long for the first."""
+    ready, _, _ = select.select([sys.stdin], [], [], within_s)
+    return os.read(sys.stdin.fileno(), 32).decode(errors="ignore") if ready else ""

@@ -1,0 +1,55 @@
+"""`lfa formation`: the operator asks the leader for another formation, and waits for its word that it was ordered."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+import typer
+
+from agents.formation import named
+from deploy.look.onlooker import Ear, find, listen
+from deploy.run.operator import Operator
+from protocol import clock
+from protocol.messages import Event, encode
+from protocol.mission import FormationSpec
+
+ANSWER_S_MAX = 2.0
+JOINED_S = 0.2  # a subscription that was just declared hears what is said from here on
+
+
+def command(
+    side: Annotated[str, typer.Argument(help="left, right, column or zigzag.")],
+    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the leader's answer as JSON.")] = False,
+) -> int:
+    named(side, FormationSpec())
+    with listen(find(fleet, connect), frozenset({"*/event"})) as ear:
+        clock.sleep(JOINED_S)
+        answer = ask(ear, side)
+    if as_json:
+        facts = {"side": side, "acknowledged": answer is not None}
+        print(msgspec.json.encode(facts if answer is None else {**facts, "leader": answer.header.sender}).decode())
+    elif answer is None:
+        print(f"formation {side}: no leader answered within {ANSWER_S_MAX:g} s")
+    else:
+        print(f"formation {side}: ordered by {answer.header.sender}, request {answer.data.get('number')} of its term")
+    return 0 if answer is not None else 1
+
+
+def ask(ear: Ear, side: str) -> Event | None:
+    """Say it to `ear`'s fleet; the event by which a leader acknowledges it, None when none does in time."""
+    say(ear, side)
+    until = clock.now() + ANSWER_S_MAX
+    while clock.now() < until:
+        ear.wait(0.05)
+        for _, message in ear.take():
+            if isinstance(message, Event) and message.kind == "formation" and message.data.get("by") == "operator":
+                return message
+    return None
+
+
+def say(ear: Ear, side: str) -> None:
+    operator = Operator(ear.fleet.name, clock.wall_ms())
+    ear.bus.publish(operator.orders_key, encode(operator.orders("formation", clock.now(), side=side)))
