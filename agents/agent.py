@@ -272,7 +272,8 @@ class Agent:
             role = Role.WAITING
         command = driver.drive(role, lease.chain, pose, twist, now)
         self._command(command, role, now)
-        self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, twist, now)
+        told = driver.published(twist)
+        self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, told, now)
         self._reports.decision(driver.decision, lease.term, now)
         self._reports.obstacle(driver, pose, now)
         self._mind_stuck(role, pose, now, lease, driver)

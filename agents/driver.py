@@ -7,7 +7,7 @@ knows of terms or keys.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, hypot, sin
+from math import atan2, cos, hypot, sin
 
 from msgspec import structs
 
@@ -20,9 +20,9 @@ from agents.features import Feature, Tracker
 from agents.following import follower_of, predecessor_of
 from agents.formation import Formation
 from agents.motion import Lead
-from agents.perception import Point, Surroundings, without
+from agents.perception import Point, Surroundings, free_along, without
 from agents.predecessor import Predecessor
-from agents.safety import safe
+from agents.safety import SKIN_M, safe
 from agents.strategy import Decision, Detour
 from agents.stuck import Stuck
 from protocol.geometry import STILL, Pose2D, Twist, bearing, distance, wrap
@@ -40,6 +40,11 @@ LEADER_OMEGA_MAX_RADPS = 0.6
 TRACK_EVERY = 5
 """Control periods between a follower's looks at its place on the route."""
 DT_MIN_S = 0.002
+OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
+"""Wheels that obey are nearer than this to the command: several periods of full acceleration."""
+NOSE_M, NOSE_RAD, NOSE_RADPS, NOSE_MPS = 0.05, 0.2, 0.5, 0.1
+"""Free way ahead, bearing of the route, and speeds when an explorer's nose is at a wall."""
+LOOK_ROUND_M = 0.35
 ON_TRACE_M = 0.3
 """Nearer than this to its place on a trace, a follower goes where its predecessor has gone: no detour is better."""
 MATE_M = 0.6
@@ -85,6 +90,14 @@ class Driver:
     def last(self) -> Twist:
         return self._last
 
+    def published(self, measured: Twist) -> Twist:
+        """What a successor is told: the command, which is what the wheels do next, so that no delay is added.
+
+        Where they do not obey (a body in the way, a closed gateway): what they do.
+        """
+        off_mps, off_radps = self._last.linear_x - measured.linear_x, self._last.angular_z - measured.angular_z
+        return self._last if abs(off_mps) < OBEYED_MPS and abs(off_radps) < OBEYED_RADPS else measured
+
     def see(self, scan: LaserScan, now: float) -> None:
         known = self.estimator.pose_at(now)
         if known is not None:
@@ -93,7 +106,7 @@ class Driver:
             mates = [(mate.x, mate.y) for mate in self._mates(now)]
             self._tracker.update(self._surroundings.points_map, (pose.x, pose.y), mates, MATE_M, now)
             if self.explore is not None:
-                self.explore.see(scan, pose, known[1], mates)
+                self.explore.see(scan, pose, known[1], self._mates(now))
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Whose successor this robot is from now on; None for nobody's."""
@@ -110,8 +123,7 @@ class Driver:
         if role != self._role:
             self._change(role, pose, twist)
         points = self._surroundings.points(pose, LOOK_M)
-        mates = [(mate.x, mate.y) for mate in self._mates(now)] if self.explore is not None else []
-        if self.explore is not None and self.explore.work(role is Role.LEADER, pose, mates, now):
+        if self.explore is not None and self.explore.work(role is Role.LEADER, pose, self._mates(now), now):
             self.lead.take(self.explore.route, pose)
         moving = self._beliefs.moving(self._tracker.moving(now), now)
         still = points if not moving else [p for p in points if not _belongs(p, pose, moving)]
@@ -172,10 +184,20 @@ class Driver:
         speed = leading.cruise_mps * self._patience(chain, pose, now)
         wanted = self.lead.step(pose, self._last, slots, speed)
         if self.explore is not None:
-            return wanted if self.explore.route else STILL
+            return self._exploring(points, pose, wanted) if self.explore.route else STILL
         reach = min(LOOK_M, self.lead.remaining_m(pose))
         around = self._steer(points, self.lead.ahead(pose, reach), wanted, 0.7 * speed, pose, now)
         return wanted if around is None else around
+
+    def _exploring(self, points: list[Point], pose: Pose2D, wanted: Twist) -> Twist:
+        """Along the planned route; where the nose is at a wall, turned towards the route first, or backed away."""
+        half_width_m = self._mission.radius_m + SKIN_M
+        if wanted.linear_x <= 0.0 or free_along(points, wanted, half_width_m) > NOSE_M:
+            return wanted
+        x, y = self.lead.ahead(pose, LOOK_ROUND_M)
+        if abs(atan2(y, x)) > NOSE_RAD:
+            return Twist(0.0, NOSE_RADPS if y > 0.0 else -NOSE_RADPS)
+        return Twist(-NOSE_MPS, 0.0) if free_along(points, Twist(-1.0, 0.0), half_width_m) > NOSE_M else STILL
 
     def _steer(
         self, points: list[Point], target: Point, wanted: Twist, speed: float, pose: Pose2D, now: float
