@@ -11,7 +11,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from protocol.mission import Mission, Refused, check_mission
+from protocol.mission import Mission, Refused, check_mission, robot_name
 from protocol.radio import Radio
 from world.terrain import Bump, Ditch, Pothole, check_feature, features
 
@@ -133,6 +133,8 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     time_limit_s: float
     world: WorldSpec = WorldSpec()
     radio: Radio = Radio()
+    restart: dict[str, Literal["never", "on-failure"]] = {}
+    """Whether `lfa run` starts a process again that failed: of `router`, `world`, `robots` or one `robot2`."""
     faults: tuple[str, ...] = ()
     """Each as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'."""
     name: str = ""
@@ -153,6 +155,9 @@ def check_scenario(scenario: Scenario) -> Scenario:
         _check_obstacle(f"world.obstacles[{index}]", obstacle)
     for key, feature in features(scenario.world):
         check_feature(f"world.{key}", feature)
+    processes = ("router", "world", "robots", *(robot_name(robot) for robot in robots))
+    stranger = next((name for name in scenario.restart if name not in processes), None)
+    _require(stranger is None, "restart", stranger, f"of {', '.join(processes)}")
     for index, wall in enumerate(scenario.world.walls_m):
         where = f"world.walls_m[{index}]"
         long_enough = hypot(wall[2] - wall[0], wall[3] - wall[1]) >= LENGTH_M_MIN

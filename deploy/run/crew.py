@@ -28,20 +28,23 @@ class Row(Struct, frozen=True):
     arguments: tuple[str, ...]
     outlives_launcher: bool = False
     """It hears of the launcher's death, wakes up if it was stopped, and ends by itself."""
+    again: tuple[str, ...] = ()
+    """What it is told besides when it starts again."""
 
     def restarted(self) -> Row:
-        """An agent that starts again starts as a follower; the others tell it the rest."""
-        return Row(self.name, tuple("follower" if word == "leader" else word for word in self.arguments))
+        """An agent that starts again starts as a follower, and the others tell it the rest; a world resumes."""
+        told = tuple("follower" if word == "leader" else word for word in self.arguments)
+        return Row(self.name, (*told, *self.again))
 
 
 def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
     """The table of processes of a run, in the order in which they are started."""
     team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
-    world = ("world.cli", str(folder / SCENARIO), "--seed", str(about.seed), *team)
+    world = ("world.cli", str(folder / SCENARIO), "--seed", str(about.seed), "--state", str(folder), *team)
     return [
         Row(ROUTER_NAME, ("deploy.fleet.router", "--listen", endpoint)),
         Row(RECORDER_NAME, ("deploy.run.recorder", recorder_task), outlives_launcher=True),
-        Row(WORLD_NAME, world),
+        Row(WORLD_NAME, world, again=("--resume", str(folder))),
         *(Row(robot_name(i), ("agents.cli", "--role", _role(i, mission), "--id", str(i), *team))
           for i in mission.robots),
     ]  # fmt: skip
@@ -72,6 +75,11 @@ class Crew:
 
     def succeeded(self, name: str) -> bool:
         return self._children[name].poll() == 0
+
+    def failed(self, name: str) -> bool:
+        """It ended, neither well nor because what it was told was refused."""
+        child = self._children.get(name)
+        return child is not None and child.poll() not in (None, 0, 2)
 
     def exit_of(self, name: str) -> str | None:
         """How `name` ended, in words; None while it runs, and before it was started."""

@@ -44,6 +44,8 @@ LASTING: dict[str, Deed] = {"stop": "continue", "cut": "heal", "loss": "loss"}
 """What can be for a while, and what ends it."""
 
 LEADER = "leader"
+COMMON = ("router", "world")
+"""What can be killed, stopped and continued besides robots, where the fleet runs as processes."""
 RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"
 _SENTENCE = re.compile(
     r"(?P<deed>\w+)(?: +(?!at )(?P<target>[\w.,>-]+))?"
@@ -130,12 +132,12 @@ def _ordered(deed: str, word: str, text: str, mission: Mission, where: str) -> i
     return int(word) if deed in ("cut", "heal") and word.isdecimal() else word
 
 
-def _target(word: str, text: str, mission: Mission, where: str) -> int | Literal["leader"]:
-    if word == LEADER:
-        return "leader"
+def _target(word: str, text: str, mission: Mission, where: str) -> int | str:
+    if word == LEADER or word in COMMON:
+        return word
     digits = word.removeprefix("robot")
     if not digits.isdecimal() or int(digits) not in mission.robots:
-        raise Refused(f"{where} {text!r}: no robot {word!r}, must be 'leader' or one of {_ids(mission)}")
+        raise Refused(f"{where} {text!r}: no robot {word!r}, must be leader, router, world or one of {_ids(mission)}")
     return int(digits)
 
 

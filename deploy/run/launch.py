@@ -32,7 +32,7 @@ from deploy.run.worldtime import WorldTime
 from protocol import clock
 from protocol.bus import Inbox
 from protocol.messages import BadMessage, Event, Message, OperatorNote, Truth, decode, encode
-from protocol.mission import robot_name
+from protocol.mission import robot_id_of, robot_name
 from protocol.radio import CLEAR, WEATHER, Air
 from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
 from protocol.zenoh_bus import ZenohBus, answers
@@ -43,6 +43,7 @@ SHOW_EVERY_S = 0.2
 START_S_MAX = 20.0
 SILENCE_S_MAX = 5.0
 SOCKET_FOLDER_MAX = 60
+REVIVE_S_MIN = 1.0  # between two starts of a process that fails again and again
 NEWS_S = 2.0  # how long a robot that starts again is told the weather
 RECORDER_S_MAX = 30.0  # to read the recording back and sum it up
 
@@ -100,6 +101,8 @@ class _Launch:
         task = msgspec.json.encode(Task(str(folder), about, self._endpoint, str(sockets))).decode()
         self._rows = rows(folder, about, self._endpoint, drawn.mission, task)
         self._crew = Crew(folder)
+        self._restart = drawn.restart
+        self._revive_at: dict[str, float] = {}
         self._schedule = Schedule(faults)
         self._undone: list[str] = []
         self._doomed: set[str] = set()
@@ -213,9 +216,12 @@ class _Launch:
     def _check(self, view: Progress) -> None:
         """Without router, recorder or world there is no run; an agent's death is what the others are for."""
         for name in (ROUTER_NAME, RECORDER_NAME, WORLD_NAME):
-            self._needs(name)
+            if not self._revives(name, view):
+                self._needs(name)
         for robot_id in self._mission.robots:
             name = robot_name(robot_id)
+            if self._revives(name, view):
+                continue
             if robot_id not in self._standing.gone and not self._crew.runs(name):
                 self._standing.gone.add(robot_id)
                 how = self._crew.exit_of(name)
@@ -226,6 +232,22 @@ class _Launch:
             raise _Aborted("no agent is left")
         if clock.now() > self._heard_at + max(SILENCE_S_MAX, START_S_MAX if not self._time.known else 0.0):
             raise _Aborted("nothing is heard of the world")
+
+    def _revives(self, name: str, view: Progress) -> bool:
+        """Start it again when it has failed and the scenario says so; False when its end is for good."""
+        policy = self._restart.get(name, self._restart.get("robots") if name.startswith("robot") else None)
+        if policy != "on-failure" or not self._crew.failed(name):
+            return False
+        if clock.now() >= self._revive_at.get(name, 0.0):
+            self._revive_at[name] = clock.now() + REVIVE_S_MIN
+            view.note(self._standing, f"{self._crew.exit_of(name)}: started again")
+            self._say("restarted", name=name, robot=robot_id_of(name), t=self._time.of(clock.now()))
+            self._start_again(name)
+        return True
+
+    def _start_again(self, name: str) -> None:
+        self._crew.start(next(row for row in self._rows if row.name == name).restarted())
+        self._repeat_weather_until = clock.now() + NEWS_S
 
     def _needs(self, name: str) -> None:
         how = self._crew.exit_of(name)
@@ -246,21 +268,20 @@ class _Launch:
 
     def _do(self, deed: Deed, victim: int | str) -> bool:
         """False when there is nobody to do it to, or somebody already."""
-        if deed in ORDERS or isinstance(victim, str):
+        if deed in ORDERS:
             self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
             self._publish(
                 self._operator.orders_key, note(self._operator, clock.now(), deed, victim, self._mission.robots)
             )
             return True
-        name = robot_name(victim)
+        name = robot_name(victim) if isinstance(victim, int) else victim
         if self._crew.runs(name) == (deed == "restart"):
             return False
         self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
         if deed == "restart":
             self._doomed.discard(name)
-            self._standing.gone.discard(victim)
-            self._crew.start(next(row for row in self._rows if row.name == name).restarted())
-            self._repeat_weather_until = clock.now() + NEWS_S
+            self._standing.gone.discard(robot_id_of(name) or 0)
+            self._start_again(name)
             return True
         if deed in ("kill", "terminate"):
             self._doomed.add(name)

@@ -12,7 +12,7 @@ import typer
 from agents.agent import Agent
 from deploy.run.chosen import choose
 from deploy.run.ending import Ended, Interrupts, finish, report
-from deploy.run.faults import ORDERS, Deed, Fault, Schedule, parse_all
+from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
 from deploy.run.operator import Operator
 from deploy.run.record import Recorder
@@ -20,7 +20,7 @@ from deploy.run.referee import Referee, Verdict
 from deploy.run.weather import note
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import Message, encode
-from protocol.mission import robot_name
+from protocol.mission import Refused, robot_name
 from protocol.node import Node
 from protocol.radio import WEATHER
 from protocol.topics import WORLD_NAME
@@ -53,6 +53,9 @@ def command(
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault] = ()) -> Ended:
     """Run `scenario` as `seed` draws it; the run folder stands when this returns. Raises Refused for a bad `out`."""
+    common = next((fault for fault in faults if fault.target in COMMON), None)
+    if common is not None:
+        raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
     about = About(scenario.name, "simulated", seed, FLEET)
@@ -114,9 +117,10 @@ class _Run:
 
     def _do(self, deed: Deed, victim: int | str) -> None:
         """A deed on one that is not there, or is there already, does nothing, as a signal would."""
-        if deed in ORDERS or isinstance(victim, str):
+        if deed in ORDERS:
             self._order(deed, victim)
             return
+        assert isinstance(victim, int), victim
         name = robot_name(victim)
         present = name in self._simulator.names
         if present == (deed == "restart"):
