@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
 
 from agents.mapping import Mapping, Point, bounds
 from agents.planner import Planner
@@ -40,15 +39,15 @@ class Explore:
         """Why the goal cannot be reached, once that is certain."""
         return self.planner.unreachable if self.planner is not None and self._failures >= GIVE_UP_SEARCHES else None
 
-    def see(self, scan: LaserScan, pose: Pose2D, twist: Twist, mates: Sequence[Point]) -> None:
+    def see(self, scan: LaserScan, pose: Pose2D, twist: Twist, mates: Sequence[Pose2D]) -> None:
         """Take a scan made at `pose` into the map."""
         if self.mapping is None:
             self._begin(pose)
         assert self.mapping is not None
         if abs(twist.angular_z) < TURNING_RADPS:
-            self.mapping.scan(scan, pose, mates)
+            self.mapping.scan(scan, pose, [(mate.x, mate.y) for mate in mates])
 
-    def work(self, leading: bool, pose: Pose2D, mates: Sequence[Point], now: float) -> bool:
+    def work(self, leading: bool, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> bool:
         """One step's share of mapping and, for who leads, planning; True when there is a new route."""
         if self.mapping is None or self.planner is None:
             return False
@@ -56,8 +55,7 @@ class Explore:
         if not leading:
             return False
         searches = self.planner.searches
-        near = [mate for mate in mates if hypot(mate[0] - pose.x, mate[1] - pose.y) < MARGIN_M]
-        found = self.planner.work(PLAN_CELLS, (pose.x, pose.y), near, now)
+        found = self.planner.work(PLAN_CELLS, (pose.x, pose.y), mates, now)
         if self.planner.searches != searches:
             self._failures = self._failures + 1 if self.planner.unreachable is not None else 0
         return found

@@ -27,6 +27,8 @@ WINDOW_M = 0.5
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
 IN_PLACE_RADPS = 0.4
+SLOWEST_SHARE = 0.25
+"""Of the speed, where a planned route bends away: it is kept to, at walking pace if need be."""
 ARRIVED_MPS = 0.02
 LATERAL_GAIN = 1.2
 
@@ -156,6 +158,8 @@ class Lead:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing)
         if abs(bearing) > IN_PLACE_RAD:
             return self._turn(bearing)
+        if self._planned:
+            v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
         reach = max(hypot(*target), 0.25)
         curvature = 2.0 * target[1] / (reach * reach)
         return Twist(v, v * curvature)

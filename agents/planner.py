@@ -12,9 +12,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from heapq import heappop, heappush
 from itertools import pairwise
-from math import ceil, hypot, inf
+from math import ceil, cos, hypot, inf, sin
 
 from agents.mapping import CELL_M, NEAR_PER_CELL, REACH, Grid, Point
+from protocol.geometry import Pose2D
 
 FREE, UNSEEN = 10, 13
 """Price of a straight step; a diagonal one costs `DIAGONAL` / `STRAIGHT` as much."""
@@ -27,8 +28,15 @@ CLOSE = 60
 """Added to the price of a step just not touching, falling with the square of the clearance gained."""
 ROOM_M = 0.45
 """Clearance beyond which more is worth nothing."""
-MATE_M = 0.35
-MATE_PRICE = 60
+MATE_GAP_M = 0.10
+"""Kept from the skin of a team-mate that is gone round: out of a dead end the way leads past those behind."""
+MATE_AHEAD_M = 0.8
+"""A team-mate counts as standing all along so far before it: it comes on while it is passed."""
+MATE_STEP_M = 0.2
+MATE_NEAR_M = 4.0
+CONFLICT_M = 1.5
+"""A team-mate on the next part of the route, of this length, is gone round."""
+CONFLICT_S = 0.4
 LOOKED_PER_YIELD = 16
 PIECE_M = 0.4
 """Between the points of a route; a cut corner is rounded over several."""
@@ -55,6 +63,7 @@ class Planner:
         self._grid = grid
         self._goal = goal
         self._prices = _prices(radius_m)
+        self._apart_m = 2.0 * radius_m + MATE_GAP_M
         self._keepout = [run for box in keepout for run in _runs(grid, box)]
         self._search: Iterator[int] | None = None
         self._begun_at = -inf
@@ -67,20 +76,20 @@ class Planner:
         """Ended so far, with or without a route."""
         self.unreachable: str | None = None
 
-    def work(self, cells: int, here: Point, mates: Sequence[Point], now: float) -> bool:
+    def work(self, cells: int, here: Point, mates: Sequence[Pose2D], now: float) -> bool:
         """Look at about so many cells more; True when there is a new `route` from `here`."""
         self._pose = here
         if self._search is None:
             if now - self._checked_at < CHECK_S:
                 return False
             self._checked_at = now
-            blocked = self.blocked_m(here) is not None
-            if self.route and not blocked and now - self._begun_at < RENEW_S:
-                return False
-            if not self.route and now - self._begun_at < RETRY_S:
+            blocked = not self.route or self.blocked_m(here) is not None
+            conflict = self._conflict(here, mates) and now - self._begun_at >= CONFLICT_S
+            due = now - self._begun_at >= (RENEW_S if self.route else RETRY_S)
+            if not ((blocked and self.route) or conflict or due):
                 return False
             self._begun_at = now
-            self._search = self._plan(tuple(mates), blocked or not self.route)
+            self._search = self._plan(tuple(mates), blocked or conflict)
         number = self.number
         while cells > 0:
             looked = next(self._search, None)
@@ -108,9 +117,16 @@ class Planner:
             along += hypot(b[0] - a[0], b[1] - a[1])
         return None
 
+    def _conflict(self, here: Point, mates: Sequence[Pose2D]) -> bool:
+        """A team-mate stands on the next part of the route."""
+        first = _nearest(self.route, here)
+        ahead = self.route[first + 1 : first + 1 + ceil(CONFLICT_M / PIECE_M)]
+        line = [point for a, b in pairwise((here, *ahead)) for point in _between(a, b)]
+        return any(hypot(x - mate.x, y - mate.y) < self._apart_m - 0.05 for mate in mates for x, y in line)
+
     # --- one search -------------------------------------------------------------------------------------------------
 
-    def _plan(self, mates: tuple[Point, ...], needed: bool) -> Iterator[int]:
+    def _plan(self, mates: tuple[Pose2D, ...], needed: bool) -> Iterator[int]:
         """Search, then make a route of the cells; set `route` or `unreachable`."""
         field = self._field(mates)
         goal = self._settled(field, self._goal)
@@ -125,6 +141,9 @@ class Planner:
         for looked in self._spread(field, goal, start, toward):
             reached = reached or looked < 0
             yield abs(looked)
+        if not reached and mates:
+            yield from self._plan((), needed)
+            return
         if not reached:
             self._fail("the goal is walled in: no way to it is left", needed)
             return
@@ -146,24 +165,34 @@ class Planner:
         self.route, self.unreachable = tuple(points), None
         self.number += 1
 
-    def _field(self, mates: tuple[Point, ...]) -> bytearray:
+    def _field(self, mates: tuple[Pose2D, ...]) -> bytearray:
         """Nearness as it is now: the map may change while the search goes on, the search's ground does not."""
-        grid = self._grid
-        field = bytearray(grid.near)
+        field = bytearray(self._grid.near)
         for low, high in self._keepout:
             field[low:high] = bytes([NEAR_PER_CELL * REACH]) * (high - low)
-        price_of = self._prices
-        dear = max(n for n, price in enumerate(price_of) if price > 0)
-        reach = int(MATE_M / CELL_M)
-        for x, y in mates:
-            cell = grid.cell(x, y)
-            if cell is not None:
-                for row in range(-reach, reach + 1):
-                    for column in range(-reach, reach + 1):
-                        place = cell + row * grid.columns + column
-                        if hypot(row, column) <= reach and price_of[field[place]] > 0:
-                            field[place] = max(field[place], dear)
+        for mate in mates:
+            apart = hypot(mate.x - self._pose[0], mate.y - self._pose[1])
+            if apart < MATE_NEAR_M:
+                ahead_m = max(0.0, min(MATE_AHEAD_M, apart - self._apart_m - 2.0 * CELL_M))
+                for n in range(int(ahead_m / MATE_STEP_M) + 1):
+                    way = n * MATE_STEP_M
+                    self._bar(field, (mate.x + way * cos(mate.theta), mate.y + way * sin(mate.theta)))
         return field
+
+    def _bar(self, field: bytearray, center: Point) -> None:
+        """No way within a team-mate's distance of `center`, but for where the robot itself stands."""
+        grid, cell = self._grid, self._grid.cell(*center)
+        if cell is None:
+            return
+        reach = min(REACH, int(self._apart_m / CELL_M))
+        own_x, own_y = self._pose
+        for row in range(-reach, reach + 1):
+            for column in range(-reach, reach + 1):
+                if hypot(row, column) * CELL_M <= self._apart_m:
+                    place = cell + row * grid.columns + column
+                    x, y = grid.center(place)
+                    if hypot(x - own_x, y - own_y) > 2.0 * CELL_M:
+                        field[place] = NEAR_PER_CELL * REACH
 
     def _settled(self, field: bytearray, point: Point) -> int | None:
         """The nearest cell to `point` that a robot can stand in, within `SETTLE_CELLS`."""
