@@ -1,0 +1,451 @@
+"""The config register as a model, without time: who may write which config, and who may vote (I5-I7; lease.md 3.1, 3.6-3.10).
+
+Robots and a witness (the last id, the tie-breaker while it votes), terms 1..T with fixed issuers, at most `changes`
+joint changes to any voters that keep the leader, hand-over, full house, and one restart with empty memory. Bonds are
+left out, as if all had run out: whoever may promise and grant by its promises and configs may do so at any time.
+Messages are facts: what was sent can be received at any later time, once, often or never. So is what a config says:
+anybody may learn any config that was written, without granting it (NACKs and HELLOs teach).
+
+What is to hold is that there is one register, not two: once a quorum has granted a term, no lower term can still get
+a quorum of its own config from voters that live (ONE). I5-I7 are checked where configs are written.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+from tests.model.checker import State, Step, Successor
+
+SEQS = 3
+"""Versions of a term: as it was re-stamped, joint, and settled."""
+HALF, ALL = 0, 1
+UNUSED, ASKED, GIVEN, LED, DROPPED = range(5)
+"""A term: not used; PREPARE is out; handed over; (term, 0) is written; nobody can write (term, 0) any more."""
+
+Content = tuple[int, int, int, int, int]
+"""Voters (mask of members), tie-breaker (mask of one or none), previous voters or 0, their tie-breaker, their rule.
+A member is one life of an id: bit 2 id for the first, bit 2 id + 1 for the one after the restart."""
+
+#                   id i at 3 i
+LIFE, PROMISED, KNOWS = range(3)
+"""KNOWS: the version known, counted from 1; 0: blank."""
+STATUS, ISSUER_LIFE, HOLDER, GIVEN_VERSION, GIVEN_GRANTS, BLANK_PROMISES, PROMISES = range(7)
+"""HOLDER: a member, counted from 1. PROMISES + m: the oldest version that member m promised with."""
+
+MUTANTS = {
+    "hand_over_writes": "hand-over that writes a new config without phase 1",
+    "full_house_half": "full house without the joint rule `all`",
+    "no_joint": "a change of voters without a joint config",
+    "same_life": "a restarted process votes at once, as its old life, with the first config",
+}
+
+
+def half(voters: int, tie: int, present: int) -> bool:
+    count = 2 * (voters & present).bit_count()
+    return count > voters.bit_count() or (count == voters.bit_count() and bool(tie & present))
+
+
+def is_quorum(content: Content, present: int) -> bool:
+    voters, tie, previous, previous_tie, rule = content
+    if not half(voters, tie, present):
+        return False
+    if not previous:
+        return True
+    return previous & present == previous if rule == ALL else half(previous, previous_tie, present)
+
+
+class Register:
+    def __init__(
+        self,
+        robots: int,
+        issuers: tuple[int, ...],
+        changes: int,
+        restarts: tuple[int, ...] = (),
+        cold: bool = False,
+        head_ties: bool = False,
+        mutant: str = "",
+    ) -> None:
+        """`restarts`: the ids of which one may die and start again. `cold`: everybody starts blank. `head_ties`: without the witness, the leader that writes is tie-breaker."""
+        assert mutant in ("", *MUTANTS), mutant
+        self.ids = tuple(range(robots + 1))
+        self.witness = robots
+        self.columns = (*(f"robot {i + 1}" for i in range(robots)), "witness")
+        self.issuer = (-1, *issuers)
+        self.terms = tuple(range(1, len(issuers) + 1))
+        self.changes, self.restarts, self.cold, self.head_ties, self.mutant = changes, restarts, cold, head_ties, mutant
+        self.blanks = cold or bool(restarts)
+        """Without blank processes there is no full house: who is no voter need not promise, nor any promise its version."""
+        self.members = 2 * len(self.ids)
+        self.used = 3 * len(self.ids)
+        """Where the number of joint changes stands."""
+        self.term_size = PROMISES + self.members + 2 * SEQS
+        self.at = (0, *(self.used + 1 + self.term_size * (k - 1) for k in self.terms))
+        first = sum(1 << 2 * i for i in self.ids)
+        self.contents: list[Content] = [(first, 1 << 2 * self.witness, 0, 0, HALF)]
+        self._number = {self.contents[0]: 0}
+
+    def initial(self) -> State:
+        s = bytearray(self.used + 1 + self.term_size * len(self.terms))
+        if not self.cold:
+            for i in self.ids:
+                s[3 * i + KNOWS] = 1
+        return bytes(s)
+
+    def successors(self, s: State) -> list[Successor]:
+        out: list[Successor] = []
+        for k in self.terms:
+            status = s[self.at[k]]
+            if status == UNUSED:
+                self._prepare(s, k, out)
+                self._hand_over(s, k, out)
+            elif status == ASKED:
+                self._promise(s, k, out)
+                self._propose(s, k, out)
+                self._full_house(s, k, out)
+            elif status == GIVEN:
+                self._grant_given(s, k, out)
+                self._take_over(s, k, out)
+            elif status == LED:
+                self._grant(s, k, out)
+                self._write(s, k, out)
+        self._learn(s, out)
+        if not any(s[3 * i + LIFE] for i in self.restarts):
+            self._restart(s, out)
+        return out
+
+    def step(self, event: tuple[object, ...]) -> Step:
+        column, text = event[0], event[1]
+        assert isinstance(column, int) and isinstance(text, str)
+        return Step(column, text % event[2:] if len(event) > 2 else text)
+
+    # --- candidates ----------------------------------------------------------------------------------------------
+
+    def _prepare(self, s: State, k: int, out: list[Successor]) -> None:
+        i = self.issuer[k]
+        if not self._next_of(s, k, i) or s[3 * i + PROMISED] > k:
+            return
+        b = bytearray(s)
+        b[self.at[k]], b[self.at[k] + ISSUER_LIFE] = ASKED, s[3 * i + LIFE]
+        self._promised(b, k, i)
+        out.append(((i, "PREPARE(%d), own PROMISE", k), bytes(b), None))
+
+    def _promise(self, s: State, k: int, out: list[Successor]) -> None:
+        """A voter refuses whoever knows an older config; a blank one promises as such."""
+        asker = 3 * self.issuer[k]
+        for v in self.ids:
+            if not self.blanks and not self._electors(s, s[asker + KNOWS]) >> 2 * v & 3:
+                continue
+            if s[3 * v + PROMISED] <= k and s[3 * v + KNOWS] <= s[asker + KNOWS]:
+                b = bytearray(s)
+                self._promised(b, k, v)
+                if b != s:
+                    knows = self._name(s[3 * v + KNOWS])
+                    out.append(((v, "PROMISE(%d, %s)", k, knows), bytes(b), self._one(b)))
+
+    def _propose(self, s: State, k: int, out: list[Successor]) -> None:
+        """An ordinary quorum of the newest config known: (k, 0) is that config re-stamped."""
+        at, i = self.at[k], self.issuer[k]
+        knows = s[3 * i + KNOWS]
+        if not knows:
+            return
+        if is_quorum(self._content(s, knows), self._promisers(s, k)):
+            b = bytearray(s)
+            wrong = self._lead(b, k, i, self._content(s, knows))
+            out.append(((i, "quorum: PROPOSE(%d, (%d,0) = %s)", k, k, self._name(knows)), bytes(b), wrong))
+
+    def _full_house(self, s: State, k: int, out: list[Successor]) -> None:
+        """Every id promised, blank ones counted, and those who are not blank hold no quorum of the newest config."""
+        at, i = self.at[k], self.issuer[k]
+        promisers, blank = self._promisers(s, k), s[at + BLANK_PROMISES]
+        lives = [[m for m in (2 * v, 2 * v + 1) if (promisers | blank) >> m & 1] for v in self.ids]
+        for house in product(*lives):
+            if 2 * i + s[3 * i + LIFE] not in house:
+                continue
+            named = sum(1 << m for m in house)
+            newest = max(s[3 * i + KNOWS], *(s[at + PROMISES + m] for m in house))
+            if newest and is_quorum(self._content(s, newest), named & promisers):
+                continue
+            tie = named & 3 << 2 * self.witness
+            content = (named, tie, named, tie, ALL)
+            if self.mutant == "full_house_half":
+                content = (named, tie, 0, 0, HALF)
+            b = bytearray(s)
+            wrong = self._lead(b, k, i, content)
+            out.append(((i, "full house: PROPOSE(%d, (%d,0))", k, k), bytes(b), wrong))
+
+    # --- voters --------------------------------------------------------------------------------------------------
+
+    def _grant(self, s: State, k: int, out: list[Successor]) -> None:
+        at = self.at[k]
+        for seq in range(SEQS):
+            slot = at + PROMISES + self.members + 2 * seq
+            version = self._version(k, seq)
+            if not s[slot]:
+                break
+            for v in self.ids:
+                if s[3 * v + PROMISED] > k or s[3 * v + KNOWS] > version or not self._elects(s, version, v):
+                    continue
+                b = bytearray(s)
+                self._granted(b, k, version, v, slot + 1)
+                if b != s:
+                    out.append(((v, "GRANT(%d, (%d,%d))", k, k, seq), bytes(b), self._one(b)))
+
+    def _grant_given(self, s: State, k: int, out: list[Successor]) -> None:
+        at = self.at[k]
+        for v in self.ids:
+            version = s[at + GIVEN_VERSION]
+            if s[3 * v + PROMISED] <= k and s[3 * v + KNOWS] <= version and self._elects(s, version, v):
+                b = bytearray(s)
+                self._granted(b, k, s[at + GIVEN_VERSION], v, at + GIVEN_GRANTS)
+                if b != s:
+                    out.append(((v, "GRANT(%d) to robot %d", k, (s[at + HOLDER] + 1) // 2), bytes(b), self._one(b)))
+
+    def _learn(self, s: State, out: list[Successor]) -> None:
+        for v in self.ids:
+            if s[3 * v + KNOWS] and not any(self.issuer[k] == v and s[self.at[k]] in (UNUSED, ASKED) for k in self.terms):
+                continue  # it will not stand for election: knowing more, it only refuses more
+            for k in self.terms:
+                for seq in range(SEQS):
+                    slot = self.at[k] + PROMISES + self.members + 2 * seq
+                    if s[slot] and s[3 * v + KNOWS] < self._version(k, seq):
+                        b = bytearray(s)
+                        b[3 * v + KNOWS] = self._version(k, seq)
+                        out.append(((v, "learns (%d,%d)", k, seq), bytes(b), None))
+            if not s[3 * v + KNOWS] and not self.cold:
+                b = bytearray(s)
+                b[3 * v + KNOWS] = 1
+                out.append(((v, "learns the first config"), bytes(b), None))
+
+    def _restart(self, s: State, out: list[Successor]) -> None:
+        for v in self.restarts:
+            b = bytearray(s)
+            b[3 * v + PROMISED] = b[3 * v + KNOWS] = 0
+            if self.mutant == "same_life":
+                b[3 * v + KNOWS] = 1
+            else:
+                b[3 * v + LIFE] = 1
+            self._drop(b)
+            if b != s:
+                out.append(((v, "dies and starts again, blank"), bytes(b), self._one(b)))
+
+    # --- leaders -------------------------------------------------------------------------------------------------
+
+    def _write(self, s: State, k: int, out: list[Successor]) -> None:
+        """What a leader whose newest version has its quorum may write next: settle a joint config, or begin one."""
+        led = self._leads(s, k)
+        if led is None:
+            return
+        leader, seq = led
+        if seq + 1 == SEQS:
+            return
+        voters, tie, previous, _, _ = content = self._content(s, self._version(k, seq))
+        if previous:
+            self._append(s, k, seq + 1, (voters, tie, 0, 0, HALF), leader, "settles", out)
+        elif s[self.used] < self.changes:
+            for changed in self._changes(s, leader):
+                new = (changed[0], changed[1], voters, tie, HALF)
+                if self.mutant == "no_joint":
+                    new = (*changed, 0, 0, HALF)
+                if changed != content[:2]:
+                    self._append(s, k, seq + 1, new, leader, "changes", out)
+
+    def _changes(self, s: State, leader: int) -> list[tuple[int, int]]:
+        """All sets of living members with the leader in it, each with its tie-breaker."""
+        others = [2 * v + s[3 * v + LIFE] for v in self.ids if v != leader]
+        found: list[tuple[int, int]] = []
+        for choice in product((0, 1), repeat=len(others)):
+            mine = 1 << 2 * leader + s[3 * leader + LIFE]
+            voters = mine | sum(1 << m for m, chosen in zip(others, choice, strict=True) if chosen)
+            tie = voters & 3 << 2 * self.witness
+            found.append((voters, tie or (mine if self.head_ties else 0)))
+        return found
+
+    def _append(
+        self, s: State, k: int, seq: int, content: Content, leader: int, verb: str, out: list[Successor]
+    ) -> None:
+        b = bytearray(s)
+        slot = self.at[k] + PROMISES + self.members + 2 * seq
+        if verb == "changes":
+            b[self.used] += 1
+        b[slot] = self._intern(content)
+        self._granted(b, k, self._version(k, seq), leader, slot + 1)
+        wrong = self._i6(s, k, seq, content) or self._one(b)
+        members = self._members(content[0])
+        out.append(((leader, verb + ": PROPOSE(%d, (%d,%d) = %s)", k, k, seq, members), bytes(b), wrong))
+
+    def _hand_over(self, s: State, k: int, out: list[Successor]) -> None:
+        """A leader gives k to another robot with its config unchanged, version included; its own voter grants first."""
+        i = self.issuer[k]
+        if not self._next_of(s, k, i):
+            return
+        for old in self.terms:
+            led = self._leads(s, old) if old < k and s[self.at[old]] == LED else None
+            if led is None or led[0] != i:
+                continue
+            version = self._version(old, led[1])
+            for heir in self.ids[:-1]:
+                if heir == i:
+                    continue
+                b = bytearray(s)
+                at = self.at[k]
+                if self.mutant == "hand_over_writes":
+                    wrong = self._lead(b, k, i, self._content(s, version))
+                    b[at + HOLDER] = 2 * heir + s[3 * heir + LIFE] + 1
+                else:
+                    b[at], b[at + GIVEN_VERSION] = GIVEN, version
+                    b[at + HOLDER] = 2 * heir + s[3 * heir + LIFE] + 1
+                    self._granted(b, k, version, i, at + GIVEN_GRANTS)
+                    wrong = self._one(b)
+                out.append(((i, "hands over: PROPOSE(%d) for robot %d", k, heir + 1), bytes(b), wrong))
+
+    def _take_over(self, s: State, k: int, out: list[Successor]) -> None:
+        """The heir leads when a quorum granted, it has promised nothing above and knows no newer config."""
+        at = self.at[k]
+        heir, life = divmod(s[at + HOLDER] - 1, 2)
+        version = s[at + GIVEN_VERSION]
+        if s[3 * heir + LIFE] != life or s[3 * heir + PROMISED] > k or s[3 * heir + KNOWS] != version:
+            return
+        if is_quorum(self._content(s, version), s[at + GIVEN_GRANTS]):
+            b = bytearray(s)
+            wrong = self._lead(b, k, heir, self._content(s, version))
+            out.append(((heir, "takes over: PROPOSE(%d, (%d,0))", k, k), bytes(b), wrong))
+
+    # --- small ---------------------------------------------------------------------------------------------------
+
+    def _version(self, k: int, seq: int) -> int:
+        return 2 + (k - 1) * SEQS + seq
+
+    def _name(self, version: int) -> str:
+        if version < 2:
+            return ("blank", "the first config")[version]
+        return "({},{})".format(1 + (version - 2) // SEQS, (version - 2) % SEQS)
+
+    def _members(self, mask: int) -> str:
+        names = [self.columns[m // 2] + "'" * (m % 2) for m in range(self.members) if mask >> m & 1]
+        return "{" + ", ".join(names) + "}"
+
+    def _content(self, s: State | bytearray, version: int) -> Content:
+        if version == 1:
+            return self.contents[0]
+        k, seq = divmod(version - 2, SEQS)
+        return self.contents[s[self.at[k + 1] + PROMISES + self.members + 2 * seq] - 1]
+
+    def _intern(self, content: Content) -> int:
+        """Its number, counted from 1."""
+        if content not in self._number:
+            self._number[content] = len(self.contents)
+            self.contents.append(content)
+        return self._number[content] + 1
+
+    def _next_of(self, s: State, k: int, i: int) -> bool:
+        return all((s[self.at[j]] != UNUSED) == (j < k) for j in self.terms if j != k and self.issuer[j] == i)
+
+    def _drop(self, b: bytearray) -> None:
+        """Whoever promised more, or died, writes nothing under a term that it asked for or was given."""
+        for k in self.terms:
+            at = self.at[k]
+            if b[at] == ASKED:
+                i, life = self.issuer[k], b[at + ISSUER_LIFE]
+            elif b[at] == GIVEN:
+                i, life = divmod(b[at + HOLDER] - 1, 2)
+            else:
+                continue
+            if b[3 * i + LIFE] != life or b[3 * i + PROMISED] > k:
+                b[at] = DROPPED
+                for field in range(1, PROMISES + self.members):
+                    b[at + field] = 0
+
+    def _electors(self, s: State | bytearray, version: int) -> int:
+        if not version:
+            return 0
+        voters, _, previous, _, _ = self._content(s, version)
+        return voters | previous
+
+    def _elects(self, s: State, version: int, v: int) -> int:
+        """What others grant only forbids. Blank ones too, but from then on they know something."""
+        return not s[3 * v + KNOWS] or self._electors(s, version) >> 2 * v + s[3 * v + LIFE] & 1
+
+    def _promisers(self, s: State, k: int) -> int:
+        at = self.at[k] + PROMISES
+        return sum(1 << m for m in range(self.members) if s[at + m])
+
+    def _promised(self, b: bytearray, k: int, v: int) -> None:
+        member, knows = 2 * v + b[3 * v + LIFE], b[3 * v + KNOWS]
+        b[3 * v + PROMISED] = k
+        if not knows:
+            b[self.at[k] + BLANK_PROMISES] |= 1 << member
+        elif not b[self.at[k] + PROMISES + member]:
+            b[self.at[k] + PROMISES + member] = knows if self.blanks else 1
+        self._drop(b)
+
+    def _granted(self, b: bytearray, k: int, version: int, v: int, grants: int) -> None:
+        b[3 * v + PROMISED], b[3 * v + KNOWS] = k, version
+        if self._electors(b, version) >> 2 * v + b[3 * v + LIFE] & 1:
+            b[grants] |= 1 << 2 * v + b[3 * v + LIFE]
+        self._drop(b)
+
+    def _lead(self, b: bytearray, k: int, leader: int, content: Content) -> str | None:
+        """(k, 0) is written and its writer's own voter grants it; what led there is read no more."""
+        at = self.at[k]
+        slot = at + PROMISES + self.members
+        assert not b[slot], "I5: a version is written once"
+        b[at], b[at + HOLDER] = LED, 2 * leader + b[3 * leader + LIFE] + 1
+        b[at + ISSUER_LIFE] = b[at + GIVEN_VERSION] = b[at + GIVEN_GRANTS] = b[at + BLANK_PROMISES] = 0
+        for m in range(self.members):
+            b[at + PROMISES + m] = 0
+        b[slot] = self._intern(content)
+        self._granted(b, k, self._version(k, 0), leader, slot + 1)
+        return self._one(b)
+
+    def _newest(self, s: State | bytearray, k: int) -> int:
+        slot = self.at[k] + PROMISES + self.members
+        return max(seq for seq in range(SEQS) if s[slot + 2 * seq])
+
+    def _leads(self, s: State, k: int) -> tuple[int, int] | None:
+        """Who leads under k, and the seq of its newest version, if a quorum has granted that."""
+        leader, life = divmod(s[self.at[k] + HOLDER] - 1, 2)
+        seq = self._newest(s, k)
+        version = self._version(k, seq)
+        if (s[3 * leader + LIFE], s[3 * leader + KNOWS]) != (life, version) or s[3 * leader + PROMISED] > k:
+            return None
+        grants = s[self.at[k] + PROMISES + self.members + 2 * seq + 1]
+        return (leader, seq) if is_quorum(self._content(s, version), grants) else None
+
+    # --- invariants ----------------------------------------------------------------------------------------------
+
+    def _i6(self, s: State, k: int, seq: int, content: Content) -> str | None:
+        """A settled config follows a joint one that quorums of both sets have granted."""
+        if content[2] or self.mutant == "no_joint":
+            return None
+        before = self._content(s, self._version(k, seq - 1))
+        grants = s[self.at[k] + PROMISES + self.members + 2 * (seq - 1) + 1]
+        if before[2] and before[:2] == content[:2] and is_quorum(before, grants):
+            return None
+        return f"I6: ({k},{seq}) settles what was not joint or not granted by quorums of both"
+
+    def _one(self, s: State | bytearray) -> str | None:
+        """A lower term may still get its quorum although a higher one has had its own."""
+        granted = 0
+        for k in self.terms[::-1]:
+            if s[self.at[k]] != LED:
+                continue
+            if granted and self._may_go_on(s, k):
+                return f"two registers: term {granted} was granted by a quorum, and term {k} may still be"
+            if not granted:
+                slot = self.at[k] + PROMISES + self.members
+                for seq in range(SEQS):
+                    if s[slot + 2 * seq] and is_quorum(self._content(s, self._version(k, seq)), s[slot + 2 * seq + 1]):
+                        granted = k
+        return None
+
+    def _may_go_on(self, s: State | bytearray, k: int) -> bool:
+        leader, life = divmod(s[self.at[k] + HOLDER] - 1, 2)
+        if s[3 * leader + LIFE] != life or s[3 * leader + PROMISED] > k:
+            return False
+        version = self._version(k, self._newest(s, k))
+        willing = sum(
+            1 << 2 * v + s[3 * v + LIFE]
+            for v in self.ids
+            if s[3 * v + PROMISED] <= k and s[3 * v + KNOWS] <= version
+        )
+        return is_quorum(self._content(s, version), willing)
