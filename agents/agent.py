@@ -24,6 +24,7 @@ from protocol.messages import (
     Ask,
     CmdVel,
     FormationNote,
+    GroundProfile,
     LaserScan,
     LeaseNote,
     Localization,
@@ -67,6 +68,7 @@ class Agent:
         self._next_control = 0.0
         self._arrived = False
         self._stuck: str | None = None
+        self._failed = False
         self._next_handover = 0.0
         self._given_up: list[tuple[int, int]] = []
         self._stopping = False
@@ -144,6 +146,8 @@ class Agent:
                 driver.estimator.localization(message, now)
             case LaserScan():
                 driver.see(message, now)
+            case GroundProfile():
+                driver.feel(message, now)
             case LeaseNote():
                 source = robot_id_of(message.header.sender)
                 if source is not None:
@@ -277,6 +281,7 @@ class Agent:
         self._reports.decision(driver.decision, lease.term, now)
         self._reports.obstacle(driver, pose, now)
         self._mind_stuck(role, pose, now, lease, driver)
+        self._mind_goal(role, lease, driver, now)
         if role is Role.LEADER:
             self._orders.lead(driver.lead, lease.chain[1:], lease.term, now)
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
@@ -299,6 +304,13 @@ class Agent:
         self._given_up.append(place)
         self._command(STILL, Role.FOLLOWER, now)
         self._apply(lease.request_handover(now), now)
+
+    def _mind_goal(self, role: Role, lease: Lease, driver: Driver, now: float) -> None:
+        """A leader that has found its goal out of reach says so once: the mission has failed."""
+        failure = None if driver.explore is None else driver.explore.failure
+        if role is Role.LEADER and failure is not None and not self._failed:
+            self._failed = True
+            self._event("failed", now, {"reason": failure}, lease.term)
 
     def _role(self, lease: Lease) -> Role:
         if lease.role is Role.LEADER:
@@ -335,7 +347,7 @@ class Agent:
             return frozenset(common)
         others = {f"lfa/{fleet}/*/{topic}" for topic in ("table", "formation", "obstacles")}
         lease = {f"lfa/{fleet}/*/lease/all", f"lfa/{fleet}/*/lease/{own}", alive_key(fleet, "*", "*")}
-        hardware = {self._voice.key(topic) for topic in ("sensors", "localization", "scan")}
+        hardware = {self._voice.key(topic) for topic in ("sensors", "localization", "scan", "ground")}
         ahead = self._driver.predecessor
         pose = set() if ahead is None else {f"lfa/{fleet}/{robot_name(ahead.robot)}/{TOPIC['pose'].name}"}
         return frozenset(common | others | lease | hardware | pose)

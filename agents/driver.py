@@ -7,26 +7,28 @@ knows of terms or keys.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, hypot, inf, sin
 
 from msgspec import structs
 
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
 from agents.crossing import Crossing
+from agents.decisions import Class, Situation, decide
 from agents.estimator import Estimator
 from agents.explore import Explore
 from agents.features import Feature, Tracker
 from agents.following import follower_of, predecessor_of
 from agents.formation import Formation
+from agents.ground import Ground
 from agents.motion import Lead
-from agents.perception import Point, Surroundings, free_along, without
+from agents.perception import Point, Surroundings, free_along, sides, without
 from agents.predecessor import Predecessor
 from agents.safety import SKIN_M, safe
 from agents.strategy import Decision, Detour
 from agents.stuck import Stuck
 from protocol.geometry import STILL, Pose2D, Twist, bearing, distance, wrap
-from protocol.messages import LaserScan, Role
+from protocol.messages import GroundProfile, LaserScan, Role
 from protocol.mission import Mission
 
 GAP_SLOW = 1.5
@@ -70,6 +72,7 @@ class Driver:
         self._tracker = Tracker()
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing()
+        self._ground = Ground(mission.limits)
         self._stuck = Stuck()
         self.stuck: str | None = None
         """Why this robot is stuck, None when it is not."""
@@ -84,7 +87,7 @@ class Driver:
     @property
     def decision(self) -> Decision | None:
         """What is being done about the surroundings, None on the wanted way."""
-        return self._crossing.decision or self._detour.decision
+        return self._crossing.decision or self._detour.decision or self._ground.decision
 
     @property
     def last(self) -> Twist:
@@ -108,6 +111,12 @@ class Driver:
             if self.explore is not None:
                 self.explore.see(scan, pose, known[1], self._mates(now))
 
+    def feel(self, profile: GroundProfile, now: float) -> None:
+        """Take a look at the floor ahead."""
+        known = self.estimator.pose_at(now)
+        if known is not None:
+            self._ground.profile(profile, known[0])
+
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Whose successor this robot is from now on; None for nobody's."""
         current = None if self.predecessor is None else self.predecessor.robot
@@ -122,7 +131,7 @@ class Driver:
         self._driven_at = now
         if role != self._role:
             self._change(role, pose, twist)
-        points = self._surroundings.points(pose, LOOK_M)
+        points = self._surroundings.points(pose, LOOK_M) + self._ground.points(pose, LOOK_M)
         if self.explore is not None and self.explore.work(role is Role.LEADER, pose, self._mates(now), now):
             self.lead.take(self.explore.route, pose)
         moving = self._beliefs.moving(self._tracker.moving(now), now)
@@ -138,6 +147,7 @@ class Driver:
             wanted = STILL
         if role is not Role.WAITING:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
+            wanted = self._ground.cross(wanted, self._mission.radius_m, now)
         self._watch(role, pose, wanted, now)
         limits = self._mission.limits
         self._last = safe(wanted, self._last, points, self._mission.radius_m, limits, dt)
@@ -207,18 +217,29 @@ class Driver:
         around = self._detour.steer(points, target, wanted, speed, now)
         decision = self._detour.decision
         if decision is not None:
-            kind = before.kind if before is not None else self._kind_ahead(pose, now)
-            self._detour.decision = structs.replace(decision, kind=kind)
+            if before is None:
+                before = self._classed(decision, points, pose, now)
+            named = {"kind": before.kind, "condition": before.condition, "updates": before.updates}
+            self._detour.decision = structs.replace(decision, **named)
         return around
 
     def met(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
         """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
         return _nearest([f for f in self._tracker.features(now) if f.kind == kind], pose)
 
-    def _kind_ahead(self, pose: Pose2D, now: float) -> str:
-        """Class of the nearest thing."""
+    def _classed(self, decision: Decision, points: list[Point], pose: Pose2D, now: float) -> Decision:
+        """The decision with the class of the nearest thing, and the row of the table that it falls under."""
         nearest = _nearest(self._tracker.features(now), pose)
-        return "stationary" if nearest is None else nearest.kind
+        apart_m = inf if nearest is None else hypot(nearest.x - pose.x, nearest.y - pose.y) - nearest.radius_m
+        kind: Class = self._ground.kind_near(pose.x, pose.y, apart_m) or (
+            "stationary" if nearest is None else nearest.kind
+        )
+        width_m = 2.0 * nearest.radius_m if nearest is not None else 0.0
+        left_m, right_m, rear_m = sides(points)
+        row = decide(Situation(kind, decision.free_m, width_m, left_m, right_m, rear_m))
+        if row is None:
+            return structs.replace(decision, kind=kind)
+        return structs.replace(decision, kind=kind, condition=row.name, updates=row.updates)
 
     def _following(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
         sighting = None if self.predecessor is None else self.predecessor.at(now)

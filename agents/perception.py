@@ -89,3 +89,11 @@ def _bent(x: float, y: float, radius: float, half_width_m: float) -> float:
             return inf
         angle += 2.0 * pi
     return max(0.0, radius * angle - half_width_m)
+
+
+def sides(points: Sequence[Point]) -> tuple[float, float, float]:
+    """Clear range [m] to the left, to the right and behind: the nearest point within 45 degrees of each."""
+    left = min((y for x, y in points if y > abs(x)), default=inf)
+    right = min((-y for x, y in points if -y > abs(x)), default=inf)
+    rear = min((-x for x, y in points if -x > abs(y)), default=inf)
+    return left, right, rear

@@ -55,6 +55,8 @@ class Reports:
         if decision is not None:
             free_m, bearing = round(min(decision.free_m, FAR_M), 3), round(decision.bearing, 3)
             data |= {"class": decision.kind, "action": decision.action, "free_m": free_m, "bearing_rad": bearing}
+            if decision.condition:
+                data |= {"condition": decision.condition, "updates": decision.updates}
         self._voice.event("decision", now, term, data)
 
     def obstacle(self, driver: Driver, pose: Pose2D, now: float) -> None:

@@ -42,7 +42,10 @@ class Decision(Struct, frozen=True):
     bearing: float
     """Chosen direction in `base_link` [rad]."""
     kind: str = "stationary"
-    """Class of what is met: `stationary`, `moving` or `wall`."""
+    """Class of what is met: `stationary`, `moving`, `wall`, `pothole`, `bump` or `ditch`."""
+    condition: str = ""
+    """The row of the decision table, by its condition, and what the decision updates (decisions.py)."""
+    updates: str = ""
 
 
 class Detour:

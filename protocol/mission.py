@@ -60,6 +60,10 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     omega_max_radps: float = 2.0
     a_max_mps2: float = 1.0
     alpha_max_radps2: float = 4.0
+    bridge_gap_m: float = 0.05
+    """The widest hole that its wheels bridge, however deep."""
+    climb_step_m: float = 0.010
+    """The highest step that they climb."""
 
 
 class Orientation(Struct, frozen=True, forbid_unknown_fields=True):
@@ -164,6 +168,8 @@ def _ranges(mission: Mission) -> list[tuple[str, float, float, float]]:
         ("limits.omega_max_radps", limits.omega_max_radps, 0.01, inf),
         ("limits.a_max_mps2", limits.a_max_mps2, 0.01, inf),
         ("limits.alpha_max_radps2", limits.alpha_max_radps2, 0.01, inf),
+        ("limits.bridge_gap_m", limits.bridge_gap_m, 0.0, 10.0),
+        ("limits.climb_step_m", limits.climb_step_m, 0.0, 10.0),
         ("leading.cruise_mps", leading.cruise_mps, 0.01, limits.v_max_mps),
         ("leading.acceleration_mps2", leading.acceleration_mps2, 0.01, limits.a_max_mps2),
         ("leading.goal_tolerance_m", leading.goal_tolerance_m, 0.01, 10.0),

@@ -1,0 +1,92 @@
+"""The decision table of control.md section 7 as data: class of what is met, condition, action, what it updates.
+
+Rows are tried in order and the first whose condition holds is taken. An obstacle strategy updates
+speed and position, an environment strategy the angle; both end in a new trajectory (the paper's section 3.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Literal
+
+from msgspec import Struct
+
+Class = Literal["stationary", "moving", "wall", "pothole", "bump", "ditch"]
+Updates = Literal["speed and position", "angle"]
+
+
+class Situation(Struct, frozen=True):
+    """The values that a decision is taken by."""
+
+    kind: Class
+    range_m: float
+    """rho: clear way in the direction of travel."""
+    width_m: float = 0.0
+    """Of the thing as far as seen; inf when its end is out of sight."""
+    left_m: float = inf
+    right_m: float = inf
+    rear_m: float = inf
+    closest_m: float = inf
+    """Closest approach predicted, of what moves."""
+    crossable: bool = False
+    """The wheels can bridge or climb it."""
+    room_m: float = 0.5
+    """W_r: the width that the robot needs beside it."""
+    swing_m: float = 0.2
+    """r_sw: what it needs to turn on the spot."""
+
+
+class Row(Struct, frozen=True):
+    kind: Class
+    name: str
+    holds: Callable[[Situation], bool]
+    action: str
+    updates: Updates
+
+
+MOTION: Updates = "speed and position"
+ANGLE: Updates = "angle"
+
+
+def _known(s: Situation) -> bool:
+    """The far edge is in sight, so that the dimension is known."""
+    return s.width_m < inf
+
+
+def _beside(s: Situation) -> bool:
+    return max(s.left_m, s.right_m) >= s.room_m
+
+
+def _behind(s: Situation) -> bool:
+    return s.rear_m >= s.swing_m
+
+
+def _turns(s: Situation) -> bool:
+    return s.range_m > s.swing_m
+
+
+#   class, condition, when it holds, action, what it updates
+TABLE: tuple[Row, ...] = (
+    Row("moving", "it keeps its distance", lambda s: s.closest_m >= 0.6, "continue", MOTION),
+    Row("moving", "it comes too near", lambda s: s.closest_m < 0.6, "give_way", MOTION),
+    Row("wall", "a side is free", lambda s: _turns(s) and _beside(s), "aside", ANGLE),
+    Row("wall", "both sides barred", lambda s: _turns(s) and _behind(s), "u_turn", ANGLE),
+    Row("wall", "too near to turn", lambda s: _behind(s), "back", ANGLE),
+    Row("ditch", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
+    Row("ditch", "a side is free", _beside, "aside", ANGLE),
+    Row("ditch", "both sides barred", _behind, "u_turn", ANGLE),
+    Row("pothole", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
+    Row("pothole", "too large, a side is free", lambda s: _known(s) and _beside(s), "aside", ANGLE),
+    Row("pothole", "its end is not in sight", _behind, "u_turn", ANGLE),
+    Row("stationary", "a side is free", lambda s: _known(s) and _beside(s), "aside", MOTION),
+    Row("stationary", "both sides barred", _behind, "u_turn", MOTION),
+    Row("bump", "low enough", lambda s: _known(s) and s.crossable, "climb", ANGLE),
+    Row("bump", "too high, a side is free", _beside, "aside", ANGLE),
+    Row("bump", "too high, both sides barred", _behind, "u_turn", ANGLE),
+)  # fmt: skip
+
+
+def decide(situation: Situation) -> Row | None:
+    """The first row of the situation's class that holds; None when the robot is stuck."""
+    return next((row for row in TABLE if row.kind == situation.kind and row.holds(situation)), None)

@@ -1,0 +1,161 @@
+"""From the ground profile to potholes, bumps and ditches: which can be crossed, and where the others bar the way.
+
+What cannot be crossed is remembered as points in `map`, so that a detour treats its edge like an obstacle's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, floor, inf, isnan, sin
+from typing import Literal
+
+from msgspec import Struct
+
+from agents.decisions import Situation, decide
+from agents.perception import Point
+from agents.strategy import Decision
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import GroundProfile
+from protocol.mission import Limits
+
+GroundKind = Literal["pothole", "bump", "ditch"]
+
+FLAT_M = 0.004
+"""Lower than this over the floor around is noise, and no wheel feels it."""
+RUN_POINTS_MIN = 1
+STRAIGHT_M = 0.08
+"""A hole whose near edge is this straight over all three lines is a ditch."""
+CELL_M = 0.05
+CELLS_MAX = 4000
+JUDGE_M = 0.6
+"""Nearer than this, what has no visible end has none."""
+NEAR_M = 0.5
+CROSSING_MPS = 0.2
+"""Slow enough for the wheels, whatever they meet (control.md section 7)."""
+SEEN_MIN = 2
+"""A cell bars the way when it was seen so often: one bad reading is no hole."""
+
+
+class GroundFeature(Struct, frozen=True, gc=False):
+    """One thing on the floor ahead, as far as seen."""
+
+    kind: GroundKind
+    near_m: float
+    """Way to its near edge."""
+    width_m: float
+    """Along the direction of travel; inf when the far edge is out of sight."""
+    size_m: float
+    """Depth of a hole, height of a bump."""
+
+    def crossable(self, limits: Limits) -> bool:
+        """Wheels bridge the gap, or climb the step; what has no visible end is neither."""
+        if self.kind == "bump":
+            return self.width_m < inf and self.size_m <= limits.climb_step_m
+        return self.width_m <= limits.bridge_gap_m or self.size_m <= limits.climb_step_m
+
+
+class Ground:
+    """Of one robot: the features of the newest profile, and the floor that it must not drive on."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._cells: dict[tuple[int, int], int] = {}
+        self._kinds: dict[tuple[int, int], GroundKind] = {}
+        self.ahead: GroundFeature | None = None
+        """The nearest feature that can be crossed and lies ahead."""
+        self.decision: Decision | None = None
+        """While something is crossed, and on the way to it."""
+        self._crossing_until = 0.0
+
+    def profile(self, profile: GroundProfile, pose_map: Pose2D) -> None:
+        """Take a profile that was made at `pose_map`."""
+        features = [(line, feature) for line in range(len(profile.heights_m)) for feature in _runs(profile, line)]
+        ditch = _is_ditch([feature for _, feature in features], len(profile.heights_m))
+        self.ahead = None
+        for line, found in features:
+            feature = GroundFeature("ditch", *_facts(found)) if ditch and found.kind == "pothole" else found
+            if feature.width_m == inf and (feature.near_m > JUDGE_M or feature.size_m <= self._limits.climb_step_m):
+                continue  # its end will be seen from nearer by; or the floor that the robot came from is higher
+            if not feature.crossable(self._limits):
+                self._bar(profile, line, feature, pose_map)
+            elif self.ahead is None or feature.near_m < self.ahead.near_m:
+                self.ahead = feature
+
+    def cross(self, wanted: Twist, radius_m: float, now: float) -> Twist:
+        """`wanted`, straight and slow over what can be crossed, until the whole robot is behind it."""
+        ahead = self.ahead
+        if ahead is not None and ahead.near_m < NEAR_M and wanted.linear_x > 0.0:
+            row = decide(Situation(ahead.kind, ahead.near_m, ahead.width_m, crossable=True))
+            if row is not None:
+                self._crossing_until = now + (ahead.near_m + ahead.width_m + 2.0 * radius_m) / CROSSING_MPS
+                self.decision = Decision(row.action, ahead.near_m, 0.0, ahead.kind, row.name, row.updates)
+        if now >= self._crossing_until:
+            self.decision = None
+            return wanted
+        if wanted.linear_x <= CROSSING_MPS:
+            return wanted
+        return Twist(CROSSING_MPS, wanted.angular_z * CROSSING_MPS / wanted.linear_x)
+
+    def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
+        """What bars the way nearer than `within_m`, in `base_link`."""
+        c, s, near = cos(pose_map.theta), sin(pose_map.theta), []
+        for x, y in self._barred():
+            dx, dy = x - pose_map.x, y - pose_map.y
+            if dx * dx + dy * dy < within_m * within_m:
+                near.append((c * dx + s * dy, c * dy - s * dx))
+        return near
+
+    def kind_near(self, x: float, y: float, within_m: float) -> GroundKind | None:
+        """Class of the barred floor nearest to (x, y) in `map`."""
+        best, kind = within_m * within_m, None
+        for (i, j), seen in self._cells.items():
+            apart = ((i + 0.5) * CELL_M - x) ** 2 + ((j + 0.5) * CELL_M - y) ** 2
+            if seen >= SEEN_MIN and apart < best:
+                best, kind = apart, self._kinds[i, j]
+        return kind
+
+    def _barred(self) -> list[Point]:
+        return [((i + 0.5) * CELL_M, (j + 0.5) * CELL_M) for (i, j), n in self._cells.items() if n >= SEEN_MIN]
+
+    def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
+        """The feature's seen points on this line."""
+        y, c, s = profile.offsets_m[line], cos(pose_map.theta), sin(pose_map.theta)
+        last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
+        x = feature.near_m
+        while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
+            cell = floor((pose_map.x + c * x - s * y) / CELL_M), floor((pose_map.y + s * x + c * y) / CELL_M)
+            if cell in self._cells or len(self._cells) < CELLS_MAX:
+                self._cells[cell] = self._cells.get(cell, 0) + 1
+                self._kinds[cell] = feature.kind
+            x += profile.increment_m
+
+
+def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:
+    """Runs of readings off the floor on one line; a missing reading neither begins nor ends one."""
+    heights, features = profile.heights_m[line], []
+    start, size, sign = None, 0.0, 0.0
+    for n, height in enumerate((*heights, 0.0)):
+        off = 0.0 if isnan(height) or abs(height) < FLAT_M else (1.0 if height > 0.0 else -1.0)
+        if start is not None and (off != sign and not isnan(height)):
+            open_ended = n == len(heights)
+            width = inf if open_ended else (n - start) * profile.increment_m
+            near_m = profile.first_m + start * profile.increment_m
+            features.append(GroundFeature("bump" if sign > 0.0 else "pothole", near_m, width, size))
+            start = None
+        if start is None and off != 0.0 and n < len(heights):
+            start, size, sign = n, 0.0, off
+        if start is not None and not isnan(height):
+            size = max(size, abs(height))
+    return features
+
+
+def _is_ditch(features: Sequence[GroundFeature], lines: int) -> bool:
+    """A hole on every line, with a straight near edge."""
+    edges = [feature.near_m for feature in features if feature.kind == "pothole"]
+    if len(edges) != lines or lines < 3:
+        return False
+    return abs(edges[0] - 2.0 * edges[1] + edges[2]) < STRAIGHT_M
+
+
+def _facts(feature: GroundFeature) -> tuple[float, float, float]:
+    return feature.near_m, feature.width_m, feature.size_m

@@ -1,0 +1,101 @@
+"""From the ground profile to potholes, bumps and ditches: crossed, or barred."""
+
+from math import inf, nan
+
+import pytest
+
+from agents.ground import CROSSING_MPS, SEEN_MIN, Ground
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import GroundProfile, Header
+from protocol.mission import Limits
+
+HEADER = Header("world", 1, 0, 0.0)
+LIMITS = Limits()
+POINTS = 29
+STEP = 0.05
+
+
+def profile(
+    *features: tuple[float, float, float], lines: tuple[int, ...] = (0, 1, 2), shift: float = 0.0
+) -> GroundProfile:
+    """Features as (from, to, height) on `lines`; each further line begins `shift` later."""
+    rows = []
+    for line in range(3):
+        row = []
+        for n in range(POINTS):
+            x = 0.1 + n * STEP
+            hits = [h for a, b, h in features if line in lines and a + shift * (line == 1) <= x < b]
+            row.append(hits[0] if hits else 0.0)
+        rows.append(tuple(row))
+    return GroundProfile(HEADER, 0.1, STEP, (0.12, 0.0, -0.12), tuple(rows))
+
+
+def looked_at(seen: GroundProfile, times: int = SEEN_MIN) -> Ground:
+    ground = Ground(LIMITS)
+    for _ in range(times):
+        ground.profile(seen, Pose2D())
+    return ground
+
+
+@pytest.mark.parametrize(
+    ("feature", "kind", "crossable"),
+    [
+        ((0.5, 0.55, -0.2), "ditch", True),
+        ((0.5, 0.9, -0.2), "ditch", False),
+        ((0.5, 0.9, -0.008), "ditch", True),
+        ((0.5, 0.6, 0.008), "bump", True),
+        ((0.5, 0.6, 0.03), "bump", False),
+        ((0.5, 0.9, -inf), "ditch", False),
+    ],
+)
+def test_what_wheels_can_do_decides(feature: tuple[float, float, float], kind: str, crossable: bool) -> None:
+    ground = looked_at(profile(feature))
+    if crossable:
+        assert ground.ahead is not None
+        assert ground.ahead.kind == kind
+        assert ground.points(Pose2D(), 2.0) == []
+    else:
+        assert ground.ahead is None
+        assert ground.kind_near(0.6, 0.0, 0.5) == kind
+        assert ground.points(Pose2D(), 2.0) != []
+
+
+def test_a_hole_on_one_line_is_a_pothole() -> None:
+    assert looked_at(profile((0.5, 0.9, -0.2), lines=(1,))).kind_near(0.6, 0.0, 0.5) == "pothole"
+
+
+def test_a_hole_with_a_round_edge_is_a_pothole() -> None:
+    assert looked_at(profile((0.5, 0.9, -0.2), shift=-0.15)).kind_near(0.6, 0.0, 0.5) == "pothole"
+
+
+def test_one_bad_reading_is_no_hole() -> None:
+    assert looked_at(profile((0.5, 0.9, -0.2)), times=SEEN_MIN - 1).points(Pose2D(), 2.0) == []
+
+
+def test_a_missing_reading_is_neither_hole_nor_floor() -> None:
+    rows = profile((0.5, 0.9, -0.2)).heights_m
+    holed = tuple(tuple(nan if n == 12 else h for n, h in enumerate(row)) for row in rows)
+    ground = looked_at(GroundProfile(HEADER, 0.1, STEP, (0.12, 0.0, -0.12), holed))
+    assert ground.kind_near(0.6, 0.0, 0.5) == "ditch"
+
+
+def test_what_has_no_visible_end_is_judged_from_nearer_by() -> None:
+    assert looked_at(profile((1.3, 9.0, 0.008))).points(Pose2D(), 2.0) == []
+    assert looked_at(profile((0.5, 9.0, -0.2))).points(Pose2D(), 2.0) != []
+
+
+def test_barred_floor_stays_where_it_is() -> None:
+    ground = looked_at(profile((0.5, 0.9, -0.2)))
+    nearest = min(x for x, _ in ground.points(Pose2D(0.3, 0.0, 0.0), 2.0))
+    assert nearest == pytest.approx(0.2, abs=0.06)
+
+
+def test_crossing_is_slow_until_the_robot_is_behind_it() -> None:
+    ground = looked_at(profile((0.4, 0.45, -0.2)))
+    assert ground.cross(Twist(0.5, 0.1), 0.15, 0.0) == Twist(CROSSING_MPS, 0.1 * CROSSING_MPS / 0.5)
+    assert ground.decision is not None
+    assert ground.decision.action == "overcome"
+    ground.profile(profile(), Pose2D())
+    assert ground.cross(Twist(0.5, 0.0), 0.15, 1.0).linear_x == CROSSING_MPS
+    assert ground.cross(Twist(0.5, 0.0), 0.15, 6.0) == Twist(0.5, 0.0)
+    assert ground.decision is None
