@@ -1,0 +1,80 @@
+"""Cuts and loss in the air of a live team, made at the receivers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from deploy.bench.team import Team
+from protocol import clock
+from protocol.mission import robot_name
+from protocol.radio import WEATHER
+from protocol.topics import WORLD_NAME
+from tests.processes.live import ROBOTS, WHOLE_S, check_terms, leads, team
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.fixture(scope="module")
+def module_team() -> Iterator[Team]:
+    with team() as live:
+        yield live
+
+
+@pytest.fixture
+def live(module_team: Team) -> Iterator[Team]:
+    module_team.await_chain(ROBOTS, WHOLE_S)
+    module_team.events.clear()
+    yield module_team
+    module_team.heal()
+    check_terms(module_team)
+
+
+def test_a_leader_cut_off_is_replaced_and_comes_back_as_a_follower(live: Team) -> None:
+    chain = live.await_chain(ROBOTS, WHOLE_S)
+    since = live.cut_off(chain[0])
+    live.wait_until(lambda: leads(live, since) == [chain[1]], "the next in chain does not lead", WHOLE_S)
+    live.heal()
+    assert live.await_chain(ROBOTS, WHOLE_S)[0] == chain[1]
+
+
+def test_of_two_halves_only_the_one_with_the_witness_has_a_leader(live: Team) -> None:
+    chain = live.await_chain(ROBOTS, WHOLE_S)
+    since = live.cut_off(*chain[:2])
+    live.wait_until(lambda: leads(live, since) == [chain[2]], "the witness's side does not lead", WHOLE_S)
+    live.heal()
+    live.await_chain(ROBOTS, WHOLE_S)
+    assert not set(leads(live, since)) & set(chain[:2])
+
+
+def test_a_leader_that_hears_nobody_is_replaced_although_all_hear_it(live: Team) -> None:
+    chain = live.await_chain(ROBOTS, WHOLE_S)
+    others = [*(robot_name(robot) for robot in chain[1:]), WORLD_NAME]
+    since = live.order(WEATHER, cut=[(other, robot_name(chain[0])) for other in others])
+    live.wait_until(lambda: leads(live, since)[-1:] == [chain[1]], "the next in chain does not lead", WHOLE_S)
+    live.heal()
+    live.await_chain(ROBOTS, WHOLE_S)
+
+
+def test_two_followers_that_do_not_hear_each_other_change_no_leader(live: Team) -> None:
+    chain = live.await_chain(ROBOTS, WHOLE_S)
+    pair = robot_name(chain[2]), robot_name(chain[3])
+    since = live.order(WEATHER, cut=[pair, pair[::-1]])
+    _pass_time(live, 1.0)
+    live.heal()
+    assert live.await_chain(ROBOTS, WHOLE_S)[0] == chain[0]
+    assert leads(live, since) in ([], [chain[0]])
+
+
+def test_a_tenth_of_all_messages_lost_changes_no_leader(live: Team) -> None:
+    chain = live.await_chain(ROBOTS, WHOLE_S)
+    since = live.order(WEATHER, radio={"loss": 0.1})
+    _pass_time(live, 3.0)
+    assert leads(live, since) in ([], [chain[0]])
+    live.heal()
+
+
+def _pass_time(live: Team, for_s: float) -> None:
+    until = clock.now() + for_s
+    live.wait_until(lambda: clock.now() >= until, "the clock stands")
