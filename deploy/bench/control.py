@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from deploy.bench import control_string, control_table
+from itertools import chain
+
+from deploy.bench import control_agents, control_string, control_table
 from deploy.bench.rows import Case, measured, select, show
 
 
 def cases() -> list[Case]:
     """The longest first, so that two jobs end together."""
-    return [*control_string.cases(), *control_table.cases()]
+    return [*control_string.cases(), *control_agents.cases(), *control_table.cases()]
 
 
-def run(as_json: bool, rows: str = "*", jobs: int = 2) -> int:
-    """0 when every chosen row holds, else 1. `rows` is a glob over row names."""
-    return show(measured(select(cases(), rows), jobs, rows), as_json)
+def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False) -> int:
+    """0 when every chosen row holds, else 1. `rows` is a glob over row names; `processes` adds real runs.
+
+    Real processes are measured one after the other and alone: beside a computation they would show its load.
+    """
+    virtual, live = cases(), control_agents.process_cases() if processes else []
+    chosen = select([*virtual, *live], rows)
+    computed = [case for case in chosen if case not in live]
+    alone = [case for case in chosen if case in live]
+    return show(chain(measured(computed, jobs, rows), measured(alone, 1, rows)), as_json)

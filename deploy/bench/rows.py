@@ -15,10 +15,16 @@ from msgspec import Struct, structs
 from protocol.mission import Refused
 
 NEAR = 0.10
+SAME = 0.01
+FOLLOWS_MIN = 0.9
+"""An amplification below this is not that of a chain that follows."""
 NEAR_FLOOR = 0.02
 """Amplitude ratios are given to two decimals: a smaller difference is none."""
 ROUNDED = 6
 """Significant digits of a printed value."""
+
+
+Rule = Literal["at most", "at least", "near", "same", "no worse"]
 
 
 class Quantity(Struct, frozen=True):
@@ -27,7 +33,7 @@ class Quantity(Struct, frozen=True):
     name: str
     unit: str
     bar: float | None = None
-    rule: Literal["at most", "at least", "near"] = "at most"
+    rule: Rule = "at most"
 
 
 class Case(Struct, frozen=True):
@@ -65,6 +71,10 @@ def _holds(quantity: Quantity, value: float) -> bool:
         return True
     if quantity.rule == "at least":
         return value >= bar
+    if quantity.rule == "same":
+        return abs(value - bar) <= SAME * bar
+    if quantity.rule == "no worse":
+        return FOLLOWS_MIN <= value <= (1.0 + NEAR) * bar
     if quantity.rule == "near":
         return abs(value - bar) <= max(NEAR * bar, NEAR_FLOOR)
     return value <= bar

@@ -1,0 +1,169 @@
+"""The same control with everything around it: whole agents, codec, world and lease, in virtual time or as processes.
+
+Three rows of the string table with ten whole followers must agree with the bare chain to 1 %; the scenarios straight,
+circle and figure_eight must keep the bars of control.md section 6, the "good" ones simulated, the "must" ones as
+processes.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import pi, sin, sqrt
+from pathlib import Path
+
+from agents.agent import Agent
+from agents.motion import Lead
+from deploy.bench.control_string import CRUISE_MPS, RAMP_MPS2, SCHEMES, SEPARATION_M, Scheme, speed_wave
+from deploy.bench.control_table import DEGREES
+from deploy.bench.rows import Case, Quantity
+from protocol.geometry import Pose2D, Twist
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import Message, Slot, Truth
+from protocol.mission import Following, FormationSpec, Leading, Mission
+from protocol.node import Node
+from protocol.radio import Radio
+from protocol.witness import Witness
+from world.kinematic import Kinematic
+from world.scenario import Lidar, Scenario, WorldSpec
+from world.simulator import Simulator
+from world.world import World
+
+FLEET = "bench"
+FOLLOWERS = 10
+OMEGA_RADPS = 2.0
+PERIODS = 8
+BEGIN_S = 5.0
+"""The chain stands together."""
+SETTLED_S = 20.0
+"""The wave has reached the last robot."""
+REPEATED = ("vel, 40 ms", "vel, 80 ms 5 %", "vel, 220 ms 20 %")
+
+SCENARIOS = ("straight", "circle", "figure_eight")
+RUN_S_MAX = 900.0
+
+#                 distance rms [mm]: straight and circle, eight   bearing, heading [deg]
+GOOD, MUST = (1.0, 2.0, 0.2, 0.3), (5.0, 10.0, 1.0, 2.0)
+
+
+def cases() -> list[Case]:
+    """In virtual time."""
+    quantities = (Quantity(f"N={FOLLOWERS} over the bare chain", "ratio", 1.0, "same"),)
+    repeated = [
+        Case(f"agents/{scheme.name}", quantities, partial(against_bare, scheme))
+        for scheme in SCHEMES
+        if scheme.name in REPEATED
+    ]
+    return [*repeated, *(_scenario("simulated", "sim", name, GOOD) for name in SCENARIOS)]
+
+
+def process_cases() -> list[Case]:
+    """As real processes on this machine: each takes as long as it takes."""
+    return [_scenario("processes", "run", name, MUST) for name in SCENARIOS]
+
+
+def against_bare(scheme: Scheme) -> tuple[float]:
+    """Amplification of ten whole followers over that of ten bare ones, under one sine on the leader's speed."""
+    bare = speed_wave(scheme, OMEGA_RADPS, FOLLOWERS)
+    whole = _whole(scheme)
+    return ((whole[FOLLOWERS] / whole[0]) / (bare[FOLLOWERS] / bare[0]),)
+
+
+class Waving(Lead):
+    """A leader that goes straight on with a sine on its speed."""
+
+    def __init__(self, mission: Mission, now: Callable[[], float]) -> None:
+        super().__init__(mission.leading, mission.limits)
+        self._now = now
+
+    def step(self, pose: Pose2D, twist: Twist, slots: Sequence[Slot], speed_max_mps: float) -> Twist:
+        self.track(pose)
+        t = self._now() - BEGIN_S
+        wave = 0.1 * sin(OMEGA_RADPS * t) if t > 2.0 else 0.0
+        return Twist(max(0.0, min(CRUISE_MPS, RAMP_MPS2 * t)) + wave, 0.0)
+
+
+def _whole(scheme: Scheme) -> list[float]:
+    """Rms deviation of each robot's true speed, the leader first [m/s]."""
+    mission = Mission(
+        robots=tuple(range(1, FOLLOWERS + 2)),
+        profile="wifi",
+        formation=FormationSpec(separation_m=SEPARATION_M, side="column"),
+        following=Following(
+            observer="pose" if scheme.mode == "pose" else "velocity", trace=True, delay_s=scheme.delay_s
+        ),
+        leading=Leading(route_m=((0.0, 0.0), (500.0, 0.0))),
+    )
+    scenario = Scenario("A wave along ten robots", mission, 1e6, WorldSpec(lidar=Lidar(beams=16, rate_hz=1.0)))
+    simulator = Simulator(Radio(delay_s=scheme.latency_s, jitter_s=scheme.jitter_s, loss=scheme.loss), seed=1)
+    period = 2.0 * pi / OMEGA_RADPS
+    begin, end = BEGIN_S + SETTLED_S, BEGIN_S + SETTLED_S + PERIODS * period
+    speeds: list[list[float]] = [[] for _ in mission.robots]
+
+    def hear(now: float, _key: str, _payload: bytes, message: Message) -> None:
+        if isinstance(message, Truth) and begin <= now < end:
+            for robot in message.robots:
+                speeds[robot.id - 1].append(robot.linear_x)
+
+    simulator.taps.append(hear)
+    agents = [Agent(robot, 1, FLEET, 1) for robot in mission.robots]
+    nodes: list[Node] = [World(FLEET, scenario, 1, 1, start_at=0.0, bodies=Kinematic), Witness(FLEET, 1, 1), *agents]
+    for node in nodes:
+        simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 1, {})))
+    simulator.at(1.0, lambda: _let_wave(agents[0], Waving(mission, lambda: simulator.now)))
+    simulator.run(end + 0.1)
+    return [_deviation(values) for values in speeds]
+
+
+def _let_wave(agent: Agent, lead: Lead) -> None:
+    """No mission can ask a leader for a wave: what it drives is replaced once it has one."""
+    assert agent._driver is not None
+    agent._driver.lead = lead
+
+
+def _deviation(values: list[float]) -> float:
+    mean = sum(values) / len(values)
+    return sqrt(sum((value - mean) ** 2 for value in values) / len(values))
+
+
+# --- scenarios ----------------------------------------------------------------------------------------------------
+
+
+def _scenario(how: str, command: str, name: str, bars: tuple[float, float, float, float]) -> Case:
+    on_bends, on_eight, bearing, heading = bars
+    quantities = (
+        Quantity("distance rms", "mm", on_eight if name == "figure_eight" else on_bends),
+        Quantity("bearing rms", "deg", bearing),
+        Quantity("heading rms", "deg", heading),
+        Quantity("settled last", "s"),
+        Quantity("contacts", "", 0.0),
+    )
+    return Case(f"{how}/{name}", quantities, partial(scenario_errors, command, name))
+
+
+def scenario_errors(command: str, name: str) -> tuple[float, ...]:
+    """Of `lfa sim NAME` or `lfa run NAME`: rms of the worst follower, from summary.json; nan for a failed run."""
+    with tempfile.TemporaryDirectory(prefix="lfa-bench-") as folder:
+        out = Path(folder) / "run"
+        argv = [sys.executable, "-c", "from deploy.cli import main; main()", command, name]
+        subprocess.run(
+            [*argv, "--out", str(out), "--no-figures", "--json"],
+            stdout=subprocess.DEVNULL,
+            timeout=RUN_S_MAX,
+            check=False,
+        )
+        summary = json.loads((out / "summary.json").read_bytes())
+    if summary["outcome"] != "goal_reached":
+        return (float("nan"),) * 5
+    followers = [robot for robot in summary["robots"] if robot["distance_error_rms_m"] is not None]
+    return (
+        1e3 * max(robot["distance_error_rms_m"] for robot in followers),
+        DEGREES * max(robot["bearing_error_rms_rad"] for robot in followers),
+        DEGREES * max(robot["heading_error_rms_rad"] for robot in followers),
+        max(robot["settled_after_s"] for robot in followers),
+        float(sum(robot["contacts"] for robot in summary["robots"])),
+    )
