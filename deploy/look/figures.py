@@ -26,6 +26,7 @@ from deploy.look.errors import Errors
 from deploy.look.trace import Array, Trace
 from deploy.run.folder import scenario_of
 from world.scenario import Scenario
+from world.terrain import patches_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -228,8 +229,14 @@ def _finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True
 
 
 def _ground(axes: Axes, run: Run) -> None:
-    """Walls and obstacles where they were; a moving one's way is dotted."""
+    """Walls, obstacles and terrain where they were; a moving one's way is dotted."""
     world = run.scenario.world
+    for patch in patches_of(world):
+        colours: dict[str, Any] = {"facecolor": "#DDD6C8" if patch.height_m > 0.0 else "#C8D3DD", "edgecolor": "#888888", "zorder": 1}
+        if patch.radius_m > 0.0:
+            axes.add_patch(Circle((patch.x, patch.y), patch.radius_m, **colours))
+        else:
+            axes.add_patch(Polygon(patch.corners_m, **colours))
     for x1, y1, x2, y2 in world.walls_m:
         axes.plot([x1, x2], [y1, y2], color="#444444", linewidth=2.0)
     for index, obstacle in enumerate(world.obstacles):
