@@ -232,7 +232,11 @@ def _ground(axes: Axes, run: Run) -> None:
     """Walls, obstacles and terrain where they were; a moving one's way is dotted."""
     world = run.scenario.world
     for patch in patches_of(world):
-        colours: dict[str, Any] = {"facecolor": "#DDD6C8" if patch.height_m > 0.0 else "#C8D3DD", "edgecolor": "#888888", "zorder": 1}
+        colours: dict[str, Any] = {
+            "facecolor": "#DDD6C8" if patch.height_m > 0.0 else "#C8D3DD",
+            "edgecolor": "#888888",
+            "zorder": 1,
+        }
         if patch.radius_m > 0.0:
             axes.add_patch(Circle((patch.x, patch.y), patch.radius_m, **colours))
         else:
