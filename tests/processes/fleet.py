@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from deploy.run.processes import Identity, identify, own_processes
 from protocol import clock
 
@@ -83,11 +85,12 @@ def running(folder: Path, *arguments: str) -> Iterator[Running]:
                 os.kill(identity.pid, 9)
 
 
-def eventually(holds: Callable[[], bool], complaint: str, within_s: float = PATIENCE_S) -> None:
+def eventually(holds: Callable[[], bool], complaint: str | Callable[[], str], within_s: float = PATIENCE_S) -> None:
     """Wait until `holds()`, failing with `complaint` after `within_s`."""
     until = clock.now() + within_s
     while not holds():
-        assert clock.now() < until, f"{complaint} within {within_s:g} s"
+        if clock.now() >= until:
+            pytest.fail(f"{complaint if isinstance(complaint, str) else complaint()} within {within_s:g} s")
         clock.sleep(POLL_S)
 
 

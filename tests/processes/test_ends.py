@@ -17,7 +17,7 @@ LEFT_S_MAX = 5.0
 
 
 def assert_nothing_is_left(run: Running) -> None:
-    eventually(lambda: run.left() == [], f"still there: {run.left()}", LEFT_S_MAX)
+    eventually(lambda: run.left() == [], lambda: f"still there: {run.left()}", LEFT_S_MAX)
     assert trace.read(run.folder).end_s > 0.0, "the recording gives no ground truth"
     assert list((run.folder / "journal").glob("robot1-*.bin")), "robot 1 left no journal"
 
