@@ -38,6 +38,9 @@ EVENTS_MAX = 4096
 TOPICS = ("event", "tracking", "pose")
 
 
+Table = Callable[[Sequence[Row], Path], Sequence[Row]]
+
+
 class Broken(Exception):
     """The team did not become what was waited for."""
 
@@ -55,13 +58,15 @@ def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
 class Team:
     """Router, world and agents of `scenario`; on leaving the block none of them is left, nor anything on disk."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, table: Table | None = None) -> None:
+        """`table` makes of the usual rows, and the folder of sockets, those that are started: all but the recorder."""
         self.scenario = scenario
         self.folder = Path(tempfile.mkdtemp(prefix="lfa-"))
         run = make(self.folder / "run", scenario)
         self._endpoint = f"unixsock-stream/{self.folder / 'router.sock'}"
         self._about = About(scenario.name, "processes", 0, f"bench{clock.wall_ms()}")
-        self._rows = {row.name: row for row in rows(run, self._about, self._endpoint, scenario.mission, "")}
+        usual = rows(run, self._about, self._endpoint, scenario.mission, "")
+        self._rows = {row.name: row for row in (usual if table is None else table(usual, self.folder))}
         self._crew = Crew(run)
         self._inbox = Inbox(every=True)
         self._bus: ZenohBus | None = None

@@ -30,11 +30,13 @@ class Row(Struct, frozen=True):
     """It hears of the launcher's death, wakes up if it was stopped, and ends by itself."""
     again: tuple[str, ...] = ()
     """What it is told besides when it starts again."""
+    inside: tuple[str, ...] = ()
+    """The command that it runs under, such as one that enters a network namespace."""
 
     def restarted(self) -> Row:
         """An agent that starts again starts as a follower, and the others tell it the rest; a world resumes."""
         told = tuple("follower" if word == "leader" else word for word in self.arguments)
-        return Row(self.name, (*told, *self.again))
+        return Row(self.name, (*told, *self.again), inside=self.inside)
 
 
 def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
@@ -67,7 +69,7 @@ class Crew:
         death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
         with (self._logs / f"{row.name}.log").open("ab") as log:
-            self._children[row.name] = processes.start(row.arguments, log, death, stdin)
+            self._children[row.name] = processes.start(row.arguments, log, death, stdin, row.inside)
 
     def runs(self, name: str) -> bool:
         child = self._children.get(name)

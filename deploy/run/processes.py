@@ -70,12 +70,15 @@ def start(
     log: IO[bytes],
     on_parent_death: signal.Signals = signal.SIGKILL,
     stdin: int = subprocess.DEVNULL,
+    inside: Sequence[str] = (),
 ) -> subprocess.Popen[bytes]:
     """`python -m ARGUMENTS` as a child that hears of our death, out of reach of the terminal's Ctrl-C.
+
+    `inside` is a command that becomes another in a place of its choice, such as `/sbin/ip netns exec NAME`.
 
     Call it from the main thread: the kernel means the thread that started a child when it speaks of its parent.
     """
     python = sys.executable
     tether = [python, "-I", "-S", str(TETHER), str(os.getpid()), str(int(on_parent_death))]
-    command = [*tether, python, "-m", *arguments]
+    command = [*tether, *inside, python, "-m", *arguments]
     return subprocess.Popen(command, stdin=stdin, stdout=log, stderr=log, start_new_session=True)
