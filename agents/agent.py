@@ -46,6 +46,8 @@ from protocol.topics import TOPIC, alive_key
 ASK_S = 0.5
 HANDOVER_S = 2.0
 """At least between two hand-overs that a stuck leader asks for."""
+TRAP_M = 0.8
+"""Radius of the place that a stuck leader tells the others to keep out of."""
 PLACE_M = 1.0
 """Side of the cell within which being stuck twice is being stuck in the same place."""
 
@@ -178,6 +180,8 @@ class Agent:
                 least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
                 if ahead is not None and least_s is not None:
                     ahead.clock.reported(least_s, now)
+            case ObstacleNote(kind="trap"):
+                driver.avoid_trap(message)
             case ObstacleNote():
                 self._beliefs.hear_obstacle(robot, message, now)
             case FormationNote():
@@ -302,6 +306,8 @@ class Agent:
             self._next_handover = inf
             return
         self._given_up.append(place)
+        header = self._voice.header("obstacles", now)
+        self._voice.say("obstacles", ObstacleNote(header, "trap", pose.x, pose.y, TRAP_M))
         self._command(STILL, Role.FOLLOWER, now)
         self._apply(lease.request_handover(now), now)
 

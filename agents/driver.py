@@ -28,7 +28,7 @@ from agents.safety import SKIN_M, safe
 from agents.strategy import Decision, Detour
 from agents.stuck import Stuck
 from protocol.geometry import STILL, Pose2D, Twist, bearing, distance, wrap
-from protocol.messages import GroundProfile, LaserScan, Role
+from protocol.messages import GroundProfile, LaserScan, ObstacleNote, Role
 from protocol.mission import Mission
 
 GAP_SLOW = 1.5
@@ -116,6 +116,10 @@ class Driver:
         known = self.estimator.pose_at(now)
         if known is not None:
             self._ground.profile(profile, known[0])
+
+    def avoid_trap(self, note: ObstacleNote) -> None:
+        """Keep out of a place in which another robot got stuck."""
+        self._ground.bar_circle(note.x, note.y, note.radius_m, "wall")
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Whose successor this robot is from now on; None for nobody's."""

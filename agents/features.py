@@ -14,8 +14,11 @@ Kind = Literal["stationary", "moving", "wall"]
 
 GAP_M = 0.3
 """Neighbouring beams' points farther apart than this belong to two things."""
-WALL_M = 1.2
+WALL_M = 1.0
 """What is wider than this is a wall."""
+FLAT_WALL_M = 0.45
+FLAT_SHARE = 0.1
+"""So is what is wider than this and bulges by less than this share of its width."""
 SAME_M = 0.5
 """A thing is taken for the one that was seen nearer than this to where it should be by now."""
 FORGET_S = 1.0
@@ -75,7 +78,7 @@ class Tracker:
         self._tracks = [track for track in self._tracks if now - track.seen_at <= FORGET_S]
         for cluster in _clusters(points_map):
             x, y, radius_m = _circle(cluster, eye)
-            if 2.0 * radius_m > WALL_M:
+            if _extent(cluster) > (FLAT_WALL_M if _flat(cluster) else WALL_M):
                 self._walls.append(Feature("wall", x, y, radius_m))
             elif any(hypot(px - eye[0], py - eye[1]) > SIGHT_M - EDGE_M for px, py in (cluster[0], cluster[-1])):
                 continue
@@ -134,6 +137,19 @@ def _circle(cluster: Sequence[Point], eye: Point) -> tuple[float, float, float]:
         return ax, ay, radius_m
     reach = (nearest_m + radius_m) / far
     return eye[0] + mx * reach, eye[1] + my * reach, radius_m
+
+
+def _extent(cluster: Sequence[Point]) -> float:
+    """Diagonal of the box that holds the visible points: also a pocket seen from inside is wide."""
+    xs, ys = [x for x, _ in cluster], [y for _, y in cluster]
+    return hypot(max(xs) - min(xs), max(ys) - min(ys))
+
+
+def _flat(cluster: Sequence[Point]) -> bool:
+    (ax, ay), (bx, by) = cluster[0], cluster[-1]
+    width = hypot(bx - ax, by - ay)
+    bulge = max(abs((bx - ax) * (y - ay) - (by - ay) * (x - ax)) for x, y in cluster)
+    return bulge < FLAT_SHARE * width * width
 
 
 def _feature(track: _Track, now: float) -> Feature:

@@ -6,7 +6,7 @@ What cannot be crossed is remembered as points in `map`, so that a detour treats
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, floor, inf, isnan, sin
+from math import ceil, cos, floor, inf, isnan, pi, sin
 from typing import Literal
 
 from msgspec import Struct
@@ -19,6 +19,7 @@ from protocol.messages import GroundProfile
 from protocol.mission import Limits
 
 GroundKind = Literal["pothole", "bump", "ditch"]
+BarKind = Literal["pothole", "bump", "ditch", "wall"]
 
 FLAT_M = 0.004
 """Lower than this over the floor around is noise, and no wheel feels it."""
@@ -60,7 +61,7 @@ class Ground:
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._cells: dict[tuple[int, int], int] = {}
-        self._kinds: dict[tuple[int, int], GroundKind] = {}
+        self._kinds: dict[tuple[int, int], BarKind] = {}
         self.ahead: GroundFeature | None = None
         """The nearest feature that can be crossed and lies ahead."""
         self.decision: Decision | None = None
@@ -96,6 +97,13 @@ class Ground:
             return wanted
         return Twist(CROSSING_MPS, wanted.angular_z * CROSSING_MPS / wanted.linear_x)
 
+    def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind) -> None:
+        """Nobody of this robot's size gets into the circle about (x, y) in `map` any more."""
+        count = ceil(2.0 * pi * radius_m / CELL_M)
+        for n in range(count):
+            angle = 2.0 * pi * n / count
+            self._bar_cell(x + radius_m * cos(angle), y + radius_m * sin(angle), kind, SEEN_MIN)
+
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
         """What bars the way nearer than `within_m`, in `base_link`."""
         c, s, near = cos(pose_map.theta), sin(pose_map.theta), []
@@ -105,7 +113,7 @@ class Ground:
                 near.append((c * dx + s * dy, c * dy - s * dx))
         return near
 
-    def kind_near(self, x: float, y: float, within_m: float) -> GroundKind | None:
+    def kind_near(self, x: float, y: float, within_m: float) -> BarKind | None:
         """Class of the barred floor nearest to (x, y) in `map`."""
         best, kind = within_m * within_m, None
         for (i, j), seen in self._cells.items():
@@ -123,11 +131,14 @@ class Ground:
         last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
         x = feature.near_m
         while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
-            cell = floor((pose_map.x + c * x - s * y) / CELL_M), floor((pose_map.y + s * x + c * y) / CELL_M)
-            if cell in self._cells or len(self._cells) < CELLS_MAX:
-                self._cells[cell] = self._cells.get(cell, 0) + 1
-                self._kinds[cell] = feature.kind
+            self._bar_cell(pose_map.x + c * x - s * y, pose_map.y + s * x + c * y, feature.kind, 1)
             x += profile.increment_m
+
+    def _bar_cell(self, x: float, y: float, kind: BarKind, seen: int) -> None:
+        cell = floor(x / CELL_M), floor(y / CELL_M)
+        if cell in self._cells or len(self._cells) < CELLS_MAX:
+            self._cells[cell] = self._cells.get(cell, 0) + seen
+            self._kinds[cell] = kind
 
 
 def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:

@@ -48,6 +48,14 @@ def test_what_is_wide_is_a_wall() -> None:
     assert [feature.kind for feature in tracker.features(0.0)] == ["wall"]
 
 
+def test_a_piece_of_wall_that_comes_into_sight_is_a_wall_and_does_not_move() -> None:
+    tracker = Tracker()
+    for n in range(30):
+        piece = [(1.5, -0.25 + 0.05 * k) for k in range(11 + n // 3)]
+        tracker.update(piece, (0.0, 0.0), [], 0.5, 0.1 * n)
+    assert [feature.kind for feature in tracker.features(2.9)] == ["wall"]
+
+
 def test_a_team_mate_is_no_obstacle() -> None:
     assert seen([(1.5, 0.0)] * 5, [(0.0, 0.0)] * 5, mates=[(1.6, 0.1)]).features(0.4) == []
 
