@@ -22,8 +22,8 @@ from deploy.run.folder import About, make
 from deploy.run.operator import Operator
 from protocol import clock
 from protocol.bus import Inbox
-from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Tracking, decode, encode
-from protocol.mission import Following, Leading, Mission, Profile, robot_id_of, robot_name
+from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Tracking, Truth, decode, encode
+from protocol.mission import FormationSpec, Leading, Mission, Profile, robot_id_of, robot_name
 from protocol.radio import WEATHER
 from protocol.topics import RECORDER_NAME, TOPIC, WORLD_NAME, address, key
 from protocol.zenoh_bus import ZenohBus, answers
@@ -35,7 +35,7 @@ SPEAKING_S = 0.15
 """Whoever has sent no pose for this long is not there."""
 SETTLED_S = 0.5
 EVENTS_MAX = 4096
-TOPICS = ("event", "tracking", "pose")
+TOPICS = ("event", "tracking", "pose", "truth")
 
 
 Table = Callable[[Sequence[Row], Path], Sequence[Row]]
@@ -46,12 +46,13 @@ class Broken(Exception):
 
 
 def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
-    """A slow round course of half an hour: nothing on it ends a bench."""
+    """A slow round course of half an hour, with room between robots for one that goes back to the tail."""
     radius_m, corners = 10.0, 16
     turns = (2.0 * pi * n / corners for n in range(1, corners * laps - corners // 2))
     route_m = tuple((radius_m * sin(turn), radius_m * (1.0 - cos(turn))) for turn in turns)
     leading = Leading(route_m=route_m, cruise_mps=0.1)
-    mission = Mission(robots=tuple(range(1, robots + 1)), profile=profile, leading=leading, following=Following())
+    formation = FormationSpec(separation_m=3.0)
+    mission = Mission(tuple(range(1, robots + 1)), profile=profile, formation=formation, leading=leading)
     return Scenario("A bench's endless course", mission, 1e6, name="endless")
 
 
@@ -73,6 +74,8 @@ class Team:
         self._operator = Operator(self._about.fleet, clock.wall_ms())
         self.events: list[Event] = []
         self.tracking: list[Tracking] = []
+        self.speeds_mps: dict[int, float] = {}
+        """True speed of each robot, as the world last said."""
         self._poses: dict[int, PoseStamped] = {}
         self._chains: dict[int, tuple[tuple[Any, ...], tuple[int, ...]]] = {}
 
@@ -157,6 +160,8 @@ class Team:
         match message:
             case PoseStamped() if robot is not None:
                 self._poses[robot] = message
+            case Truth():
+                self.speeds_mps = {robot.id: abs(robot.linear_x) for robot in message.robots}
             case Tracking():
                 self.tracking.append(message)
             case Event():

@@ -34,15 +34,15 @@ def live(module_team: Team) -> Iterator[Team]:
 def test_a_leader_cut_off_is_replaced_and_comes_back_as_a_follower(live: Team) -> None:
     chain = live.await_chain(ROBOTS, WHOLE_S)
     since = live.cut_off(chain[0])
-    live.wait_until(lambda: leads(live, since) == [chain[1]], "the next in chain does not lead", WHOLE_S)
+    live.wait_until(lambda: bool(set(leads(live, since)) & set(chain[1:])), "nobody else leads", WHOLE_S)
     live.heal()
-    assert live.await_chain(ROBOTS, WHOLE_S)[0] == chain[1]
+    assert live.await_chain(ROBOTS, WHOLE_S)[0] != chain[0]
 
 
 def test_of_two_halves_only_the_one_with_the_witness_has_a_leader(live: Team) -> None:
     chain = live.await_chain(ROBOTS, WHOLE_S)
     since = live.cut_off(*chain[:2])
-    live.wait_until(lambda: leads(live, since) == [chain[2]], "the witness's side does not lead", WHOLE_S)
+    live.wait_until(lambda: bool(set(leads(live, since)) & set(chain[2:])), "the witness's side does not lead", WHOLE_S)
     live.heal()
     live.await_chain(ROBOTS, WHOLE_S)
     assert not set(leads(live, since)) & set(chain[:2])
@@ -52,7 +52,7 @@ def test_a_leader_that_hears_nobody_is_replaced_although_all_hear_it(live: Team)
     chain = live.await_chain(ROBOTS, WHOLE_S)
     others = [*(robot_name(robot) for robot in chain[1:]), WORLD_NAME]
     since = live.order(WEATHER, cut=[(other, robot_name(chain[0])) for other in others])
-    live.wait_until(lambda: leads(live, since)[-1:] == [chain[1]], "the next in chain does not lead", WHOLE_S)
+    live.wait_until(lambda: bool(set(leads(live, since)) & set(chain[1:])), "nobody else leads", WHOLE_S)
     live.heal()
     live.await_chain(ROBOTS, WHOLE_S)
 

@@ -62,11 +62,11 @@ def test_a_short_stop_of_the_leader_changes_nothing(live: Team) -> None:
 def test_a_leader_that_wakes_up_late_finds_another_and_leads_no_more(live: Team, for_s: float) -> None:
     chain = live.await_chain(ROBOTS, WHOLE_S)
     since = live.signal(chain[0], signal.SIGSTOP)
-    live.wait_until(lambda: leads(live, since) == [chain[1]], "the next in chain does not lead", WHOLE_S)
+    live.wait_until(lambda: bool(set(leads(live, since)) & set(chain[1:])), "nobody else leads", WHOLE_S)
     _pass_time(live, max(0.0, since + for_s - clock.now()))
     live.signal(chain[0], signal.SIGCONT)
-    live.await_chain(ROBOTS, WHOLE_S)
-    assert leads(live, since) == [chain[1]]
+    assert live.await_chain(ROBOTS, WHOLE_S)[0] != chain[0]
+    assert chain[0] not in leads(live, since)
 
 
 def test_the_leader_and_the_next_killed_at_once_leave_the_third_to_lead(live: Team) -> None:

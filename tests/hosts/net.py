@@ -1,0 +1,156 @@
+"""Several machines on one: network namespaces on a bridge, each with its own router, joined by tcp links.
+
+Needs root, ip and nft. Names carry our pid, so that two runs do not meet; all of it is gone on leaving the block.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from deploy.bench.team import Team, endless
+from deploy.run.crew import ROUTER_NAME, Row
+from protocol.mission import robot_id_of
+from protocol.topics import RECORDER_NAME, WORLD_NAME
+
+PORT = 7447
+ROBOTS = 4
+WORLD_HOST = 0
+"""The host of world and witness; robot n is host n."""
+TABLE = "inet lfa"
+
+
+def missing() -> str | None:
+    """Why such a network cannot be made here, None when it can."""
+    if os.geteuid() != 0:
+        return "needs root, for network namespaces"
+    absent = [tool for tool in ("ip", "nft") if shutil.which(tool) is None]
+    if absent:
+        return f"needs {' and '.join(absent)}"
+    probe = f"lfa{os.getpid()}p"
+    made = subprocess.run(["ip", "netns", "add", probe], capture_output=True, text=True, check=False)
+    if made.returncode != 0:
+        return f"no network namespaces here: {made.stderr.strip()}"
+    _run("ip", "netns", "del", probe)
+    return None
+
+
+class Net:
+    """Hosts 0..N, all in one switch."""
+
+    def __init__(self, hosts: int) -> None:
+        self._switch = f"lfa{os.getpid()}s"
+        self._made: list[str] = []
+        self.hosts = range(hosts)
+
+    def __enter__(self) -> Net:
+        try:
+            self._namespace(self._switch)
+            self._inside(self._switch, "ip", "link", "add", "br0", "type", "bridge")
+            self._inside(self._switch, "ip", "link", "set", "br0", "up")
+            for host in self.hosts:
+                self._join(host)
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+
+    def _end(self) -> None:
+        while self._made:
+            _run("ip", "netns", "del", self._made.pop())
+
+    def _namespace(self, name: str) -> None:
+        _run("ip", "netns", "add", name)
+        self._made.append(name)
+        self._inside(name, "ip", "link", "set", "lo", "up")
+
+    def _join(self, host: int) -> None:
+        name, port = _name(host), f"p{host}"
+        self._namespace(name)
+        peer = ("peer", "name", port, "netns", self._switch)
+        self._inside(name, "ip", "link", "add", "eth0", "type", "veth", *peer)
+        self._inside(name, "ip", "addr", "add", f"{_ip(host)}/24", "dev", "eth0")
+        self._inside(name, "ip", "link", "set", "eth0", "up")
+        self._inside(self._switch, "ip", "link", "set", port, "master", "br0", "up")
+
+    def _inside(self, name: str, *command: str) -> None:
+        _run("ip", "netns", "exec", name, *command)
+
+    # --- what can be done to it ------------------------------------------------------------------------------------
+
+    def cut(self, one: Sequence[int], other: Sequence[int]) -> None:
+        """No packet passes between the sides: dropped where they come in, as the air does it."""
+        for side, far in ((one, other), (other, one)):
+            for host in side:
+                self._rules(host, f"ip saddr {{ {', '.join(_ip(f) for f in far)} }} drop")
+
+    def reset(self, host: int) -> None:
+        """Every tcp link of that host is reset with the next packet, until `heal`."""
+        self._rules(host, "ip saddr != 127.0.0.1 meta l4proto tcp reject with tcp reset")
+
+    def heal(self) -> None:
+        for host in self.hosts:
+            self._inside(_name(host), "nft", f"add table {TABLE}; delete table {TABLE}")
+
+    def _rules(self, host: int, rule: str) -> None:
+        chain = f"chain {TABLE} in {{ type filter hook input priority 0; }}"
+        script = f"add table {TABLE}; delete table {TABLE}; add table {TABLE}; add {chain}; add rule {TABLE} in {rule}"
+        self._inside(_name(host), "nft", script)
+
+
+@contextmanager
+def team_on_hosts() -> Iterator[tuple[Team, Net]]:
+    """Four robots, each on its own host, and the world on another."""
+    with Net(ROBOTS + 1) as net, Team(endless(ROBOTS), _table) as team:
+        yield team, net
+
+
+def _table(usual: Sequence[Row], sockets: Path) -> list[Row]:
+    """A router a host, and on each what lives there; the onlooker joins the world's router over its unix socket."""
+    rows = [_router(host, sockets) for host in range(ROBOTS + 1)]
+    for row in usual:
+        host = WORLD_HOST if row.name == WORLD_NAME else robot_id_of(row.name)
+        if row.name not in (ROUTER_NAME, RECORDER_NAME) and host is not None:
+            told = tuple(
+                _socket(host, sockets) if word == _socket(WORLD_HOST, sockets) else word for word in row.arguments
+            )
+            rows.append(Row(row.name, told, again=row.again, inside=_enter(host)))
+    return rows
+
+
+def _router(host: int, sockets: Path) -> Row:
+    listen = ("--listen", _socket(host, sockets), "--listen", f"tcp/{_ip(host)}:{PORT}")
+    others = (word for far in range(host) for word in ("--connect", f"tcp/{_ip(far)}:{PORT}"))
+    name = ROUTER_NAME if host == WORLD_HOST else f"{ROUTER_NAME}{host}"
+    return Row(name, ("deploy.fleet.router", *listen, *others), inside=_enter(host))
+
+
+def _socket(host: int, sockets: Path) -> str:
+    return f"unixsock-stream/{sockets / ('router.sock' if host == WORLD_HOST else f'router{host}.sock')}"
+
+
+def _enter(host: int) -> tuple[str, ...]:
+    ip = shutil.which("ip")
+    assert ip is not None
+    return (ip, "netns", "exec", _name(host))
+
+
+def _name(host: int) -> str:
+    return f"lfa{os.getpid()}h{host}"
+
+
+def _ip(host: int) -> str:
+    return f"10.77.0.{host + 1}"
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise OSError(f"{' '.join(command)}: {done.stderr.strip()}")
