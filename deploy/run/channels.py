@@ -45,9 +45,7 @@ def plain(value: Any) -> Any:
         return value
     if kind is tuple or kind is list:
         # Beams and heights are by far the most of all numbers, and need no call each.
-        return [
-            plain(item) if type(item) is not float else item if item - item == 0.0 else str(item) for item in value
-        ]
+        return [plain(item) if type(item) is not float else item if item - item == 0.0 else str(item) for item in value]
     if kind is dict:
         return {str(name): plain(item) for name, item in value.items()}
     if not issubclass(kind, Struct):
