@@ -55,7 +55,7 @@ def check_course(scenario: Scenario) -> Scenario:
         _check_place(scenario, (pose.x, pose.y), place)
     for n, (robot_id, pose) in enumerate(zip(mission.robots, poses, strict=True)):
         for other_id, other in zip(mission.robots[:n], poses[:n], strict=True):
-            if hypot(pose.x - other.x, pose.y - other.y) < 2.0 * mission.radius_m:
+            if not world.starts_coincide and hypot(pose.x - other.x, pose.y - other.y) < 2.0 * mission.radius_m:
                 right = f"starts at least {2.0 * mission.radius_m:g} m apart (two radii)"
                 value = f"robots {other_id} and {robot_id} both near ({pose.x:.2f}, {pose.y:.2f})"
                 raise Refused(f"world.starts = {value}: must be {right}")

@@ -17,6 +17,8 @@ import numpy.typing as npt
 from protocol.geometry import TAU, Pose2D
 from world.spec import Lidar, Obstacle, Scenario
 
+OVERLAP_SEEN = 0.9
+"""Of two radii: a robot with its centre nearer than this is not seen."""
 ANGLE_MIN = -pi
 ROUNDING = 1e-9
 """Of a beam's width: beams through a corner meet at least one of its edges."""
@@ -87,6 +89,9 @@ def _cast_at_circles(flat: Floats, poses: Floats, circles: Floats, lidar: Lidar)
     away = np.sqrt(dx * dx + dy * dy)
     seen = away < lidar.range_max_m + circles[:, 2]
     np.fill_diagonal(seen, False)
+    # Bodies do not overlap, but for robots that started in each other: they are nothing to each other (physics.py).
+    robots = len(poses)
+    seen[:, :robots] &= away[:, :robots] > OVERLAP_SEEN * 2.0 * circles[:robots, 2]
     robot, shape = np.nonzero(seen)
     if not len(robot):
         return

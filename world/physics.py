@@ -68,6 +68,8 @@ class Physics:
         self._touching = [0] * len(self._robots)
         self._parted_at: dict[tuple[int, str], int] = {}
         self._touches: list[Touch] = []
+        self._never_apart = _overlapping(self.poses, radius_m)
+        """Pairs of robots, by place, that began in each other: nothing to each other until they were apart."""
         for n, (x1, y1, x2, y2) in enumerate(world.walls_m):
             self._add_shape(pymunk.Segment(self._space.static_body, (x1, y1), (x2, y2), 0.0), _THING, -1, f"wall{n}")
         self._pushable: dict[int, pymunk.Body] = {}
@@ -211,6 +213,9 @@ class Physics:
         self._space.add(slide, turn)
 
     def _on_begin(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: object) -> None:
+        if self._pair(arbiter) in self._never_apart:
+            arbiter.process_collision = False
+            return
         x, y = arbiter.contact_point_set.points[0].point_a
         for shape, against in (arbiter.shapes, arbiter.shapes[::-1]):
             robot, _ = self._names[shape]
@@ -222,11 +227,29 @@ class Physics:
                     self._touches.append(Touch(robot, other, x, y))
 
     def _on_separate(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: object) -> None:
+        pair = self._pair(arbiter)
+        if pair in self._never_apart:
+            self._never_apart.remove(pair)
+            return
         for shape, against in (arbiter.shapes, arbiter.shapes[::-1]):
             robot, _ = self._names[shape]
             if robot >= 0:
                 self._touching[robot] -= 1
                 self._parted_at[robot, self._names[against][1]] = self._steps
+
+    def _pair(self, arbiter: pymunk.Arbiter) -> frozenset[int]:
+        """Places of the two robots that meet; -1 stands for a thing."""
+        return frozenset(self._names[shape][0] for shape in arbiter.shapes)
+
+
+def _overlapping(poses: Sequence[Pose2D], radius_m: float) -> set[frozenset[int]]:
+    apart_m = 2.0 * radius_m
+    return {
+        frozenset((n, other))
+        for n, pose in enumerate(poses)
+        for other in range(n)
+        if hypot(pose.x - poses[other].x, pose.y - poses[other].y) < apart_m
+    }
 
 
 def _inertia_of(obstacle: Obstacle, mass_kg: float) -> float:

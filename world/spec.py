@@ -105,6 +105,8 @@ class Vary(Struct, frozen=True, forbid_unknown_fields=True):
 class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     starts: tuple[tuple[float, float, float], ...] | None = None
     """x [m], y [m], theta [rad] of each robot in `map`; None: the leader at (0, 0, 0), the others in their slots."""
+    starts_coincide: bool = False
+    """Starts may lie in each other, as the paper's do: such robots meet and see each other once they were apart."""
     start: tuple[float, ...] | None = None
     """x, y [m] and perhaps theta [rad] of the first robot; the others stand behind it, where walls leave room."""
     map: str | None = None
