@@ -23,6 +23,7 @@ from protocol.messages import (
     Fence,
     Fenced,
     GatewayStamp,
+    GroundProfile,
     Header,
     LaserScan,
     LeaseNote,
@@ -118,7 +119,7 @@ def test_every_topic_comes_at_its_rate_for_every_robot() -> None:
     said = Rig().run(10.0 - 0.005)
     count = Counter((e.key.split("/")[2], e.key.split("/")[3]) for e in said)
     for robot in ("robot1", "robot2", "robot3", "robot4"):
-        assert [count[robot, topic] for topic in ("sensors", "localization", "scan")] == [500, 100, 100]
+        assert [count[robot, topic] for topic in ("sensors", "localization", "scan", "ground")] == [500, 100, 100, 200]
     assert (count["sim", "truth"], count["sim", "clock"], count["world", "mission"]) == (500, 10, 1)
 
 
@@ -127,6 +128,7 @@ def test_rates_do_not_depend_on_the_physics_rate(physics_hz: float) -> None:
     said = Rig(f"world.physics_hz={physics_hz}").run(4.0 - 0.001)
     assert len(of(said, Sensors, "robot1")) == 200
     assert len(of(said, LaserScan, "robot1")) == 40
+    assert len(of(said, GroundProfile, "robot1")) == 80
 
 
 def test_sensors_are_stamped_with_the_moment_that_their_state_belongs_to() -> None:
@@ -383,6 +385,31 @@ def test_without_an_engine_the_world_speaks_the_same() -> None:
 # --- determinism ---------------------------------------------------------------------------------------------------
 
 
+def test_a_robot_in_a_hole_is_told_so_by_its_own_sensors_alone() -> None:
+    """Its wheels turn, its localisation stands, and the floor ahead is a step up; no message says `stuck`."""
+    hole = "world.potholes=[{center_m=[0.5,0], width_m=0.4, length_m=2, depth_m=0.07}]"
+    rig = Rig("mission.robots=[1]", hole).opened()
+    rig.run(4.0, Twist(0.3, 0.0))
+    said = rig.run(3.0, Twist(0.3, 0.0))
+    sensors, fixes, ground = of(said, Sensors), of(said, Localization), of(said, GroundProfile)
+    assert sensors[-1].odometer_m - sensors[0].odometer_m == pytest.approx(0.9, abs=0.01)
+    assert sensors[-1].pose_odom.x - sensors[0].pose_odom.x == pytest.approx(0.9, abs=0.01)
+    assert {fix.pose_map for fix in fixes} == {fixes[0].pose_map}
+    assert 0.3 < fixes[0].pose_map.x < 0.7
+    assert {row for profile in ground for row in profile.heights_m} == {(0.07,) * 29}
+    assert {type(e.message) for e in said} <= {Sensors, Localization, LaserScan, GroundProfile, Truth, Clock}
+
+
+def test_the_profile_of_a_robot_shows_the_hole_where_it_comes_to_it() -> None:
+    hole = "world.potholes=[{center_m=[1.0,0], width_m=0.28, length_m=2, depth_m=0.07}]"
+    rig = Rig("mission.robots=[1]", hole).opened()
+    for profile in of(rig.run(0.5), GroundProfile):
+        points = [profile.first_m + j * profile.increment_m for j in range(29)]
+        for row in profile.heights_m:
+            seen = [x for x, height in zip(points, row, strict=True) if height == -0.07]
+            assert seen == [x for x in points if 0.86 <= x <= 1.14]
+
+
 def everything(seed: int, scenario: str = "paper_path1") -> list[bytes]:
     rig = Rig(scenario=scenario, seed=seed).opened()
     rig.run(2.0, Twist(0.4, 0.1))
@@ -392,6 +419,10 @@ def everything(seed: int, scenario: str = "paper_path1") -> list[bytes]:
 def test_the_same_seed_says_the_same_bytes_and_another_one_others() -> None:
     assert everything(7) == everything(7)
     assert everything(7) != everything(8)
+
+
+def test_terrain_and_its_noise_are_the_seeds() -> None:
+    assert everything(7, "terrain") == everything(7, "terrain") != everything(8, "terrain")
 
 
 def test_noise_from_an_unseeded_generator_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
