@@ -1,4 +1,4 @@
-"""Every state that a small model can reach, breadth first, whole states stored: so the first violation is a shortest one.
+"""Every state that a small model can reach, breadth first, whole states stored: the first violation is a shortest one.
 
 A model is anything with `columns`, `initial()` and `successors(state)`. States are hashable and compared as a whole:
 there is no hashing to fewer bits that could lose one.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from time import perf_counter
+from time import process_time
 from typing import Protocol
 
 State = bytes
@@ -28,8 +28,8 @@ Successor = tuple[tuple[object, ...], State, str | None]
 
 
 class Model(Protocol):
-    columns: tuple[str, ...]
-
+    @property
+    def columns(self) -> tuple[str, ...]: ...
     def initial(self) -> State: ...
     def successors(self, state: State) -> Iterable[Successor]: ...
     def step(self, event: tuple[object, ...]) -> Step: ...
@@ -41,6 +41,7 @@ class Outcome:
     depth: int
     """Length of the longest shortest path; of the counter-example, when there is one."""
     seconds: float
+    """Of one core."""
     complete: bool
     """Nothing was left out: False when `states_max` or `depth_max` ended the search."""
     violation: str | None
@@ -49,7 +50,7 @@ class Outcome:
 
 def explore(model: Model, states_max: int, depth_max: int | None = None) -> Outcome:
     """All reachable states, up to the first violation or a bound."""
-    began = perf_counter()
+    began = process_time()
     start = model.initial()
     parent: dict[State, State | None] = {start: None}
     frontier, depth, bounded = [start], 0, False
@@ -63,7 +64,7 @@ def explore(model: Model, states_max: int, depth_max: int | None = None) -> Outc
             for event, after, violation in model.successors(state):
                 if violation is not None:
                     trace = (*_path(model, parent, state), model.step(event))
-                    return Outcome(len(parent), depth, perf_counter() - began, False, violation, trace)
+                    return Outcome(len(parent), depth, process_time() - began, False, violation, trace)
                 if after not in parent:
                     parent[after] = state
                     following.append(after)
@@ -71,7 +72,7 @@ def explore(model: Model, states_max: int, depth_max: int | None = None) -> Outc
         if len(parent) > states_max:
             bounded = True
             break
-    return Outcome(len(parent), depth, perf_counter() - began, not bounded, None, ())
+    return Outcome(len(parent), depth, process_time() - began, not bounded, None, ())
 
 
 def _path(model: Model, parent: dict[State, State | None], state: State) -> list[Step]:

@@ -39,8 +39,8 @@ OBEYED = 21
 #                 term k at 24 + 13 (k-1)
 TERMS, TERM_SIZE = 24, 13
 STATUS, HOLDER, FENCED, ROUND_AGE, ACK_AGE, PROMISES, FENCED_TOLD, RELEASE_OUT, MOTION = 0, 1, 2, 3, 4, 7, 10, 11, 12
-"""ROUND_AGE and ACK_AGE + v: by the holder's clock, of the newest round, and of the newest that v granted. PROMISES + v:
-bit t is set when v sent a PROMISE that names term t as still to be fenced, bit 0 for one that names none.
+"""ROUND_AGE and ACK_AGE + v: by the holder's clock, of the newest round, and of the newest that v granted.
+PROMISES + v: bit t is set when v sent a PROMISE that names term t as still to be fenced, bit 0 for one that names none.
 FENCED_TOLD: bit t when FENCED(t) was sent. MOTION: how long the newest command may still be obeyed."""
 
 MUTANTS = {
@@ -75,7 +75,7 @@ class LeaseCore:
         its own and ages on its way; without, a voter grants the newest as it leaves (an older one only forbids).
         """
         assert mutant in ("", *MUTANTS) and (gateways or deadman == 0), (mutant, deadman)
-        self.issuer = (None, *issuers)
+        self.issuer = (-1, *issuers)
         self.terms = tuple(range(1, len(issuers) + 1))
         self.act, self.deadman, self.gateways, self.mutant = act, deadman, gateways, mutant
         self.delays = delays
@@ -142,7 +142,7 @@ class LeaseCore:
             out.append(((gateway, "gateway: FENCED(%d, %d)", t, k), bytes(b), None))
 
     def _propose(self, s: State, k: int, out: list[Successor]) -> None:
-        """A quorum of promises, each naming nothing, the candidate's own lease, or one that is fenced; own GRANT first."""
+        """A quorum of promises, each naming nothing, its own lease, or one that is fenced; own GRANT first."""
         at, i = self.at[k], self.issuer[k]
         told = s[at + FENCED_TOLD]
         fine = 1 | told

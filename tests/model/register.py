@@ -1,4 +1,4 @@
-"""The config register as a model, without time: who may write which config, and who may vote (I5-I7; lease.md 3.1, 3.6-3.10).
+"""The config register as a model, without time: who may write which config, who may vote (I5-I7; lease.md 3.6-3.10).
 
 Robots and a witness (the last id, the tie-breaker while it votes), terms 1..T with fixed issuers, at most `changes`
 joint changes to any voters that keep the leader, hand-over, full house, and one restart with empty memory. Bonds are
@@ -6,8 +6,10 @@ left out, as if all had run out: whoever may promise and grant by its promises a
 Messages are facts: what was sent can be received at any later time, once, often or never. So is what a config says:
 anybody may learn any config that was written, without granting it (NACKs and HELLOs teach).
 
-What is to hold is that there is one register, not two: once a quorum has granted a term, no lower term can still get
-a quorum of its own config from voters that live (ONE). I5-I7 are checked where configs are written.
+What is to hold is that there is one register, not two: once a quorum has granted a term and while its holder lives, no
+lower term can still get a quorum of its own config from voters that live (ONE). With `floor`, a process that starts
+again promises nothing below the terms used so far (its wall clock's milliseconds), and ONE must hold whether the
+holder lives or not: terms never go back. I5-I7 are checked where configs are written.
 """
 
 from __future__ import annotations
@@ -63,9 +65,11 @@ class Register:
         restarts: tuple[int, ...] = (),
         cold: bool = False,
         head_ties: bool = False,
+        floor: bool = False,
         mutant: str = "",
     ) -> None:
-        """`restarts`: the ids of which one may die and start again. `cold`: everybody starts blank. `head_ties`: without the witness, the leader that writes is tie-breaker."""
+        """`restarts`: the ids of which one may die and start again. `cold`: everybody starts blank.
+        `head_ties`: without the witness, the leader that writes is tie-breaker."""
         assert mutant in ("", *MUTANTS), mutant
         self.ids = tuple(range(robots + 1))
         self.witness = robots
@@ -73,8 +77,11 @@ class Register:
         self.issuer = (-1, *issuers)
         self.terms = tuple(range(1, len(issuers) + 1))
         self.changes, self.restarts, self.cold, self.head_ties, self.mutant = changes, restarts, cold, head_ties, mutant
+        self.floor = floor
+        self.lasting = floor or not restarts
+        """ONE also counts terms whose holder has died."""
         self.blanks = cold or bool(restarts)
-        """Without blank processes there is no full house: who is no voter need not promise, nor any promise its version."""
+        """Without blank processes there is no full house: nobody but voters need promise, no promise keep a version."""
         self.members = 2 * len(self.ids)
         self.used = 3 * len(self.ids)
         """Where the number of joint changes stands."""
@@ -144,7 +151,7 @@ class Register:
 
     def _propose(self, s: State, k: int, out: list[Successor]) -> None:
         """An ordinary quorum of the newest config known: (k, 0) is that config re-stamped."""
-        at, i = self.at[k], self.issuer[k]
+        i = self.issuer[k]
         knows = s[3 * i + KNOWS]
         if not knows:
             return
@@ -202,7 +209,9 @@ class Register:
 
     def _learn(self, s: State, out: list[Successor]) -> None:
         for v in self.ids:
-            if s[3 * v + KNOWS] and not any(self.issuer[k] == v and s[self.at[k]] in (UNUSED, ASKED) for k in self.terms):
+            if s[3 * v + KNOWS] and not any(
+                self.issuer[k] == v and s[self.at[k]] in (UNUSED, ASKED) for k in self.terms
+            ):
                 continue  # it will not stand for election: knowing more, it only refuses more
             for k in self.terms:
                 for seq in range(SEQS):
@@ -219,7 +228,10 @@ class Register:
     def _restart(self, s: State, out: list[Successor]) -> None:
         for v in self.restarts:
             b = bytearray(s)
-            b[3 * v + PROMISED] = b[3 * v + KNOWS] = 0
+            b[3 * v + PROMISED] = (
+                max((k for k in self.terms if s[self.at[k]] != UNUSED), default=0) if self.floor else 0
+            )
+            b[3 * v + KNOWS] = 0
             if self.mutant == "same_life":
                 b[3 * v + KNOWS] = 1
             else:
@@ -318,7 +330,7 @@ class Register:
     def _name(self, version: int) -> str:
         if version < 2:
             return ("blank", "the first config")[version]
-        return "({},{})".format(1 + (version - 2) // SEQS, (version - 2) % SEQS)
+        return f"({1 + (version - 2) // SEQS},{(version - 2) % SEQS})"
 
     def _members(self, mask: int) -> str:
         names = [self.columns[m // 2] + "'" * (m % 2) for m in range(self.members) if mask >> m & 1]
@@ -431,7 +443,8 @@ class Register:
                 continue
             if granted and self._may_go_on(s, k):
                 return f"two registers: term {granted} was granted by a quorum, and term {k} may still be"
-            if not granted:
+            leader, life = divmod(s[self.at[k] + HOLDER] - 1, 2)
+            if not granted and (self.lasting or s[3 * leader + LIFE] == life):
                 slot = self.at[k] + PROMISES + self.members
                 for seq in range(SEQS):
                     if s[slot + 2 * seq] and is_quorum(self._content(s, self._version(k, seq)), s[slot + 2 * seq + 1]):
@@ -444,8 +457,6 @@ class Register:
             return False
         version = self._version(k, self._newest(s, k))
         willing = sum(
-            1 << 2 * v + s[3 * v + LIFE]
-            for v in self.ids
-            if s[3 * v + PROMISED] <= k and s[3 * v + KNOWS] <= version
+            1 << 2 * v + s[3 * v + LIFE] for v in self.ids if s[3 * v + PROMISED] <= k and s[3 * v + KNOWS] <= version
         )
         return is_quorum(self._content(s, version), willing)
