@@ -26,6 +26,7 @@ def command(
     processes: Annotated[
         bool, typer.Option("--processes", help="Also with real processes, against their bars.")
     ] = False,
+    figures: Annotated[str | None, typer.Option(help="Draw into this folder.")] = None,
     kills: Annotated[int | None, typer.Option(help="Rounds of each fault.")] = None,
     full: Annotated[bool, typer.Option("--full", help="Many more rounds, with their tails.")] = False,
     minutes: Annotated[float | None, typer.Option(help="How long to look on.")] = None,
@@ -35,7 +36,7 @@ def command(
     if name not in names:
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
     run = import_module(f"deploy.bench.{name}").run
-    given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None}
+    given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None, "figures": figures}
     given |= {"kills": kills, "full": full or None, "minutes": minutes}
     given = {option: value for option, value in given.items() if value is not None}
     for option in given:

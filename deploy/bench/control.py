@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from itertools import chain
+from pathlib import Path
 
-from deploy.bench import control_agents, control_string, control_table
+from deploy.bench import control_agents, control_figures, control_string, control_table
 from deploy.bench.rows import Case, measured, select, show
 
 
@@ -13,13 +14,15 @@ def cases() -> list[Case]:
     return [*control_string.cases(), *control_agents.cases(), *control_table.cases()]
 
 
-def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False) -> int:
-    """0 when every chosen row holds, else 1. `rows` is a glob over row names; `processes` adds real runs.
+def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, figures: str | None = None) -> int:
+    """0 when every chosen row holds, else 1. `rows` is a glob over row names, `figures` a folder to draw into.
 
-    Real processes are measured one after the other and alone: beside a computation they would show its load.
+    `processes` adds real runs, one after the other and alone: beside a computation they would show its load.
     """
     virtual, live = cases(), control_agents.process_cases() if processes else []
     chosen = select([*virtual, *live], rows)
     computed = [case for case in chosen if case not in live]
     alone = [case for case in chosen if case in live]
+    if figures is not None:
+        control_figures.draw(Path(figures))
     return show(chain(measured(computed, jobs, rows), measured(alone, 1, rows)), as_json)
