@@ -87,6 +87,12 @@ class Floor:
         self._under: list[list[Patch | None]] = [[None, None] for _ in poses]
         """What is under the left and the right wheel of each robot; None is the floor at 0."""
         self._height_m = [[0.0, 0.0] for _ in poses]
+        for n, pose in enumerate(poses):  # a world that resumes has robots in holes
+            self.near(n, pose)
+            for wheel in (0, 1):
+                edge = self._edge(n, wheel, pose, 0.0)
+                if edge is not None:
+                    self._under[n][wheel], self._height_m[n][wheel] = edge
 
     def near(self, n: int, pose: Pose2D) -> bool:
         """Whether robot number `n` at `pose` may have to do with a patch in this step."""

@@ -7,6 +7,7 @@ from math import acos, atan, cos, hypot, inf, pi, sin, sqrt, tan
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from protocol.geometry import STILL, Twist
 from world import wheels
@@ -201,6 +202,16 @@ def test_a_push_does_not_lift_a_robot_out_of_a_hole() -> None:
         world.step([Twist(0.3, 0.0) if step < 3 * HZ else STILL, Twist(0.5, 0.0)])
     assert 1.6 < world.poses[0].x < 2.2
     assert world.poses[1].x < world.poses[0].x
+
+
+@pytest.mark.parametrize(("feature", "height_m"), [(bump(0.03, width_m=0.6), 0.03), (pothole(0.6, 0.06), -0.06)])
+def test_a_world_that_resumes_has_robots_standing_where_they_were(feature: str, height_m: float) -> None:
+    scenario = load("straight", ["mission.robots=[1]", feature])
+    on_it = replace(scenario, world=replace(scenario.world, starts=((EDGE_M + 0.3, 0.0, 0.0),)))
+    world = Physics(on_it)
+    assert world.standing_m() == [height_m]
+    drive(world, Twist(0.2, 0.0), 6.0)
+    assert (world.poses[0].x > 1.7) is (height_m > 0.0)
 
 
 def test_terrain_off_the_way_changes_no_bit_of_a_motion() -> None:
