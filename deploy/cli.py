@@ -36,6 +36,8 @@ COMMANDS = (
           "lfa formation column"),
     Entry("watch", "deploy.look.watch", "How a running fleet stands, live on the terminal; keys do things to it.",
           "lfa watch --once"),
+    Entry("view", "deploy.look.view", "A recording or a running fleet in the rerun viewer, a browser, or a picture.",
+          "lfa view runs/paper_path1-20260101-120000 --screenshot run.png"),
     Entry("topic", "deploy.look.topic", "What travels in a running fleet: list, echo, hz.",
           "lfa topic echo robot2/pose --count 1"),
     Entry("list", "deploy.look.scenarios", "The shipped scenarios.",
@@ -48,6 +50,8 @@ COMMANDS = (
           "lfa report runs/paper_path1-20260101-120000"),
     Entry("replay", "deploy.look.replay", "Run cores again on their journals and compare; or play a recording back.",
           "lfa replay runs/paper_path1-20260101-120000 --robot 2"),
+    Entry("verify", "deploy.look.verify", "Check the invariants of a run of real processes on its journals.",
+          "lfa verify runs/paper_path1-20260101-120000"),
     Entry("bench", "deploy.bench.command", "Measure, beside the bar to be reached.",
           "lfa bench lidar --json"),
 )  # fmt: skip

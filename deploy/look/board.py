@@ -114,11 +114,17 @@ class Board:
         )
 
     def _happened(self, at: float, event: Event) -> None:
-        if event.kind in DULL:
-            return
-        data = {name: value for name, value in event.data.items() if name != "t"}
-        told = ", ".join(f"{name} {_short(value)}" for name, value in data.items())
-        self.events.append(Happened(at, event.header.sender, f"{event.kind} {told}".strip()))
+        what = told("", event.kind, event.data)
+        if what is not None:
+            self.events.append(Happened(at, event.header.sender, what))
+
+
+def told(who: str, kind: str, data: dict[str, Any]) -> str | None:
+    """An event as a line for people; None for what says nothing to them."""
+    if kind in DULL:
+        return None
+    facts = ", ".join(f"{name} {_short(value)}" for name, value in data.items() if name != "t")
+    return f"{who} {kind} {facts}".strip()
 
 
 def _state(role: str, tracking: Tracking | None, status: Status | None) -> str:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.patches import Circle, Polygon
 
 from deploy.look import chronicle, errors, trace
@@ -80,7 +80,7 @@ class Run:
         return f"robot {robot}" if n % step == 0 or n == many - 1 else None
 
 
-Draw = Callable[["Figure", Run], None]
+Draw = Callable[[FigureBase, Run], None]
 
 
 def png(figure: Figure) -> bytes:
@@ -100,16 +100,28 @@ def drawn(name: str, run: Run) -> Figure:
     return figure
 
 
+def overview(run: Run) -> Figure:
+    """World, leaders, errors and speeds on one sheet, laid out as the viewer's."""
+    with _style():
+        figure = Figure(figsize=(16.0, 10.0), layout="constrained")
+        grid = figure.add_gridspec(20, 5)
+        parts = ((grid[:15, :3], _path_flow), (grid[15:, :3], _leader_timeline),
+                 (grid[:8, 3:], _distance_error), (grid[8:, 3:], _orientation_error))  # fmt: skip
+        for place, draw in parts:
+            draw(figure.add_subfigure(place), run)
+    return figure
+
+
 # --- the paper's ----------------------------------------------------------------------------------------------------
 
 
-def _distance_error(figure: Figure, run: Run) -> None:
+def _distance_error(figure: FigureBase, run: Run) -> None:
     axes = figure.subplots()
     _lines(axes, run, {robot: (e.t, e.distance) for robot, e in run.errors.items()})
     _finish(axes, run, "Distance error of each follower", "D - k [m]")
 
 
-def _orientation_error(figure: Figure, run: Run) -> None:
+def _orientation_error(figure: FigureBase, run: Run) -> None:
     panels = figure.subplots(3, sharex=True)
     table: tuple[tuple[str, Callable[[Errors], Array]], ...] = (
         ("against the commanded slot", lambda e: e.bearing),
@@ -121,7 +133,7 @@ def _orientation_error(figure: Figure, run: Run) -> None:
         _finish(axes, run, f"Orientation error {title}", "[deg]", last=axes is panels[-1], legend=axes is panels[0])
 
 
-def _path_flow(figure: Figure, run: Run) -> None:
+def _path_flow(figure: FigureBase, run: Run) -> None:
     axes = figure.subplots()
     _ground(axes, run)
     for robot, rows in run.seen.truth.items():
@@ -135,7 +147,7 @@ def _path_flow(figure: Figure, run: Run) -> None:
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
 
 
-def _tracking(figure: Figure, run: Run) -> None:
+def _tracking(figure: FigureBase, run: Run) -> None:
     (a, b), (c, d) = figure.subplots(2, 2, sharex=True)
     _lines(a, run, {robot: (e.t, e.distance) for robot, e in run.errors.items()})
     _finish(a, run, "(a) Distance error", "D - k [m]", last=False)
@@ -152,7 +164,7 @@ def _tracking(figure: Figure, run: Run) -> None:
 # --- what the paper has none of -------------------------------------------------------------------------------------
 
 
-def _leader_timeline(figure: Figure, run: Run) -> None:
+def _leader_timeline(figure: FigureBase, run: Run) -> None:
     axes, end_s = figure.subplots(), max(run.seen.end_s, 1.0)
     for reign in run.reigns:
         lasted_s = (end_s if reign.until_s is None else reign.until_s) - reign.from_s
@@ -171,7 +183,7 @@ def _leader_timeline(figure: Figure, run: Run) -> None:
     axes.set(xlim=(0.0, end_s), ylim=(max(run.robots) + 0.8, min(run.robots) - 0.8))
 
 
-def _string_stability(figure: Figure, run: Run) -> None:
+def _string_stability(figure: FigureBase, run: Run) -> None:
     """Along the last chain: how large an error each follower keeps, how lively each turns against the one ahead."""
     left, right = figure.subplots(1, 2)
     hops = [(robot, int(e.predecessor[-1]), e) for robot, e in run.errors.items() if e.steady.any()]

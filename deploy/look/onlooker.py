@@ -8,12 +8,14 @@ from contextlib import contextmanager
 
 from msgspec import Struct
 
-from deploy.run.inject import Running, agents, one_fleet
+from deploy.run.inject import Running, agents, one_fleet, option
+from deploy.run.processes import own_processes
 from protocol.bus import Arrival, Inbox
 from protocol.messages import BadMessage, Message, decode
 from protocol.mission import Refused
 from protocol.topics import TOPIC, address
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
+from world.scenario import Scenario, draw, load
 
 INBOX_SIZE_MAX = 65536
 
@@ -85,3 +87,20 @@ def _message(arrival: Arrival) -> Message | None:
         return decode(arrival.payload, topic.type)
     except BadMessage:
         return None
+
+
+def scenario_of_fleet(fleet: Fleet) -> Scenario | None:
+    """The scenario that the fleet's world was started with, when that is one of this user's processes here."""
+    for identity in own_processes():
+        words = list(identity.arguments)
+        module = next(
+            (n for n, word in enumerate(words) if word.rpartition("/")[2] in ("world.cli", "lfa-world")), None
+        )
+        if module is None or option(words, "--fleet", "fleet") != fleet.name:
+            continue
+        named = next((word for word in words[module + 1 :] if not word.startswith("-")), "")
+        try:
+            return draw(load(named), int(option(words, "--seed", "0")))
+        except (Refused, ValueError):
+            return None
+    return None

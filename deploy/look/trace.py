@@ -24,7 +24,7 @@ from zstandard import ZstdError
 
 from deploy.run import channels
 from deploy.run.record import RECORDING
-from protocol.mission import robot_id_of
+from protocol.mission import Refused, robot_id_of
 from protocol.topics import TOPIC, TRUTH_OWNER
 
 Array = NDArray[np.float64]
@@ -76,7 +76,10 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
     decoders = {t: msgspec.json.Decoder(channels.shape(TOPIC[t].type)) for t in topics}
     for channel, t, body in recorded(folder, topics):
         _, owner, topic, *_ = channel.split("/")
-        yield owner, topic, t, decoders[topic].decode(body)
+        try:
+            yield owner, topic, t, decoders[topic].decode(body)
+        except msgspec.ValidationError as error:
+            raise Refused(f"{folder / RECORDING}: recorded by another version, {channel}: {error}") from None
 
 
 def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
@@ -89,7 +92,8 @@ def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float,
             for opcode, body in _records(chunk):
                 if opcode == Opcode.CHANNEL:
                     channel = Channel.read(ReadDataStream(BytesIO(body)))
-                    if channel.topic.split("/")[2] in topics:
+                    parts = channel.topic.split("/")
+                    if len(parts) > 2 and parts[2] in topics:
                         wanted[channel.id] = channel.topic
                 elif opcode == Opcode.MESSAGE:
                     channel_id, _, log_time = _MESSAGE.unpack_from(body)

@@ -102,14 +102,14 @@ def _agent(identity: Identity) -> Running | None:
     names = {word.rpartition("/")[2] for word in words[:3]}
     if not names & {"agents.cli", "lfa-agent"}:
         return None
-    robot = _option(words, "--id", "")
+    robot = option(words, "--id", "")
     if not robot.isdecimal():
         return None
-    endpoint = _option(words, "--connect", default_endpoint())
-    return Running(int(robot), _option(words, "--fleet", "fleet"), endpoint, identity)
+    endpoint = option(words, "--connect", default_endpoint())
+    return Running(int(robot), option(words, "--fleet", "fleet"), endpoint, identity)
 
 
-def _option(words: Sequence[str], name: str, default: str) -> str:
+def option(words: Sequence[str], name: str, default: str) -> str:
     """The value of `--name value` or `--name=value`."""
     for word, following in zip(words, [*words[1:], ""], strict=True):
         if word == name:

@@ -1,0 +1,58 @@
+"""The viewer's first sight of a fleet: the world on the left, who leads below it, errors and speeds on the right."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from deploy.look.scene import TIMELINE
+from world.spec import Scenario
+
+MARGIN_M = 1.0
+LEGEND_MAX = 10
+
+
+def layout(scenario: Scenario | None, robots: int, *, follow: bool) -> rrb.Blueprint:
+    """A blueprint; `follow` keeps to the newest data. Without a scenario the world's bounds are the viewer's guess."""
+    few = robots <= LEGEND_MAX
+    world = rrb.Spatial2DView(
+        origin="world",
+        name="World [m] (y is drawn upwards, shown negative)",
+        background=[255, 255, 255],
+        visual_bounds=_bounds(scenario),
+    )
+    plots = [
+        ("errors/distance", "Distance error D - k [m]"),
+        ("errors/bearing", "Orientation error [deg]"),
+        ("speeds", "Speed [m/s]"),
+    ]
+    legend = rrb.PlotLegend(visible=few)
+    right = rrb.Vertical(
+        *(rrb.TimeSeriesView(origin=origin, name=name, plot_legend=legend) for origin, name in plots),
+        rrb.Tabs(
+            rrb.TextLogView(origin="log", name="Decisions and events"),
+            rrb.TimeSeriesView(origin="errors/heading", name="Heading error [deg]", plot_legend=legend),
+            rrb.TimeSeriesView(origin="processes/lag", name="Loop lag [ms]", plot_legend=legend),
+        ),
+        row_shares=[3, 3, 2, 3],
+    )
+    lease = rrb.StateTimelineView(origin="lease", name="Leader, term and roles")
+    left = rrb.Vertical(world, lease, row_shares=[3, 1] if few else [2, 1])
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following" if follow else "paused"),
+    )
+
+
+def _bounds(scenario: Scenario | None) -> rrb.VisualBounds2D | None:
+    """Everything that is known to stand somewhere."""
+    if scenario is None:
+        return None
+    world, route = scenario.world, scenario.mission.leading.route_m
+    points = [(0.0, 0.0), *route, *(o.center_m for o in world.obstacles), *((x, y) for x, y, _ in world.starts or ())]
+    points += [end for x1, y1, x2, y2 in world.walls_m for end in ((x1, y1), (x2, y2))]
+    tail_m = 0.0 if world.walls_m else len(scenario.mission.robots) * scenario.mission.formation.separation_m
+    low_x, high_x = min(x for x, _ in points) - MARGIN_M - tail_m, max(x for x, _ in points) + MARGIN_M
+    low_y, high_y = min(y for _, y in points) - MARGIN_M, max(y for _, y in points) + MARGIN_M + tail_m
+    return rrb.VisualBounds2D(x_range=[low_x, high_x], y_range=[-high_y, -low_y])

@@ -1,0 +1,243 @@
+"""A fleet as rerun draws it: messages in, entities out. The same code for a running fleet and for a recording.
+
+Rerun's 2-D views have y downwards: everything in `map` is drawn at (x, -y), so that left is left. Rows pile up per
+entity and leave together with `flush`. Entities: `world/robotN` (pose, with its body and its scan below), `slots`,
+`links` and `trails` of each robot, `errors`, `speeds`, `lease`, `processes` and `log`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from math import atan2, cos, hypot, pi, sin
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from deploy.look.board import told
+from protocol.geometry import wrap
+from protocol.mission import Mission, robot_id_of
+from world.spec import WorldSpec
+
+APPLICATION = "lfa"
+TIMELINE = "time"
+TOPICS = frozenset({"pose", "tracking", "scan", "event", "status", "truth", "mission"})
+TRAIL_STEP_M, TRAIL_POINTS_MAX = 0.15, 150
+SPEED_EVERY = 5
+INK, SOFT, GHOST = (60, 60, 60), (150, 150, 150), (150, 150, 150, 120)
+LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
+ROLE_COLOURS = {"leader": LEADS, "follower": FOLLOWS, "waiting": WAITS, "gone": GONE}
+PALETTE = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (90, 90, 90))
+ALARMS = ("fault", "contact", "failed", "died", "slowed")
+
+
+class Scene:
+    """Draws into one recording stream."""
+
+    def __init__(self, stream: rr.RecordingStream) -> None:
+        self._stream = stream
+        self._radius_m = Mission().radius_m
+        self._where: dict[int, tuple[float, float, float]] = {}
+        self._true = False
+        self._trails: dict[int, deque[tuple[float, float]]] = {}
+        self._counts: dict[str, int] = {}
+        self._roles: dict[int, str] = {}
+        self._leader = ""
+        self._rows: dict[tuple[str, str], list[tuple[float, Any]]] = {}
+        self._mission_known = False
+
+    # --- what stands still -----------------------------------------------------------------------------------------
+
+    def ground(self, world: WorldSpec) -> None:
+        """Walls and obstacles."""
+        walls = [[(x1, -y1), (x2, -y2)] for x1, y1, x2, y2 in world.walls_m]
+        if walls:
+            self._always("world/walls", rr.LineStrips2D(walls, colors=INK, radii=0.05))
+        for index, obstacle in enumerate(world.obstacles):
+            outline = obstacle.corners_m or _circle(obstacle.radius_m or 0.1)
+            moves = bool(obstacle.waypoints_m) or obstacle.mass_kg is not None
+            place = (0.0, 0.0) if moves else obstacle.center_m
+            strip = [(place[0] + dx, -(place[1] + dy)) for dx, dy in (*outline, outline[0])]
+            self._always(f"world/obstacles/{index}", rr.LineStrips2D([strip], colors=INK, radii=0.03))
+            if moves:
+                self._row("transform", f"world/obstacles/{index}", 0.0, (*obstacle.center_m, 0.0))
+
+    def mission(self, mission: Any) -> None:
+        """Route and goal; once."""
+        if self._mission_known:
+            return
+        self._mission_known, self._radius_m = True, float(mission.radius_m)
+        route = [(float(x), -float(y)) for x, y in mission.leading.route_m]
+        self._always("world/route", rr.LineStrips2D([[(0.0, 0.0), *route]], colors=SOFT, radii=0.015))
+        self._always("world/goal", rr.Points2D([route[-1]], colors=LEADS, radii=0.15, labels=["goal"]))
+        for n, robot in enumerate(mission.robots):
+            self._dress(robot, n, len(mission.robots))
+
+    def _dress(self, robot: int, n: int, of: int) -> None:
+        """Colours, widths and names that stay."""
+        colour = PALETTE[n] if of <= len(PALETTE) else _shade(n / (of - 1))
+        for series in ("errors/distance", "errors/bearing", "errors/heading", "speeds", "processes/lag"):
+            self._always(f"{series}/robot{robot}", rr.SeriesLines(colors=colour, names=f"robot {robot}", widths=1.5))
+        self._always(f"world/trails/robot{robot}", rr.LineStrips2D.from_fields(colors=colour, radii=0.015))
+        self._always(f"world/slots/robot{robot}", rr.Points2D.from_fields(colors=GHOST, radii=0.11))
+        self._always(f"world/links/robot{robot}", rr.LineStrips2D.from_fields(colors=SOFT, radii=0.012))
+        self._always(f"world/robot{robot}/scan", rr.Points2D.from_fields(colors=colour, radii=0.03))
+
+    # --- what comes ------------------------------------------------------------------------------------------------
+
+    def see(self, t: float, owner: str, topic: str, message: Any) -> None:
+        """A message (of the wire, or as read back from a recording) at world time `t` [s]."""
+        robot = robot_id_of(owner)
+        match topic:
+            case "truth":
+                self._truth(t, message)
+            case "mission":
+                self.mission(message.mission)
+            case "event":
+                self._event(t, owner, message)
+            case "pose" if robot:
+                self._pose(t, robot, message)
+            case "tracking" if robot:
+                self._tracking(t, robot, message)
+            case "scan" if robot:
+                self._scan(t, robot, message)
+            case "status" if robot:
+                self._row("scalar", f"processes/lag/robot{robot}", t, float(message.counters.get("loop_lag_ms", 0.0)))
+
+    def flush(self) -> None:
+        """Send everything that has piled up."""
+        rows, self._rows = self._rows, {}
+        for (kind, entity), of_entity in rows.items():
+            times = rr.TimeColumn(TIMELINE, duration=np.array([t for t, _ in of_entity]))
+            columns = _COLUMNS[kind]([row for _, row in of_entity])
+            self._stream.send_columns(entity, indexes=[times], columns=columns)
+
+    def _truth(self, t: float, message: Any) -> None:
+        self._true = True
+        for r in message.robots:
+            self._where[r.id] = (r.x, r.y, r.theta)
+        for body in message.obstacles:
+            if self._every(f"obstacle{body.index}", SPEED_EVERY):
+                self._row("transform", f"world/obstacles/{body.index}", t, (body.x, body.y, 0.0))
+
+    def _pose(self, t: float, robot: int, message: Any) -> None:
+        x, y, theta = float(message.x), float(message.y), float(message.theta)
+        if not self._true:
+            self._where[robot] = (x, y, theta)
+        if robot not in self._roles:
+            self._role(t, robot, str(message.role))
+        self._row("transform", f"world/robot{robot}", t, (x, y, theta))
+        self._trail(t, robot, x, -y)
+        if self._every(f"speed{robot}", SPEED_EVERY):
+            self._row("scalar", f"speeds/robot{robot}", t, float(message.twist.linear_x))
+
+    def _trail(self, t: float, robot: int, x: float, y: float) -> None:
+        trail = self._trails.setdefault(robot, deque(maxlen=TRAIL_POINTS_MAX))
+        if not trail or hypot(x - trail[-1][0], y - trail[-1][1]) >= TRAIL_STEP_M:
+            trail.append((x, y))
+            if len(trail) > 1:
+                self._row("strip", f"world/trails/robot{robot}", t, list(trail))
+
+    def _tracking(self, t: float, robot: int, message: Any) -> None:
+        slot = message.slot_map
+        self._row("points", f"world/slots/robot{robot}", t, np.array([[float(slot.x), -float(slot.y)]]))
+        own, ahead = self._where.get(robot), self._where.get(message.predecessor)
+        if own is None or ahead is None:
+            return
+        dx, dy = own[0] - ahead[0], own[1] - ahead[1]
+        self._row("strip", f"world/links/robot{robot}", t, [(own[0], -own[1]), (ahead[0], -ahead[1])])
+        bearing = wrap(atan2(dy, dx) - float(message.chi) - float(message.phi))
+        self._row("scalar", f"errors/distance/robot{robot}", t, hypot(dx, dy) - float(message.separation_m))
+        self._row("scalar", f"errors/bearing/robot{robot}", t, bearing * 180.0 / pi)
+        self._row("scalar", f"errors/heading/robot{robot}", t, wrap(float(message.heading) - own[2]) * 180.0 / pi)
+
+    def _scan(self, t: float, robot: int, message: Any) -> None:
+        ranges = np.array(message.ranges_m, dtype=object).astype(np.float32)
+        hit = np.flatnonzero(np.isfinite(ranges))
+        angles = float(message.angle_min) + float(message.angle_increment) * hit
+        points = np.stack([ranges[hit] * np.cos(angles), -ranges[hit] * np.sin(angles)], axis=1)
+        self._row("points", f"world/robot{robot}/scan", t, points)
+
+    def _event(self, t: float, owner: str, message: Any) -> None:
+        data, kind = message.data, message.kind
+        robot = data.get("robot") if isinstance(data.get("robot"), int) else robot_id_of(owner)
+        if kind == "role" and robot:
+            self._role(t, robot, str(data.get("role")))
+        elif robot and (kind == "died" or (kind == "fault" and data.get("deed") in ("kill", "terminate"))):
+            self._role(t, robot, "gone")
+        elif kind == "leader_command" and robot and message.term is not None:
+            self._lead(t, robot, message.term.n)
+        text = told(owner, kind, data)
+        if text is not None:
+            self._say(t, "log", rr.TextLog(text, level="WARN" if kind in ALARMS else "INFO"))
+
+    def _role(self, t: float, robot: int, role: str) -> None:
+        if self._roles.get(robot) == role:
+            return
+        self._roles[robot] = role
+        r, colour = self._radius_m, ROLE_COLOURS.get(role, WAITS)
+        circle = _circle(r)
+        nose = [(-0.5 * r, 0.7 * r), (r, 0.0), (-0.5 * r, -0.7 * r), (-0.5 * r, 0.7 * r)]
+        body = rr.LineStrips2D([[*circle, circle[0]], nose], colors=colour, radii=0.035)
+        self._say(t, f"world/robot{robot}/body", body)
+        self._say(
+            t, f"world/robot{robot}/name", rr.Points2D([(0.0, 0.0)], colors=colour, radii=0.04, labels=[str(robot)])
+        )
+        self._say(t, f"lease/roles/robot{robot}", rr.StateChange(state=role))
+
+    def _lead(self, t: float, robot: int, term: int) -> None:
+        leader = f"robot {robot}, term {term}"
+        if leader != self._leader:
+            self._leader = leader
+            self._say(t, "lease/leader", rr.StateChange(state=leader))
+
+    # --- into rerun ------------------------------------------------------------------------------------------------
+
+    def _every(self, what: str, nth: int) -> bool:
+        count = self._counts.get(what, 0)
+        self._counts[what] = count + 1
+        return count % nth == 0
+
+    def _row(self, kind: str, entity: str, t: float, row: Any) -> None:
+        self._rows.setdefault((kind, entity), []).append((t, row))
+
+    def _always(self, entity: str, what: Any) -> None:
+        self._stream.log(entity, what, static=True)
+
+    def _say(self, t: float, entity: str, what: Any) -> None:
+        self._stream.set_time(TIMELINE, duration=t)
+        self._stream.log(entity, what)
+
+
+def _transforms(rows: Sequence[tuple[float, float, float]]) -> Any:
+    poses = np.array(rows)
+    half = -0.5 * poses[:, 2]
+    zero = np.zeros_like(half)
+    translation = np.stack([poses[:, 0], -poses[:, 1], zero], axis=1)
+    quaternion = np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
+    return rr.Transform3D.columns(translation=translation, quaternion=quaternion)
+
+
+def _points(rows: Sequence[Any]) -> Any:
+    return rr.Points2D.columns(positions=np.concatenate(rows)).partition([len(row) for row in rows])
+
+
+_COLUMNS: dict[str, Callable[[Any], Any]] = {
+    "transform": _transforms,
+    "points": _points,
+    "strip": lambda rows: rr.LineStrips2D.columns(strips=rows),
+    "scalar": lambda rows: rr.Scalars.columns(scalars=rows),
+}
+
+
+def _circle(radius_m: float, corners: int = 20) -> tuple[tuple[float, float], ...]:
+    angles = (2.0 * pi * n / corners for n in range(corners))
+    return tuple((radius_m * cos(angle), radius_m * sin(angle)) for angle in angles)
+
+
+def _shade(part: float) -> tuple[int, int, int]:
+    """From blue to yellow with growing lightness: can be told apart with any colour vision."""
+    dark, light = (40, 60, 140), (250, 220, 60)
+    red, green, blue = (round(a + part * (b - a)) for a, b in zip(dark, light, strict=True))
+    return red, green, blue

@@ -1,0 +1,74 @@
+"""A picture of a recording without a display: by rerun's own viewer on a virtual screen, or drawn by `figures.py`.
+
+The viewer needs a screen (Xvfb will do) and Vulkan (Mesa's software driver will do). Where they are missing, the same
+layout is drawn without it, and the line that names the file says so.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from deploy.look.view import quiet, viewer_path
+from protocol.mission import Refused
+
+SIZE = "1600x1000"
+SHOT_S_MAX = 120.0
+
+
+def take(rrd: Path, picture: Path, folder: Path | None) -> str:
+    """Write `picture` of `rrd`; a line that says which file it is and who drew it. Raises Refused."""
+    if picture.suffix != ".png" or not picture.resolve().parent.is_dir():
+        raise Refused(f"--screenshot {picture}: must be a .png in a folder that exists")
+    complaint = _by_viewer(rrd, picture)
+    if complaint is None:
+        return f"{picture} (rerun's viewer)"
+    if folder is None:
+        raise Refused(f"--screenshot {picture}: {complaint}")
+    from deploy.look import figures
+
+    picture.write_bytes(figures.png(figures.overview(figures.Run(folder))))
+    return f"{picture} (drawn without the viewer: {complaint})"
+
+
+def _by_viewer(rrd: Path, picture: Path) -> str | None:
+    """None when it worked, else what was missing."""
+    with _screen() as display:
+        if display is None:
+            return "no display, and no Xvfb on the PATH"
+        picture.unlink(missing_ok=True)
+        command = [viewer_path(), str(rrd), "--screenshot-to", str(picture), "--window-size", SIZE, "--port", "auto"]
+        try:
+            subprocess.run(
+                command, env=quiet() | {"DISPLAY": display}, timeout=SHOT_S_MAX, capture_output=True, check=True
+            )
+        except subprocess.TimeoutExpired:
+            return f"the viewer took no picture within {SHOT_S_MAX:g} s"
+        except (OSError, subprocess.CalledProcessError):
+            return "the viewer cannot draw here (it needs Vulkan or OpenGL)"
+    return None if picture.is_file() else "the viewer took no picture"
+
+
+@contextmanager
+def _screen() -> Iterator[str | None]:
+    """A display: the one that is there, else a virtual one for the moment, else None."""
+    present = os.environ.get("DISPLAY")
+    xvfb = shutil.which("Xvfb")
+    if present or xvfb is None:
+        yield present
+        return
+    ours, theirs = os.pipe()
+    command = [xvfb, "-displayfd", str(theirs), "-screen", "0", f"{SIZE}x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(command, pass_fds=[theirs], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(theirs)
+    try:
+        with os.fdopen(ours) as answer:
+            number = answer.readline().strip()
+        yield f":{number}" if number else None
+    finally:
+        server.terminate()
+        server.wait()

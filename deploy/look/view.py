@@ -1,0 +1,183 @@
+"""`lfa view`: a recording or a running fleet in the rerun viewer, in a browser, or as a picture without any display."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from deploy.look.onlooker import Fleet, find, listen, scenario_of_fleet
+from deploy.run.record import RECORDING
+from deploy.run.worldtime import WorldTime
+from protocol import clock
+from protocol.messages import Ask, Header, Truth, encode
+from protocol.mission import Refused
+from protocol.topics import OPERATOR_NAME, address, key
+
+if TYPE_CHECKING:
+    import rerun
+
+    from world.spec import Scenario
+
+RRD = "recording.rrd"
+FLUSH_S = 0.1
+PORT, WEB_PORT = 9876, 9090
+SHOT_S = 5.0  # of a running fleet, before its picture is taken
+
+
+def command(
+    folder: Annotated[Path | None, typer.Argument(metavar="[RUN]", help="A run folder; none: a running fleet.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    serve_web: Annotated[bool, typer.Option("--serve-web", help="Serve the viewer to a browser.")] = False,
+    screenshot: Annotated[Path | None, typer.Option(help="Write a PNG and end; needs no display.")] = None,
+    port: Annotated[int, typer.Option(help="Where viewers get their data.")] = PORT,
+    web_port: Annotated[int, typer.Option(help="Where a browser gets the viewer.")] = WEB_PORT,
+) -> int:
+    _need_rerun()
+    if serve_web:
+        _free(port, "--port")
+        _free(web_port, "--web-port")
+    if folder is None:
+        return _live(find(fleet, connect), serve_web, screenshot, port, web_port)
+    rrd = converted(folder)
+    if screenshot is not None:
+        from deploy.look.shot import take
+
+        print(take(rrd, screenshot, folder))
+        return 0
+    print(rrd)
+    if serve_web:
+        return _viewer(str(rrd), "--web-viewer", "--port", str(port), "--web-viewer-port", str(web_port))
+    if not _display():
+        print("no display here: look at it with --serve-web, or --screenshot FILE", file=sys.stderr)
+        return 0
+    return _viewer(str(rrd))
+
+
+def converted(folder: Path) -> Path:
+    """`recording.rrd` of a run, made anew when it is older than the recording. Raises Refused."""
+    import rerun as rr
+
+    from deploy.look.layout import layout
+    from deploy.look.scene import APPLICATION, TOPICS, Scene
+    from deploy.look.trace import messages
+    from deploy.run.folder import scenario_of
+
+    source, rrd = folder / RECORDING, folder / RRD
+    if not source.is_file():
+        raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
+    if rrd.is_file() and rrd.stat().st_mtime > source.stat().st_mtime:
+        return rrd
+    scenario = scenario_of(folder)
+    stream = rr.RecordingStream(APPLICATION, recording_id=folder.resolve().name)
+    unfinished = rrd.with_suffix(".part")
+    stream.save(unfinished, default_blueprint=layout(scenario, len(scenario.mission.robots), follow=True))
+    scene = Scene(stream)
+    scene.ground(scenario.world)
+    scene.mission(scenario.mission)
+    for owner, topic, t, message in messages(folder, TOPICS):
+        scene.see(t, owner, topic, message)
+    scene.flush()
+    stream.disconnect()
+    return unfinished.rename(rrd)
+
+
+def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web_port: int) -> int:
+    """Draw a running fleet until Ctrl-C; viewers may come and go."""
+    import rerun as rr
+
+    from deploy.look.layout import layout
+    from deploy.look.scene import APPLICATION
+
+    scenario = scenario_of_fleet(fleet)
+    stream = rr.RecordingStream(APPLICATION)
+    plan = layout(scenario, len(fleet.team) or 4, follow=True)
+    if screenshot is not None:
+        from deploy.look.shot import take
+
+        with tempfile.TemporaryDirectory() as place:
+            rrd = Path(place) / RRD
+            stream.save(rrd, default_blueprint=plan)
+            _draw(fleet, stream, scenario, clock.now() + SHOT_S)
+            stream.disconnect()
+            print(take(rrd, screenshot, None))
+        return 0
+    if serve_web:
+        data = stream.serve_grpc(grpc_port=port, default_blueprint=plan)
+        rr.serve_web_viewer(web_port=web_port, open_browser=_display(), connect_to=data)
+        print(f"http://127.0.0.1:{web_port}?url={data}", flush=True)
+    elif _display():
+        rr.spawn(port=port, connect=False)
+        stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy", default_blueprint=plan)
+    else:
+        raise Refused("no display here: say --serve-web, or --screenshot FILE")
+    _draw(fleet, stream, scenario, None)
+    return 0
+
+
+def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None, until: float | None) -> None:
+    from deploy.look.scene import TOPICS, Scene
+
+    scene, time = Scene(stream), WorldTime()
+    if scenario is not None:
+        scene.ground(scenario.world)
+        scene.mission(scenario.mission)
+    with listen(fleet, frozenset(f"*/{topic}" for topic in TOPICS), every=True) as ear:
+        ask = Ask(Header(OPERATOR_NAME, clock.wall_ms(), 1, clock.now()), "mission")
+        ear.bus.publish(key(fleet.name, OPERATOR_NAME, "ask"), encode(ask))
+        while until is None or clock.now() < until:
+            clock.sleep(FLUSH_S)
+            for arrival, message in ear.take():
+                if isinstance(message, Truth):
+                    time.see(arrival.at, message.time_s)
+                where = address(arrival.key)
+                if where is not None:
+                    scene.see(time.of(arrival.at), where.owner, where.topic, message)
+            scene.flush()
+
+
+def _viewer(*arguments: str) -> int:
+    """The viewer as a child, until it is closed; Ctrl-C ends it and us."""
+    child = subprocess.Popen(["rerun", *arguments], executable=viewer_path(), env=quiet())
+    try:
+        return child.wait()
+    except KeyboardInterrupt:
+        child.send_signal(signal.SIGTERM)
+        child.wait()
+        raise
+
+
+def viewer_path() -> str:
+    """The rerun binary that came with the SDK."""
+    return str(Path(sys.executable).with_name("rerun"))
+
+
+def quiet() -> dict[str, str]:
+    return {"RUST_LOG": "error", **os.environ}
+
+
+def _display() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _need_rerun() -> None:
+    try:
+        import rerun  # noqa: F401
+    except ImportError:
+        raise Refused("view needs rerun: install with: pip install 'lfa[view]'") from None
+
+
+def _free(port: int, option: str) -> None:
+    with socket.socket() as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except (OSError, OverflowError):
+            raise Refused(f"{option} {port}: taken, or no port of yours: give another") from None

@@ -1,0 +1,90 @@
+"""`lfa view RUN`: everything that was recorded of poses, scans and slots is in the `.rrd`, and it becomes a picture."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from deploy.look import view
+from deploy.look.shot import take
+from deploy.look.trace import messages
+from deploy.run.faults import parse_all
+from deploy.run.simulate import run
+from protocol.mission import Refused
+from world.scenario import load
+
+RRD_BYTES_A_SECOND_MAX = 250_000  # 30 MB for two minutes
+PNG = b"\x89PNG"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    scenario = load("paper_path1", ["time_limit_s=6.0"])
+    made = tmp_path_factory.mktemp("runs") / "run"
+    return run(scenario, 2, made, parse_all(scenario.mission, (), ["kill leader at 3 s"])).folder
+
+
+def _rows(rrd: Path) -> Counter[str]:
+    """Rows of each entity that change with time, as rerun itself counts them."""
+    told = subprocess.run([view.viewer_path(), "rrd", "print", str(rrd)], capture_output=True, text=True, check=True)
+    found: Counter[str] = Counter()
+    for line in told.stdout.splitlines():
+        chunk = re.search(r"with (\d+) rows .* - /(world/\S+) - data columns: \[(.*)\]", line)
+        if chunk is not None and re.search("positions|translation", chunk[3]):
+            found[chunk[2]] += int(chunk[1])
+    return found
+
+
+def test_each_robot_has_as_many_poses_scans_and_slots_as_were_recorded(folder: Path) -> None:
+    rrd = view.converted(folder)
+    topics = frozenset({"pose", "scan", "tracking"})
+    rows, said = _rows(rrd), Counter((owner, topic) for owner, topic, *_ in messages(folder, topics))
+    for robot in ("robot1", "robot2", "robot3", "robot4"):
+        assert rows[f"world/{robot}"] == said[robot, "pose"] > 0
+        assert rows[f"world/{robot}/scan"] == said[robot, "scan"] > 0
+        assert rows[f"world/slots/{robot}"] == said[robot, "tracking"]
+    assert rrd.stat().st_size < 6.0 * RRD_BYTES_A_SECOND_MAX
+
+
+def test_without_a_screen_the_picture_is_drawn_and_says_so(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(shutil, "which", lambda _name: None)
+    picture = tmp_path / "run.png"
+    said = take(view.converted(folder), picture, folder)
+    assert "drawn without the viewer: no display, and no Xvfb" in said
+    assert picture.read_bytes().startswith(PNG)
+
+
+@pytest.mark.skipif(not (os.environ.get("DISPLAY") or shutil.which("Xvfb")), reason="neither display nor Xvfb here")
+def test_with_a_virtual_screen_the_picture_is_the_viewers_or_says_why_not(folder: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "run.png"
+    said = take(view.converted(folder), picture, folder)
+    assert "(rerun's viewer)" in said or "the viewer" in said
+    assert picture.read_bytes().startswith(PNG)
+
+
+def test_bad_input_is_refused_in_one_line(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(Refused, match=r"no run folder, it has no recording\.mcap"):
+        view.converted(tmp_path)
+    with pytest.raises(Refused, match=r"must be a \.png in a folder that exists"):
+        take(folder / "recording.rrd", tmp_path / "none" / "a.png", folder)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        with pytest.raises(Refused, match="taken"):
+            view.command(folder, serve_web=True, port=taken.getsockname()[1])
+
+
+def test_a_recording_that_was_cut_off_is_shown_as_far_as_it_goes(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "scenario.toml").write_text((folder / "scenario.toml").read_text())
+    recorded = (folder / "recording.mcap").read_bytes()
+    (tmp_path / "recording.mcap").write_bytes(recorded[: len(recorded) // 2])
+    assert view.converted(tmp_path).is_file(), "a recording cut off is read up to its last whole chunk"
