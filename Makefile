@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-hosts lint bench clean setup
+.PHONY: demo test test-hosts lint bench model clean setup
 
 setup: $(STAMP)
 
