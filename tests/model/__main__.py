@@ -10,10 +10,11 @@ from tests.model.checker import Outcome, explore, in_columns
 from tests.model.runs import MUTANTS, RULES, STATES_MAX, Run
 
 
-def main() -> int:
+def report(rules: tuple[Run, ...], mutants: tuple[Run, ...]) -> int:
+    """Print what each run found; answers the exit code."""
     began, failed, states = process_time(), 0, 0
     print("The rules as they are: every reachable state")
-    for run in RULES:
+    for run in rules:
         outcome, text = _explored(run)
         states += outcome.states
         _say(run, outcome, "holds" if outcome.complete else "FAILS")
@@ -21,7 +22,7 @@ def main() -> int:
             failed += 1
             print(text if outcome.violation else "not complete: too many states", flush=True)
     print("\nPlanted faults: each must be caught, as short as it can be shown")
-    for run in MUTANTS:
+    for run in mutants:
         outcome, text = _explored(run)
         states += outcome.states
         _say(run, outcome, f"caught in {outcome.depth} steps" if outcome.violation else "SURVIVES")
@@ -50,4 +51,4 @@ def _say(run: Run, outcome: Outcome, verdict: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(report(RULES, MUTANTS))

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from tests.model import lease_core, refinement, register
+from tests.model.__main__ import report
 from tests.model.checker import explore, in_columns
 from tests.model.runs import MUTANTS, RULES, STATES_MAX, Run
 
@@ -28,6 +29,17 @@ def test_a_planted_fault_is_caught_with_a_trace(run: Run) -> None:
 
 def test_every_mutant_is_planted() -> None:
     assert {run.mutant for run in MUTANTS} == {*lease_core.MUTANTS, *register.MUTANTS}
+
+
+def test_make_model_fails_with_a_trace_when_t_grant_is_one_unit_short(capsys: pytest.CaptureFixture[str]) -> None:
+    short = next(run for run in MUTANTS if run.mutant == "t_grant_short")
+    assert report((short,), ()) == 1
+    assert "=> I1: leases 1 and 2 are both valid" in capsys.readouterr().out
+
+
+def test_make_model_fails_when_a_planted_fault_survives() -> None:
+    harmless = next(run for run in RULES if run.short)
+    assert report((), (harmless,)) == 1
 
 
 @pytest.mark.parametrize("compare", refinement.ALL, ids=lambda compare: compare.__name__)
