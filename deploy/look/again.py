@@ -59,17 +59,17 @@ def compare(path: Path) -> Comparison:
         heading, entries = journal.read(path)
     except (OSError, ValueError) as error:
         raise Refused(f"{path}: cannot be replayed ({error}): must be a journal of a run folder") from None
-    host = Host(_node(path, heading), Journal(None, heading))
+    host = Host(node_of(path, heading), Journal(None, heading))
     calls = 0
     for entry in entries:
         calls += 1
-        sent = _call(host, entry)
+        sent = call(host, entry)
         if digest(sent) != entry.digest:
             return Comparison(path.name, calls, Difference(calls, entry.at, _what(entry), _said(sent)))
     return Comparison(path.name, calls)
 
 
-def _call(host: Host, entry: Entry) -> Sent:
+def call(host: Host, entry: Entry) -> Sent:
     match entry.kind:
         case "tick":
             return host.tick(entry.at)
@@ -79,8 +79,8 @@ def _call(host: Host, entry: Entry) -> Sent:
             return host.message(entry.at, entry.key, entry.payload)
 
 
-def _node(path: Path, heading: Heading) -> Node:
-    """The node as it was before its first call."""
+def node_of(path: Path, heading: Heading) -> Node:
+    """The node as it was before its first call. Raises Refused when this version cannot make it."""
     if heading.version != JOURNAL_VERSION:
         raise Refused(
             f"{path}: version {heading.version}: must be {JOURNAL_VERSION}, replay it with the lfa of its time"

@@ -1,0 +1,63 @@
+"""`lfa verify` finds nothing in a sound run, and finds what is planted."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from deploy.look import verify
+from deploy.run.faults import parse_all
+from deploy.run.simulate import run
+from protocol import journal
+from protocol.gateway import Gateway
+from protocol.messages import CmdVel, decode
+from protocol.mission import Refused
+from world.scenario import load
+
+SHORT = ("mission.leading.route_m=[[2.0, 0.0]]", "faults=[]")
+FAULTS = ("kill leader at 2 s", "stop leader at 3 s for 1 s")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run in which one leader is killed, and the next is stopped and wakes up late."""
+    scenario = load("leader_killed", SHORT)
+    faults = parse_all(scenario.mission, (), FAULTS)
+    return run(scenario, 3, tmp_path_factory.mktemp("verify") / "run", faults).folder
+
+
+def test_a_sound_run_has_no_violation(folder: Path) -> None:
+    verdict = verify.verify(folder)
+    assert verdict.broken == (), f"reproduce: lfa verify {folder}"
+    assert verdict.journals == 6
+    assert verdict.happenings > 1000
+
+
+def test_an_old_leaders_command_is_harmless_unless_a_gateway_obeys_it(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = tmp_path / "late"
+    shutil.copytree(folder, late)
+    _come_again(next((late / "journal").glob("world-*.bin")))
+    assert verify.verify(late).broken == ()
+    monkeypatch.setattr(Gateway, "_objection", lambda *_: None)
+    assert {"I2"} <= {violation.name for violation in verify.verify(late).broken}
+
+
+def _come_again(world: Path) -> None:
+    """The first leader command of the run reaches the world once more, at its end."""
+    _, entries = journal.read(world)
+    known = list(entries)
+    first = next(e for e in known if e.key.endswith("cmd_vel") and decode(e.payload, CmdVel).as_leader)  # type: ignore[union-attr]
+    body = msgspec.msgpack.encode(replace(first, at=known[-1].at + 0.01))
+    with world.open("ab") as file:
+        file.write(len(body).to_bytes(4, "little") + body)
+
+
+def test_a_folder_without_journals_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match="no journals"):
+        verify.verify(tmp_path)
