@@ -35,7 +35,7 @@ def on_map(scenario: Scenario, folder: Path) -> Scenario:
         mission = replace(mission, leading=leading)
     room = None
     if world.map is not None:
-        drawn = maps.read(folder / world.map)
+        drawn = _read("world.map", folder / world.map)
         world, room = replace(world, walls_m=(*world.walls_m, *maps.walls(drawn))), Room(drawn)
         _check_goal(scenario, drawn, room)
     if world.starts is None or world.start is not None:
@@ -45,10 +45,17 @@ def on_map(scenario: Scenario, folder: Path) -> Scenario:
 
 
 def _keepout(path: Path) -> tuple[tuple[float, float, float, float], ...]:
-    mask = maps.read(path)
+    mask = _read("world.keepout", path)
     if mask.origin[2] != 0.0:
         raise Refused(f"{path}: origin = {list(mask.origin)}: must have yaw 0 in a keepout mask")
     return maps.boxes(mask)
+
+
+def _read(key: str, path: Path) -> Map:
+    try:
+        return maps.read(path)
+    except Refused as refused:
+        raise Refused(f"{key} = {path.name}: {refused}") from None
 
 
 def _check_goal(scenario: Scenario, drawn: Map, room: Room) -> None:
@@ -73,7 +80,7 @@ def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
         return None
     x, y = (start[0], start[1]) if start is not None else (0.0, 0.0)
     if room is not None and room.clearance_m(x, y) < mission.radius_m:
-        what = "inside a wall" if room.clearance_m(x, y) < 0.0 else f"{room.clearance_m(x, y):.2f} m from a wall"
+        what = "inside a wall" if room.clearance_m(x, y) == 0.0 else f"{room.clearance_m(x, y):.2f} m from a wall"
         raise Refused(f"world.start = {[x, y]}: {what} of the map {scenario.world.map}: must have room for a robot")
     if (start is not None and len(start) == 3) or not mission.leading.route_m:
         headings = [start[2] if start is not None and len(start) == 3 else 0.0]

@@ -134,19 +134,19 @@ class Room:
     """How far it is from any point to the nearest wall of a map."""
 
     def __init__(self, drawn: Map) -> None:
-        rows, columns = np.nonzero(drawn.occupied)
-        r = drawn.resolution_m
-        c, s = cos(drawn.origin[2]), sin(drawn.origin[2])
-        x, y = (columns + 0.5) * r, (rows + 0.5) * r
-        self._x = drawn.origin[0] + c * x - s * y
-        self._y = drawn.origin[1] + s * x + c * y
-        self._half_m = 0.5 * r
+        self._drawn = drawn
+        self._rows, self._columns = np.nonzero(drawn.occupied)
 
     def clearance_m(self, x: float, y: float) -> float:
-        """Distance [m] to the nearest occupied cell's edge, to half a cell; negative inside, inf with no walls."""
-        if not len(self._x):
+        """Distance [m] to the edge of the nearest occupied cell; 0 inside of one, inf with no walls."""
+        if not len(self._rows):
             return float("inf")
-        return float(np.sqrt(np.min((self._x - x) ** 2 + (self._y - y) ** 2))) - self._half_m
+        drawn, half = self._drawn, 0.5
+        c, s = cos(drawn.origin[2]), sin(drawn.origin[2])
+        dx, dy = (x - drawn.origin[0]) / drawn.resolution_m, (y - drawn.origin[1]) / drawn.resolution_m
+        away_x = np.maximum(np.abs(self._columns + half - (c * dx + s * dy)) - half, 0.0)
+        away_y = np.maximum(np.abs(self._rows + half - (c * dy - s * dx)) - half, 0.0)
+        return drawn.resolution_m * float(np.sqrt(np.min(away_x * away_x + away_y * away_y)))
 
 
 def _rounded(point: Point) -> Point:

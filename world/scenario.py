@@ -19,7 +19,6 @@ from msgspec.structs import replace
 from protocol.mission import Refused
 from protocol.radio import Radio
 from world.course import check_course, draw, starts_of
-from world.mapped import on_map
 from world.spec import (
     Body,
     Lidar,
@@ -58,6 +57,7 @@ SHORT_FORMS = {
     "goal": "mission.leading.route_m",
 }
 """What `--set` knows by a shorter name; `goal=[x, y]` is a route of one point."""
+QUOTES = "'\""
 FILE_BYTES_MAX = 4 * 1024 * 1024
 NUMBER_MAX = 1e9
 
@@ -82,10 +82,19 @@ def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = 
     try:
         _refuse_unknown(document)
         _refuse_endless(document)
-        scenario = on_map(replace(_convert(document), name=path.stem), path.parent)
+        scenario = _on_map(replace(_convert(document), name=path.stem), path.parent)
         return check_course(check_scenario(scenario))
     except Refused as refused:
         raise Refused(f"{_source(str(refused), keys, robots, path)}: {refused}") from None
+
+
+def _on_map(scenario: Scenario, folder: Path) -> Scenario:
+    """Only a scenario with a map needs what reads images."""
+    if scenario.world.map is None and scenario.world.keepout is None and scenario.world.start is None:
+        return scenario
+    from world.mapped import on_map
+
+    return on_map(scenario, folder)
 
 
 def _names() -> list[str]:
@@ -126,6 +135,8 @@ def _override(document: dict[str, Any], override: str) -> str:
     if key == "goal":
         text = f"[{text}]"
     key = SHORT_FORMS.get(key, key)
+    if key in ("world.map", "world.keepout"):  # relative to where the command is given, not to the scenario's file
+        text = f"'{Path(text.strip(QUOTES)).absolute()}'"
     if not equals or not re.fullmatch(r"\w+(\.\w+|\[\d+\])*", key):
         raise Refused(f"--set {override!r}: must be key=value, such as world.lidar.beams=360")
     *way, last = (int(part) if part.isdecimal() else part for part in re.findall(r"\w+", key))

@@ -1,0 +1,185 @@
+"""ROS maps: read as Nav2 reads them, refused in one line, turned into walls in metres, and written to be read again."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from protocol.mission import Refused
+from world import maps
+from world.scenario import load, starts_of
+
+ROWS = ((0, 0, 0, 0), (0, 254, 205, 0), (0, 254, 254, 0))
+"""Shades, the top row first: 4 columns, 3 rows."""
+
+
+def yaml(folder: Path, content: bytes, name: str = "m.pgm", **fields: object) -> Path:
+    given = {"image": name, "resolution": 0.5, "origin": "[1.0, 2.0, 0.0]", "negate": 0} | {
+        "occupied_thresh": 0.65, "free_thresh": 0.196} | fields  # fmt: skip
+    (folder / name).write_bytes(content)
+    path = folder / "m.yaml"
+    path.write_text("".join(f"{key}: {value}\n" for key, value in given.items() if value is not None))
+    return path
+
+
+def pgm(rows: tuple[tuple[int, ...], ...] = ROWS, header: bytes = b"P5\n# made by hand\n4 3\n255\n") -> bytes:
+    return header + bytes(shade for row in rows for shade in row)
+
+
+def png(rows: tuple[tuple[int, ...], ...] = ROWS) -> bytes:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    lines = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows))
+    size = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", size) + chunk(b"IDAT", lines) + chunk(b"IEND", b"")
+
+
+AS_READ = [[100, 0, 0, 100], [100, 0, -1, 100], [100, 100, 100, 100]]
+"""Occupancy, the bottom row first."""
+
+
+def test_row_0_of_the_image_is_the_top_and_205_is_unknown(tmp_path: Path) -> None:
+    assert maps.read(yaml(tmp_path, pgm())).cells.tolist() == AS_READ
+
+
+def test_a_pgm_of_numbers_and_a_png_say_the_same_as_a_pgm_of_bytes(tmp_path: Path) -> None:
+    numbers = " ".join(str(shade) for row in ROWS for shade in row)
+    plain = f"P2 # of numbers\n4\n3\n# largest\n255\n{numbers}\n".encode()
+    assert maps.read(yaml(tmp_path, plain)).cells.tolist() == AS_READ
+    assert maps.read(yaml(tmp_path, png(), name="m.png")).cells.tolist() == AS_READ
+
+
+@pytest.mark.parametrize(
+    ("fields", "shade", "occupancy"),
+    [
+        ({}, 0, 100), ({}, 255, 0), ({}, 205, -1), ({"free_thresh": 0.25}, 205, 0),
+        ({"negate": 1}, 255, 100), ({"negate": "true"}, 0, 0),
+        ({"mode": "scale"}, 0, 100), ({"mode": "scale"}, 150, 48), ({"mode": "scale"}, 255, 0),
+        ({"mode": "raw"}, 70, 70), ({"mode": "raw"}, 205, -1),
+    ],
+)  # fmt: skip
+def test_thresholds_modes_and_negate_are_those_of_the_map_server(
+    tmp_path: Path, fields: dict[str, object], shade: int, occupancy: int
+) -> None:
+    path = yaml(tmp_path, b"P5 1 1 255\n" + bytes([shade]), **fields)
+    assert maps.read(path).cells.tolist() == [[occupancy]]
+
+
+def test_walls_are_the_outlines_of_occupied_cells_in_metres_turned_by_the_origins_yaw(tmp_path: Path) -> None:
+    image = b"P5 3 1 255\n" + bytes([254, 0, 0])
+    turned = yaml(tmp_path, image, resolution=0.1, origin=f"[5.0, 1.0, {pi / 2}]")
+    walls = {tuple(sorted(((x1, y1), (x2, y2)))) for x1, y1, x2, y2 in maps.walls(maps.read(turned))}
+    corners = ((5.0, 1.1), (5.0, 1.3), (4.9, 1.1), (4.9, 1.3))
+    a, b, c, d = corners
+    assert walls == {tuple(sorted(edge)) for edge in ((a, b), (c, d), (a, c), (b, d))}
+
+
+def test_a_straight_wall_is_one_segment_however_many_cells_it_has() -> None:
+    cells = np.zeros((600, 300), dtype=np.int16)
+    cells[10, :] = 100
+    assert len(maps.walls(maps.Map(cells, 0.05))) == 4
+
+
+def test_what_is_written_is_read_again(tmp_path: Path) -> None:
+    cells = np.array(AS_READ, dtype=np.int16)
+    maps.write(tmp_path / "again.yaml", maps.Map(cells, 0.1, (-1.5, 2.0, 0.25)))
+    again = maps.read(tmp_path / "again.yaml")
+    assert (again.cells.tolist(), again.resolution_m, again.origin) == (AS_READ, 0.1, (-1.5, 2.0, 0.25))
+
+
+#        image                                          fields                       what the line must say
+BAD = [
+    (pgm(), {"image": None}, "image is missing"),
+    (pgm(), {"image": "none.pgm"}, "none.pgm: cannot be read"),
+    (pgm(), {"resolution": 0}, "resolution = 0"),
+    (pgm(), {"resolution": "nan"}, "resolution = nan"),
+    (pgm(), {"resolution": None}, "resolution = None"),
+    (pgm(), {"origin": "[1, 2, x]"}, "origin = [1, 2, x]"),
+    (pgm(), {"mode": "other"}, "mode = other"),
+    (pgm(), {"negate": 2}, "negate = 2"),
+    (pgm(), {"free_thresh": 0.9}, "free_thresh = 0.9"),
+    (pgm()[:-1], {}, "11 cells: must be 4 x 3"),
+    (pgm(header=b"P5 4 3 65535\n"), {}, "16-bit"),
+    (pgm(header=b"P5 0 3 255\n"), {}, "0 x 3 cells"),
+    (pgm(header=b"P5 999999999 999999999 255\n"), {}, "must be from 1 to"),
+    (b"P5 4", {}, "no pgm header"),
+    (b"P2 2 1 255 7 x", {}, "no number"),
+    (b"GIF89a", {}, "neither pgm"),
+    (png()[:40], {}, "no png"),
+]
+
+
+@pytest.mark.parametrize(("image", "fields", "said"), BAD)
+def test_a_bad_map_is_one_line_that_names_the_file(
+    tmp_path: Path, image: bytes, fields: dict[str, object], said: str
+) -> None:
+    with pytest.raises(Refused) as refused:
+        maps.read(yaml(tmp_path, image, **fields))
+    assert said in str(refused.value) and str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+# --- in a scenario -------------------------------------------------------------------------------------------
+
+
+def room(folder: Path) -> Path:
+    """10 m x 6 m with walls all round and a block in the middle."""
+    cells = np.zeros((60, 100), dtype=np.int16)
+    cells[0], cells[-1], cells[:, 0], cells[:, -1] = 100, 100, 100, 100
+    cells[25:35, 45:55] = 100
+    maps.write(folder / "room.yaml", maps.Map(cells, 0.1))
+    return folder / "room.yaml"
+
+
+def test_set_knows_map_start_and_goal_by_their_short_names(tmp_path: Path) -> None:
+    scenario = load("explore", [f"map={room(tmp_path)}", "start=4,1,0", "goal=[8.5, 4.5]"])
+    assert scenario.mission.goal_m == (8.5, 4.5)
+    assert len(scenario.world.walls_m) == 12
+    assert scenario.world.map is None, "walls are held by the scenario itself, whoever reads it again"
+    assert [pose.x for pose in starts_of(scenario)] == pytest.approx([4.0, 3.2, 2.4, 1.6])
+    assert [pose.y for pose in starts_of(scenario)] == pytest.approx([1.0] * 4)
+
+
+def test_a_map_given_with_set_is_relative_to_where_the_command_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    room(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert len(load("explore", ["map=room.yaml", "start=[4, 1]", "goal=8.5,4.5"]).world.walls_m) == 12
+
+
+def test_a_chain_without_room_behind_it_is_laid_out_round_the_corner(tmp_path: Path) -> None:
+    scenario = load("explore", [f"map={room(tmp_path)}", "start=0.8,3.0,0", "goal=8.5,4.5"])
+    poses = starts_of(scenario)
+    drawn = maps.Room(maps.read(tmp_path / "room.yaml"))
+    assert min(drawn.clearance_m(pose.x, pose.y) for pose in poses) > 0.2
+
+
+@pytest.mark.parametrize(
+    ("sets", "said"),
+    [
+        (["goal=5.0,3.0"], "inside a wall"),
+        (["goal=0.2,3.0"], "0.10 m from the walls"),
+        (["goal=50,3"], "outside of the map"),
+        (["start=5.0,3.0"], "inside a wall"),
+        (["start=1"], "world.start"),
+        (["map=none.yaml"], "world.map = none.yaml"),
+    ],
+)
+def test_a_start_or_goal_without_room_is_one_line(tmp_path: Path, sets: list[str], said: str) -> None:
+    with pytest.raises(Refused, match=said) as refused:
+        load("explore", [f"map={room(tmp_path)}", "start=4,1", "goal=8.5,4.5", *sets])
+    assert "\n" not in str(refused.value)
+
+
+def test_a_keepout_mask_becomes_boxes_that_the_mission_tells(tmp_path: Path) -> None:
+    cells = np.zeros((60, 100), dtype=np.int16)
+    cells[10:20, 60:80] = 100
+    maps.write(tmp_path / "keepout.yaml", maps.Map(cells, 0.1))
+    sets = [f"map={room(tmp_path)}", f"keepout={tmp_path / 'keepout.yaml'}", "start=4,1", "goal=8.5,4.5"]
+    assert load("explore", sets).mission.leading.keepout_m == ((6.0, 1.0, 8.0, 2.0),)
