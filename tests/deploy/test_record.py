@@ -21,6 +21,7 @@ from protocol.messages import (
     LeaseNote,
     Member,
     Message,
+    MissionNote,
     Nack,
     OperatorNote,
     Term,
@@ -28,6 +29,7 @@ from protocol.messages import (
     Truth,
 )
 from protocol.topics import TOPICS, key
+from world.scenario import shipped
 
 HEADER = Header("robot2", 7, 3, 12.5)
 
@@ -121,7 +123,8 @@ ANYTHING = st.dictionaries(st.text(), st.recursive(st.none() | st.floats() | st.
 MESSAGES = [
     st.builds(Event, data=ANYTHING),
     st.builds(OperatorNote, arguments=ANYTHING),
-    *(st.from_type(topic.type) for topic in TOPICS if topic.type not in (Event, OperatorNote)),
+    st.builds(MissionNote, mission=st.sampled_from([scenario.mission for scenario in shipped().values()])),
+    *(st.from_type(topic.type) for topic in TOPICS if topic.type not in (Event, OperatorNote, MissionNote)),
 ]
 
 
