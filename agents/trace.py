@@ -12,6 +12,7 @@ from math import cos, hypot, sin
 
 from msgspec import Struct
 
+from agents.config import CONTROL_PERIOD_S
 from protocol.geometry import Pose2D, Twist, along_arc, between, compose, part_of_arc, sinc, wrap
 
 SAMPLES_MAX = 64
@@ -62,7 +63,20 @@ class JitterBuffer:
         return False
 
     def at(self, stamp: float) -> Sample | None:
-        """State at `stamp`; None when that is later than all samples."""
+        """State at `stamp`; None when that is later than all samples.
+
+        From poses alone, the velocity is that of the control period which begins at `stamp`: a follower that drives
+        it is where its target is at the end. A slope of the past would be late, and grow along the chain.
+        """
+        sample = self._find(stamp)
+        if self._with_velocity or sample is None:
+            return sample
+        end = self._find(min(stamp + CONTROL_PERIOD_S, self._samples[-1].stamp))
+        if end is None or end.stamp - stamp < 0.5 * CONTROL_PERIOD_S:
+            return sample
+        return Sample(stamp, sample.pose, _mean_twist(sample, end), sample.travelled_m)
+
+    def _find(self, stamp: float) -> Sample | None:
         samples = self._samples
         later = samples[-1]
         if stamp > later.stamp:
@@ -88,8 +102,13 @@ def _between(a: Sample, b: Sample, stamp: float, with_velocity: bool) -> Sample:
         if va * vb > 0.0:
             along = part * (va + 0.5 * part * (vb - va)) / (0.5 * (va + vb))
     else:
-        twist = Twist(way / h, wrap(step.theta) / h)
+        twist = _mean_twist(a, b)
     return Sample(stamp, compose(a.pose, part_of_arc(step, along)), twist, a.travelled_m + along * way)
+
+
+def _mean_twist(a: Sample, b: Sample) -> Twist:
+    h = b.stamp - a.stamp
+    return Twist((b.travelled_m - a.travelled_m) / h, wrap(b.pose.theta - a.pose.theta) / h)
 
 
 def _before(oldest: Sample, stamp: float) -> Sample:
