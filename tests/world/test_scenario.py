@@ -144,8 +144,8 @@ def test_set_reaches_into_lists() -> None:
 
 def test_a_scenario_is_read_without_the_engine() -> None:
     code = (
-        "import sys, world.scenario as s; s.load('paper_path1'); print(sorted({'pymunk', 'numpy'} & sys.modules.keys()));"
-        "s.shipped(); print('pymunk' in sys.modules)"  # one with a map needs numpy
+        "import sys, world.scenario as s; s.load('paper_path1'); print(sorted({'pymunk', 'numpy'} & sys.modules.keys()))"
+        "; s.shipped(); print('pymunk' in sys.modules)"  # one with a map needs numpy
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert said == "[]\nFalse\n"
