@@ -73,7 +73,7 @@ class Driver:
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing()
         self._ground = Ground(mission.limits)
-        self._stuck = Stuck()
+        self._stuck = Stuck(again=mission.leading.motion != "explore")
         self.stuck: str | None = None
         """Why this robot is stuck, None when it is not."""
         self.explore = Explore(mission) if mission.leading.motion == "explore" else None
@@ -106,10 +106,12 @@ class Driver:
         if known is not None:
             pose = known[0]
             self._surroundings.scan(scan, pose, now)
-            mates = [(mate.x, mate.y) for mate in self._mates(now)]
-            self._tracker.update(self._surroundings.points_map, (pose.x, pose.y), mates, MATE_M, now)
-            if self.explore is not None:
-                self.explore.see(scan, pose, known[1], self._mates(now))
+            mates = self._mates(now)
+            if self.explore is not None:  # its map tells where it can go: what moves shows there and goes again
+                self.explore.see(scan, pose, known[1], mates)
+                return
+            places = [(mate.x, mate.y) for mate in mates]
+            self._tracker.update(self._surroundings.points_map, (pose.x, pose.y), places, MATE_M, now)
 
     def feel(self, profile: GroundProfile, now: float) -> None:
         """Take a look at the floor ahead."""

@@ -20,7 +20,9 @@ TURNING = ("u_turn", "back")
 class Stuck:
     """Watches one robot on its way; `reset` when it arrives, waits for its team, or starts anew."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, again: bool = True) -> None:
+        """Without `again`, turning round and coming back (S3) are no signs: an explorer does both."""
+        self._again = again
         self._moved: deque[tuple[float, float, float]] = deque()
         self._action: str | None = None
         self._since = 0.0
@@ -29,7 +31,7 @@ class Stuck:
         self._entries: dict[tuple[int, int], deque[float]] = {}
 
     def reset(self) -> None:
-        self.__init__()  # type: ignore[misc]
+        self.__init__(again=self._again)  # type: ignore[misc]
 
     def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> str | None:
         """The reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before limits."""
@@ -40,9 +42,9 @@ class Stuck:
             return "S4: waited too long for what moves"
         if action == "blocked" and now - self._since > BLOCKED_S:
             return "S2: blocked on all sides"
-        if len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
+        if self._again and len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
             return "S3: turned round again and again"
-        if self._entries_of_cell(now) >= CELL_ENTRIES:
+        if self._again and self._entries_of_cell(now) >= CELL_ENTRIES:
             return "S3: in the same place again and again"
         return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
 
