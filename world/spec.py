@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import hypot, pi
 from typing import Literal
 
-from msgspec import Struct
+from msgspec import Struct, field
 
 from protocol.mission import Mission, Refused, check_mission, robot_name
 from protocol.radio import Radio
@@ -127,6 +127,29 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     physics_hz: float = 100.0
 
 
+class Assert(Struct, frozen=True, forbid_unknown_fields=True):
+    """What must hold at the end of a run besides the goal; a key that is not given is not judged."""
+
+    goal_reached: bool = True
+    """False: a run may as well end at its time limit."""
+    distance_error_max_m: float | None = None
+    """Largest distance error of any follower from when it settled, avoidance and formation changes left out."""
+    distance_error_rms_m: float | None = None
+    bearing_error_rms_rad: float | None = None
+    settled_within_s: float | None = None
+    """Every follower within 5 cm of its distance for good, this soon after the start."""
+    recovered_within_s: float | None = None
+    """The chain closed over a lost leader, this soon after its loss."""
+    failover_max_ms: float | None = None
+    """From the loss of a leader to the first accepted command of the next."""
+    contacts_max: int | None = None
+    separation_min_m: float | None = None
+    """Between the centres of any two robots, at any time."""
+    duration_max_s: float | None = None
+    leaders_max: int | None = None
+    left_behind_max: int | None = None
+
+
 class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     """`mission` is what the team is told; the rest is what the world does to it."""
 
@@ -139,6 +162,8 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     """Whether `lfa run` starts a process again that failed: of `router`, `world`, `robots` or one `robot2`."""
     faults: tuple[str, ...] = ()
     """Each as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'."""
+    asserted: Assert = field(default=Assert(), name="assert")
+    """The table `[assert]`: what `lfa run` and `lfa sim` judge a run by."""
     name: str = ""
     """Set by `load` from the file's name."""
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from deploy.look.scene import TIMELINE
-from world.spec import Scenario
+from deploy.look.scene import NAMED_MAX, TIMELINE
+from world.scenario import Scenario, starts_of
 
 MARGIN_M = 1.0
-LEGEND_MAX = 10
 
 
 def layout(scenario: Scenario | None, robots: int, *, follow: bool) -> rrb.Blueprint:
     """A blueprint; `follow` keeps to the newest data. Without a scenario the world's bounds are the viewer's guess."""
-    few = robots <= LEGEND_MAX
+    few = robots <= NAMED_MAX
     world = rrb.Spatial2DView(
         origin="world",
         name="World [m] (y is drawn upwards, shown negative)",
@@ -35,8 +34,8 @@ def layout(scenario: Scenario | None, robots: int, *, follow: bool) -> rrb.Bluep
         ),
         row_shares=[3, 3, 2, 3],
     )
-    lease = rrb.StateTimelineView(origin="lease", name="Leader, term and roles")
-    left = rrb.Vertical(world, lease, row_shares=[3, 1] if few else [2, 1])
+    lease = rrb.StateTimelineView(origin="lease" if few else "lease/leader", name="Leader, term and roles")
+    left = rrb.Vertical(world, lease, row_shares=[3, 1] if few else [6, 1])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),
@@ -50,9 +49,8 @@ def _bounds(scenario: Scenario | None) -> rrb.VisualBounds2D | None:
     if scenario is None:
         return None
     world, route = scenario.world, scenario.mission.leading.route_m
-    points = [(0.0, 0.0), *route, *(o.center_m for o in world.obstacles), *((x, y) for x, y, _ in world.starts or ())]
+    points = [(0.0, 0.0), *route, *(o.center_m for o in world.obstacles), *((s.x, s.y) for s in starts_of(scenario))]
     points += [end for x1, y1, x2, y2 in world.walls_m for end in ((x1, y1), (x2, y2))]
-    tail_m = 0.0 if world.walls_m else len(scenario.mission.robots) * scenario.mission.formation.separation_m
-    low_x, high_x = min(x for x, _ in points) - MARGIN_M - tail_m, max(x for x, _ in points) + MARGIN_M
-    low_y, high_y = min(y for _, y in points) - MARGIN_M, max(y for _, y in points) + MARGIN_M + tail_m
+    low_x, high_x = min(x for x, _ in points) - MARGIN_M, max(x for x, _ in points) + MARGIN_M
+    low_y, high_y = min(y for _, y in points) - MARGIN_M, max(y for _, y in points) + MARGIN_M
     return rrb.VisualBounds2D(x_range=[low_x, high_x], y_range=[-high_y, -low_y])

@@ -25,6 +25,7 @@ TIMELINE = "time"
 TOPICS = frozenset({"pose", "tracking", "scan", "event", "status", "truth", "mission"})
 TRAIL_STEP_M, TRAIL_POINTS_MAX = 0.15, 150
 SPEED_EVERY = 5
+NAMED_MAX = 10  # more names than this would hide the robots
 INK, SOFT, GHOST = (60, 60, 60), (150, 150, 150), (150, 150, 150, 120)
 LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
 ROLE_COLOURS = {"leader": LEADS, "follower": FOLLOWS, "waiting": WAITS, "gone": GONE}
@@ -46,6 +47,7 @@ class Scene:
         self._leader = ""
         self._rows: dict[tuple[str, str], list[tuple[float, Any]]] = {}
         self._mission_known = False
+        self._named = True
 
     # --- what stands still -----------------------------------------------------------------------------------------
 
@@ -68,6 +70,7 @@ class Scene:
         if self._mission_known:
             return
         self._mission_known, self._radius_m = True, float(mission.radius_m)
+        self._named = len(mission.robots) <= NAMED_MAX
         route = [(float(x), -float(y)) for x, y in mission.leading.route_m]
         self._always("world/route", rr.LineStrips2D([[(0.0, 0.0), *route]], colors=SOFT, radii=0.015))
         self._always("world/goal", rr.Points2D([route[-1]], colors=LEADS, radii=0.15, labels=["goal"]))

@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Struct
 
 from deploy.look import chronicle, errors, trace
+from deploy.look.assertions import Assertion, judge
 from deploy.look.chronicle import Failover, FaultDone, Line, Reign, Violation
 from deploy.look.errors import Errors
 from deploy.look.trace import Array, Trace
@@ -18,6 +19,7 @@ from deploy.run.referee import Verdict
 from world.scenario import Outcome
 
 SUMMARY = "summary.json"
+ENDED_WELL = ("goal_reached", "time_limit")
 LEFT_BEHIND_M = 0.5
 OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
 
@@ -49,11 +51,6 @@ class RobotSummary(Struct, kw_only=True):
     orientation_requests: int
 
 
-class Assertion(Struct):
-    name: str
-    ok: bool
-
-
 class Summary(Struct, kw_only=True):
     scenario: str
     mode: str
@@ -76,18 +73,18 @@ class Summary(Struct, kw_only=True):
 
     @property
     def exit_code(self) -> int:
-        """0 only for a goal that was reached with all assertions ok."""
-        return 0 if self.outcome == "goal_reached" and all(a.ok for a in self.assertions) else 1
+        """0 only for a run that ended by itself with all assertions ok; the goal is one of them by default."""
+        return 0 if self.outcome in ENDED_WELL and all(a.ok for a in self.assertions) else 1
 
 
 def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, faults_left: Sequence[str]) -> Summary:
     """Read the run in `folder` back and say what it came to. `faults_left`: those that the run ended before."""
-    seen, events = trace.read(folder), chronicle.lines(folder)
-    robots = [_robot(robot, seen, events) for robot in scenario_of(folder).mission.robots]
+    seen, events, scenario = trace.read(folder), chronicle.lines(folder), scenario_of(folder)
+    robots = [_robot(robot, seen, events) for robot in scenario.mission.robots]
     chain = chronicle.last_chain(events)
     reigns = chronicle.reigns(events)
     violations = chronicle.terms_that_went_back(events)
-    return Summary(
+    summary = Summary(
         scenario=about.scenario,
         mode=about.mode,
         seed=about.seed,
@@ -102,12 +99,18 @@ def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, f
         failovers=chronicle.failovers(events, reigns),
         faults=chronicle.faults(events),
         assertions=[
-            Assertion("goal_reached", verdict.outcome == "goal_reached"),
             Assertion("no_violations", not violations),
-            Assertion("all_faults_done", not faults_left),
+            Assertion("all_faults_done", not faults_left, ", ".join(faults_left)),
         ],
         violations=violations,
     )
+    wanted = scenario.asserted
+    if wanted.goal_reached:
+        reached = Assertion("goal_reached", verdict.outcome == "goal_reached", verdict.reason or "")
+        summary.assertions.insert(0, reached)
+    followed = (errors.of_follower(seen, robot.id) for robot in robots if robot.alive)
+    summary.assertions += judge(wanted, summary, seen, [e for e in followed if e is not None])
+    return summary
 
 
 def write(folder: Path, summary: Summary) -> None:

@@ -30,7 +30,7 @@ def text(summary: Summary, folder: Path) -> str:
             *(f"  {line}" for line in _aligned(rows)),
             *(f"  {line}" for line in _leaders(summary)),
             *([f"  left behind: robot {', '.join(map(str, summary.left_behind))}"] if summary.left_behind else []),
-            *(f"  not ok: {assertion.name}" for assertion in summary.assertions if not assertion.ok),
+            *(f"  not ok: {a.name} {a.text}".rstrip() for a in summary.assertions if not a.ok),
             *(f"  violation of {v.invariant} at {v.at_s:.3f} s: {v.text}" for v in summary.violations),
             f"run folder: {folder}",
         ]

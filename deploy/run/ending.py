@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from deploy.look import assertions
 from deploy.look import summary as summaries
 from deploy.look.summary import Summary
 from deploy.look.table import text
@@ -77,8 +78,10 @@ def finish(
     return Ended(folder, summary, ended_by)
 
 
-def report(ended: Ended, *, figures: bool, as_json: bool) -> int:
-    """Draw, print, and return the exit code."""
+def report(ended: Ended, *, figures: bool, as_json: bool, junit: Path | None = None) -> int:
+    """Draw, write the judgements as JUnit XML where wanted, print, and return the exit code. Raises Refused."""
+    if junit is not None:
+        assertions.junit(junit, ended.summary)
     if figures:
         from deploy.look.plots import draw
 

@@ -56,12 +56,13 @@ def command(
     fault: Annotated[list[str] | None, typer.Option(help="Such as 'kill leader at 20 s'; again for more.")] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")] = None,
     figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
+    junit: Annotated[Path | None, typer.Option(help="Write the assertions' results as JUnit XML.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
     chosen = choose(scenario, overrides or (), robots)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     ended = run(chosen, seed, out, faults)
-    return report(ended, figures=figures and ended.signal is None, as_json=as_json)
+    return report(ended, figures=figures and ended.signal is None, as_json=as_json, junit=junit)
 
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:

@@ -1,0 +1,107 @@
+"""`[assert]` of a scenario against what a run came to: a judgement for each key that was given, with numbers.
+
+A bound on what never happened (a failover, a contact) holds. A bound on an error fails when there is no such error
+to judge: a follower that never settled has not kept its distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import combinations
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+from msgspec import Struct
+
+from deploy.look.errors import Errors
+from deploy.look.trace import Trace
+from protocol.mission import Refused
+from world.spec import Assert
+
+if TYPE_CHECKING:
+    from deploy.look.summary import Summary
+
+
+class Assertion(Struct):
+    name: str
+    ok: bool
+    text: str = ""
+    """What was found and what was asked for, with units."""
+
+
+def judge(wanted: Assert, summary: Summary, seen: Trace, followed: Iterable[Errors]) -> list[Assertion]:
+    """One for each bound that `wanted` gives. `followed`: the errors of all that followed at the end, too."""
+    errors = list(followed)
+    followers = [robot for robot in summary.robots if robot.settled_after_s is not None or robot.final_distance_error_m]
+    #    name                   bound                         found                                                 unit
+    table: tuple[tuple[str, float | None, float, str], ...] = (
+        ("distance_error_max_m", wanted.distance_error_max_m, _most(_largest(e) for e in errors), "m"),
+        ("distance_error_rms_m", wanted.distance_error_rms_m, _most(r.distance_error_rms_m for r in followers), "m"),
+        (
+            "bearing_error_rms_rad",
+            wanted.bearing_error_rms_rad,
+            _most(r.bearing_error_rms_rad for r in followers),
+            "rad",
+        ),
+        ("settled_within_s", wanted.settled_within_s, _most(r.settled_after_s for r in followers), "s"),
+        ("recovered_within_s", wanted.recovered_within_s, _most(f.chain_ms for f in summary.failovers) / 1000.0, "s"),
+        ("failover_max_ms", wanted.failover_max_ms, _most(f.first_command_ms for f in summary.failovers), "ms"),
+        ("contacts_max", wanted.contacts_max, sum(robot.contacts for robot in summary.robots), ""),
+        ("duration_max_s", wanted.duration_max_s, summary.sim_duration_s, "s"),
+        ("leaders_max", wanted.leaders_max, len(summary.leaders), ""),
+        ("left_behind_max", wanted.left_behind_max, len(summary.left_behind), ""),
+    )
+    judged = [_at_most(name, found, bound, unit) for name, bound, found, unit in table if bound is not None]
+    if wanted.separation_min_m is not None:
+        nearest = separation_min_m(seen)
+        text = f"{nearest:.3f} m, at least {wanted.separation_min_m:g} m wanted"
+        judged.append(Assertion("separation_min_m", nearest >= wanted.separation_min_m, text))
+    return judged
+
+
+def separation_min_m(seen: Trace) -> float:
+    """Least distance between the centres of two robots at any time [m]; inf for a single one."""
+    nearest = inf
+    for a, b in combinations(seen.truth.values(), 2):
+        n = min(a.shape[0], b.shape[0])
+        nearest = min(nearest, float(np.min(np.hypot(a[:n, 1] - b[:n, 1], a[:n, 2] - b[:n, 2]))))
+    return nearest
+
+
+def junit(path: Path, summary: Summary) -> None:
+    """Write the judgements as JUnit XML, as CI systems read it. Raises Refused when it cannot be written."""
+    suite = quoteattr(f"lfa.{summary.scenario}")
+    failed = sum(not assertion.ok for assertion in summary.assertions)
+    cases = "".join(_case(assertion, suite) for assertion in summary.assertions)
+    head = f'tests="{len(summary.assertions)}" failures="{failed}" errors="0" time="{summary.duration_s:.3f}"'
+    about = f'<properties><property name="seed" value="{summary.seed}"/></properties>'
+    text = f'<?xml version="1.0" encoding="utf-8"?>\n<testsuite name={suite} {head}>{about}{cases}</testsuite>\n'
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise Refused(f"--junit {path}: cannot be written ({error.strerror})") from None
+
+
+def _case(assertion: Assertion, suite: str) -> str:
+    head = f"<testcase classname={suite} name={quoteattr(assertion.name)}"
+    if assertion.ok:
+        return f"{head}/>"
+    message = assertion.text or "does not hold"
+    return f"{head}><failure message={quoteattr(message)}>{escape(message)}</failure></testcase>"
+
+
+def _at_most(name: str, found: float, bound: float, unit: str) -> Assertion:
+    shown = "none to judge" if found == inf else f"{found:.4g} {unit}".rstrip()
+    return Assertion(name, found <= bound, f"{shown}, at most {bound:g} {unit}".rstrip() + " wanted")
+
+
+def _most(values: Iterable[float | None]) -> float:
+    """The largest; inf when one is missing, 0 of none."""
+    return max((inf if value is None else value for value in values), default=0.0)
+
+
+def _largest(e: Errors) -> float | None:
+    return float(np.max(np.abs(e.distance[e.steady]))) if e.steady.any() else None

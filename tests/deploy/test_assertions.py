@@ -1,0 +1,78 @@
+"""`[assert]`: each key judged against what was found, in the summary, the exit code and the JUnit file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from deploy.look.assertions import junit
+from deploy.look.summary import Summary
+from deploy.run.faults import parse_all
+from deploy.run.simulate import run
+from protocol.mission import Refused
+from world.scenario import load
+from world.spec import Assert
+
+FOUND = (
+    #  key                      holds   does not
+    ("distance_error_max_m",    1.0,    1e-9),
+    ("distance_error_rms_m",    1.0,    1e-9),
+    ("bearing_error_rms_rad",   1.0,    1e-9),
+    ("settled_within_s",        10.0,   0.01),
+    ("recovered_within_s",      1.0,    1e-4),
+    ("failover_max_ms",         200.0,  0.1),
+    ("contacts_max",            0,      -1),
+    ("separation_min_m",        0.3,    5.0),
+    ("duration_max_s",          60.0,   1.0),
+    ("leaders_max",             2,      1),
+    ("left_behind_max",         0,      -1),
+)  # fmt: skip
+
+
+def _summary(folder: Path, *overrides: str, fault: str = "kill leader at 2 s") -> Summary:
+    scenario = load("straight", ["mission.leading.route_m=[[3.0, 0.0]]", "faults=[]", *overrides])
+    return run(scenario, 0, folder, parse_all(scenario.mission, (), [fault])).summary
+
+
+def _judged(summary: Summary) -> dict[str, bool]:
+    return {assertion.name: assertion.ok for assertion in summary.assertions}
+
+
+def test_every_key_is_tried_here() -> None:
+    assert {key for key, *_ in FOUND} == set(Assert.__struct_fields__) - {"goal_reached"}
+
+
+def test_bounds_that_hold_let_the_run_pass(tmp_path: Path) -> None:
+    summary = _summary(tmp_path / "run", *(f"assert.{key}={holds}" for key, holds, _ in FOUND))
+    assert [assertion for assertion in summary.assertions if not assertion.ok] == []
+    assert {key for key, *_ in FOUND} <= set(_judged(summary))
+    assert summary.exit_code == 0
+
+
+def test_bounds_that_do_not_hold_fail_it_one_by_one(tmp_path: Path) -> None:
+    summary = _summary(tmp_path / "run", *(f"assert.{key}={broken}" for key, _, broken in FOUND))
+    assert [key for key, *_ in FOUND if _judged(summary)[key]] == []
+    assert summary.exit_code == 1
+
+
+def test_a_run_that_need_not_arrive_may_end_at_its_limit(tmp_path: Path) -> None:
+    summary = _summary(tmp_path / "run", "time_limit_s=2.5", "assert.goal_reached=false")
+    assert summary.outcome == "time_limit"
+    assert "goal_reached" not in _judged(summary)
+    assert summary.exit_code == 0
+
+
+def test_junit_tells_what_failed_and_by_how_much(tmp_path: Path) -> None:
+    path = tmp_path / "lfa.xml"
+    junit(path, _summary(tmp_path / "run", "assert.separation_min_m=5.0"))
+    suite = ElementTree.parse(path).getroot()
+    assert (suite.get("tests"), suite.get("failures")) == ("4", "1")
+    failures = {case.get("name"): failure.get("message") for case in suite for failure in case.iter("failure")}
+    assert "at least 5 m wanted" in str(failures["separation_min_m"])
+
+
+def test_an_unknown_key_is_refused_with_the_right_one() -> None:
+    with pytest.raises(Refused, match="did you mean 'contacts_max'"):
+        load("straight", ["assert.contact_max=0"])
