@@ -14,6 +14,7 @@ import msgspec
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
 from agents.driver import Driver
+from agents.mapping import Grid
 from agents.orders import Orders
 from agents.reports import Reports, status
 from agents.voice import Voice
@@ -94,6 +95,12 @@ class Agent:
     @property
     def interests(self) -> frozenset[str]:
         return self._interests
+
+    @property
+    def grid(self) -> Grid | None:
+        """The map of an explorer, as far as it has come."""
+        explore = None if self._driver is None else self._driver.explore
+        return None if explore is None or explore.mapping is None else explore.mapping.grid
 
     @property
     def finished(self) -> bool:
@@ -181,7 +188,7 @@ class Agent:
                 if ahead is not None and least_s is not None:
                     ahead.clock.reported(least_s, now)
             case ObstacleNote(kind="trap"):
-                driver.avoid_trap(message)
+                driver.avoid_trap(message, now)
             case ObstacleNote():
                 self._beliefs.hear_obstacle(robot, message, now)
             case FormationNote():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from math import ceil, cos, floor, hypot, sin
+from math import ceil, cos, floor, hypot, inf, sin
 
 from protocol.geometry import Pose2D
 from protocol.messages import LaserScan
@@ -112,6 +112,8 @@ class Mapping:
             angle = pose.theta + scan.angle_min + n * scan.angle_increment
             c, s = cos(angle), sin(angle)
             hits = r < min(scan.range_max_m, SIGHT_M)
+            if r == inf and min(scan.ranges_m[n - 1], scan.ranges_m[(n + 1) % count]) < SIGHT_M:
+                continue  # a beam that did not come back, among others that did: nothing is known of its way
             free_m = r - SHORT_OF_HIT_M if hits else min(scan.range_max_m, SIGHT_M)
             if hits:
                 x, y = pose.x + r * c, pose.y + r * s

@@ -44,6 +44,8 @@ COMMANDS = (
           "lfa list --json"),
     Entry("validate", "deploy.look.validate", "Check a scenario file, and say what a seed makes of it.",
           "lfa validate my_course.toml --set mission.leading.cruise_mps=0.3"),
+    Entry("schema", "deploy.look.schema", "Every key of a scenario: JSON schema for editors, or a table.",
+          "lfa schema --markdown"),
     Entry("plot", "deploy.look.plots", "Draw the figures of a run folder.",
           "lfa plot runs/paper_path1-20260101-120000"),
     Entry("report", "deploy.look.report", "One HTML page about a run, or about two side by side.",
@@ -52,6 +54,8 @@ COMMANDS = (
           "lfa replay runs/paper_path1-20260101-120000 --robot 2"),
     Entry("verify", "deploy.look.verify", "Check the invariants of a run of real processes on its journals.",
           "lfa verify runs/paper_path1-20260101-120000"),
+    Entry("map", "deploy.look.mapped", "What an explorer came to know, as a ROS map.yaml and pgm.",
+          "lfa map runs/explore-20260101-120000 --out maps"),
     Entry("bench", "deploy.bench.command", "Measure, beside the bar to be reached.",
           "lfa bench lidar --json"),
 )  # fmt: skip

@@ -1,0 +1,77 @@
+"""`lfa map`: what a robot came to know of the ground, as a ROS map.yaml and its pgm.
+
+The map is not recorded: the robot's journal is run again, and its agent asked at the end.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from agents.agent import Agent
+from agents.mapping import CELL_M, OCCUPIED, Grid
+from deploy.look import again, chronicle
+from deploy.run.folder import JOURNALS
+from protocol import journal
+from protocol.host import Host
+from protocol.journal import Journal
+from protocol.mission import Refused, robot_name
+from world import maps
+from world.maps import Map
+
+RIM_CELLS = 2
+"""Of unknown ground, kept around what is known."""
+
+
+def command(
+    run: Annotated[Path, typer.Argument(help="Run folder of a scenario with motion = explore.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for map.yaml and map.pgm; default the run folder.")] = None,
+    robot: Annotated[int | None, typer.Option(help="Whose map; default the last leader's.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
+) -> int:
+    drawn = map_of(run, robot)
+    path = (out or run) / "map.yaml"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        maps.write(path, drawn)
+    except OSError as error:
+        raise Refused(f"--out {path.parent}: cannot be written ({error.strerror}), give a place to write to") from None
+    rows, columns = drawn.cells.shape
+    facts = {"map": str(path), "columns": columns, "rows": rows, "resolution_m": drawn.resolution_m,
+             "known_cells": int((drawn.cells >= 0).sum()), "occupied_cells": int(drawn.occupied.sum())}  # fmt: skip
+    print(json.dumps(facts) if as_json else f"{path}: {columns} x {rows} cells, {facts['occupied_cells']} occupied")
+    return 0
+
+
+def map_of(run: Path, robot: int | None = None) -> Map:
+    """The map of `robot`, or of who led last, at the end of the run. Raises Refused when there is none."""
+    reigns = chronicle.reigns(chronicle.lines(run))
+    robot = robot if robot is not None else reigns[-1].robot_id if reigns else 1
+    lives = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
+    if not lives:
+        raise Refused(f"{run}: no journal of {robot_name(robot)}: must be a run folder with that robot in it")
+    heading, entries = journal.read(lives[-1])
+    node = again.node_of(lives[-1], heading)
+    host = Host(node, Journal(None, heading))
+    for entry in entries:
+        again.call(host, entry)
+    grid = node.grid if isinstance(node, Agent) else None
+    if grid is None:
+        raise Refused(f"{run}: {robot_name(robot)} kept no map: must be a run with mission.leading.motion = explore")
+    return known_part(grid)
+
+
+def known_part(grid: Grid) -> Map:
+    """The smallest map with all that `grid` knows, and a rim."""
+    scores = np.frombuffer(bytes(grid.scores), dtype=np.uint8).reshape(grid.rows, grid.columns)
+    cells = np.where(scores >= OCCUPIED, maps.OCCUPIED, np.where(scores > 0, 0, maps.UNKNOWN)).astype(np.int16)
+    rows, columns = np.nonzero(scores)
+    if not len(rows):
+        return Map(cells, CELL_M, (grid.x0_m, grid.y0_m, 0.0))
+    low = max(0, int(rows.min()) - RIM_CELLS), max(0, int(columns.min()) - RIM_CELLS)
+    part = cells[low[0] : int(rows.max()) + RIM_CELLS + 1, low[1] : int(columns.max()) + RIM_CELLS + 1]
+    return Map(part, CELL_M, (grid.x0_m + low[1] * CELL_M, grid.y0_m + low[0] * CELL_M, 0.0))
