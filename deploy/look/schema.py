@@ -1,0 +1,148 @@
+"""`lfa schema`: every key of a scenario, for editors (JSON schema) and for people (a table), both made from the types.
+
+What a key means stands below its field in the source, as everywhere in this project; that text is read from there.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Iterator
+from functools import cache
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+import typer
+from msgspec import NODEFAULT, Struct
+from msgspec.structs import FieldInfo, fields
+
+from world.scenario import Scenario
+
+UNITS = {
+    "m": "m", "s": "s", "ms": "ms", "rad": "rad", "mps": "m/s", "mps2": "m/s²", "radps": "rad/s", "radps2": "rad/s²",
+    "hz": "Hz", "kg": "kg", "n": "N",
+}  # fmt: skip
+
+
+class Key(Struct, frozen=True):
+    """One key that a scenario file may hold."""
+
+    path: str
+    type: str
+    unit: str
+    default: str
+    """In TOML; empty: must be given."""
+    text: str
+
+
+def command(
+    markdown: Annotated[bool, typer.Option("--markdown", help="A table for people instead of a JSON schema.")] = False,
+) -> int:
+    print(table() if markdown else msgspec.json.format(msgspec.json.encode(schema()), indent=1).decode())
+    return 0
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema of a scenario file, with the texts of the keys."""
+    made = msgspec.json.schema(Scenario)
+    for name, struct in {kind.__name__: kind for kind in _structs(Scenario)}.items():
+        properties = made["$defs"].get(name, {}).get("properties", {})
+        for field in fields(struct):
+            text = _texts(struct).get(field.name)
+            if text and field.encode_name in properties:
+                properties[field.encode_name]["description"] = text
+    made["$defs"]["Scenario"]["properties"].pop("name")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "lfa scenario", **made}
+
+
+def documented() -> list[Key]:
+    """Every key, in the order of the types; `[]` stands for one of a list."""
+    return list(_keys(Scenario, ""))
+
+
+def table() -> str:
+    rows = ["| key | type | unit | default | what |", "| --- | --- | --- | --- | --- |"]
+    rows += [
+        f"| `{key.path}` | {_cell(key.type)} | {key.unit} | {f'`{_cell(key.default)}`' if key.default else 'required'} "
+        f"| {_cell(key.text)} |"
+        for key in documented()
+    ]
+    return "\n".join(rows)
+
+
+def _keys(struct: type[Struct], where: str) -> Iterator[Key]:
+    hints = get_type_hints(struct)
+    for field in fields(struct):
+        path, kind = f"{where}{field.encode_name}", hints[field.name]
+        if path == "name":
+            continue
+        inner = next(_structs_of(kind), None)
+        if inner is None:
+            yield Key(path, _type(kind), _unit(field.encode_name), _default(field), _texts(struct).get(field.name, ""))
+        else:
+            yield from _keys(inner, f"{path}[]." if get_origin(kind) is tuple else f"{path}.")
+
+
+def _structs(struct: type[Struct]) -> Iterator[type[Struct]]:
+    yield struct
+    for kind in get_type_hints(struct).values():
+        for inner in _structs_of(kind):
+            yield from _structs(inner)
+
+
+def _structs_of(kind: Any) -> Iterator[type[Struct]]:
+    if isinstance(kind, type) and issubclass(kind, Struct):
+        yield kind
+    for argument in get_args(kind):
+        yield from _structs_of(argument)
+
+
+@cache  # bounded by the number of types in the program
+def _texts(struct: type[Struct]) -> dict[str, str]:
+    """The string below each field, on one line."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(struct))).body[0]
+    assert isinstance(body, ast.ClassDef)
+    found = {}
+    for field, after in zip(body.body, body.body[1:], strict=False):
+        below = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and below:
+            found[field.target.id] = " ".join(str(after.value.value).split())  # type: ignore[attr-defined]
+    return found
+
+
+def _unit(name: str) -> str:
+    """Units end names: `separation_m`, or `v_max_mps`."""
+    return UNITS.get(name.rpartition("_")[2], "") if "_" in name else ""
+
+
+def _type(kind: Any) -> str:
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        return " or ".join(f'"{value}"' for value in arguments)
+    if origin in (Union, UnionType):
+        return " or ".join(_type(argument) for argument in arguments if argument is not type(None))
+    if origin is tuple:
+        inner = [_type(argument) for argument in arguments if argument is not Ellipsis]
+        return f"list of {inner[0]}" if Ellipsis in arguments else f"[{', '.join(inner)}]"
+    if origin is dict:
+        return f"table of {_type(arguments[1])}"
+    return {float: "number", int: "whole number", str: "text", bool: "true or false"}.get(kind, str(kind))
+
+
+def _default(field: FieldInfo) -> str:
+    value = (
+        field.default_factory()
+        if field.default is NODEFAULT and field.default_factory is not NODEFAULT
+        else field.default
+    )
+    if value is NODEFAULT:
+        return ""
+    if value is None:
+        return "not given"
+    return msgspec.json.encode(value).decode()
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
