@@ -159,3 +159,21 @@ def test_a_follower_that_closes_over_a_dead_robot_keeps_its_path() -> None:
     assert isinstance(sighting, Sighting)
     point = sighting.trace.at(sighting.travelled_m - 1.7)
     assert hypot(point.x - behind.x, point.y - behind.y) < 0.02
+
+
+@pytest.mark.parametrize("mode", ["velocity", "pose"])
+@pytest.mark.parametrize("phase_s", [0.0, 0.007, -1e-9])
+def test_the_buffers_velocity_carries_its_pose_over_the_coming_period(mode: str, phase_s: float) -> None:
+    """Section 5.2: G = exp(-delta s) only if a follower that drives this velocity stays on the delayed path."""
+    predecessor = Predecessor(1, mode=mode, delay_s=0.1)  # type: ignore[arg-type]
+    pose = Pose2D()
+    for n in range(100):
+        twist = Twist(0.5 + 0.3 * sin(0.1 * n), 0.2)
+        predecessor.heard(_message(n * DT, pose, twist), n * DT)
+        pose = along_arc(pose, twist, DT)
+    now = 1.9 + phase_s
+    here, after = predecessor.at(now), predecessor.at(now + DT)
+    assert here is not None
+    assert after is not None
+    driven = along_arc(here.pose, here.twist, DT)
+    assert hypot(driven.x - after.pose.x, driven.y - after.pose.y) < 2e-5
