@@ -117,11 +117,11 @@ class Driver:
         """Take a look at the floor ahead."""
         known = self.estimator.pose_at(now)
         if known is not None:
-            self._ground.profile(profile, known[0])
+            self._ground.profile(profile, known[0], now)
 
-    def avoid_trap(self, note: ObstacleNote) -> None:
+    def avoid_trap(self, note: ObstacleNote, now: float) -> None:
         """Keep out of a place in which another robot got stuck."""
-        self._ground.bar_circle(note.x, note.y, note.radius_m, "wall")
+        self._ground.bar_circle(note.x, note.y, note.radius_m, "wall", now)
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Whose successor this robot is from now on; None for nobody's."""

@@ -6,7 +6,7 @@ What cannot be crossed is remembered as points in `map`, so that a detour treats
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil, cos, floor, inf, isnan, pi, sin
+from math import ceil, copysign, cos, floor, inf, isnan, pi, sin
 from typing import Literal
 
 from msgspec import Struct
@@ -23,7 +23,6 @@ BarKind = Literal["pothole", "bump", "ditch", "wall"]
 
 FLAT_M = 0.004
 """Lower than this over the floor around is noise, and no wheel feels it."""
-RUN_POINTS_MIN = 1
 STRAIGHT_M = 0.08
 """A hole whose near edge is this straight over all three lines is a ditch."""
 CELL_M = 0.05
@@ -34,7 +33,8 @@ NEAR_M = 0.5
 CROSSING_MPS = 0.2
 """Slow enough for the wheels, whatever they meet (control.md section 7)."""
 SEEN_MIN = 2
-"""A cell bars the way when it was seen so often: one bad reading is no hole."""
+AGAIN_S = 1.0
+"""A cell counts when it was seen so often, each time within so long of the last: one bad reading is no hole."""
 
 
 class GroundFeature(Struct, frozen=True, gc=False):
@@ -61,6 +61,9 @@ class Ground:
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._cells: dict[tuple[int, int], int] = {}
+        self._seen_at: dict[tuple[int, int], float] = {}
+        self._crossable: dict[tuple[int, int], float] = {}
+        """Near edges of what can be crossed, and when they were seen last."""
         self._kinds: dict[tuple[int, int], BarKind] = {}
         self.ahead: GroundFeature | None = None
         """The nearest feature that can be crossed and lies ahead."""
@@ -68,7 +71,7 @@ class Ground:
         """While something is crossed, and on the way to it."""
         self._crossing_until = 0.0
 
-    def profile(self, profile: GroundProfile, pose_map: Pose2D) -> None:
+    def profile(self, profile: GroundProfile, pose_map: Pose2D, now: float) -> None:
         """Take a profile that was made at `pose_map`."""
         features = [(line, feature) for line in range(len(profile.heights_m)) for feature in _runs(profile, line)]
         ditch = _is_ditch([feature for _, feature in features], len(profile.heights_m))
@@ -78,8 +81,10 @@ class Ground:
             if feature.width_m == inf and (feature.near_m > JUDGE_M or feature.size_m <= self._limits.climb_step_m):
                 continue  # its end will be seen from nearer by; or the floor that the robot came from is higher
             if not feature.crossable(self._limits):
-                self._bar(profile, line, feature, pose_map)
-            elif self.ahead is None or feature.near_m < self.ahead.near_m:
+                self._bar(profile, line, feature, pose_map, now)
+            elif self._confirmed(profile.offsets_m[line], feature, pose_map, now) and (
+                self.ahead is None or feature.near_m < self.ahead.near_m
+            ):
                 self.ahead = feature
 
     def cross(self, wanted: Twist, radius_m: float, now: float) -> Twist:
@@ -97,12 +102,12 @@ class Ground:
             return wanted
         return Twist(CROSSING_MPS, wanted.angular_z * CROSSING_MPS / wanted.linear_x)
 
-    def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind) -> None:
+    def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind, now: float) -> None:
         """Nobody of this robot's size gets into the circle about (x, y) in `map` any more."""
         count = ceil(2.0 * pi * radius_m / CELL_M)
         for n in range(count):
             angle = 2.0 * pi * n / count
-            self._bar_cell(x + radius_m * cos(angle), y + radius_m * sin(angle), kind, SEEN_MIN)
+            self._bar_cell(x + radius_m * cos(angle), y + radius_m * sin(angle), kind, SEEN_MIN, now)
 
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
         """What bars the way nearer than `within_m`, in `base_link`."""
@@ -125,38 +130,56 @@ class Ground:
     def _barred(self) -> list[Point]:
         return [((i + 0.5) * CELL_M, (j + 0.5) * CELL_M) for (i, j), n in self._cells.items() if n >= SEEN_MIN]
 
-    def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
+    def _confirmed(self, y: float, feature: GroundFeature, pose_map: Pose2D, now: float) -> bool:
+        """Whether the near edge was seen hereabouts a moment ago too."""
+        c, s, x = cos(pose_map.theta), sin(pose_map.theta), feature.near_m
+        i, j = floor((pose_map.x + c * x - s * y) / CELL_M), floor((pose_map.y + s * x + c * y) / CELL_M)
+        around = [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]
+        before = any(0.0 < now - self._crossable.get(cell, -inf) <= AGAIN_S for cell in around)
+        if len(self._crossable) >= CELLS_MAX:
+            self._crossable.clear()
+        self._crossable[i, j] = now
+        return before
+
+    def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D, now: float) -> None:
         """The feature's seen points on this line."""
         y, c, s = profile.offsets_m[line], cos(pose_map.theta), sin(pose_map.theta)
         last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
         x = feature.near_m
         while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
-            self._bar_cell(pose_map.x + c * x - s * y, pose_map.y + s * x + c * y, feature.kind, 1)
+            self._bar_cell(pose_map.x + c * x - s * y, pose_map.y + s * x + c * y, feature.kind, 1, now)
             x += profile.increment_m
 
-    def _bar_cell(self, x: float, y: float, kind: BarKind, seen: int) -> None:
+    def _bar_cell(self, x: float, y: float, kind: BarKind, seen: int, now: float) -> None:
         cell = floor(x / CELL_M), floor(y / CELL_M)
-        if cell in self._cells or len(self._cells) < CELLS_MAX:
-            self._cells[cell] = self._cells.get(cell, 0) + seen
-            self._kinds[cell] = kind
+        if cell not in self._cells and len(self._cells) >= CELLS_MAX:
+            return
+        before = self._cells.get(cell, 0)
+        if before < SEEN_MIN and now - self._seen_at.get(cell, -inf) > AGAIN_S:
+            before = 0
+        self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, kind
 
 
 def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:
-    """Runs of readings off the floor on one line; a missing reading neither begins nor ends one."""
+    """Runs of readings off the floor on one line; a missing reading neither begins nor ends one.
+
+    A run's size is its median reading: the largest one would be noise's.
+    """
     heights, features = profile.heights_m[line], []
-    start, size, sign = None, 0.0, 0.0
+    start, sign = 0, 0.0
+    run: list[float] = []
     for n, height in enumerate((*heights, 0.0)):
-        off = 0.0 if isnan(height) or abs(height) < FLAT_M else (1.0 if height > 0.0 else -1.0)
-        if start is not None and (off != sign and not isnan(height)):
-            open_ended = n == len(heights)
-            width = inf if open_ended else (n - start) * profile.increment_m
-            near_m = profile.first_m + start * profile.increment_m
-            features.append(GroundFeature("bump" if sign > 0.0 else "pothole", near_m, width, size))
-            start = None
-        if start is None and off != 0.0 and n < len(heights):
-            start, size, sign = n, 0.0, off
-        if start is not None and not isnan(height):
-            size = max(size, abs(height))
+        missing = isnan(height)
+        off = 0.0 if missing or abs(height) < FLAT_M else copysign(1.0, height)
+        if run and off != sign and not missing:
+            width = inf if n == len(heights) else (n - start) * profile.increment_m
+            near_m, size_m = profile.first_m + start * profile.increment_m, sorted(run)[len(run) // 2]
+            features.append(GroundFeature("bump" if sign > 0.0 else "pothole", near_m, width, size_m))
+            run = []
+        if off != 0.0:
+            if not run:
+                start, sign = n, off
+            run.append(abs(height))
     return features
 
 

@@ -32,8 +32,8 @@ def profile(
 
 def looked_at(seen: GroundProfile, times: int = SEEN_MIN) -> Ground:
     ground = Ground(LIMITS)
-    for _ in range(times):
-        ground.profile(seen, Pose2D())
+    for n in range(times):
+        ground.profile(seen, Pose2D(), 0.05 * n)
     return ground
 
 
@@ -72,6 +72,22 @@ def test_one_bad_reading_is_no_hole() -> None:
     assert looked_at(profile((0.5, 0.9, -0.2)), times=SEEN_MIN - 1).points(Pose2D(), 2.0) == []
 
 
+def test_bad_readings_now_and_then_in_one_place_are_no_hole() -> None:
+    ground = Ground(LIMITS)
+    for n in range(5):
+        ground.profile(profile((0.5, 0.55, -0.2), lines=(n % 3,)), Pose2D(), 2.0 * n)
+        assert ground.ahead is None
+    assert ground.points(Pose2D(), 2.0) == []
+
+
+def test_a_bump_is_as_high_as_most_of_its_readings() -> None:
+    rows = profile((0.5, 0.7, 0.009)).heights_m
+    noisy = tuple(tuple(0.013 if n == 9 else h for n, h in enumerate(row)) for row in rows)
+    ground = looked_at(GroundProfile(HEADER, 0.1, STEP, (0.12, 0.0, -0.12), noisy))
+    assert ground.ahead is not None
+    assert ground.ahead.kind == "bump"
+
+
 def test_a_missing_reading_is_neither_hole_nor_floor() -> None:
     rows = profile((0.5, 0.9, -0.2)).heights_m
     holed = tuple(tuple(nan if n == 12 else h for n, h in enumerate(row)) for row in rows)
@@ -95,7 +111,7 @@ def test_crossing_is_slow_until_the_robot_is_behind_it() -> None:
     assert ground.cross(Twist(0.5, 0.1), 0.15, 0.0) == Twist(CROSSING_MPS, 0.1 * CROSSING_MPS / 0.5)
     assert ground.decision is not None
     assert ground.decision.action == "overcome"
-    ground.profile(profile(), Pose2D())
+    ground.profile(profile(), Pose2D(), 0.9)
     assert ground.cross(Twist(0.5, 0.0), 0.15, 1.0).linear_x == CROSSING_MPS
     assert ground.cross(Twist(0.5, 0.0), 0.15, 6.0) == Twist(0.5, 0.0)
     assert ground.decision is None
