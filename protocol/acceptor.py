@@ -1,13 +1,14 @@
 """The voter in every process: what it has promised, to whom it is bound and for how long (rules E1-E4).
 
-Nothing here is kept on disk. A voter that starts, also one that starts again, is silent until every grant that an
-earlier life may have given has run out (E1).
+Nothing here is kept on disk. A process that starts, also one that starts again, is a new member: it grants when a
+config names this very life of it, and its promises count in a full house only (E1, E18).
 """
 
 from __future__ import annotations
 
 from msgspec import Struct
 
+from protocol.membership import is_first
 from protocol.messages import Config, Grant, Grantee, Member, Nack, Prepare, Promise, Propose, Term
 
 
@@ -39,7 +40,8 @@ class Acceptor:
         E15: with `holder_gone`, a hint that the bond's holder is dead, the voter promises all the same, but tells
         which term has to be fenced first: the hint alone frees nobody.
         """
-        if now < self.silent_until:
+        blank = is_first(config)
+        if blank and now < self.silent_until:
             return None  # E1
         bond = self.bound(now)
         foreign = bond is not None and bond.holder != src
@@ -47,12 +49,10 @@ class Acceptor:
             return self.refusal(body.term, config, now)
         self.promised = body.term
         needs_fence = Grantee(bond.term, bond.holder) if bond is not None else None
-        return Promise(body.term, config, needs_fence, blank=False)
+        return Promise(body.term, config, needs_fence, blank)
 
-    def propose(self, src: Member, body: Propose, config: Config, now: float) -> Grant | Nack | None:
+    def propose(self, src: Member, body: Propose, config: Config, now: float) -> Grant | Nack:
         """Phase 2: first grant and renewal alike."""
-        if now < self.silent_until:
-            return None  # E1
         outdated = body.term < self.promised or body.term <= self.released or config.version > body.config.version
         bond = self.bound(now)
         # E3: bound voters grant to their holder or to whom it hands over (E16), or when its term can move nothing more.

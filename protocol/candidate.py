@@ -6,7 +6,6 @@ The term stays the same while the attempt only repeats itself, so a robot that n
 from __future__ import annotations
 
 from protocol.holder import Holder
-from protocol.membership import seat
 from protocol.messages import Config, Grantee, Member, Term
 from protocol.quorum import electors, is_quorum
 from protocol.timing import Timing
@@ -24,7 +23,9 @@ class Candidate:
         """The term was handed over by its issuer (E16): this process only counts the grants."""
         self._promised: dict[Member, Grantee | None] = {}
         self._fenced: set[Grantee] = set()
+        self._remembering: set[Member] = set()
         self._refused: set[Member] = set()
+        self._bound_until = now
         self._act_s = timing.act_s
         self._fences_asked: set[Grantee] = set()
         self._pause_s = 2.0 * timing.rank_step_s
@@ -34,11 +35,13 @@ class Candidate:
         """A PREPARE leaves: each pause is longer than the one before, up to two heartbeats."""
         self.ask_at = now + self._pause_s
         self._fences_asked.clear()
+        self._bound_until = now
         self._pause_s = min(self._pause_s * PAUSE_GROWTH, self._pause_s_max)
 
     def wait_until(self, at: float) -> None:
-        """A voter is bound until then: asking it before is idle."""
-        self.ask_at = max(self.ask_at, at)
+        """A voter is bound until then: ask again exactly when all that refused are free."""
+        self._bound_until = max(self._bound_until, at)
+        self.ask_at = self._bound_until
 
     @property
     def deadline(self) -> float:
@@ -51,9 +54,11 @@ class Candidate:
         """Without a quorum's grants by then, what was granted is worth nothing any more."""
         return float("inf") if self.holder is None else self.holder.began_at + self._act_s
 
-    def promised(self, src: Member, needs_fence: Grantee | None) -> None:
+    def promised(self, src: Member, needs_fence: Grantee | None, blank: bool) -> None:
         """The newest answer of a voter counts: a bond that it named before may have run out since."""
-        self._promised[seat(src.id)] = needs_fence
+        self._promised[src] = needs_fence
+        if not blank:
+            self._remembering.add(src)
 
     def fenced(self, robot_id: int, old: Term) -> None:
         """The gateway of `robot_id` refuses `old`."""
@@ -82,12 +87,20 @@ class Candidate:
         While it only asks, at once: a higher term of its own costs nothing. Once grants are on their way, only
         when no quorum is left: a late refusal by one voter must not undo an election that the others have made.
         """
-        self._refused.add(seat(src.id))
+        self._refused.add(src)
         left = [m for m in electors(config) if m not in self._refused]
         return self.holder is None or not is_quorum(config, left)
 
     def has_quorum(self, config: Config) -> bool:
-        return is_quorum(config, self._promised)
+        """E18: only lives that `config` names, and that know of a config, count."""
+        return is_quorum(config, self._remembering)
+
+    def full_house(self, config: Config, universe: tuple[int, ...]) -> tuple[Member, ...]:
+        """E18: the newest life of every id, when all have promised and hold no quorum of `config`; else nobody."""
+        lives = {m.id: m for m in sorted(self._promised)}
+        if not all(i in lives for i in universe) or self.has_quorum(config):
+            return ()
+        return tuple(lives[i] for i in universe)
 
 
 def _term(grantee: Grantee) -> Term:

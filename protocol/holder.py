@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from protocol.membership import seat
-from protocol.messages import Config, Grant, Member, Propose, Term
-from protocol.quorum import quorum_time
+from protocol.messages import Config, Grant, Member, Propose, Term, Version
+from protocol.quorum import is_quorum, quorum_time
 from protocol.timing import Timing
 
 ROUNDS_KEPT = 64
@@ -18,18 +17,22 @@ class Holder:
         self.term = term
         self.expiry: float | None = None
         self.next_round_at = now
-        self.heard_at: dict[int, float] = {}
-        """When each robot last gave a sign of life to this holder."""
+        self.heard_at: dict[Member, float] = {}
+        """When each life last gave a sign of itself to this holder."""
+        self.said_hello: list[Member] = []
+        """Lives that asked to be let in, in the order of asking."""
         self.began_at = now
-        self.newest_grant: dict[int, tuple[Member, float]] = {}
-        """Of each voter the life that granted last, and the moment of its own clock that its grant carried (E16)."""
+        self.nonces: dict[Member, float] = {}
+        """Of each voter the moment of its own clock that its last grant carried (E16)."""
         self._fenced = fenced
         self._me = me
         self._timing = timing
         self._round = 0
         self._sent_at: dict[int, float] = {}
         self._acked: dict[Member, float] = {}
-        """Of each seat the newest send time [s] that it has granted."""
+        """Of each voter the newest send time [s] that it has granted."""
+        self._accepted: dict[Member, Version] = {}
+        """Of each voter the newest config that it has granted."""
 
     def next_propose(self, config: Config, now: float) -> Propose:
         """The next round; `now` is read before the message leaves."""
@@ -47,13 +50,14 @@ class Holder:
 
     def granted(self, src: Member, grant: Grant, config: Config, now: float) -> bool:
         """Count a grant; answers whether the lease got longer."""
-        self.heard_at[src.id] = now
-        self.newest_grant[src.id] = (src, grant.nonce)
+        self.heard_at[src] = now
+        self.nonces[src] = grant.nonce
+        if src not in self._accepted or grant.version > self._accepted[src]:
+            self._accepted[src] = grant.version
         sent_at = self._sent_at.get(grant.round)
-        voter = seat(src.id)
-        if sent_at is None or sent_at <= self._acked.get(voter, float("-inf")):
+        if sent_at is None or sent_at <= self._acked.get(src, float("-inf")):
             return False
-        self._acked[voter] = sent_at
+        self._acked[src] = sent_at
         # E2: the lease runs from when we asked. Counted from the grant it would outlive the voters' own count by
         # the way back, and two robots could lead (I1).
         since = quorum_time(config, self._acked)
@@ -62,6 +66,10 @@ class Holder:
         self.expiry = since + self._timing.act_s
         return True
 
-    def silent(self, robot_id: int, now: float) -> bool:
-        """Nothing was heard of it for t_chain."""
-        return now - self.heard_at.get(robot_id, self.began_at) > self._timing.chain_silence_s
+    def committed(self, config: Config) -> bool:
+        """A quorum has accepted `config` or a later one."""
+        return is_quorum(config, {m for m, version in self._accepted.items() if version >= config.version})
+
+    def silent(self, member: Member, now: float, silence_s: float) -> bool:
+        """Nothing was heard of this life for `silence_s`."""
+        return now - self.heard_at.get(member, self.began_at) > silence_s

@@ -11,7 +11,18 @@ from protocol.acceptor import Acceptor
 from protocol.candidate import Candidate
 from protocol.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
 from protocol.holder import Holder
-from protocol.membership import ANY_LIFE, VOTERS_MAX, first_config, ids, is_first, led_by, rank, with_chain
+from protocol.membership import (
+    VOTERS_MAX,
+    chosen,
+    first_config,
+    ids,
+    is_first,
+    led_by,
+    of_full_house,
+    rank,
+    rewritten,
+    universe,
+)
 from protocol.messages import (
     NO_TERM,
     Config,
@@ -30,6 +41,7 @@ from protocol.messages import (
     Term,
 )
 from protocol.mission import WITNESS_ID, Mission, robot_name
+from protocol.quorum import electors
 from protocol.timing import CLOCK_RATE_ERROR, Timing
 
 __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Send", "StepDown"]
@@ -37,8 +49,6 @@ __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Se
 NEVER = float("inf")
 SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 """How many seconds of the fastest clock one second of the slowest may last."""
-FIRST_START_S = 5.0
-"""How long the very first election waits for everybody before a quorum is enough."""
 HELLO_HEARTBEATS = 3
 
 
@@ -64,8 +74,8 @@ class Lease:
         """A requested release is complete: the last words are out and the process may end."""
         self._timing = timing
         self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
-        self._robots = mission.robots
-        self._voters = frozenset(member.id for member in self.config.voters)
+        self._universe = universe(mission)
+        self._tiebreak, self._shrink = mission.tiebreak, mission.shrink
         self._acceptor = Acceptor(Term(floor), timing.grant_s, now)
         self._candidate: Candidate | None = None
         self._holder: Holder | None = None
@@ -73,11 +83,10 @@ class Lease:
         """The highest term heard of."""
         self._down: dict[int, tuple[int, float]] = {}
         """Of each robot whose token vanished: the incarnation that it vanished of, and when."""
-        self._met: set[int] = {me.id}
-        """Ids that were ever heard."""
+        self._lives: dict[int, int] = {me.id: me.incarnation}
+        """Of each id the newest life that was heard."""
         self._pending: tuple[Member, Prepare] | None = None
         """The last PREPARE refused because of a bond."""
-        self._born_at = now
         self._leader_until = now
         self._hello_at = now
         self._elect_at = NEVER
@@ -111,6 +120,11 @@ class Lease:
             return Role.LEADER
         return Role.FOLLOWER if self.leader is not None and self.me.id in self.chain else Role.WAITING
 
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Ids that the first election of the fleet still waits for (E18); empty once somebody has led."""
+        return tuple(i for i in self._universe if i not in self._lives) if is_first(self.config) else ()
+
     def may_command(self, now: float) -> bool:
         """Leading, and `now` is before the lease's expiry (I1, I2)."""
         return self._holder is not None and now < _expiry(self._holder)
@@ -125,9 +139,10 @@ class Lease:
         """A message of another process, or of this one's own gateway (FENCED: `src.id` is the gateway's robot)."""
         effects: list[Effect] = []
         self._expire(now, effects)
-        if src.id == self.me.id and not isinstance(body, Fenced):
-            return effects  # an echo of our own
-        self._heard(src, now)
+        if not isinstance(body, Fenced):  # a gateway's incarnations are not its robot's
+            if src.id == self.me.id:
+                return effects  # an echo of our own
+            self._heard(src, now)
         match body:
             case Propose():
                 self._on_propose(src, body, now, effects)
@@ -156,7 +171,7 @@ class Lease:
         if now >= self._release_at:
             self._stopped(now, effects)
         if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
-            self._mend(now, effects)
+            self._reshape(now, effects)
         if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
             self._send_round(self._holder, now, effects)
         if self._candidate is not None:
@@ -166,7 +181,7 @@ class Lease:
         if now >= self._hello_at:
             self._hello_at = now + HELLO_HEARTBEATS * self._timing.heartbeat_s
             if self._is_out(now) and not self._closing:
-                effects.append(Send("all", Hello(self.config.version)))
+                effects.append(Send("all", Hello(None if is_first(self.config) else self.config.version)))
         if self.leader is not None and self._holder is None and now >= self._leader_until:
             self.leader = None
         return effects
@@ -196,7 +211,7 @@ class Lease:
         elif id != self.me.id:
             self._down[id] = (max(incarnation, self._down.get(id, (0, now))[0]), now)
             if self._holder is not None and self._candidate is None:
-                self._mend(now, effects)
+                self._reshape(now, effects)
             elif self._holder is None:
                 self._on_holder_gone(now, effects)
         return effects
@@ -237,7 +252,7 @@ class Lease:
 
     def _on_prepare(self, src: Member, body: Prepare, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.term)
-        if self.me.id not in self._voters:
+        if self._stands_before(src, body):
             return
         answer = self._acceptor.prepare(src, body, self.config, now, self._holder_gone())
         if answer is not None:
@@ -249,20 +264,26 @@ class Lease:
         elif answer is not None and answer.remaining_s > 0.0:
             self._pending = (src, body)  # answered again as soon as the bond ends: it may have overtaken the news
 
+    def _stands_before(self, src: Member, body: Prepare) -> bool:
+        """E5: in the first election of a fleet nobody promises to a candidate further back than itself."""
+        first = is_first(self.config) and body.version == self.config.version and self.me.id in self._may_lead
+        return first and not self._closing and self._rank(self.me.id) < self._rank(src.id)
+
     def _on_propose(self, src: Member, body: Propose, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.term)
-        answer = self._acceptor.propose(src, body, self.config, now) if self.me.id in self._voters else None
+        named = self.me in electors(body.config)
+        answer = self._acceptor.propose(src, body, self.config, now) if named else None
+        if answer is None and body.config.version < self.config.version:
+            answer = self._acceptor.refusal(body.term, self.config, now)
         if isinstance(answer, Nack):
             effects.append(Send(robot_name(src.id), answer))
             return
-        if answer is None and body.config.version < self.config.version:
-            return  # who does not vote (yet) follows the newest all the same
         if answer is not None and body.holder != self.me:
             effects.append(Send(robot_name(body.holder.id), answer))
         self._yield_to(body.term, now, effects)
-        if answer is not None:
-            self._step_down(now, "deposed", effects)  # its own voter let go of it: its term was fenced
-        self._adopt(body.config, effects)
+        if answer is not None and body.holder != self.me:
+            self._step_down(now, "deposed", effects)  # the own voter has let go: our term is fenced
+        self._adopt(body.config, now, effects)
         if answer is not None and body.holder == self.me:
             self._take_over(body, answer, now, effects)
         self.leader = body.holder.id
@@ -294,10 +315,13 @@ class Lease:
 
     def _heard(self, src: Member, now: float) -> None:
         """A life that still speaks two heartbeats after its token vanished is not dead; until then, last words."""
-        self._met.add(src.id)
-        incarnation, since = self._down.get(src.id, (-1, now))
-        if src.incarnation >= incarnation >= 0 and now - since > 2.0 * self._timing.heartbeat_s:
-            del self._down[src.id]
+        if src.incarnation > self._lives.get(src.id, -1):
+            self._lives[src.id] = src.incarnation
+        if src.id in self._down:
+            incarnation, since = self._down[src.id]
+            late = now - since > 2.0 * self._timing.heartbeat_s
+            if src.incarnation > incarnation or (src.incarnation == incarnation and late):
+                del self._down[src.id]
 
     def _yield_to(self, term: Term, now: float, effects: list[Effect]) -> None:
         """Whoever promises or grants a higher term gives up its own lower candidacy."""
@@ -308,40 +332,26 @@ class Lease:
     # --- standing for election ---------------------------------------------------------------------------------
 
     def _rank(self, robot_id: int) -> int:
-        return rank(self.config, robot_id, lambda other: other not in self._may_lead or self._is_down(other))
+        return rank(self.config, robot_id, lambda other: other.id not in self._may_lead or self._is_down(other))
 
-    def _is_down(self, robot_id: int) -> bool:
-        """Its token vanished, and no later life of it is in the chain."""
-        if robot_id not in self._down:
-            return False
-        lives = [m.incarnation for m in self.config.chain if m.id == robot_id]
-        return self._down[robot_id][0] >= max(lives, default=ANY_LIFE)
-
-    def _start_waits_until(self, now: float) -> float | None:
-        """E5: when the very first election may begin here, None when now.
-
-        The head of the chain waits until everybody was heard, the others for the head; none longer than FIRST_START_S.
-        """
-        over_at = self._born_at + FIRST_START_S
-        if not is_first(self.config) or now >= over_at:
-            return None
-        if self._rank(self.me.id) > 0:
-            return over_at
-        return None if all(i in self._met for i in self._robots) else now + self._timing.heartbeat_s
+    def _is_down(self, member: Member) -> bool:
+        """The token of this life, or of a later one, vanished."""
+        return member.id in self._down and self._down[member.id][0] >= member.incarnation
 
     def _elect_after(self, at: float) -> None:
         """E6: stand for election once `at` has passed, each robot its rank later than the one before it."""
         self._elect_base = at
-        can_stand = self.me.id in self._may_lead and self.me.id in self._voters and not self._closing
-        self._elect_at = at + self._rank(self.me.id) * self._timing.rank_step_s if can_stand else NEVER
+        if self.me.id not in self._may_lead or self._closing:
+            self._elect_at = NEVER
+            return
+        # Who has no vote stands last: it is needed only when nobody who has one can lead.
+        named = is_first(self.config) or self.me in self.config.voters
+        patience_s = 0.0 if named else self._timing.chain_silence_s
+        self._elect_at = at + patience_s + self._rank(self.me.id) * self._timing.rank_step_s
 
     def _stand(self, now: float, effects: list[Effect]) -> None:
         """A new candidacy under a term above all that was heard of. A leader may stand too: it raises its term."""
         self._elect_after(now + self._timing.grant_s)
-        waits_until = self._start_waits_until(now)
-        if waits_until is not None:
-            self._elect_after(waits_until)
-            return
         bond = self._acceptor.bound(now)
         if bond is not None and bond.holder != self.me and not self._holder_gone():
             self._elect_after(bond.expiry)
@@ -371,17 +381,25 @@ class Lease:
         candidate = self._candidate
         if candidate is None or candidate.holder is not None or body.term != candidate.term:
             return
-        candidate.promised(src, body.needs_fence)
-        if candidate.has_quorum(self.config):
-            self._fence_or_propose(candidate, now, effects)
+        candidate.promised(src, body.needs_fence, body.blank)
+        self._fence_or_propose(candidate, now, effects)
 
     def _fence_or_propose(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
         """E15: phase 2 begins when every lease that a promiser is bound to is fenced at its holder's own gateway."""
+        lives: tuple[Member, ...] = ()
+        if not candidate.has_quorum(self.config):
+            lives = candidate.full_house(self.config, self._universe)
+            if self.me not in lives:
+                return
         for grantee in candidate.fences_to_ask(self.me):
             effects.append(Send(gateway_of(grantee.holder.id), Fence(grantee.term, candidate.term)))
         if not candidate.unfenced(self.me):
             candidate.holder = Holder(self.me, candidate.term, self._timing, now, candidate.fenced_terms)
-            self._adopt(led_by(self.config, self.me, candidate.term, self._is_down), effects)
+            if lives:
+                config = of_full_house(self.config, self.me, candidate.term, lives)
+            else:
+                config = led_by(self.config, self.me, candidate.term, self._is_down)
+            self._adopt(config, now, effects)
             self._send_round(candidate.holder, now, effects)
 
     def _on_fenced(self, src: Member, body: Fenced, now: float, effects: list[Effect]) -> None:
@@ -390,8 +408,7 @@ class Lease:
         candidate = self._candidate
         if candidate is not None and candidate.holder is None and body.term == candidate.term:
             candidate.fenced(src.id, body.old)
-            if candidate.has_quorum(self.config) and not candidate.unfenced(self.me):
-                self._fence_or_propose(candidate, now, effects)
+            self._fence_or_propose(candidate, now, effects)
 
     def _drop_candidate(self, now: float, effects: list[Effect]) -> None:
         """Give the candidacy up. Grants for it are given back, unless this robot may still move under another term."""
@@ -408,7 +425,7 @@ class Lease:
         newer = body.config.version > self.config.version
         if candidate is not None and body.term == candidate.term:
             if newer:
-                self._adopt(body.config, effects)
+                self._adopt(body.config, now, effects)
             beaten = candidate.refused(src, self.config) if body.promised > candidate.term else False
             if beaten or (newer and candidate.holder is not None):
                 self._drop_candidate(now, effects)
@@ -416,15 +433,15 @@ class Lease:
             elif newer:
                 candidate.ask_at = now
                 self._press(candidate, now, effects)
-            else:
+            elif body.remaining_s > 0.0:
                 candidate.wait_until(now + body.remaining_s * SLOWEST)
         elif candidate is None and holder is not None and body.term == holder.term:
             if newer:
-                self._adopt(body.config, effects)
-            if newer or body.promised > holder.term:
+                self._adopt(body.config, now, effects)
+            if self._holder is not None and body.promised > holder.term:
                 self._stand(now, effects)  # E10
         elif newer and candidate is None and holder is None:
-            self._adopt(body.config, effects)
+            self._adopt(body.config, now, effects)
             self._elect_after(now + self._timing.grant_s)
 
     # --- leading -----------------------------------------------------------------------------------------------
@@ -443,8 +460,6 @@ class Lease:
         self._count(holder, self.me, own, now, effects)
 
     def _on_grant(self, src: Member, body: Grant, now: float, effects: list[Effect]) -> None:
-        if src.id not in self._voters:
-            return
         if self._candidate is not None and self._candidate.holder is not None and self._candidate.term == body.term:
             self._count(self._candidate.holder, src, body, now, effects)
         elif self._holder is not None and self._holder.term == body.term:
@@ -458,46 +473,50 @@ class Lease:
         expiry = _expiry(holder)
         if holder is self._holder:
             effects.append(LeaseExtended(holder.term, expiry))
+            if self.config.previous is not None and self._candidate is None:
+                self._reshape(now, effects)  # the joint config may have been accepted
         elif now < expiry:
             if self._candidate is not None and self._candidate.given:
-                self._adopt(led_by(self.config, self.me, holder.term, self._is_down, keep_leader=True), effects)
+                self._adopt(led_by(self.config, self.me, holder.term, self._is_down, keep_leader=True), now, effects)
             self._candidate, self._holder = None, holder
             self.leader = self.me.id
             effects.append(BecomeLeader(holder.term, expiry))
 
-    def _mend(self, now: float, effects: list[Effect]) -> None:
-        """E8: close the chain over whoever is silent for t_chain, or at once over whoever's token vanished."""
-        holder = self._holder
+    def _reshape(self, now: float, effects: list[Effect]) -> None:
+        """E8, E9, E17: who is gone leaves the chain, who asks joins its tail, and the voters follow, jointly."""
+        holder, config, timing = self._holder, self.config, self._timing
         assert holder is not None
-        chain = self.config.chain
-        left = tuple(m for m in chain if m == self.me or not (self._is_down(m.id) or holder.silent(m.id, now)))
-        if len(left) < len(chain):
-            self._write(left, now, effects)
 
-    def _write(self, chain: tuple[Member, ...], now: float, effects: list[Effect]) -> None:
-        """A new version of the config, told at once."""
-        assert self._holder is not None
-        self._adopt(with_chain(self.config, chain), effects)
-        self._send_round(self._holder, now, effects)
+        def stays(member: Member, silence_s: float) -> bool:
+            superseded = self._lives.get(member.id, -1) > member.incarnation
+            return member == self.me or not (superseded or holder.silent(member, now, silence_s))
+
+        here = [m for m in config.chain if not self._is_down(m) and stays(m, timing.chain_silence_s)]
+        asking = [m for m in holder.said_hello if not self._is_down(m) and stays(m, timing.chain_silence_s)]
+        holder.said_hello.clear()
+        chain = (*here, *(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here))))
+        kept = tuple(m for m in config.voters if stays(m, timing.remove_silence_s))
+        witness = next((m for m in (*kept, *asking) if m.id == WITNESS_ID), None)
+        voters = chosen(kept, chain, witness)
+        if self._shrink == "static" and 2 * len(voters) <= len(self._universe):
+            voters = config.voters
+        tie = self.me if self._tiebreak == "head" else witness if self._tiebreak == "witness" else None
+        newer = rewritten(config, chain, voters, tie, holder.committed(config))
+        if newer is not config:
+            self._adopt(newer, now, effects)
+            self._send_round(holder, now, effects)
 
     def _on_hello(self, src: Member, body: Hello, now: float, effects: list[Effect]) -> None:
-        """E9: a robot that was out returns at the tail; so does a later life of one that was in.
-
-        While nobody leads, whoever says HELLO is told the newest config, so that it does not wait for a first start.
-        """
+        """E9: whoever is out asks the leader; while nobody leads, it is told the newest config."""
         if self.leader is None and (body.version is None or body.version < self.config.version):
             effects.append(Send(robot_name(src.id), self._acceptor.refusal(NO_TERM, self.config, now)))
-        if self._holder is None or self._candidate is not None or src.id not in self._robots:
+        if self._holder is None or src.id not in self._universe or src.incarnation < self._lives[src.id]:
             return
-        self._holder.heard_at[src.id] = now
-        if self._down.get(src.id, (-1, 0.0))[0] >= src.incarnation:
-            return  # its last words, perhaps
-        place = next((m for m in self.config.chain if m.id == src.id), None)
-        if place is None or ANY_LIFE < place.incarnation < src.incarnation:
-            rest = tuple(m for m in self.config.chain if m.id != src.id)
-            self._write((*rest, src), now, effects)
-        elif place.incarnation == ANY_LIFE:
-            self._write(tuple(src if m is place else m for m in self.config.chain), now, effects)
+        self._holder.heard_at[src] = now
+        if src not in self._holder.said_hello:
+            self._holder.said_hello.append(src)
+        if self._candidate is None:
+            self._reshape(now, effects)
 
     # --- stopping ----------------------------------------------------------------------------------------------
 
@@ -561,10 +580,10 @@ class Lease:
     def _successor(self, holder: Holder, now: float) -> tuple[Member, float] | None:
         """The first behind us that may lead and granted within t_chain: its life, and its clock's moment then."""
         for member in self.config.chain[1:]:
-            life, nonce = holder.newest_grant.get(member.id, (member, None))
-            fit = member.id in self._may_lead and not self._is_down(member.id) and not holder.silent(member.id, now)
-            if fit and nonce is not None and member.incarnation in (ANY_LIFE, life.incarnation):
-                return life, nonce
+            nonce = holder.nonces.get(member)
+            fit = member.id in self._may_lead and member in self.config.voters and not self._is_down(member)
+            if fit and nonce is not None and not holder.silent(member, now, self._timing.chain_silence_s):
+                return member, nonce
         return None
 
     def _take_over(self, body: Propose, own: Grant, now: float, effects: list[Effect]) -> None:
@@ -583,8 +602,11 @@ class Lease:
 
     # --- small -------------------------------------------------------------------------------------------------
 
-    def _adopt(self, config: Config, effects: list[Effect]) -> None:
+    def _adopt(self, config: Config, now: float, effects: list[Effect]) -> None:
+        """A newer config becomes ours. One of another leader ends our lease: it has been fenced, or has run out."""
         if config.version > self.config.version:
+            if config.chain[0] != self.me:
+                self._step_down(now, "deposed", effects)
             self.config = config
             effects.append(AdoptChain(config))
 
@@ -592,11 +614,9 @@ class Lease:
         """E9: bound to nobody (a learner always is), or this life of it is not in the leader's chain."""
         if self._holder is not None:
             return False
-        if self.me.id != WITNESS_ID and not any(
-            m.id == self.me.id and m.incarnation in (ANY_LIFE, self.me.incarnation) for m in self.config.chain
-        ):
+        if self.me.id != WITNESS_ID and self.me not in self.config.chain:
             return True
-        return self._acceptor.bound(now) is None
+        return self.me not in self.config.voters or self._acceptor.bound(now) is None
 
 
 def _expiry(holder: Holder) -> float:

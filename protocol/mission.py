@@ -16,6 +16,8 @@ WITNESS_NAME = "witness"
 
 Side = Literal["left", "right", "column", "zigzag"]
 Motion = Literal["path_following", "point_to_point", "explore"]
+TieBreak = Literal["witness", "head", "none"]
+Shrink = Literal["dynamic", "static"]
 Profile = Literal["fast", "std", "wifi"]
 
 
@@ -95,6 +97,10 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     """Ids in the order of the first chain; the first leads."""
     witness: bool = True
     profile: Profile = "std"
+    tiebreak: TieBreak = "witness"
+    """Who decides between two halves: the witness, the head of the chain, or nobody."""
+    shrink: Shrink = "dynamic"
+    """`static`: never fewer voters than a majority of the team."""
     can_lead: tuple[int, ...] | None = None
     """Ids that may lead; all when not given."""
     formation: FormationSpec = FormationSpec()

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from protocol.messages import CmdVel, Config, Grant, Member, Promise, Propose, Term, Version
+from protocol.messages import CmdVel, Config, Electorate, Grant, Member, Promise, Propose, Term, Version
+from protocol.quorum import is_quorum
 from protocol.timing import CLOCK_RATE_ERROR, Timing
 
 EARLY_S = 1e-6
@@ -216,6 +217,56 @@ class OneChain(Checker):
             self.broken(at, f"{_m(who)} leads {_t(term)} with chain {[m.id for m in chain]}")
 
 
+class JointChange(Checker):
+    name = "I6"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._known: dict[Version, Config] = {}
+        self._accepted: dict[Member, Version] = {}
+
+    def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
+        self._accepted[voter] = max(grant.version, self._accepted.get(voter, grant.version))
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        if config.version in self._known:
+            return
+        self._known[config.version] = config
+        term, seq = config.version.term, config.version.seq
+        before = self._known.get(Version(term, seq - 1))
+        if before is None:
+            return
+        if (config.voters, config.tie) != (before.voters, before.tie):
+            if before.previous is not None or config.previous != Electorate(before.voters, before.tie):
+                self.broken(at, f"version {_t(term)}.{seq} has other voters and is not joint with those before")
+        elif config.previous != before.previous:
+            accepted = {m for m, version in self._accepted.items() if version >= before.version}
+            if config.previous is not None or not is_quorum(before, accepted):
+                self.broken(at, f"version {_t(term)}.{seq} ends a joint config that its quorums have not accepted")
+
+
+class NoAmnesiacVote(Checker):
+    name = "I7"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._promised: dict[Term, dict[Member, bool]] = {}
+
+    def promises(self, at: float, who: Member, promise: Promise) -> None:
+        self._promised.setdefault(promise.term, {})[who] = promise.blank
+
+    def proposes(self, at: float, who: Member, propose: Propose) -> None:
+        config = propose.config
+        if propose.round != 0 or config.version != Version(propose.term, 0):
+            return
+        promised = {**self._promised.get(propose.term, {}), who: False}
+        previous = config.previous
+        full = previous is not None and previous.rule == "all" and set(previous.voters) <= set(promised)
+        remembering = {m for m, blank in promised.items() if not blank}
+        if not is_quorum(config, remembering) and not full:
+            self.broken(at, f"{_t(propose.term)} proposed on promises of {sorted(_m(m) for m in promised)}")
+
+
 class Residual(_WithFences):
     name = "I8"
 
@@ -237,7 +288,16 @@ class Residual(_WithFences):
         self._last = (at - age, cmd)
 
 
-SAFETY: tuple[type[Checker], ...] = (LeaseExclusivity, Acting, OneHolder, OneBond, OneChain, Residual)
+SAFETY: tuple[type[Checker], ...] = (
+    LeaseExclusivity,
+    Acting,
+    OneHolder,
+    OneBond,
+    OneChain,
+    JointChange,
+    NoAmnesiacVote,
+    Residual,
+)
 
 
 def _t(term: Term) -> str:

@@ -247,7 +247,7 @@ class Arena:
         if shuffled:
             self.random.shuffle(inbox)
         for method, arguments in inbox:
-            self._carry_out(process, getattr(process.lease, method)(*arguments, process.clock.local(self.now)))
+            self._take(process, method, arguments)
         self._wake_at(process, self.now)
 
     def start_gateway(self, robot_id: int, at: float | None = None) -> None:
@@ -351,7 +351,10 @@ class Arena:
             if len(process.inbox) < INBOX_SIZE_MAX:
                 process.inbox.append((method, arguments))
             return
-        if method == "receive" and type(arguments[1]) is Promise:
+        self._take(process, method, arguments)
+
+    def _take(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
+        if method == "receive" and isinstance(arguments[1], Promise):
             for tell in self._tell["promises"]:
                 tell(self.now, arguments[0], arguments[1])
         self._carry_out(process, getattr(process.lease, method)(*arguments, process.clock.local(self.now)))

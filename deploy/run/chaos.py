@@ -9,7 +9,6 @@ from msgspec import Struct, structs
 from deploy.look.checkers import SAFETY, Checker, Violation
 from deploy.run.arena import Arena, Trace
 from deploy.run.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Fault, Schedule
-from protocol.membership import is_first
 from protocol.messages import Member
 from protocol.mission import WITNESS_ID
 from protocol.quorum import is_quorum
@@ -132,8 +131,8 @@ class Faults:
     def _quorum_lives(self) -> bool:
         living = [p for p in self.arena.processes.values() if p.alive]
         newest = max((p.lease.config for p in living), key=lambda c: c.version, default=None)
-        seats = {Member(p.id, 0) for p in living}
-        return newest is not None and not is_first(newest) and is_quorum(newest, seats)
+        robots = any(p.id != WITNESS_ID for p in living)
+        return newest is not None and robots and is_quorum(newest, {p.member for p in living})
 
 
 def play(schedule: Schedule, trace: Trace | None = None) -> Played:

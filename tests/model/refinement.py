@@ -163,15 +163,14 @@ def candidate() -> int:
     """A `Candidate` asks for grants only when a quorum promised and every lease named is fenced or its own."""
     me, compared = Member(1, 7), 0
     named = (None, Grantee(Term(1, 1, 7), me), Grantee(Term(1, 2, 7), MEMBERS[1]), Grantee(Term(2, 2, 7), MEMBERS[2]))
-    seats = tuple(Member(m.id, 0) for m in MEMBERS)
-    config = Config(VERSIONS[0], seats, None, None, seats)
+    config = Config(VERSIONS[0], MEMBERS, None, None, MEMBERS)
     others = named[2:]
     for promises in product(("silent", *named), repeat=3):
         for fenced in chain.from_iterable(combinations(others, n) for n in range(3)):
             attempt = Candidate(Term(9, 1, 7), timing_of("std"), 0.0)
             for member, needs in zip(MEMBERS, promises, strict=True):
                 if needs != "silent":
-                    attempt.promised(member, needs)  # type: ignore[arg-type]
+                    attempt.promised(member, needs, False)  # type: ignore[arg-type]
             for grantee in fenced:
                 assert grantee is not None
                 attempt.fenced(grantee.holder.id, grantee.term)
@@ -206,8 +205,7 @@ def _member(members: tuple[Member, ...], mask: int) -> Member | None:
 def holder() -> int:
     """A `Holder`'s lease ends T_act after the newest round that two of three granted: the model's two young grants."""
     timing, me, compared = timing_of("std"), Member(1, 7), 0
-    seats = tuple(Member(m.id, 0) for m in MEMBERS)
-    config = Config(VERSIONS[0], seats, None, None, seats)
+    config = Config(VERSIONS[0], MEMBERS, None, None, MEMBERS)
     for rounds in product((None, 0, 1, 2), repeat=3):
         held = Holder(me, Term(9, 1, 7), timing, 0.0)
         for n in range(3):

@@ -144,6 +144,7 @@ def test_an_agent_is_small(terminals: Terminals) -> None:
     terminals.look_on()
     terminals.world()
     terminals.agent(1, "leader")
+    terminals.agent(2)  # the first election of a fleet waits for everybody
     sizes_mb: list[float] = []
 
     def told() -> bool:

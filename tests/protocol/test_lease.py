@@ -9,7 +9,7 @@ import pytest
 from deploy.look.checkers import SAFETY, Checker
 from deploy.run.arena import Arena
 from protocol.acceptor import Acceptor
-from protocol.effects import BecomeLeader, Effect, Send, StepDown
+from protocol.effects import BecomeLeader, Effect, LeaseExtended, Send, StepDown
 from protocol.lease import Lease
 from protocol.membership import first_config
 from protocol.messages import (
@@ -58,8 +58,13 @@ class Team(Arena):
 
 
 def config_of(term: Term, seq: int = 0) -> Config:
-    first = first_config(TEAM)
-    return Config(Version(term, seq), first.voters, first.tie, None, first.chain)
+    """Four robots and the witness, in their first lives."""
+    chain = tuple(Member(i, 1) for i in TEAM.robots)
+    tie = Member(0, 1)
+    return Config(Version(term, seq), (*chain, tie), tie, None, chain)
+
+
+OLD = config_of(Term(1, 1, 1))
 
 
 def voter(now: float = 10.0) -> Acceptor:
@@ -68,7 +73,7 @@ def voter(now: float = 10.0) -> Acceptor:
 
 
 def ask(voter: Acceptor, who: Member, term: Term, now: float, number: int = 0) -> Grant | Nack | None:
-    return voter.propose(who, Propose(term, config_of(term), number, who), config_of(Term()), now)
+    return voter.propose(who, Propose(term, config_of(term), number, who), OLD, now)
 
 
 A, B = Member(1, 7), Member(2, 8)
@@ -78,12 +83,13 @@ LOW, HIGH = Term(5, 1, 7), Term(6, 2, 8)
 # --- the voter -----------------------------------------------------------------------------------------------
 
 
-def test_e1_a_voter_that_starts_promises_and_grants_nothing_for_the_longest_bond() -> None:
-    fresh = Acceptor(Term(), STD.grant_s, 10.0)
+def test_e1_a_process_that_starts_promises_nothing_for_the_longest_bond() -> None:
+    fresh, blank = Acceptor(Term(), STD.grant_s, 10.0), first_config(TEAM)
     soon, later = 10.0 + STD.grant_s - 0.001, 10.0 + STD.grant_s
-    assert fresh.prepare(A, Prepare(LOW, Version()), config_of(Term()), soon) is None
-    assert ask(fresh, A, LOW, soon) is None
-    assert isinstance(ask(fresh, A, LOW, later), Grant)
+    assert fresh.prepare(A, Prepare(LOW, Version()), blank, soon) is None
+    promise = fresh.prepare(A, Prepare(LOW, Version()), blank, later)
+    assert isinstance(promise, Promise)
+    assert promise.blank
 
 
 def test_e1_promises_of_a_new_life_are_above_its_floor() -> None:
@@ -119,7 +125,7 @@ def test_e3_the_holder_may_raise_its_own_term() -> None:
 
 def test_e3_what_was_promised_is_kept() -> None:
     free = voter()
-    free.prepare(B, Prepare(HIGH, Version()), config_of(Term()), 10.0)
+    free.prepare(B, Prepare(HIGH, OLD.version), OLD, 10.0)
     assert isinstance(ask(free, A, LOW, 10.1), Nack)
 
 
@@ -159,48 +165,70 @@ def test_a_voter_refuses_a_config_older_than_its_own() -> None:
 # --- lease time ------------------------------------------------------------------------------------------------
 
 
-def alone(timing_now: float = 0.0) -> Lease:
-    """Robot 1 of two with a witness, open for votes."""
+def alone() -> Lease:
+    """Robot 1 of two with a witness; it has heard the others."""
     mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
-    lease = Lease(Member(1, 7), mission, STD, timing_now, floor=0)
-    for other in (Member(0, 3), Member(2, 4)):
-        lease.receive(other, Hello(Version()), timing_now)
+    lease = Lease(Member(1, 7), mission, STD, 0.0, floor=0)
+    for other in OTHERS:
+        lease.receive(other, Hello(None), 0.0)
     return lease
+
+
+OTHERS = (Member(0, 3), Member(2, 4))
 
 
 def sent(effects: list[Effect], kind: type) -> list[LeaseBody]:
     return [e.body for e in effects if isinstance(e, Send) and isinstance(e.body, kind)]
 
 
-def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
-    """Robot 1 asked at `asked_at`; the witness's grant came `slow_s` later."""
-    lease = alone()
-    now = STD.grant_s
-    [prepare] = sent(lease.tick(now), Prepare)
+def proposed(lease: Lease, at: float) -> Propose:
+    """What it proposes when both others promise at `at`."""
+    [prepare] = sent(lease.tick(STD.grant_s), Prepare)
     assert isinstance(prepare, Prepare)
-    asked_at = now + 0.001
-    promise = Promise(prepare.term, lease.config, None, False)
-    [propose] = sent(lease.receive(Member(0, 3), promise, asked_at), Propose)
+    promise = Promise(prepare.term, lease.config, None, True)
+    effects = [e for other in OTHERS for e in lease.receive(other, promise, at)]
+    [propose] = sent(effects, Propose)
     assert isinstance(propose, Propose)
+    return propose
+
+
+def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
+    """Robot 1 asked at `asked_at`; the others' grants came `slow_s` later."""
+    lease, asked_at = alone(), STD.grant_s + 0.001
+    propose = proposed(lease, asked_at)
     at = asked_at + slow_s
     grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
-    return lease, asked_at, at, lease.receive(Member(0, 3), grant, at)
+    effects = [e for other in OTHERS for e in lease.receive(other, grant, at)]
+    return lease, asked_at, at, effects
 
 
 def test_e2_bug_1_the_lease_runs_from_when_it_was_asked_for_not_from_the_grant() -> None:
     lease, asked_at, at, effects = elected(slow_s=0.035)
     [become] = [e for e in effects if isinstance(e, BecomeLeader)]
-    assert become.expiry == asked_at + STD.act_s, "counted from the grant, two robots could lead (I1)"
+    assert become.expiry == asked_at + STD.act_s
     assert lease.may_command(at)
     assert not lease.may_command(asked_at + STD.act_s)
 
 
+def test_e2_bug_1_a_renewal_counts_from_its_round_not_from_the_grants() -> None:
+    lease, _, _, _ = elected(slow_s=0.001)
+    asked_at = lease.next_deadline()
+    [propose] = sent(lease.tick(asked_at), Propose)
+    assert isinstance(propose, Propose)
+    grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
+    effects = [e for other in OTHERS for e in lease.receive(other, grant, asked_at + 0.035)]
+    assert [e.expiry for e in effects if isinstance(e, LeaseExtended)] == [asked_at + STD.act_s], (
+        "counted from the grants, the voters would be free before the lease ends (I1)"
+    )
+
+
 def test_bug_6_leadership_is_announced_only_with_the_quorums_grants() -> None:
     lease = alone()
-    [prepare] = sent(lease.tick(STD.grant_s), Prepare)
-    assert isinstance(prepare, Prepare)
-    effects = lease.receive(Member(0, 3), Promise(prepare.term, lease.config, None, False), STD.grant_s)
-    assert not any(isinstance(e, BecomeLeader) for e in effects)
+    propose = proposed(lease, STD.grant_s)
+    assert lease.role is not Role.LEADER
+    grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
+    effects = lease.receive(OTHERS[0], grant, STD.grant_s)
+    assert not any(isinstance(e, BecomeLeader) for e in effects), "in a full house everybody must grant"
     assert lease.role is not Role.LEADER
 
 
@@ -244,13 +272,19 @@ def test_e5_whatever_the_order_of_starting_the_head_of_the_chain_leads_first() -
     assert team.lease_of(3).chain == (1, 2, 3, 4)
 
 
-def test_e5_a_head_that_never_comes_is_not_waited_for_for_ever() -> None:
+def test_e18_a_fleet_that_nobody_remembers_waits_for_everybody() -> None:
     team = Arena(4, seed=3)
+    for robot_id in team.mission.robots:
+        team.start_gateway(robot_id, -1.0)
     for robot_id in (0, 2, 3, 4):
         team.at(0.0, team.start, robot_id)
     team.run(8.0)
-    assert team.leaders() == [2]
-    assert team.lease_of(3).chain == (2, 3, 4)
+    assert team.leaders() == []
+    assert team.lease_of(2).missing == (1,)
+    team.start(1)
+    team.run(9.0)
+    assert team.leaders() == [1]
+    assert team.lease_of(2).missing == ()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -344,12 +378,17 @@ def test_bug_4_the_command_of_a_zombie_is_refused() -> None:
 
 def test_bug_8_terms_grow_over_a_total_blackout() -> None:
     team = Team()
-    before = team.lease_of(1).term
+    team.kill(1)
+    team.start(1)
+    team.run(2.0)
+    before = team.lease_of(2).term
     for robot_id in team.ids:
         team.kill(robot_id)
+    for robot_id in team.mission.robots:
+        team.start_gateway(robot_id)
     for robot_id in team.ids:
         team.start(robot_id)
-    team.run(3.0)
+    team.run(4.0)
     assert team.leaders() == [1]
     assert team.lease_of(1).term > before
     assert team.safe()
@@ -527,4 +566,156 @@ def test_e16_the_last_robot_has_nobody_to_hand_over_to_and_leads_again() -> None
     team.hand_over(1)
     team.run(3.0)
     assert team.leaders() == [1]
+    assert team.safe()
+
+
+# --- members that come and go ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", [(1, 2, 3), (3, 1, 4), (4, 3, 2), (2, 1, 4)])
+def test_e17_a_team_shrinks_one_by_one_to_the_last_and_the_chain_is_the_old_one_minus_the_dead(
+    order: tuple[int, ...],
+) -> None:
+    team = Team()
+    left = [1, 2, 3, 4]
+    for victim in order:
+        team.kill(victim)
+        left.remove(victim)
+        team.run(team.now + STD.remove_silence_s + 0.3)
+        assert team.leaders() == left[:1]
+        assert team.lease_of(left[-1]).chain == tuple(left)
+        assert team.safe()
+    assert {m.id for m in team.lease_of(left[0]).config.voters} == {0, left[0]}
+
+
+def test_e17_without_a_quorum_nobody_shrinks_the_team() -> None:
+    team = Team()
+    for victim in (1, 2, 3):
+        team.kill(victim)
+    team.run(6.0)
+    assert team.leaders() == []
+    assert len(team.lease_of(4).config.voters) == 5
+
+
+def test_e17_a_restarted_robot_votes_in_its_new_life_within_two_heartbeats() -> None:
+    team = Team()
+    old = team.processes[3].member
+    team.kill(3)
+    team.start(3)
+    team.run(1.0 + 4 * STD.heartbeat_s)
+    voters = team.lease_of(1).config.voters
+    assert team.processes[3].member in voters
+    assert old not in voters
+    assert team.lease_of(1).config.previous is None
+    assert team.safe()
+
+
+def test_bug_7_an_amnesiac_does_not_bring_an_old_majority_back() -> None:
+    """The design's 3.6: two are cut off and removed; of the two that go on one forgets everything, and joins them."""
+    team = Team()
+    team.cut((3, 4))
+    team.run(4.0)
+    assert team.leaders() == [1]
+    assert {m.id for m in team.lease_of(1).config.voters} == {0, 1, 2}
+    team.kill(2, hinted=False)
+    team.heal()
+    team.cut((2, 3, 4))
+    team.start(2)
+    team.run(8.0)
+    assert team.leaders() == [1]
+    assert team.safe()
+    team.heal()
+    team.run(11.0)
+    assert team.leaders() == [1]
+    assert sorted(team.lease_of(4).chain) == [1, 2, 3, 4]
+    assert team.safe()
+
+
+@pytest.mark.parametrize("cut_off", [(1, 2), (3, 4), (1, 3)])
+def test_of_two_halves_the_one_with_the_witness_goes_on(cut_off: tuple[int, ...]) -> None:
+    team = Team()
+    team.cut(cut_off)
+    team.run(4.0)
+    stays = [i for i in team.mission.robots if i not in cut_off]
+    assert team.leaders() == stays[:1]
+    assert sorted(team.lease_of(stays[0]).chain) == stays
+    late = [cmd for at, cmd in team.accepted if cmd.holder in cut_off and at > 1.0 + STD.act_s + STD.deadman_s]
+    assert late == []
+    team.heal()
+    team.run(7.0)
+    assert len({team.lease_of(i).config.version for i in team.ids}) == 1
+    assert sorted(team.lease_of(1).chain) == [1, 2, 3, 4]
+    assert team.safe()
+
+
+def test_the_larger_part_goes_on_without_the_witness() -> None:
+    team = Team(5)
+    team.cut((2, 3, 4, 5))
+    team.run(3.0)
+    assert team.leaders() == [2]
+    assert team.lease_of(4).chain == (2, 3, 4, 5)
+    assert team.safe()
+
+
+def test_e17_a_witness_that_restarts_is_the_tie_breaker_in_its_new_life() -> None:
+    team = Team()
+    team.kill(0)
+    team.run(1.5)
+    assert team.leaders() == [1]
+    team.start(0)
+    team.run(2.0)
+    config = team.lease_of(3).config
+    assert config.tie == team.processes[0].member
+    assert config.tie in config.voters
+    assert config.previous is None
+    assert team.safe()
+
+
+def test_e18_a_majority_that_lost_its_memory_waits_for_all_and_then_goes_on() -> None:
+    team = Team()
+    for victim in (1, 2, 3):
+        team.kill(victim)
+    for victim in (1, 2):
+        team.start(victim)
+    team.run(4.0)
+    assert team.leaders() == []
+    team.start(3)
+    team.run(6.0)
+    assert len(team.leaders()) == 1
+    assert sorted(team.lease_of(4).chain) == [1, 2, 3, 4]
+    assert team.safe()
+
+
+def test_shrink_static_keeps_a_majority_of_the_team_as_voters() -> None:
+    mission = Mission(robots=(1, 2, 3, 4), shrink="static", leading=Leading(route_m=((1.0, 0.0),)))
+    team = Team(mission=mission)
+    for victim in (4, 3):
+        team.kill(victim)
+        team.run(team.now + 2.0)
+    assert team.leaders() == [1]
+    assert len(team.lease_of(1).config.voters) == 3
+    team.kill(2)
+    team.run(team.now + 2.0)
+    assert team.leaders() == [1]
+    assert len(team.lease_of(1).config.voters) == 3
+
+
+def test_tiebreak_head_lets_one_of_two_go_on_without_a_witness() -> None:
+    mission = Mission(robots=(1, 2), witness=False, tiebreak="head", leading=Leading(route_m=((1.0, 0.0),)))
+    team = Team(mission=mission)
+    team.run(2.0)
+    team.kill(2)
+    team.run(4.0)
+    assert team.leaders() == [1]
+    assert team.safe()
+
+
+def test_learners_move_up_when_voters_die() -> None:
+    team = Team(12)
+    team.run(3.0)
+    for victim in (2, 3, 4):
+        team.kill(victim)
+        team.run(team.now + 2.0)
+    voters = {m.id for m in team.lease_of(1).config.voters}
+    assert voters == {0, 1, 5, 6, 7, 8, 9}
     assert team.safe()
