@@ -21,6 +21,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.patches import Circle, Polygon
 
 from deploy.look import chronicle, errors, trace
+from deploy.look import summary as summaries
 from deploy.look.chronicle import Line
 from deploy.look.errors import Errors
 from deploy.look.trace import Array, Trace
@@ -44,13 +45,28 @@ FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": T
 
 
 class Run:
-    """A run folder, read when it is needed."""
+    """A run folder in numbers. `truth`: by robot, in `map`, rows of t [s], x, y [m], theta [rad], v [m/s], omega [rad/s].
+    `errors`: by follower (deploy/look/errors.py). `events`: the lines of events.jsonl."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.scenario: Scenario = scenario_of(folder)
         self.seen: Trace = trace.read(folder)
         self.events: list[Line] = chronicle.lines(folder)
+
+    @cached_property
+    def summary(self) -> summaries.Summary:
+        return summaries.read(self.folder)
+
+    @property
+    def truth(self) -> dict[int, Array]:
+        return self.seen.truth
+
+    def figure(self, name: str) -> Figure:
+        """One of FIGURES by its name. Raises KeyError with the names that there are."""
+        if name not in (known := [known for known, *_ in FIGURES]):
+            raise KeyError(f"{name}: must be one of {', '.join(known)}")
+        return drawn(name, self)
 
     @property
     def robots(self) -> tuple[int, ...]:

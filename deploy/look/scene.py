@@ -184,9 +184,9 @@ class Scene:
         nose = [(-0.5 * r, 0.7 * r), (r, 0.0), (-0.5 * r, -0.7 * r), (-0.5 * r, 0.7 * r)]
         body = rr.LineStrips2D([[*circle, circle[0]], nose], colors=colour, radii=0.035)
         self._say(t, f"world/robot{robot}/body", body)
-        self._say(
-            t, f"world/robot{robot}/name", rr.Points2D([(0.0, 0.0)], colors=colour, radii=0.04, labels=[str(robot)])
-        )
+        if self._named:
+            name = rr.Points2D([(0.0, 0.0)], colors=colour, radii=0.04, labels=[str(robot)])
+            self._say(t, f"world/robot{robot}/name", name)
         self._say(t, f"lease/roles/robot{robot}", rr.StateChange(state=role))
 
     def _lead(self, t: float, robot: int, term: int) -> None:
