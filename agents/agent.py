@@ -17,6 +17,7 @@ from agents.driver import Driver
 from agents.mapping import Grid
 from agents.orders import Orders
 from agents.reports import Reports, status
+from agents.stuck import POSE_LOST
 from agents.voice import Voice
 from protocol.geometry import STILL, Pose2D, Twist
 from protocol.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
@@ -308,6 +309,11 @@ class Agent:
             return
         self._next_handover = now + HANDOVER_S
         place = (floor(pose.x / PLACE_M), floor(pose.y / PLACE_M))
+        if driver.stuck == POSE_LOST:  # no fault of the place: it comes back with the hardware that starts again
+            if len(lease.chain) > 1:
+                self._command(STILL, Role.FOLLOWER, now)
+                self._apply(lease.request_handover(now), now)
+            return
         if place in self._given_up or len(lease.chain) == 1:
             self._event("failed", now, {"reason": f"robot {self._id} is stuck again: {driver.stuck}"})
             self._next_handover = inf

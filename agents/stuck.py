@@ -14,6 +14,7 @@ TURNS, TURNS_S = 3, 10.0
 CELL_M, CELL_ENTRIES, CELL_S = 0.5, 3, 30.0
 WAITING_S = 10.0
 POSE_LOST_S = 1.0
+POSE_LOST = "S5: own pose lost"
 TURNING = ("u_turn", "back")
 
 
@@ -37,7 +38,7 @@ class Stuck:
         """The reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before limits."""
         self._note(pose, action, now)
         if pose_age_s > POSE_LOST_S:
-            return "S5: own pose lost"
+            return POSE_LOST
         if action == "wait" and now - self._since > WAITING_S:
             return "S4: waited too long for what moves"
         if action == "blocked" and now - self._since > BLOCKED_S:

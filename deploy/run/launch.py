@@ -104,6 +104,8 @@ class _Launch:
         self._crew = Crew(folder)
         self._restart = drawn.restart
         self._revive_at: dict[str, float] = {}
+        self._restarted: list[str] = []
+        """Processes started again of which nobody was told yet."""
         self._schedule = Schedule(faults)
         self._undone: list[str] = []
         self._doomed: set[str] = set()
@@ -199,6 +201,9 @@ class _Launch:
             self._heard_at = at
             self._began_at = at if self._began_at is None else self._began_at
             self._time.see(at, message.time_s)
+            while self._restarted:  # not before: what is said while the router is away is lost
+                name = self._restarted.pop(0)
+                self._say("restarted", name=name, robot=robot_id_of(name), t=message.time_s)
         elif isinstance(message, Event) and message.header.sender == OPERATOR_NAME:
             self._expect(message)
         elif isinstance(message, OperatorNote) and message.command == WEATHER:
@@ -242,8 +247,8 @@ class _Launch:
         if clock.now() >= self._revive_at.get(name, 0.0):
             self._revive_at[name] = clock.now() + REVIVE_S_MIN
             view.note(self._standing, f"{self._crew.exit_of(name)}: started again")
-            self._say("restarted", name=name, robot=robot_id_of(name), t=self._time.of(clock.now()))
             self._start_again(name)
+            self._restarted.append(name)
         return True
 
     def _start_again(self, name: str) -> None:
