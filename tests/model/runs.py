@@ -79,7 +79,7 @@ RULES = (
     lease("fences", "123", 1, gateways=True),
     config("one change", 2, "12", 1, short=True),
     config("one change, hand-over", 2, "112", 1),
-    config("one change, hand-over", 3, "112", 1),
+    config("one change", 3, "12", 1),
     config("two changes, hand-over, head as tie-breaker", 2, "112", 2, head_ties=True),
     config("cold start by full house", 2, "12", 0, cold=True, short=True),
     config("full house and a restart", 2, "12", 0, (0, 1, 2), cold=True, short=True),
