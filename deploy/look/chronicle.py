@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,20 @@ def reigns(events: Sequence[Line]) -> list[Reign]:
         last = _ending(done, found[-1], float("inf"))
         found[-1].until_s = None if last is None else last.at_s
     return found
+
+
+def places(events: Sequence[Line], robots: Sequence[int], end_s: float) -> dict[int, list[tuple[float, float]]]:
+    """Of each robot, its place in the newest chain from each moment on [s]; nan while it is out of it."""
+    newest: tuple[Any, ...] = ()
+    steps: dict[int, list[tuple[float, float]]] = {robot: [(0.0, nan)] for robot in robots}
+    for line in of_kind(events, "chain"):
+        version = (tuple(line["term"] or ()), line.get("seq", 0))
+        if newest and version <= newest:
+            continue
+        newest, chain = version, line.get("chain", [])
+        for robot, known in steps.items():
+            known.append((line["t"], float(chain.index(robot)) if robot in chain else nan))
+    return {robot: [*known, (end_s, known[-1][1])] for robot, known in steps.items()}
 
 
 def failovers(events: Sequence[Line], reigns: Sequence[Reign]) -> list[Failover]:

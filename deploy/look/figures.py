@@ -199,6 +199,27 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
     axes.set(xlim=(0.0, end_s), ylim=(max(run.robots) + 0.8, min(run.robots) - 0.8))
 
 
+def _lease(figure: FigureBase, run: Run) -> None:
+    """Who held the lease when, in which term, why it changed; below it the place of each robot in the chain."""
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 3))
+    end_s = max(run.seen.end_s, 1.0)
+    first_n = min((reign.term[0] for reign in run.reigns), default=0)
+    for n, reign in enumerate(run.reigns):
+        until_s = end_s if reign.until_s is None else reign.until_s
+        colour = run.look(reign.robot_id)["color"]
+        above.barh(0, until_s - reign.from_s, left=reign.from_s, height=0.5, color=colour, edgecolor="white")
+        text = f"{reign.cause}: robot {reign.robot_id}, term +{reign.term[0] - first_n}"
+        above.annotate(text, (reign.from_s, 0.3 + 0.35 * (n % 4)), xytext=(3, 0), textcoords="offset points",
+                       fontsize=7)  # fmt: skip
+        above.axvline(reign.from_s, color=colour, linewidth=0.6)
+    above.set(ylim=(-0.3, 1.8), yticks=[], title="Who held the lease, in which term, and what ended the one before")
+    for robot, steps in chronicle.places(run.events, run.robots, end_s).items():
+        below.step(*zip(*steps, strict=True), where="post", label=run.label(robot), **run.look(robot))
+    last = len(run.robots) - 1
+    below.set(ylim=(last + 0.5, -0.5), yticks=range(last + 1), xlim=(0.0, end_s))
+    _finish(below, run, "The chain after it, as its leader told it", "place in the chain")
+
+
 def _string_stability(figure: FigureBase, run: Run) -> None:
     """Along the last chain: how large an error each follower keeps, how lively each turns against the one ahead."""
     left, right = figure.subplots(1, 2)
@@ -228,6 +249,7 @@ FIGURES: tuple[tuple[str, tuple[float, float], str, Draw], ...] = (
     ("fig07_distance_error",    (10.0, 4.0), "Distance error (figure 7)",                           _distance_error),
     ("fig08_orientation_error", (10.0, 6.5), "Orientation error (figure 8)",                        _orientation_error),
     ("fig11_tracking",          (10.0, 6.0), "Tracking controller's output (figure 11)",            _tracking),
+    ("lease_timeline",          (10.0, 5.0), "Lease, terms and chain",                              _lease),
     ("string_stability",        (10.0, 3.5), "String stability, hop by hop",                        _string_stability),
     ("leader_timeline",         (10.0, 3.0), "Who led, and what it took to replace a lost leader",  _leader_timeline),
 )  # fmt: skip
