@@ -45,7 +45,7 @@ FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": T
 
 
 class Run:
-    """A run folder in numbers. `truth`: by robot, in `map`, rows of t [s], x, y [m], theta [rad], v [m/s], omega [rad/s].
+    """A run in numbers. `truth`: by robot, in `map`, rows of t [s], x, y [m], theta [rad], v [m/s], omega [rad/s].
     `errors`: by follower (deploy/look/errors.py). `events`: the lines of events.jsonl."""
 
     def __init__(self, folder: Path) -> None:
@@ -209,8 +209,9 @@ def _lease(figure: FigureBase, run: Run) -> None:
         colour = run.look(reign.robot_id)["color"]
         above.barh(0, until_s - reign.from_s, left=reign.from_s, height=0.5, color=colour, edgecolor="white")
         text = f"{reign.cause}: robot {reign.robot_id}, term +{reign.term[0] - first_n}"
-        above.annotate(text, (reign.from_s, 0.3 + 0.35 * (n % 4)), xytext=(3, 0), textcoords="offset points",
-                       fontsize=7)  # fmt: skip
+        above.annotate(
+            text, (reign.from_s, 0.3 + 0.35 * (n % 4)), xytext=(3, 0), textcoords="offset points", fontsize=7
+        )
         above.axvline(reign.from_s, color=colour, linewidth=0.6)
     above.set(ylim=(-0.3, 1.8), yticks=[], title="Who held the lease, in which term, and what ended the one before")
     for robot, steps in chronicle.places(run.events, run.robots, end_s).items():
