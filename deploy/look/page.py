@@ -114,7 +114,8 @@ def _leaders(run: Run, s: Summary) -> str:
             for f in s.failovers
         ],
     )
-    return _figure("leader_timeline")(run, s) + reigns + ("<h3>Failovers</h3>" + failovers if s.failovers else "")
+    timelines = _figure("leader_timeline")(run, s) + _figure("lease_timeline")(run, s)
+    return timelines + reigns + ("<h3>Failovers</h3>" + failovers if s.failovers else "")
 
 
 def _faults(run: Run, s: Summary) -> str:
