@@ -18,7 +18,7 @@ from protocol.messages import (
     Role,
     Status,
 )
-from protocol.mission import WITNESS_ID, WITNESS_NAME, Mission, robot_id_of
+from protocol.mission import WITNESS_ID, WITNESS_NAME, Mission, robot_id_of, robot_name
 from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop
 from protocol.timing import timing_of
 from protocol.topics import TO_ALL, alive_key, key
@@ -117,6 +117,8 @@ class Witness:
         if self._lease is None:
             return Status(header, Level.WARN, "waiting for a mission", Role.WAITING, NO_TERM, {})
         text = "no leader" if self._lease.leader is None else f"robot{self._lease.leader} leads"
+        if self._lease.missing:
+            text = f"waiting for {', '.join(robot_name(i) for i in self._lease.missing)}"
         return Status(header, Level.OK, text, Role.WAITING, self._lease.term, {})
 
     def _header(self, topic: str, now: float) -> Header:

@@ -36,6 +36,15 @@ def test_it_tells_its_state_once_a_second_and_never_leads() -> None:
     assert not any(isinstance(m, LeaseNote) and isinstance(m.body, Prepare) for m in told)
 
 
+def test_it_names_those_that_the_first_election_waits_for() -> None:
+    witness = Witness("f", 1, 0, MISSION)
+    hello = LeaseNote(Header("robot1", 7, 0, 0.0), Hello(None))
+    witness.tick(0.0)
+    witness.receive(Received(0.1, "lfa/f/robot1/lease/all", hello))
+    [status] = [e.message for e in witness.tick(1.0) if isinstance(e.message, Status)]
+    assert status.text == "waiting for robot2"
+
+
 def test_on_stop_it_finishes() -> None:
     witness = Witness("f", 1, 0, MISSION)
     witness.tick(0.0)
