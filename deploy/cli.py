@@ -38,6 +38,8 @@ COMMANDS = (
           "lfa watch --once"),
     Entry("view", "deploy.look.view", "A recording or a running fleet in the rerun viewer, a browser, or a picture.",
           "lfa view runs/paper_path1-20260101-120000 --screenshot run.png"),
+    Entry("record", "deploy.run.onlook", "Record a fleet that runs already.",
+          "lfa record --seconds 60"),
     Entry("topic", "deploy.look.topic", "What travels in a running fleet: list, echo, hz.",
           "lfa topic echo robot2/pose --count 1"),
     Entry("list", "deploy.look.scenarios", "The shipped scenarios.",

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from deploy.look import trace
 from protocol.zenoh_bus import answers
 from tests.processes.fleet import LFA, eventually, lfa, running
 
@@ -76,3 +77,14 @@ def test_what_is_not_there_is_said_in_one_line() -> None:
     piped = lfa("watch")
     assert (piped.returncode, piped.stderr) == (2, "lfa: watch needs a terminal: use --once or --json\n")
     assert lfa("formation", "circle").stderr == "lfa: formation = circle: must be one of left, right, column, zigzag\n"
+
+
+def test_a_running_fleet_can_be_recorded_from_outside(tmp_path: Path) -> None:
+    with running(tmp_path / "run", "straight", "--robots", "2") as run:
+        run.wait_for("leader_command")
+        fleet, out = f"straight-{run.launcher.pid}", tmp_path / "outside"
+        done = lfa("record", "--fleet", fleet, "--seconds", "2", "--out", str(out))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert ", 0 lost:" in done.stdout
+    assert set(trace.read(out).truth) == {1, 2}
+    assert (out / "scenario.toml").is_file()
