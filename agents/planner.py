@@ -9,7 +9,7 @@ gives the cells it has looked at, so it goes on in the next tick where the budge
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from heapq import heappop, heappush
 from itertools import pairwise
 from math import ceil, cos, hypot, inf, sin
@@ -50,6 +50,8 @@ RETRY_S = 1.0
 """Between two searches that find nothing."""
 CHECK_S = 0.2
 """Between two looks at whether the map still agrees with the route."""
+LONG_CELLS, ROOM_CELLS_MAX = 12_000, 60_000
+"""A search that has looked at so many cells asks whether the robot is walled in, in a room of at most so many."""
 SETTLE_CELLS = 6
 """How far from a barred start or goal a free cell is looked for."""
 
@@ -137,10 +139,16 @@ class Planner:
         if start is None:
             self._fail("no way out of where the robot stands", needed)
             return
-        toward, reached = memoryview(bytearray(4 * len(field))).cast("i"), False
+        toward, reached = bytearray(len(field)), False
+        looked_at, asked = 0, False
         for looked in self._spread(field, goal, start, toward):
             reached = reached or looked < 0
+            looked_at += abs(looked)
             yield abs(looked)
+            if looked_at > LONG_CELLS and not asked:
+                asked = True
+                if (yield from self._closed_in(field, start, goal)):
+                    break
         if not reached and mates:
             yield from self._plan((), needed)
             return
@@ -148,7 +156,8 @@ class Planner:
             self._fail("the goal is walled in: no way to it is left", needed)
             return
         here = self._settled(field, self._pose)
-        cells = _chain(toward, here if here is not None and toward[here] else start, goal)
+        reachable = here is not None and (toward[here] or here == goal)
+        cells = _chain(toward, self._grid.columns, here if here is not None and reachable else start, goal)
         yield len(cells)
         rest = self.route[_nearest(self.route, self._pose) :]
         old = inf if needed else sum(self._price_of_line(field, a, b) for a, b in pairwise(rest))
@@ -205,20 +214,20 @@ class Planner:
         )
         return min((pair for pair in around if self._prices[field[pair[1]]] > 0), default=(0, None))[1]
 
-    def _spread(self, field: bytearray, goal: int, start: int, toward: memoryview[int]) -> Iterator[int]:
-        """A* from `goal`: `toward[cell]` becomes the next cell on the way to it, plus one. Ends with a negative number
-        when `start` is reached, else when nothing is left."""
+    def _spread(self, field: bytearray, goal: int, start: int, toward: bytearray) -> Iterator[int]:
+        """A* from `goal`: `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. Ends
+        with a negative number when `start` is reached, else when nothing is left."""
         columns, prices, scores = self._grid.columns, self._prices, self._grid.scores
         steps = tuple(
-            (row * columns + column, DIAGONAL if row and column else STRAIGHT)
-            for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column
-        )  # fmt: skip
+            (number, offset, DIAGONAL if abs(offset) not in (1, columns) else STRAIGHT)
+            for number, offset in enumerate(_offsets(columns), start=1)
+        )
         best = memoryview(bytearray(4 * len(field))).cast("i")
         closed = bytearray(len(field))
         start_row, start_column = divmod(start, columns)
         rim = (REACH, self._grid.rows - REACH)
         heap = [goal]
-        best[goal], toward[goal] = 1, goal + 1
+        best[goal] = 1
         looked = 0
         while heap:
             cell = heappop(heap) & 0xFFFFFF
@@ -236,7 +245,7 @@ class Planner:
             if not (rim[0] <= row < rim[1] and REACH <= column < columns - REACH):
                 continue
             cost = best[cell]
-            for offset, length in steps:
+            for number, offset, length in steps:
                 other = cell + offset
                 if closed[other]:
                     continue
@@ -249,12 +258,31 @@ class Planner:
                 known = best[other]
                 if known == 0 or total < known:
                     best[other] = total
-                    toward[other] = cell + 1
+                    toward[other] = number
                     row, column = divmod(other, columns)
                     dr, dc = abs(row - start_row), abs(column - start_column)
                     guess = GUESS * (STRAIGHT * max(dr, dc) + (DIAGONAL - STRAIGHT) * min(dr, dc))
                     heappush(heap, (total + guess) << 24 | other)
         yield looked
+
+    def _closed_in(self, field: bytearray, start: int, goal: int) -> Generator[int, None, bool]:
+        """Whether the ground around the robot ends before the goal: a long search would find that out last."""
+        prices, columns = self._prices, self._grid.columns
+        seen = bytearray(len(field))
+        seen[start] = 1
+        cells = [start]
+        for cell in cells:
+            if cell == goal or len(cells) > ROOM_CELLS_MAX:
+                return False
+            row, column = divmod(cell, columns)
+            if not (REACH <= row < self._grid.rows - REACH and REACH <= column < columns - REACH):
+                return False
+            for other in (cell + 1, cell - 1, cell + columns, cell - columns):
+                if not seen[other] and prices[field[other]]:
+                    seen[other] = 1
+                    cells.append(other)
+            yield 1
+        return True
 
     def _fail(self, why: str, needed: bool) -> None:
         if needed:
@@ -332,10 +360,15 @@ def _prices(radius_m: float) -> bytes:
     return bytes(prices)
 
 
-def _chain(toward: memoryview, start: int, goal: int) -> list[int]:
-    cells = [start]
+def _offsets(columns: int) -> tuple[int, ...]:
+    return tuple(row * columns + column for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
+
+
+def _chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
+    """The cells from `start` to `goal`, each step of the search taken back."""
+    offsets, cells = _offsets(columns), [start]
     while cells[-1] != goal:
-        cells.append(toward[cells[-1]] - 1)
+        cells.append(cells[-1] - offsets[toward[cells[-1]] - 1])
     return cells
 
 

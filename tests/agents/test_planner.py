@@ -20,13 +20,17 @@ def ground(*boxes: Box, seen: bool = True) -> Grid:
     grid = Grid((-1.0, -1.0), (11.0, 9.0))
     if seen:
         grid.scores[:] = bytes([4]) * len(grid.scores)
+    occupy(grid, boxes)
+    return grid
+
+
+def occupy(grid: Grid, boxes: tuple[Box, ...]) -> None:
     for cell in range(len(grid.scores)):
         x, y = grid.center(cell)
         if any(x1 < x < x2 and y1 < y < y2 for x1, y1, x2, y2 in boxes) and grid.cell(x, y) is not None:
             grid.scores[cell] = OCCUPIED
             for offset, value in grid.stamp:
                 grid.near[cell + offset] = max(grid.near[cell + offset], value)
-    return grid
 
 
 def plan(planner: Planner, here: Point, *, budget: int = 10**6, mates: tuple[Pose2D, ...] = (), at: float = 0.0) -> int:
@@ -123,6 +127,16 @@ def test_a_goal_that_is_walled_in_is_reported_and_not_searched_for_in_the_whole_
     calls = plan(planner, (2.0, 3.0), budget=160)
     assert planner.route == () and planner.unreachable is not None and "walled in" in planner.unreachable
     assert calls < 10
+
+
+def test_a_robot_that_is_walled_in_itself_finds_out_before_it_has_searched_the_world_outside() -> None:
+    far = Grid((-20.0, -20.0), (40.0, 40.0))
+    box = ((0.0, 0.0, 4.0, 0.2), (0.0, 3.8, 4.0, 4.0), (0.0, 0.0, 0.2, 4.0), (3.8, 0.0, 4.0, 4.0))
+    occupy(far, box)
+    planner = Planner(far, (30.0, 30.0), RADIUS_M)
+    calls = plan(planner, (2.0, 2.0), budget=160)
+    assert planner.unreachable is not None and "walled in" in planner.unreachable
+    assert calls < 120
 
 
 def test_a_goal_in_a_wall_is_reported() -> None:

@@ -1,0 +1,62 @@
+"""Unknown ground from start to end in the simulator: the goal is reached, or the reason is said; the map loads back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from deploy.look.mapped import map_of
+from deploy.run.simulate import run
+from world import maps
+from world.scenario import load
+
+TEAM = ("mission.robots=[1,2]", "mission.formation.separation_m=0.6", "time_limit_s=90")
+
+
+def room(folder: Path, *walls: tuple[int, int, int, int]) -> maps.Map:
+    """6 m x 5 m with walls all round and others (row, row, column, column) of 0.1 m cells."""
+    cells = np.zeros((50, 60), dtype=np.int16)
+    for low, high, left, right in ((0, 1, 0, 60), (49, 50, 0, 60), (0, 50, 0, 1), (0, 50, 59, 60), *walls):
+        cells[low:high, left:right] = 100
+    drawn = maps.Map(cells, 0.1)
+    maps.write(folder / "room.yaml", drawn)
+    return drawn
+
+
+@pytest.fixture(scope="module")
+def explored(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, maps.Map, str, int]:
+    """A run round a wall that is longer than it looks; its folder, the true map, the outcome, the contacts."""
+    folder = tmp_path_factory.mktemp("explored")
+    true = room(folder, (0, 34, 29, 31))
+    sets = [f"map={folder / 'room.yaml'}", "start=1.5,1.5", "goal=4.8,1.5", *TEAM]
+    ended = run(load("explore", sets), 1, folder / "run")
+    return ended.folder, true, ended.summary.outcome, sum(robot.contacts for robot in ended.summary.robots)
+
+
+def test_the_goal_behind_an_unknown_wall_is_reached_without_contact(
+    explored: tuple[Path, maps.Map, str, int],
+) -> None:
+    folder, _, outcome, contacts = explored
+    assert (outcome, contacts) == ("goal_reached", 0), f"look at {folder}"
+
+
+def test_the_leaders_map_overlays_the_true_one(explored: tuple[Path, maps.Map, str, int], tmp_path: Path) -> None:
+    folder, true, _, _ = explored
+    maps.write(tmp_path / "map.yaml", map_of(folder))
+    seen = maps.read(tmp_path / "map.yaml")
+    space = maps.Room(true)
+    rows, columns = np.nonzero(seen.occupied)
+    centers = [seen.to_map((column + 0.5) * 0.1, (row + 0.5) * 0.1) for row, column in zip(rows, columns, strict=True)]
+    off_m = np.array([space.clearance_m(*center) for center in centers])
+    assert len(off_m) > 100
+    assert (off_m <= 0.1).mean() >= 0.95
+
+
+def test_a_goal_that_turns_out_to_be_walled_in_ends_the_mission_with_that_reason(tmp_path: Path) -> None:
+    room(tmp_path, (25, 26, 30, 60), (25, 50, 30, 31))
+    sets = [f"map={tmp_path / 'room.yaml'}", "start=1.5,1.5", "goal=4.5,4.0", *TEAM]
+    summary = run(load("explore", sets), 1, tmp_path / "run").summary
+    assert summary.outcome == "failed", f"look at {tmp_path}"
+    assert summary.reason is not None and "walled in" in summary.reason
