@@ -117,6 +117,8 @@ class Team:
             name = robot_name(robot)
             if not self._crew.wait([name], START_S_MAX):
                 raise Broken(f"{name} does not end")
+            self._poses.pop(robot, None)  # what its earlier life said counts no more
+            self._chains.pop(robot, None)
             self._crew.start(self._rows[name].restarted())
 
     def start(self, row: Row) -> None:

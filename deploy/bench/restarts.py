@@ -1,0 +1,60 @@
+"""A robot killed and started again with empty memory, a hundred times at random moments in ten minutes: it always
+comes back into the chain, and the journals of the whole run break no invariant."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator
+from random import Random
+
+from deploy.bench.rows import Quantity, Row, row, show
+from deploy.bench.team import Broken, Team, endless
+from deploy.look.verify import verify
+from protocol import clock
+
+ROBOTS = 4
+RESTARTS = 100
+EVERY_S = 6.0
+REJOIN_S = 30.0
+"""Patience; it should take t_remove and a second at most."""
+
+
+def run(as_json: bool, kills: int = RESTARTS) -> int:
+    """Print the rows; 0 when all hold."""
+    return show(_rows(kills), as_json)
+
+
+def _rows(kills: int) -> Iterator[list[Row]]:
+    chance = Random("restarts")
+    rejoined, slowest_s = 0, 0.0
+    with Team(endless(ROBOTS)) as team:
+        team.await_chain(ROBOTS)
+        for _ in range(kills):
+            until = clock.now() + EVERY_S
+            _look_on(team, clock.now() + 2.0 * chance.random())
+            victim = chance.choice(team.scenario.mission.robots)
+            team.signal(victim, signal.SIGKILL)
+            _look_on(team, clock.now() + chance.choice((0.0, 0.02, 0.2, 1.0)))
+            team.restart(victim)
+            began = clock.now()
+            try:
+                team.wait_until(lambda: len(team.chain()) == ROBOTS, f"robot {victim} is not back", REJOIN_S)
+            except Broken as broken:
+                print(f"{broken}: {team.describe()}", file=sys.stderr, flush=True)
+                continue
+            rejoined += 1
+            slowest_s = max(slowest_s, clock.now() - began)
+            _look_on(team, until)
+        verdict = verify(team.folder / "run")
+    for broken_one in verdict.broken:
+        print(f"{broken_one.name} at {broken_one.at:.3f} s: {broken_one.text}", file=sys.stderr, flush=True)
+    yield [
+        row("restarts", Quantity("rejoined", "times", float(kills), "at least"), float(rejoined)),
+        row("restarts", Quantity("slowest start to whole chain", "s"), slowest_s),
+        row("restarts", Quantity("violations", "times", 0.0), float(len(verdict.broken))),
+    ]
+
+
+def _look_on(team: Team, until: float) -> None:
+    team.wait_until(lambda: clock.now() >= until, "the clock stands", 2.0 * EVERY_S)
