@@ -13,7 +13,8 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import pi, sin, sqrt
+from itertools import pairwise
+from math import hypot, pi, sin, sqrt
 from pathlib import Path
 
 from agents.agent import Agent
@@ -29,8 +30,8 @@ from protocol.node import Node
 from protocol.radio import Radio
 from protocol.witness import Witness
 from world.kinematic import Kinematic
-from world.scenario import Lidar, Scenario, WorldSpec
-from world.simulator import Simulator
+from world.scenario import Lidar, Scenario, WorldSpec, load
+from world.simulator import LocalClock, Simulator
 from world.world import World
 
 FLEET = "bench"
@@ -41,6 +42,7 @@ BEGIN_S = 5.0
 """The chain stands together."""
 SETTLED_S = 20.0
 """The wave has reached the last robot."""
+CLOCKS_BEGIN_S, CLOCKS_END_S = 25.0, 40.0
 REPEATED = ("vel, 40 ms", "vel, 80 ms 5 %", "vel, 220 ms 20 %")
 
 SCENARIOS = ("straight", "circle", "figure_eight")
@@ -58,7 +60,8 @@ def cases() -> list[Case]:
         for scheme in SCHEMES
         if scheme.name in REPEATED
     ]
-    return [*repeated, *(_scenario("simulated", "sim", name, GOOD) for name in SCENARIOS)]
+    clocks = Case("agents/clocks 3 s, 10 days, 200 ppm", (Quantity("distance rms", "mm", 1.0),), clock_errors)
+    return [*repeated, clocks, *(_scenario("simulated", "sim", name, GOOD) for name in SCENARIOS)]
 
 
 def process_cases() -> list[Case]:
@@ -110,13 +113,46 @@ def _whole(scheme: Scheme) -> list[float]:
                 speeds[robot.id - 1].append(robot.linear_x)
 
     simulator.taps.append(hear)
-    agents = [Agent(robot, 1, FLEET, 1) for robot in mission.robots]
-    nodes: list[Node] = [World(FLEET, scenario, 1, 1, start_at=0.0, bodies=Kinematic), Witness(FLEET, 1, 1), *agents]
-    for node in nodes:
-        simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 1, {})))
+    agents = _gather(simulator, scenario, {})
     simulator.at(1.0, lambda: _let_wave(agents[0], Waving(mission, lambda: simulator.now)))
     simulator.run(end + 0.1)
     return [_deviation(values) for values in speeds]
+
+
+def _gather(simulator: Simulator, scenario: Scenario, clocks: dict[str, LocalClock]) -> list[Agent]:
+    """World, witness and agents of `scenario`, each on its clock; the agents."""
+    agents = [Agent(robot, 1, FLEET, 1) for robot in scenario.mission.robots]
+    nodes: list[Node] = [World(FLEET, scenario, 1, 1, start_at=0.0, bodies=Kinematic), Witness(FLEET, 1, 1), *agents]
+    for node in nodes:
+        journal = Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 1, {}))
+        simulator.add(node, journal, clocks.get(node.name))
+    return agents
+
+
+CLOCKS = {
+    "robot2": LocalClock(3.0, 1.0),
+    "robot3": LocalClock(864000.0, 1.0 + 200e-6),
+    "robot4": LocalClock(0.0, 1.0 - 200e-6),
+}
+
+
+def clock_errors() -> tuple[float]:
+    """Distance rms [mm] of the worst follower on the circle, 20 ms apart, each machine with a clock of its own."""
+    simulator = Simulator(Radio(delay_s=0.02, jitter_s=0.001), seed=1)
+    scenario = load("circle")
+    sums, count = [0.0, 0.0, 0.0], 0
+
+    def hear(now: float, _key: str, _payload: bytes, message: Message) -> None:
+        nonlocal count
+        if isinstance(message, Truth) and now > CLOCKS_BEGIN_S:
+            count += 1
+            for index, (ahead, robot) in enumerate(pairwise(message.robots)):
+                sums[index] += (hypot(robot.x - ahead.x, robot.y - ahead.y) - SEPARATION_M) ** 2
+
+    simulator.taps.append(hear)
+    _gather(simulator, scenario, CLOCKS)
+    simulator.run(CLOCKS_END_S)
+    return (1e3 * sqrt(max(sums) / count),)
 
 
 def _let_wave(agent: Agent, lead: Lead) -> None:
