@@ -1,0 +1,53 @@
+"""A world that starts again goes on from where the one before it stood."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from protocol.messages import Truth
+from protocol.mission import Refused
+from world import memory
+from world.scenario import draw, load
+from world.world import World
+
+SCENARIO = draw(load("paper_path1"), 7)
+
+
+def last_truth(world: World, since: float, until: float) -> Truth:
+    """The last ground truth that `world` says between these moments, ticked as it asks for it."""
+    truths: list[Truth] = []
+    while world.next_deadline() <= until:
+        said = world.tick(max(world.next_deadline(), since))
+        truths += [envelope.message for envelope in said if isinstance(envelope.message, Truth)]
+    return truths[-1]
+
+
+def test_time_robots_and_obstacles_go_on_from_the_state() -> None:
+    first = World("f", SCENARIO, 7, 1, start_at=10.0)
+    before = last_truth(first, 10.0, 12.0)
+    known = msgspec.json.decode(msgspec.json.encode(first.memory()), type=memory.Memory)
+    second = World("f", memory.resumed(SCENARIO, known), 7, 2, start_at=50.0, memory=known)
+    after = last_truth(second, 50.0, 50.015)
+    assert after.robots == before.robots
+    assert 0.0 < after.time_s - before.time_s < 0.03
+    moved_m = max(abs(a.x - b.x) + abs(a.y - b.y) for a, b in zip(after.obstacles, before.obstacles, strict=True))
+    assert moved_m < 0.01, "an obstacle jumped"
+
+
+def test_the_state_of_another_team_is_refused() -> None:
+    known = World("f", SCENARIO, 7, 1, start_at=0.0)
+    last_truth(known, 0.0, 0.1)
+    other = draw(load("paper_path1", robots=2), 7)
+    with pytest.raises(Refused, match="--resume"):
+        memory.resumed(other, known.memory())
+
+
+def test_a_folder_without_a_state_is_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match="--resume"):
+        memory.read(tmp_path)
+    (tmp_path / memory.STATE).write_text("{")
+    with pytest.raises(Refused, match="no state of a world"):
+        memory.read(tmp_path)
