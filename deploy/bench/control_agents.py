@@ -43,7 +43,7 @@ BEGIN_S = 5.0
 SETTLED_S = 20.0
 """The wave has reached the last robot."""
 CLOCKS_BEGIN_S, CLOCKS_END_S = 25.0, 40.0
-REPEATED = ("vel, 40 ms", "vel, 80 ms 5 %", "vel, 220 ms 20 %")
+REPEATED = ("vel, 40 ms", "vel, 80 ms 5 %", "vel, 80 ms 20 %")
 
 SCENARIOS = ("straight", "circle", "figure_eight")
 RUN_S_MAX = 900.0
