@@ -137,7 +137,8 @@ class Agent:
                 role, term = (
                     (Role.WAITING, NO_TERM) if self._lease is None else (self._role(self._lease), self._lease.term)
                 )
-                status(self._voice, message, self._driver, role, term, now)
+                missing = () if lease is None else lease.missing
+                status(self._voice, message, self._driver, missing, role, term, now)
             case Stop():
                 self._stop(now)
             case _ if self._lease is not None and self._driver is not None:

@@ -8,6 +8,7 @@ from agents.strategy import Decision
 from agents.voice import Voice
 from protocol.geometry import Pose2D, Twist
 from protocol.messages import Level, ObstacleNote, PoseStamped, Role, Status, TableRow, Term, Tracking
+from protocol.mission import robot_name
 from protocol.node import Vitals
 
 TRACKING_EVERY = 2
@@ -82,8 +83,10 @@ class Reports:
         ))  # fmt: skip
 
 
-def status(voice: Voice, vitals: Vitals, driver: Driver | None, role: Role, term: Term, now: float) -> None:
-    """Diagnostics in the sense of ROS; `driver` is None before the mission is known."""
+def status(
+    voice: Voice, vitals: Vitals, driver: Driver | None, missing: tuple[int, ...], role: Role, term: Term, now: float
+) -> None:
+    """Diagnostics in the sense of ROS. `driver` is None before the mission is known; `missing` stay away (E18)."""
     counters: dict[str, float] = {
         "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
         "dropped": vitals.dropped,
@@ -94,6 +97,8 @@ def status(voice: Voice, vitals: Vitals, driver: Driver | None, role: Role, term
     text, level = "waiting for the mission", Level.WARN
     if driver is not None:
         text, level = (role.value, Level.OK) if driver.estimator.ready else ("waiting for sensors", Level.WARN)
+        if missing:
+            text, level = f"waiting for {', '.join(robot_name(i) for i in missing)}", Level.WARN
         counters |= {"outliers": driver.estimator.outliers, "refused": driver.estimator.refused}
         if driver.predecessor is not None:
             counters["predecessor_clock_offset_s"] = driver.predecessor.clock.offset(now)

@@ -102,6 +102,16 @@ class Candidate:
             return ()
         return tuple(lives[i] for i in universe)
 
+    def blank_majority(self, universe: tuple[int, ...]) -> tuple[Member, ...]:
+        """E19: the newest lives of more than half of all ids, the witness (last of `universe`) among them; else nobody.
+
+        One promiser that remembers a config is enough to forbid it.
+        """
+        lives = {m.id: m for m in sorted(self._promised)}
+        here = tuple(lives[i] for i in universe if i in lives)
+        fine = 2 * len(here) > len(universe) and universe[-1] in lives and not self._remembering
+        return here if fine else ()
+
 
 def _term(grantee: Grantee) -> Term:
     return grantee.term

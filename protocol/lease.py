@@ -47,6 +47,8 @@ from protocol.timing import CLOCK_RATE_ERROR, Timing
 __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Send", "StepDown"]
 
 NEVER = float("inf")
+COLD_START_S = 3.0
+"""How long a cold start waits for everybody where `cold_start = "majority"` (E19)."""
 SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 """How many seconds of the fastest clock one second of the slowest may last."""
 HELLO_HEARTBEATS = 3
@@ -76,6 +78,8 @@ class Lease:
         self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
         self._universe = universe(mission)
         self._tiebreak, self._shrink = mission.tiebreak, mission.shrink
+        majority = mission.cold_start == "majority" and mission.witness
+        self._majority_from = now + COLD_START_S if majority else NEVER
         self._acceptor = Acceptor(Term(floor), timing.grant_s, now)
         self._candidate: Candidate | None = None
         self._holder: Holder | None = None
@@ -389,6 +393,8 @@ class Lease:
         lives: tuple[Member, ...] = ()
         if not candidate.has_quorum(self.config):
             lives = candidate.full_house(self.config, self._universe)
+            if not lives and is_first(self.config) and now >= self._majority_from:
+                lives = candidate.blank_majority(self._universe)
             if self.me not in lives:
                 return
         for grantee in candidate.fences_to_ask(self.me):

@@ -17,6 +17,7 @@ WITNESS_NAME = "witness"
 Side = Literal["left", "right", "column", "zigzag"]
 Motion = Literal["path_following", "point_to_point", "explore"]
 TieBreak = Literal["witness", "head", "none"]
+ColdStart = Literal["full_house", "majority"]
 Shrink = Literal["dynamic", "static"]
 Profile = Literal["fast", "std", "wifi"]
 
@@ -100,6 +101,11 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     tiebreak: TieBreak = "witness"
     """Who decides between two halves: the witness, the head of the chain, or nobody."""
     shrink: Shrink = "dynamic"
+    cold_start: ColdStart = "full_house"
+    """Who must be there when nobody remembers anything: all ids, or after 3 s more than half of them with the witness.
+
+    `majority` is for gateways that stand or fall with the witness, as a simulated world's do (E19).
+    """
     """`static`: never fewer voters than a majority of the team."""
     can_lead: tuple[int, ...] | None = None
     """Ids that may lead; all when not given."""

@@ -10,7 +10,7 @@ from deploy.look.checkers import SAFETY, Checker
 from deploy.run.arena import Arena
 from protocol.acceptor import Acceptor
 from protocol.effects import BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from protocol.lease import Lease
+from protocol.lease import COLD_START_S, Lease
 from protocol.membership import first_config
 from protocol.messages import (
     Config,
@@ -718,4 +718,52 @@ def test_learners_move_up_when_voters_die() -> None:
         team.run(team.now + 2.0)
     voters = {m.id for m in team.lease_of(1).config.voters}
     assert voters == {0, 1, 5, 6, 7, 8, 9}
+    assert team.safe()
+
+
+MAJORITY = Mission(robots=(1, 2, 3, 4), cold_start="majority", leading=Leading(route_m=((1.0, 0.0),)))
+
+
+def started(*ids: int, mission: Mission) -> Arena:
+    """Only these processes, for six seconds."""
+    arena = Arena(4, mission=mission)
+    for robot_id in ids:
+        arena.start(robot_id)
+    arena.run(6.0)
+    return arena
+
+
+def test_e19_a_majority_with_the_witness_starts_after_its_patience_and_latecomers_join() -> None:
+    arena = started(0, 1, 2, mission=MAJORITY)
+    assert arena.leaders() == [1]
+    assert next(at for at, _, effect in arena.log if isinstance(effect, BecomeLeader)) >= COLD_START_S
+    arena.start(3)
+    arena.start(4)
+    arena.run(10.0)
+    assert arena.leaders() == [1]
+    assert arena.lease_of(4).chain[:2] == (1, 2)
+    assert sorted(arena.lease_of(4).chain) == [1, 2, 3, 4]
+
+
+def test_e19_needs_the_witness_and_more_than_half() -> None:
+    assert started(1, 2, 3, mission=MAJORITY).leaders() == []
+    assert started(0, 1, mission=MAJORITY).leaders() == []
+
+
+def test_e19_is_not_for_a_full_house_team() -> None:
+    assert (
+        started(0, 1, 2, 3, mission=Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))).leaders()
+        == []
+    )
+
+
+def test_e19_a_promiser_that_remembers_a_config_forbids_it() -> None:
+    """Two of four die, and the two that are left with the witness lose their memory but for one."""
+    team = Team(mission=MAJORITY)
+    for victim in (0, 1, 2, 3):
+        team.kill(victim)
+    for victim in (0, 1):
+        team.start(victim)
+    team.run(9.0)
+    assert team.leaders() == []
     assert team.safe()
