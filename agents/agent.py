@@ -134,9 +134,8 @@ class Agent:
                 if self._lease is None:
                     self._begin(message.mission, now)
             case Vitals():
-                role, term = (
-                    (Role.WAITING, NO_TERM) if self._lease is None else (self._role(self._lease), self._lease.term)
-                )
+                lease = self._lease
+                role, term = (Role.WAITING, NO_TERM) if lease is None else (self._role(lease), lease.term)
                 missing = () if lease is None else lease.missing
                 status(self._voice, message, self._driver, missing, role, term, now)
             case Stop():
