@@ -32,8 +32,8 @@ JUDGE_M = 0.6
 NEAR_M = 0.5
 CROSSING_MPS = 0.2
 """Slow enough for the wheels, whatever they meet (control.md section 7)."""
-SEEN_MIN = 2
-AGAIN_S = 1.0
+SEEN_MIN = 4
+AGAIN_S = 0.3
 """A cell counts when it was seen so often, each time within so long of the last: one bad reading is no hole."""
 
 

@@ -29,6 +29,8 @@ class Stuck:
         self._since = 0.0
         self._turns: deque[float] = deque(maxlen=TURNS)
         self._cell: tuple[int, int] | None = None
+        self._entered: tuple[float, float] | None = None
+        """Where the cell was entered: who stands on a border does not enter with every bit of noise."""
         self._entries: dict[tuple[int, int], deque[float]] = {}
 
     def reset(self) -> None:
@@ -55,8 +57,9 @@ class Stuck:
             if action in TURNING:
                 self._turns.append(now)
         cell = (floor(pose.x / CELL_M), floor(pose.y / CELL_M))
-        if cell != self._cell:
-            self._cell = cell
+        far = self._entered is None or hypot(pose.x - self._entered[0], pose.y - self._entered[1]) > 0.5 * CELL_M
+        if cell != self._cell and far:
+            self._cell, self._entered = cell, (pose.x, pose.y)
             self._entries.setdefault(cell, deque(maxlen=CELL_ENTRIES)).append(now)
             if len(self._entries) > 256:
                 self._entries.pop(next(iter(self._entries)))

@@ -46,6 +46,13 @@ def test_S3_in_the_same_place_again_and_again() -> None:
     assert str(reason).startswith("S3")
 
 
+def test_noise_on_a_cells_border_is_no_coming_back() -> None:
+    stuck = Stuck()
+    for n in range(500):
+        x = 0.5 + (0.004 if n % 2 else -0.004) + 0.0002 * n
+        assert stuck.watch(Pose2D(x, 0.1, 0.0), STILL, None, 0.0, 0.02 * n) is None
+
+
 def test_S4_waited_too_long_for_what_moves() -> None:
     assert str(watched(WAITING_S + 0.2, STILL, "wait")).startswith("S4")
 
