@@ -18,7 +18,8 @@ BACK_MPS = 0.25
 WAIT_S_MAX = 5.0
 """After so long what moves is gone round as if it stood."""
 HOLD_S = 1.0
-"""A robot stays slow at least so long after the last conflict."""
+"""A robot takes less care only so long after the last conflict."""
+CARE = {"slow": 0, "wait": 1, "back": 2}
 WORTH_M = 0.1
 """Backing off must win this much clearance over waiting."""
 
@@ -30,34 +31,43 @@ class Crossing:
         self.decision: Decision | None = None
         self._waiting_since: float | None = None
         self._held_until = 0.0
+        self._impatient = False
+
+    @property
+    def patient(self) -> bool:
+        """False once the longest wait is over: what moves is then gone round as if it stood."""
+        return not self._impatient
 
     def give_way(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, now: float) -> Twist:
         """`wanted`, or less of it. `moving` as of now, in `map` like `pose`."""
         near = _closest(moving, pose, wanted)
-        if near >= CLEARANCE_M:
-            if self._held_until > now and self.decision is not None:
-                return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
-            self.decision, self._waiting_since = None, None
+        if near >= CLEARANCE_M and now >= self._held_until:
+            self.decision, self._waiting_since, self._impatient = None, None, False
             return wanted
-        self._held_until = now + HOLD_S
         if self._waiting_since is None:
             self._waiting_since = now
-        if now - self._waiting_since > WAIT_S_MAX:
+        self._impatient = now - self._waiting_since > WAIT_S_MAX
+        if self._impatient:
             self.decision = None
             return wanted
-        action, twist = self._less(moving, pose, wanted)
-        self.decision = Decision(action, near, 0.0, "moving")
-        return twist
+        action = "slow" if near >= CLEARANCE_M else self._less(moving, pose, wanted)
+        if self.decision is None or CARE[action] >= CARE[self.decision.action] or now >= self._held_until:
+            self.decision = Decision(action, near, 0.0, "moving")
+            self._held_until = now + HOLD_S if near < CLEARANCE_M else self._held_until
+        return _done(self.decision.action, wanted)
 
-    def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist) -> tuple[str, Twist]:
-        slow = Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
-        if _closest(moving, pose, slow) >= CLEARANCE_M:
-            return "slow", slow
-        back = Twist(-BACK_MPS, 0.0)
-        standing, backing = _closest(moving, pose, STILL), _closest(moving, pose, back)
-        if standing >= CLEARANCE_M or standing + WORTH_M >= backing:
-            return "wait", STILL
-        return "back", back
+    def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist) -> str:
+        """The least that keeps the distance; what keeps most of it when nothing does."""
+        if _closest(moving, pose, _done("slow", wanted)) >= CLEARANCE_M:
+            return "slow"
+        standing, backing = _closest(moving, pose, STILL), _closest(moving, pose, _done("back", wanted))
+        return "wait" if standing >= CLEARANCE_M or standing + WORTH_M >= backing else "back"
+
+
+def _done(action: str, wanted: Twist) -> Twist:
+    if action == "slow":
+        return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
+    return STILL if action == "wait" else Twist(-BACK_MPS, 0.0)
 
 
 def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist) -> float:

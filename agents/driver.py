@@ -141,7 +141,8 @@ class Driver:
         if self.explore is not None and self.explore.work(role is Role.LEADER, pose, self._mates(now), now):
             self.lead.take(self.explore.route, pose)
         moving = self._beliefs.moving(self._tracker.moving(now), now)
-        still = points if not moving else [p for p in points if not _belongs(p, pose, moving)]
+        giving_way = moving and self._crossing.patient
+        still = [p for p in points if not _belongs(p, pose, moving)] if giving_way else points
         if role is Role.LEADER:
             wanted = self._leading(chain, still, pose, now)
         elif role is Role.FOLLOWER:

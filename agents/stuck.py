@@ -15,7 +15,8 @@ CELL_M, CELL_ENTRIES, CELL_S = 0.5, 3, 30.0
 WAITING_S = 10.0
 POSE_LOST_S = 1.0
 POSE_LOST = "S5: own pose lost"
-TURNING = ("u_turn", "back")
+TURN_S_MIN = 1.0
+"""U-turns nearer together are one: an action that flickers."""
 
 
 class Stuck:
@@ -54,7 +55,7 @@ class Stuck:
     def _note(self, pose: Pose2D, action: str | None, now: float) -> None:
         if action != self._action:
             self._action, self._since = action, now
-            if action in TURNING:
+            if action == "u_turn" and (not self._turns or now - self._turns[-1] >= TURN_S_MIN):
                 self._turns.append(now)
         cell = (floor(pose.x / CELL_M), floor(pose.y / CELL_M))
         far = self._entered is None or hypot(pose.x - self._entered[0], pose.y - self._entered[1]) > 0.5 * CELL_M
