@@ -34,6 +34,8 @@ class Profiler:
         self._shape = (3, count)
         self._reach_m = float(np.hypot(ahead[-1], side_m))
         self._patches = patches_of(scenario.world)
+        self.flat = not self._patches
+        """Nothing to see: robots of such a world carry no ground sensor, and need not hear of it 20 times a second."""
         rows = [(p.x, p.y, p.reach_m, p.radius_m, p.half_x_m, p.half_y_m, p.c, p.s) for p in self._patches]
         self._rows = np.array(rows, dtype=float).reshape(-1, 8)
 

@@ -238,7 +238,7 @@ class World:
         if self._is_due(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, self._bodies.moved())
             sent += [robot.scan(stamp, ranges[n]) for n, robot in enumerate(self._robots)]
-        if self._is_due(TOPIC["ground"].rate_hz):
+        if not self._profiler.flat and self._is_due(TOPIC["ground"].rate_hz):
             heights = self._profiler.profile(poses, self._bodies.standing_m())
             sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in enumerate(self._robots)]
         if self._is_due(TOPIC["truth"].rate_hz):

@@ -112,20 +112,26 @@ def events(said: list[Envelope], kind: str) -> list[Event]:
     return [event for event in of(said, Event) if event.kind == kind]
 
 
+FAR_BUMP = "world.bumps=[{center_m=[50,50], width_m=0.1, length_m=1, height_m=0.01}]"
+
 # --- time --------------------------------------------------------------------------------------------------------
 
 
 def test_every_topic_comes_at_its_rate_for_every_robot() -> None:
-    said = Rig().run(10.0 - 0.005)
+    said = Rig(FAR_BUMP).run(10.0 - 0.005)
     count = Counter((e.key.split("/")[2], e.key.split("/")[3]) for e in said)
     for robot in ("robot1", "robot2", "robot3", "robot4"):
         assert [count[robot, topic] for topic in ("sensors", "localization", "scan", "ground")] == [500, 100, 100, 200]
     assert (count["sim", "truth"], count["sim", "clock"], count["world", "mission"]) == (500, 10, 1)
 
 
+def test_a_world_without_terrain_has_no_ground_sensors() -> None:
+    assert of(Rig().run(1.0), GroundProfile) == []
+
+
 @pytest.mark.parametrize("physics_hz", [100.0, 130.0, 250.0])
 def test_rates_do_not_depend_on_the_physics_rate(physics_hz: float) -> None:
-    said = Rig(f"world.physics_hz={physics_hz}").run(4.0 - 0.001)
+    said = Rig(f"world.physics_hz={physics_hz}", FAR_BUMP).run(4.0 - 0.001)
     assert len(of(said, Sensors, "robot1")) == 200
     assert len(of(said, LaserScan, "robot1")) == 40
     assert len(of(said, GroundProfile, "robot1")) == 80
