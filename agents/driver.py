@@ -28,7 +28,7 @@ from agents.safety import SKIN_M, safe
 from agents.strategy import Decision, Detour
 from agents.stuck import Stuck
 from protocol.geometry import STILL, Pose2D, Twist, bearing, distance, wrap
-from protocol.messages import GroundProfile, LaserScan, ObstacleNote, Role
+from protocol.messages import GroundProfile, LaserScan, ObstacleNote, Role, Slot
 from protocol.mission import Mission
 
 GAP_SLOW = 1.5
@@ -42,6 +42,8 @@ LEADER_OMEGA_MAX_RADPS = 0.6
 TRACK_EVERY = 5
 """Control periods between a follower's looks at its place on the route."""
 DT_MIN_S = 0.002
+SWING_S, SWING_SHARE = 10.0, 0.7
+"""After an orientation request the leader goes at this share of its cruise speed for so long."""
 OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
 """Wheels that obey are nearer than this to the command: several periods of full acceleration."""
 NOSE_M, NOSE_RAD, NOSE_RADPS, NOSE_MPS = 0.05, 0.2, 0.5, 0.1
@@ -83,6 +85,8 @@ class Driver:
         self._driven_at: float | None = None
         self._waiting_since: float | None = None
         self._steps = 0
+        self._asked: dict[int, float] = {}
+        self._swings_until = 0.0
 
     @property
     def decision(self) -> Decision | None:
@@ -198,13 +202,21 @@ class Driver:
     def _leading(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
         leading = self._mission.leading
         slots = [] if self.formation.trace else [self.formation.slot_of(robot) for robot in chain[1:]]
-        speed = leading.cruise_mps * self._patience(chain, pose, now)
+        speed = leading.cruise_mps * self._patience(chain, pose, now) * self._swing(slots, now)
         wanted = self.lead.step(pose, self._last, slots, speed)
         if self.explore is not None:
             return self._exploring(points, pose, wanted) if self.explore.route else STILL
         reach = min(LOOK_M, self.lead.remaining_m(pose))
         around = self._steer(points, self.lead.ahead(pose, reach), wanted, 0.7 * speed, pose, now)
         return wanted if around is None else around
+
+    def _swing(self, slots: Sequence[Slot], now: float) -> float:
+        """Share of the cruise speed while the formation changes: the last robot's slot swings with all before it."""
+        asked = {slot.robot: slot.phi for slot in slots}
+        if any(self._asked.get(robot, phi) != phi for robot, phi in asked.items()):
+            self._swings_until = now + SWING_S
+        self._asked = asked
+        return SWING_SHARE if now < self._swings_until else 1.0
 
     def _exploring(self, points: list[Point], pose: Pose2D, wanted: Twist) -> Twist:
         """Along the planned route; where the nose is at a wall, turned towards the route first, or backed away."""
