@@ -7,14 +7,13 @@ moment. A robot that becomes leader commands at once.
 from __future__ import annotations
 
 from math import floor, inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
 from agents.driver import Driver
-from agents.mapping import Grid
 from agents.orders import Orders
 from agents.reports import Reports, status
 from agents.stuck import POSE_LOST
@@ -44,6 +43,9 @@ from protocol.mission import Mission, Refused, check_mission, robot_id_of, robot
 from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
 from protocol.timing import timing_of
 from protocol.topics import TOPIC, alive_key
+
+if TYPE_CHECKING:
+    from agents.mapping import Grid
 
 ASK_S = 0.5
 HANDOVER_S = 2.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import atan2, cos, hypot, inf, sin
+from typing import TYPE_CHECKING
 
 from msgspec import structs
 
@@ -16,7 +17,6 @@ from agents.config import CONTROL_PERIOD_S
 from agents.crossing import Crossing
 from agents.decisions import Class, Situation, decide
 from agents.estimator import Estimator
-from agents.explore import Explore
 from agents.features import Feature, Tracker
 from agents.following import follower_of, predecessor_of
 from agents.formation import Formation
@@ -30,6 +30,9 @@ from agents.stuck import Stuck
 from protocol.geometry import STILL, Pose2D, Twist, bearing, distance, wrap
 from protocol.messages import GroundProfile, LaserScan, ObstacleNote, Role, Slot
 from protocol.mission import Mission
+
+if TYPE_CHECKING:
+    from agents.explore import Explore
 
 GAP_SLOW = 1.5
 GAP_WAIT = 2.2
@@ -78,7 +81,11 @@ class Driver:
         self._stuck = Stuck(again=mission.leading.motion != "explore")
         self.stuck: str | None = None
         """Why this robot is stuck, None when it is not."""
-        self.explore = Explore(mission) if mission.leading.motion == "explore" else None
+        self.explore: Explore | None = None
+        if mission.leading.motion == "explore":
+            from agents.explore import Explore  # a map and a planner: memory that only explorers need
+
+            self.explore = Explore(mission)
         """A map of one's own and the route through it, where the mission asks for it."""
         self._role = Role.WAITING
         self._last = STILL
