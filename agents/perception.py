@@ -65,7 +65,7 @@ def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> fl
     if v == 0.0:
         return inf
     sign = 1.0 if v > 0.0 else -1.0
-    if abs(omega) < STRAIGHT_RADPS * abs(v):
+    if abs(omega) <= STRAIGHT_RADPS * abs(v):
         return min((_straight(sign * x, y, half_width_m) for x, y in points), default=inf)
     radius = abs(v / omega)
     left = 1.0 if omega * sign > 0.0 else -1.0

@@ -62,3 +62,7 @@ def test_no_body_that_stays_within_the_free_way_touches_the_point(x: float, y: f
 def test_a_point_that_was_passed_does_not_bar_a_bend() -> None:
     beside = (0.0, -0.19)
     assert free_along([beside], Twist(0.5, 0.5), 0.2) > 0.5
+
+
+def test_the_smallest_of_speeds_straight_ahead_is_straight() -> None:
+    assert free_along([(1.0, 0.0)], Twist(5e-324, 0.0), 0.2) == 0.8
