@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, inf, pi, sin, sqrt
+from math import acos, atan2, cos, hypot, inf, pi, sin, sqrt
 
 from protocol.geometry import Pose2D, Twist
 from protocol.messages import LaserScan
@@ -81,14 +81,14 @@ def _straight(x: float, y: float, half_width_m: float) -> float:
 def _bent(x: float, y: float, radius: float, half_width_m: float) -> float:
     """Forward motion on a left bend about (0, radius); the way until the body's edge meets the point."""
     from_center = hypot(x, y - radius)
-    if abs(from_center - radius) >= half_width_m:
+    if abs(from_center - radius) >= half_width_m or from_center == 0.0:
         return inf
-    angle = atan2(x, radius - y)
-    if angle <= 0.0:
-        if x <= 0.0 and hypot(x, y) < 2.0 * half_width_m:
-            return inf
-        angle += 2.0 * pi
-    return max(0.0, radius * angle - half_width_m)
+    if hypot(x, y) < half_width_m:
+        return inf if x <= 0.0 else 0.0
+    # The body touches the point while the angle between them, seen from the bend's centre, is at most this.
+    reach = (radius * radius + from_center * from_center - half_width_m * half_width_m) / (2.0 * radius * from_center)
+    touching = acos(max(-1.0, min(1.0, reach)))
+    return radius * ((atan2(x, radius - y) - touching) % (2.0 * pi))
 
 
 def sides(points: Sequence[Point]) -> tuple[float, float, float]:
