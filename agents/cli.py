@@ -54,7 +54,11 @@ def _parser() -> argparse.ArgumentParser:
     add("--role", required=True, help="place it starts in: leader, follower or witness; roles change at run time")
     add("--id", required=True, help="robot id from the mission (1, 2, ...), or w for the witness")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
-    add("--connect", metavar="ENDPOINT", help="the router, like tcp/127.0.0.1:7447 (default: this machine's)")
+    add(
+        "--connect",
+        metavar="ENDPOINT",
+        help="router, like tcp/127.0.0.1:7447; a,b: or the next (default: this machine's)",
+    )
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; else it comes over Zenoh")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
     add("--faults", action="store_true", help="obey an operator's radio weather (lfa fault cut, loss): for tests")

@@ -18,6 +18,8 @@ TO_ALL = "all"
 WORLD_NAME = "world"
 OPERATOR_NAME = "operator"
 RECORDER_NAME = "recorder"
+HOST_PREFIX = "host-"
+"""The supervisor of machine `a` speaks as `host-a`."""
 
 
 class Topic(Struct, frozen=True):
@@ -61,6 +63,9 @@ TOPICS: tuple[Topic, ...] = (
     Topic("contact",      m.Contact,       ("driver",),           None, False, False, "data",       None),
     Topic("truth",        m.Truth,         ("world",),            50.0, False, False, "background", None),
     Topic("clock",        m.Clock,         ("world",),            1.0,  True,  False, "background", None),
+    Topic("host",         m.HostStatus,    ("host",),             1.0,  True,  True,  "data",       3.0),
+    Topic("order",        m.HostOrder,     ("operator",),         None, False, True,  "prompt",     None),
+    Topic("log",          m.LogLines,      ("host",),             None, False, True,  "background", None),
 )  # fmt: skip
 
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}

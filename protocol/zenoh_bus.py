@@ -58,10 +58,13 @@ class ZenohBus:
     """A client session with declared publishers, followed subscriptions and one liveliness token."""
 
     def __init__(self, endpoint: str, inbox: Inbox, lease_ms: int = LINK_LEASE_MS) -> None:
-        """Raises RouterAbsent when no router answers, Refused for an endpoint that is none."""
+        """`endpoint` may be several, `a,b`: the first that answers, the next when that one is lost.
+
+        Raises RouterAbsent when no router answers, Refused for an endpoint that is none.
+        """
         self._inbox = inbox
         try:
-            self._session = zenoh.open(_config("client", [], [endpoint], lease_ms))
+            self._session = zenoh.open(_config("client", [], endpoint.split(","), lease_ms))
         except zenoh.ZError as error:
             raise _open_error(endpoint, error) from None
         self._publishers: dict[str, zenoh.Publisher] = {}
@@ -157,7 +160,7 @@ def open_router(
 def answers(endpoint: str) -> bool:
     """True when a router can be opened at `endpoint` at the moment."""
     try:
-        zenoh.open(_config("client", [], [endpoint], LINK_LEASE_MS)).close()  # type: ignore[no-untyped-call]
+        zenoh.open(_config("client", [], endpoint.split(","), LINK_LEASE_MS)).close()  # type: ignore[no-untyped-call]
     except zenoh.ZError:
         return False
     return True
@@ -198,7 +201,7 @@ def _config(mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: 
 
 def _open_error(endpoint: str, error: zenoh.ZError) -> Exception:
     known = ("unixsock-stream/", "tcp/", "udp/", "tls/", "quic/", "ws/")
-    if not endpoint.startswith(known):
+    if not all(one.startswith(known) for one in endpoint.split(",")):
         return Refused(f"connect {endpoint}: must be like tcp/127.0.0.1:7447 or unixsock-stream//run/lfa.sock")
     return RouterAbsent(_reason(error))
 

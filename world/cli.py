@@ -29,7 +29,7 @@ def start(
     ] = None,
     robots: Annotated[int | None, typer.Option(help="Size of the team, ids 1 to N.")] = None,
     fleet: Annotated[str, typer.Option(help="Name of the fleet: part of every key.")] = "fleet",
-    connect: Annotated[str | None, typer.Option(help="Router's endpoint, like tcp/127.0.0.1:7447.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, like tcp/127.0.0.1:7447; a,b: or the next.")] = None,
     journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
     witness: Annotated[bool, typer.Option(help="Hold the mission's witness here.")] = True,
     state: Annotated[Path | None, typer.Option(help="Run folder to keep the bodies' state in, for --resume.")] = None,
