@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import Any, NamedTuple
-
-import typer
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from protocol.mission import Refused
+
+if TYPE_CHECKING:
+    import typer
 
 
 class Entry(NamedTuple):
@@ -60,28 +61,43 @@ COMMANDS = (
           "lfa map runs/explore-20260101-120000 --out maps"),
     Entry("bench", "deploy.bench.command", "Measure, beside the bar to be reached.",
           "lfa bench lidar --json"),
+    Entry("completion", "deploy.completion", "Print a script that completes commands and options in your shell.",
+          "lfa completion bash > ~/.local/share/bash-completion/completions/lfa"),
 )  # fmt: skip
 
 
 def main() -> None:
     """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
+    if sys.argv[1:] in ([], ["--help"]):  # answered before the parser is imported, which takes longer than all else
+        print(overview())
+        sys.exit(0)
     try:
         sys.exit(run_cli("lfa", build(sys.argv[1:2])))
     except KeyboardInterrupt:
         sys.exit(130)
 
 
-def build(called: list[str]) -> typer.Typer:
-    """All commands; only the one that is `called` is imported, the others are known by name and help."""
+def overview() -> str:
+    """What `lfa --help` prints."""
+    rows = (f"  {entry.name:<12}{entry.help}" for entry in COMMANDS)
+    return "\n".join(["Usage: lfa COMMAND [ARGUMENTS]...", "", _ABOUT, "", *rows, "", _MORE])
+
+
+def build(called: Sequence[str]) -> typer.Typer:
+    """All commands; only those that are `called` are imported, the others are known by name and help."""
+    import typer
+
     app = typer.Typer(name="lfa", help=_ABOUT, no_args_is_help=True, **_PLAIN)
     for entry in COMMANDS:
-        function = import_module(entry.module).command if [entry.name] == called else _absent
+        function = import_module(entry.module).command if entry.name in called else _absent
         app.command(entry.name, help=entry.help, epilog=f"Example: {entry.example}", no_args_is_help=False)(function)
     return app
 
 
 def run_cli(name: str, app: typer.Typer) -> int:
     """Run `app` on the command line; the exit code. Used by all scripts of `deploy`."""
+    import typer
+
     try:
         code = app(standalone_mode=False, prog_name=name)
     except Refused as refused:
@@ -98,6 +114,8 @@ def run_cli(name: str, app: typer.Typer) -> int:
 
 def command_app(function: Callable[..., Any], help_text: str, example: str) -> typer.Typer:
     """A script of one command."""
+    import typer
+
     app = typer.Typer(**_PLAIN)
     app.command(help=help_text, epilog=f"Example: {example}")(function)
     return app
@@ -114,3 +132,5 @@ def _absent() -> None:
 
 _PLAIN: dict[str, Any] = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
 _ABOUT = "A chain of robots, each its own process, that survives the loss of its leader."
+_MORE = """\
+Each has --help with an example: lfa run --help. For a first look: lfa run paper_path1 --fault 'kill leader at 20 s'"""

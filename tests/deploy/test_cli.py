@@ -1,0 +1,56 @@
+"""`lfa` itself: a table of commands that answers quickly, and what a shell completes."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from deploy import completion
+from deploy.cli import COMMANDS, overview
+from world.scenario import shipped
+
+LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+
+
+def test_help_names_every_command() -> None:
+    told = subprocess.run([*LFA, "--help"], capture_output=True, text=True, check=True).stdout
+    assert told == overview() + "\n"
+    assert [entry.name for entry in COMMANDS if f"  {entry.name} " not in told] == []
+
+
+def test_help_does_not_wait_for_the_parser() -> None:
+    code = "import sys; from deploy import cli; cli.overview(); print('typer' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
+
+
+def _completed(script: Path, *typed: str) -> list[str]:
+    """What bash offers for the last of the words."""
+    ask = f"source {script}; COMP_WORDS=({' '.join(typed)}); COMP_CWORD={len(typed) - 1}; _lfa; echo ${{COMPREPLY[@]}}"
+    return subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=True).stdout.split()
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("completion") / "lfa.bash"
+    path.write_bytes(subprocess.run([*LFA, "completion", "bash"], capture_output=True, check=True).stdout)
+    return path
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_completes_commands_options_scenarios_and_choices(script: Path) -> None:
+    assert _completed(script, "lfa", "re") == ["record", "report", "replay"]
+    assert _completed(script, "lfa", "sim", "--se") == ["--seed", "--set"]
+    assert _completed(script, "lfa", "run", "paper_path") == [n for n in shipped() if n.startswith("paper_path")]
+    assert _completed(script, "lfa", "topic", "e") == ["echo"]
+    assert "--no-figures" in _completed(script, "lfa", "run", "--no")
+
+
+def test_every_command_is_in_the_script_of_every_shell() -> None:
+    rows = completion.words()
+    assert all("--help" in row.options for row in rows)
+    for make in (completion._bash, completion._zsh, completion._fish):
+        assert [entry.name for entry in COMMANDS if entry.name not in make(rows)] == []
