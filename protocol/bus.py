@@ -9,12 +9,14 @@ import threading
 from collections import deque
 from typing import Protocol
 
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from protocol.node import PeerDown, PeerUp, RouterLost
 from protocol.topics import TOPIC, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
+TOKEN_HOLD_S = 0.001
+"""How long a vanished token is held back: six times what was measured between it and the news of a router's death."""
 
 
 class Arrival(Struct, frozen=True, gc=False):
@@ -80,6 +82,46 @@ class Inbox:
             self._newest.clear()
         arrivals.sort(key=_at)
         return arrivals
+
+
+class Tokens:
+    """Liveliness changes, without those that only tell of the own router's death (zenoh.md 0.7).
+
+    When the link to the router breaks, every token vanishes, a moment *before* the news of the break; and
+    `session.info` still shows the link then. So a token that vanished is held for a moment, and believed when no such
+    news followed. Nor does anything that vanishes while the link is gone say anything.
+    """
+
+    def __init__(self) -> None:
+        self._held: list[Arrival] = []
+        self._cut_off = False
+
+    def sift(self, arrivals: list[Arrival], now: float) -> list[Arrival]:
+        """Of `arrivals` and of what is held, what may be believed by `now`; a token that is held comes later."""
+        if not arrivals and not self._held:
+            return arrivals
+        through: list[Arrival] = []
+        for arrival in arrivals:
+            match arrival.payload:
+                case PeerDown():
+                    if not self._cut_off:
+                        self._held.append(structs.replace(arrival, at=arrival.at + TOKEN_HOLD_S))
+                    continue
+                case PeerUp(name, incarnation):
+                    self._cut_off = False
+                    self._held = [held for held in self._held if held.payload != PeerDown(name, incarnation)]
+                case RouterLost():
+                    self._cut_off = True
+                    self._held.clear()
+            through.append(arrival)
+        if self._held:
+            through += [held for held in self._held if held.at <= now]
+            self._held = [held for held in self._held if held.at > now]
+            through.sort(key=_at)
+        return through
+
+    def next_due(self) -> float:
+        return min((held.at for held in self._held), default=float("inf"))
 
 
 def _at(arrival: Arrival) -> float:

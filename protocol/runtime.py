@@ -19,7 +19,7 @@ from types import FrameType
 from msgspec import Struct
 
 from protocol import clock
-from protocol.bus import Arrival, Inbox
+from protocol.bus import Arrival, Inbox, Tokens
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, OperatorNote, decode
@@ -55,10 +55,11 @@ class _Seat:
         self.inbox = inbox
         self._followed: frozenset[str] | None = None
         self._weather_key = weather_key
+        self._tokens = Tokens()
         self._reception = Reception(node.name, Random(f"air-{node.name}-{node.incarnation}"))
 
     def next_deadline(self) -> float:
-        return min(self.host.node.next_deadline(), self._reception.next_due())
+        return min(self.host.node.next_deadline(), self._reception.next_due(), self._tokens.next_due())
 
     def step(self, now: float) -> float:
         """Feed what came, tick if due; how late the tick was [s]."""
@@ -85,7 +86,7 @@ class _Seat:
 
     def _through_the_air(self, now: float) -> list[Arrival]:
         """What came, less what the weather took; the operator's word about the weather goes no further."""
-        arrivals = self.inbox.take()
+        arrivals = self._tokens.sift(self.inbox.take(), now)
         if self._weather_key is None:
             return arrivals
         for arrival in arrivals:

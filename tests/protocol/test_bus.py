@@ -2,8 +2,8 @@
 
 import threading
 
-from protocol.bus import Arrival, Inbox
-from protocol.node import PeerDown
+from protocol.bus import TOKEN_HOLD_S, Arrival, Inbox, Tokens
+from protocol.node import PeerDown, PeerUp, RouterLost
 
 
 def arrival(at: float, topic: str) -> Arrival:
@@ -44,3 +44,43 @@ def test_only_what_acts_on_arrival_wakes_the_loop() -> None:
     wake.clear()
     inbox.put(Arrival(0.0, "lfa/f/robot1/alive/3", PeerDown("robot1", 3)))
     assert wake.is_set()
+
+
+def token(at: float, peer: PeerDown | PeerUp) -> Arrival:
+    return Arrival(at, f"lfa/f/{peer.name}/alive/{peer.incarnation}", peer)
+
+
+def told(arrivals: list[Arrival]) -> list[object]:
+    return [arrival.payload for arrival in arrivals]
+
+
+def test_a_routers_death_is_not_everyones_death() -> None:
+    """In the order and at the distances that a killed router was measured to make them."""
+    tokens = Tokens()
+    gone = [token(1.0 + n * 2e-5, PeerDown(f"robot{n}", 3)) for n in (1, 2, 3)]
+    assert tokens.sift(gone, 1.0001) == []
+    assert tokens.next_due() == gone[0].at + TOKEN_HOLD_S
+    assert told(tokens.sift([Arrival(1.0002, "", RouterLost())], 1.01)) == [RouterLost()]
+    assert tokens.sift([token(1.02, PeerDown("robot4", 3))], 1.1) == [], "cut off: this says nothing about robot 4"
+    assert tokens.next_due() == float("inf")
+
+
+def test_a_token_that_vanished_is_believed_after_a_millisecond() -> None:
+    tokens = Tokens()
+    assert tokens.sift([token(1.0, PeerDown("robot1", 3))], 1.0) == []
+    assert told(tokens.sift([arrival(1.0005, "lease")], 1.0006)) == [b""]
+    assert told(tokens.sift([arrival(1.002, "lease")], 1.002)) == [PeerDown("robot1", 3), b""]
+
+
+def test_a_token_that_comes_back_at_once_never_vanished() -> None:
+    tokens = Tokens()
+    back = PeerUp("robot1", 3)
+    assert told(tokens.sift([token(1.0, PeerDown("robot1", 3)), token(1.0002, back)], 1.1)) == [back]
+
+
+def test_after_the_link_is_back_a_vanished_token_is_a_hint_again() -> None:
+    tokens = Tokens()
+    tokens.sift([Arrival(1.0, "", RouterLost())], 1.0)
+    tokens.sift([token(2.0, PeerUp("robot1", 3))], 2.0)
+    tokens.sift([token(3.0, PeerDown("robot1", 3))], 3.0)
+    assert told(tokens.sift([], 3.1)) == [PeerDown("robot1", 3)]
