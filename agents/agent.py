@@ -200,6 +200,8 @@ class Agent:
 
     def _obey(self, note: OperatorNote, now: float, lease: Lease) -> None:
         """An operator's word; only the leader changes the formation, or gives the lease to the next in the chain."""
+        if note.command == "forget":
+            self._forget(note, now, lease)
         if lease.role is not Role.LEADER:
             return
         if note.command == "formation":
@@ -208,6 +210,15 @@ class Agent:
         elif note.command == "handover":
             self._command(STILL, Role.FOLLOWER, now)
             self._apply(lease.request_handover(now), now)
+
+    def _forget(self, note: OperatorNote, now: float, lease: Lease) -> None:
+        """Lives that are dead for good: the lease needs them no more for its next attempt (E20)."""
+        try:
+            lost = msgspec.convert(note.arguments.get("lives"), tuple[Member, ...])
+        except msgspec.ValidationError:
+            return
+        self._event("forget", now, {"robots": [member.id for member in lost]})
+        self._apply(lease.request_forget(lost, now), now)
 
     # --- beginning and ending ---------------------------------------------------------------------------------------
 

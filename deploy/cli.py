@@ -33,6 +33,8 @@ COMMANDS = (
           "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v"),
     Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",
           "lfa fault kill leader"),
+    Entry("forget", "deploy.run.forget", "Robots lost for good: a fleet without memory waits for them no more.",
+          "lfa forget 3"),
     Entry("formation", "deploy.run.formation", "Ask the leader of a running fleet for another formation.",
           "lfa formation column"),
     Entry("watch", "deploy.look.watch", "How a running fleet stands, live on the terminal; keys do things to it.",

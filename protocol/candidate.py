@@ -6,7 +6,9 @@ The term stays the same while the attempt only repeats itself, so a robot that n
 from __future__ import annotations
 
 from protocol.holder import Holder
-from protocol.messages import Config, Grantee, Member, Term
+from protocol.membership import ANY_LIFE
+from protocol.messages import NO_TERM, Config, Grantee, Member, Term
+from protocol.mission import WITNESS_ID
 from protocol.quorum import electors, is_quorum
 from protocol.timing import Timing
 
@@ -14,14 +16,19 @@ PAUSE_GROWTH = 1.5
 
 
 class Candidate:
-    def __init__(self, term: Term, timing: Timing, now: float) -> None:
+    def __init__(self, term: Term, timing: Timing, now: float, forget: tuple[Member, ...] = ()) -> None:
+        """`forget`: lives that an operator declared dead for this attempt (E20)."""
         self.term = term
+        self.forget = forget
+        self.began_at = now
         self.ask_at = now
         self.holder: Holder | None = None
         """Set once the first PROPOSE has left: the term as it is being granted."""
         self.given = False
         """The term was handed over by its issuer (E16): this process only counts the grants."""
         self._promised: dict[Member, Grantee | None] = {}
+        self._absent: frozenset[Grantee] = frozenset()
+        """E21: stands for whatever a robot that did not promise may still command."""
         self._fenced: set[Grantee] = set()
         self._remembering: set[Member] = set()
         self._refused: set[Member] = set()
@@ -62,14 +69,14 @@ class Candidate:
 
     def fenced(self, robot_id: int, old: Term) -> None:
         """The gateway of `robot_id` refuses `old`."""
-        self._fenced |= {
-            g for g in self._promised.values() if g is not None and (g.holder.id, g.term) == (robot_id, old)
-        }
+        self._fenced |= {g for g in self._named() if (g.holder.id, g.term) == (robot_id, old)}
 
     def unfenced(self, me: Member) -> list[Grantee]:
         """E15: leases that promisers are still bound to, and whose gateways have not answered yet."""
-        named = {g for g in self._promised.values() if g is not None and g.holder != me}
-        return sorted(named - self._fenced, key=_term)
+        return sorted((g for g in self._named() - self._fenced if g.holder != me), key=_of_whom)
+
+    def _named(self) -> set[Grantee]:
+        return {g for g in self._promised.values() if g is not None} | self._absent
 
     def fences_to_ask(self, me: Member) -> list[Grantee]:
         """Of these the ones not asked for since the last PREPARE."""
@@ -79,7 +86,7 @@ class Candidate:
 
     @property
     def fenced_terms(self) -> tuple[Term, ...]:
-        return tuple(sorted(grantee.term for grantee in self._fenced))
+        return tuple(sorted(grantee.term for grantee in self._fenced if grantee.term != NO_TERM))
 
     def refused(self, src: Member, config: Config) -> bool:
         """`src` has promised a higher term; answers whether this one is beaten.
@@ -96,11 +103,15 @@ class Candidate:
         return is_quorum(config, self._remembering)
 
     def full_house(self, config: Config, universe: tuple[int, ...]) -> tuple[Member, ...]:
-        """E18: the newest life of every id, when all have promised and hold no quorum of `config`; else nobody."""
+        """E18: the newest life of every id, when all have promised and hold no quorum of `config`; else nobody.
+
+        Of the ids that are forgotten in this attempt none is needed (E20).
+        """
         lives = {m.id: m for m in sorted(self._promised)}
-        if not all(i in lives for i in universe) or self.has_quorum(config):
+        forgotten = {m.id for m in self.forget}
+        if not all(i in lives or i in forgotten for i in universe) or self.has_quorum(config):
             return ()
-        return tuple(lives[i] for i in universe)
+        return tuple(lives[i] for i in universe if i in lives)
 
     def blank_majority(self, universe: tuple[int, ...]) -> tuple[Member, ...]:
         """E19: the newest lives of more than half of all ids, the witness (last of `universe`) among them; else nobody.
@@ -112,6 +123,17 @@ class Candidate:
         fine = 2 * len(here) > len(universe) and universe[-1] in lives and not self._remembering
         return here if fine else ()
 
+    def whoever_answers(self, universe: tuple[int, ...]) -> tuple[Member, ...]:
+        """E21: the newest lives that promised. Every other robot's gateway is to refuse what is below, first."""
+        lives = {m.id: m for m in sorted(self._promised)}
+        absent = (i for i in universe if i not in lives and i != WITNESS_ID)
+        self._absent = frozenset(Grantee(NO_TERM, Member(i, ANY_LIFE)) for i in absent)
+        return tuple(lives[i] for i in universe if i in lives)
 
-def _term(grantee: Grantee) -> Term:
-    return grantee.term
+    def expects_nobody(self) -> None:
+        """E21 does not apply (any more)."""
+        self._absent = frozenset()
+
+
+def _of_whom(grantee: Grantee) -> tuple[Term, Member]:
+    return grantee.term, grantee.holder

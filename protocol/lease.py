@@ -52,6 +52,8 @@ COLD_START_S = 3.0
 SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 """How many seconds of the fastest clock one second of the slowest may last."""
 HELLO_HEARTBEATS = 3
+FORGET_GRANTS = 3
+"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
 
 
 def gateway_of(robot_id: int) -> str:
@@ -75,12 +77,18 @@ class Lease:
         self.released = False
         """A requested release is complete: the last words are out and the process may end."""
         self._timing = timing
+        self._grant_s = timing.grant_s
         self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
         self._universe = universe(mission)
         self._tiebreak, self._shrink = mission.tiebreak, mission.shrink
         majority = mission.cold_start == "majority" and mission.witness
         self._majority_from = now + COLD_START_S if majority else NEVER
-        self._acceptor = Acceptor(Term(floor), timing.grant_s, now)
+        self._lonely_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
+        self._lonely_from = now + self._lonely_s
+        self._forget: tuple[Member, ...] = ()
+        """E20: whom the operator declared dead, until `_forget_until`."""
+        self._forget_until = now
+        self._acceptor = Acceptor(Term(floor), self._grant_s, now)
         self._candidate: Candidate | None = None
         self._holder: Holder | None = None
         self._seen = Term(floor)
@@ -252,11 +260,33 @@ class Lease:
             self._hand_over(self._holder, now, effects)
         return effects
 
+    def request_forget(self, lost: tuple[Member, ...], now: float) -> list[Effect]:
+        """E20: an operator says that these lives, and every earlier one of their ids, are dead and stay off.
+
+        It holds for one attempt of each that stands for election now, and is no news where somebody leads, or
+        where a later life of one of them was heard.
+        """
+        effects: list[Effect] = []
+        self._expire(now, effects)
+        lost = tuple(m for m in lost if m.id in self._universe)
+        if self._holder is None and self.leader is None and lost and not self._lives_on(lost):
+            self._drop_candidate(now, effects)
+            self._forget, self._forget_until = lost, now + FORGET_GRANTS * self._grant_s
+            self._elect_after(now)
+        return effects
+
+    def _lives_on(self, lost: tuple[Member, ...]) -> bool:
+        """One of these is this very process, or was heard in a later life."""
+        return any(m.id == self.me.id or self._lives.get(m.id, -1) > m.incarnation for m in lost)
+
     # --- voting ------------------------------------------------------------------------------------------------
 
     def _on_prepare(self, src: Member, body: Prepare, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.term)
         if self._stands_before(src, body):
+            return
+        if body.forget and self._lives_on(body.forget):
+            effects.append(Send(robot_name(src.id), self._acceptor.refusal(body.term, self.config, now)))
             return
         answer = self._acceptor.prepare(src, body, self.config, now, self._holder_gone())
         if answer is not None:
@@ -291,7 +321,8 @@ class Lease:
         if answer is not None and body.holder == self.me:
             self._take_over(body, answer, now, effects)
         self.leader = body.holder.id
-        self._leader_until = now + self._timing.grant_s
+        self._leader_until = now + self._grant_s
+        self._lonely_from = now + self._lonely_s
         self._elect_after(self._leader_until)
 
     def _on_release(self, body: Release, now: float, effects: list[Effect]) -> None:
@@ -355,13 +386,14 @@ class Lease:
 
     def _stand(self, now: float, effects: list[Effect]) -> None:
         """A new candidacy under a term above all that was heard of. A leader may stand too: it raises its term."""
-        self._elect_after(now + self._timing.grant_s)
+        self._elect_after(now + self._grant_s)
         bond = self._acceptor.bound(now)
         if bond is not None and bond.holder != self.me and not self._holder_gone():
             self._elect_after(bond.expiry)
             return
         number = max(self._seen.n, self._acceptor.promised.n) + 1
-        self._candidate = Candidate(Term(number, self.me.id, self.me.incarnation), self._timing, now)
+        forget = self._forget if now < self._forget_until else ()
+        self._candidate = Candidate(Term(number, self.me.id, self.me.incarnation), self._timing, now, forget)
         self._seen = self._candidate.term
         self._press(self._candidate, now, effects)
 
@@ -373,9 +405,12 @@ class Lease:
                 self._elect_after(now + self._timing.rank_step_s)
             elif now >= candidate.holder.next_round_at and not candidate.given:
                 self._send_round(candidate.holder, now, effects)
+        elif candidate.forget and now >= self._forget_until:
+            self._drop_candidate(now, effects)
+            self._elect_after(now)
         elif now >= candidate.ask_at:
             candidate.asked(now)
-            request = Prepare(candidate.term, self.config.version)
+            request = Prepare(candidate.term, self.config.version, candidate.forget)
             effects.append(Send("all", request))
             own = self._acceptor.prepare(self.me, request, self.config, now, self._holder_gone())
             if isinstance(own, Promise):
@@ -391,10 +426,9 @@ class Lease:
     def _fence_or_propose(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
         """E15: phase 2 begins when every lease that a promiser is bound to is fenced at its holder's own gateway."""
         lives: tuple[Member, ...] = ()
+        candidate.expects_nobody()
         if not candidate.has_quorum(self.config):
-            lives = candidate.full_house(self.config, self._universe)
-            if not lives and is_first(self.config) and now >= self._majority_from:
-                lives = candidate.blank_majority(self._universe)
+            lives = self._without_quorum(candidate, now)
             if self.me not in lives:
                 return
         for grantee in candidate.fences_to_ask(self.me):
@@ -407,6 +441,16 @@ class Lease:
                 config = led_by(self.config, self.me, candidate.term, self._is_down)
             self._adopt(config, now, effects)
             self._send_round(candidate.holder, now, effects)
+
+    def _without_quorum(self, candidate: Candidate, now: float) -> tuple[Member, ...]:
+        """Who makes a fresh config where no quorum of the known one answers (E18-E21); nobody while too few do."""
+        lives = candidate.full_house(self.config, self._universe)
+        if not lives and is_first(self.config) and now >= self._majority_from:
+            lives = candidate.blank_majority(self._universe)
+        asked_all = now >= candidate.began_at + self._timing.heartbeat_s
+        if not lives and not is_first(self.config) and now >= self._lonely_from and asked_all:
+            lives = candidate.whoever_answers(self._universe)
+        return lives
 
     def _on_fenced(self, src: Member, body: Fenced, now: float, effects: list[Effect]) -> None:
         if src.id == self.me.id and body.old == self._unreleased:
@@ -427,6 +471,8 @@ class Lease:
 
     def _on_nack(self, src: Member, body: Nack, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.promised, body.config.version.term)
+        if body.remaining_s > 0.0 and body.holder != self.me:
+            self._lonely_from = now + self._lonely_s  # somebody holds a lease
         candidate, holder = self._candidate, self._holder
         newer = body.config.version > self.config.version
         if candidate is not None and body.term == candidate.term:
@@ -448,7 +494,7 @@ class Lease:
                 self._stand(now, effects)  # E10
         elif newer and candidate is None and holder is None:
             self._adopt(body.config, now, effects)
-            self._elect_after(now + self._timing.grant_s)
+            self._elect_after(now + self._grant_s)
 
     # --- leading -----------------------------------------------------------------------------------------------
 
@@ -477,6 +523,7 @@ class Lease:
         if not holder.granted(src, grant, self.config, now):
             return
         expiry = _expiry(holder)
+        self._lonely_from = now + self._lonely_s
         if holder is self._holder:
             effects.append(LeaseExtended(holder.term, expiry))
             if self.config.previous is not None and self._candidate is None:
@@ -532,7 +579,7 @@ class Lease:
             self._step_down(now, "expired", effects)
             # A leader that can talk but not hear would keep its voters bound for ever: it falls silent, and lets
             # others go first.
-            self._elect_after(now + self._timing.grant_s)
+            self._elect_after(now + self._grant_s)
 
     def _step_down(self, now: float, cause: Cause, effects: list[Effect], below: Term | None = None) -> None:
         """Stop, have the own gateway refuse the term (all below `below`), then free the voters (E4)."""
@@ -560,7 +607,7 @@ class Lease:
         if gift is not None and isinstance(own, Grant):
             effects.append(Send("all", gift))
             effects.append(Send(robot_name(gift.holder.id), own))
-            self.leader, self._leader_until = gift.holder.id, now + self._timing.grant_s
+            self.leader, self._leader_until = gift.holder.id, now + self._grant_s
         else:
             self._acceptor.release(term)
             effects.append(Send("all", Release(term)))
@@ -581,7 +628,7 @@ class Lease:
             self._gift = Propose(term, self.config, 0, life, nonce=nonce)
         self._drop_candidate(now, effects)
         self._step_down(now, "handed_over", effects, None if self._gift is None else self._gift.term)
-        self._elect_after(now + self._timing.grant_s)
+        self._elect_after(now + self._grant_s)
 
     def _successor(self, holder: Holder, now: float) -> tuple[Member, float] | None:
         """The first behind us that may lead and granted within t_chain: its life, and its clock's moment then."""

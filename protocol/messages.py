@@ -89,6 +89,8 @@ class GatewayStamp(Struct, frozen=True, array_like=True, gc=False):
 class Prepare(Struct, frozen=True, array_like=True, tag="prepare"):
     term: Term
     version: Version
+    forget: tuple[Member, ...] = ()
+    """Lives that an operator declared dead for this attempt only, and with them every earlier one of their ids."""
 
 
 class Grantee(Struct, frozen=True, array_like=True):

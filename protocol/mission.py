@@ -19,6 +19,7 @@ Motion = Literal["path_following", "point_to_point", "explore"]
 TieBreak = Literal["witness", "head", "none"]
 ColdStart = Literal["full_house", "majority"]
 Shrink = Literal["dynamic", "static"]
+Lonely = Literal["stop", "continue_after"]
 Profile = Literal["fast", "std", "wifi"]
 
 
@@ -101,12 +102,18 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     tiebreak: TieBreak = "witness"
     """Who decides between two halves: the witness, the head of the chain, or nobody."""
     shrink: Shrink = "dynamic"
+    """`static`: never fewer voters than a majority of the team."""
     cold_start: ColdStart = "full_house"
     """Who must be there when nobody remembers anything: all ids, or after 3 s more than half of them with the witness.
 
     `majority` is for gateways that stand or fall with the witness, as a simulated world's do (E19).
     """
-    """`static`: never fewer voters than a majority of the team."""
+    lonely: Lonely = "stop"
+    """What those without a quorum do: stop, or go on by themselves after `continue_after_s` without a leader.
+
+    `continue_after` gives safety up for motion where a team is parted; it is for gateways of one world (E21).
+    """
+    continue_after_s: float = 10.0
     can_lead: tuple[int, ...] | None = None
     """Ids that may lead; all when not given."""
     formation: FormationSpec = FormationSpec()
@@ -174,6 +181,7 @@ def _ranges(mission: Mission) -> list[tuple[str, float, float, float]]:
         ("formation.separation_m", formation.separation_m, 2.0 * mission.radius_m + 0.1, 100.0),
         ("formation.angle_rad", formation.angle_rad, 0.0, pi / 2),
         ("formation.heading_filter_m", formation.heading_filter_m, 0.0, 100.0),
+        ("continue_after_s", mission.continue_after_s, 2.0, 3600.0),
         ("following.delay_s", mission.following.delay_s or 0.0, 0.0, 0.8),
         ("limits.v_max_mps", limits.v_max_mps, 0.01, inf),
         ("limits.v_reverse_max_mps", limits.v_reverse_max_mps, 0.0, inf),

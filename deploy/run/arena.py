@@ -229,6 +229,12 @@ class Arena:
         if process.alive and not process.paused:
             self._carry_out(process, process.lease.request_handover(process.clock.local(self.now)))
 
+    def forget(self, *lost: Member) -> None:
+        """The operator's word to every robot that lives, now."""
+        for process in self.processes.values():
+            if process.alive and process.id != WITNESS_ID:
+                self._deliver(process, "request_forget", (lost,))
+
     def pause(self, robot_id: int) -> None:
         """SIGSTOP: what comes is kept, the clock goes on."""
         self.processes[robot_id].paused = True

@@ -38,8 +38,12 @@ class Terminals:
         eventually(lambda: answers(self.endpoint), "the router does not answer")
         return child
 
-    def world(self) -> subprocess.Popen[str]:
-        return self._start("world.cli", "straight", "--robots", "2", *self._team())
+    def world(self, robots: int = 2) -> subprocess.Popen[str]:
+        return self._start("world.cli", "straight", "--robots", str(robots), *self._team())
+
+    def lfa(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", "from deploy.cli import main; main()", *arguments, *self._team()]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
     def agent(self, robot_id: int, role: str = "follower") -> subprocess.Popen[str]:
         return self._start("agents.cli", "--role", role, "--id", str(robot_id), *self._team())
@@ -154,3 +158,18 @@ def test_an_agent_is_small(terminals: Terminals) -> None:
 
     eventually(told, "robot 1 does not lead")
     assert max(sizes_mb) < RSS_MB_MAX
+
+
+def test_a_fleet_goes_on_without_robots_that_the_operator_declares_lost(terminals: Terminals) -> None:
+    terminals.router()
+    terminals.world(robots=4)
+    terminals.agent(1)
+    terminals.look_on()
+    waits = "waiting for robot2, robot3, robot4"
+    eventually(lambda: any(isinstance(m, Status) and m.text == waits for m in terminals.heard()), waits)
+    alive = terminals.lfa("forget", "1")
+    assert (alive.returncode, alive.stderr) == (2, "lfa: robot 1 lives: end its process first, or let it join\n")
+    done = terminals.lfa("forget", "2", "3", "4")
+    assert (done.returncode, done.stdout) == (0, "forgotten: robot2, robot3, robot4; robot1 leads\n"), done.stderr
+    again = terminals.lfa("forget", "3")
+    assert again.stdout == "robot1 leads: who is silent leaves its voters without being forgotten\n"

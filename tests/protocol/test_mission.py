@@ -17,6 +17,7 @@ REFUSED = [
     (msgspec.structs.replace(GOOD, formation=FormationSpec(separation_m=0.2)), "mission.formation.separation_m"),
     (msgspec.structs.replace(GOOD, formation=FormationSpec(angle_rad=2.0)), "mission.formation.angle_rad"),
     (msgspec.structs.replace(GOOD, limits=Limits(v_max_mps=float("nan"))), "mission.limits.v_max_mps"),
+    (msgspec.structs.replace(GOOD, continue_after_s=0.1), "mission.continue_after_s"),
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=())), "mission.leading.route_m"),
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, float("inf")),))), "mission.leading.route_m"),
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, 0.0),), cruise_mps=3.0)), "mission.leading.cruise"),

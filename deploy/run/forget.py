@@ -1,0 +1,74 @@
+"""`lfa forget`: robots that are lost for good, so that a fleet without its memory need not wait for them (E20)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+import typer
+
+from deploy.look.onlooker import Ear, find, listen
+from deploy.run.operator import Operator
+from protocol import clock
+from protocol.messages import Event, PoseStamped, Role, Status, encode
+from protocol.mission import Refused, robot_id_of, robot_name
+
+LISTEN_S = 1.2
+"""Long enough to hear a leader's pose and everybody's status."""
+ANSWER_S_MAX = 6.0
+"""Two attempts of the slowest profile."""
+
+
+def command(
+    robots: Annotated[list[int], typer.Argument(help="Ids whose processes are dead, and stay off until it is done.")],
+    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what came of it as JSON.")] = False,
+) -> int:
+    for robot in robots:
+        if robot < 1:
+            raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
+    with listen(find(fleet, connect), frozenset({"*/event", "*/pose", "*/status"})) as ear:
+        for robot in robots:
+            if ear.bus.living(ear.fleet.name, robot_name(robot)):
+                raise Refused(f"robot {robot} lives: end its process first, or let it join")
+        leader, _ = _listen(ear, LISTEN_S)
+        asked = leader is None
+        waits = ""
+        if asked:
+            _say(ear, robots)
+            leader, waits = _listen(ear, ANSWER_S_MAX, until_led=True)
+    if as_json:
+        print(msgspec.json.encode({"robots": robots, "asked": asked, "leader": leader}).decode())
+    elif not asked:
+        print(f"robot{leader} leads: who is silent leaves its voters without being forgotten")
+    elif leader is None:
+        print(f"nobody leads after {ANSWER_S_MAX:g} s{waits}")
+    else:
+        print(f"forgotten: {', '.join(map(robot_name, robots))}; robot{leader} leads")
+    return 0 if leader is not None else 1
+
+
+def _say(ear: Ear, robots: list[int]) -> None:
+    """Every life that began before this moment is meant; one that begins later may join."""
+    now_ms = clock.wall_ms()
+    operator = Operator(ear.fleet.name, now_ms)
+    lives = [[robot, now_ms] for robot in robots]
+    ear.bus.publish(operator.orders_key, encode(operator.orders("forget", clock.now(), lives=lives)))
+
+
+def _listen(ear: Ear, seconds: float, until_led: bool = False) -> tuple[int | None, str]:
+    """Who leads, and what is said about waiting for others; with `until_led`, no longer than needed."""
+    leader, waits = None, ""
+    until = clock.now() + seconds
+    while clock.now() < until and not (until_led and leader is not None):
+        ear.wait(0.05)
+        for _, message in ear.take():
+            match message:
+                case PoseStamped(role=Role.LEADER) | Event(kind="lease", data={"change": "acquired"}):
+                    leader = robot_id_of(message.header.sender)
+                case Event(kind="lease"):
+                    leader = None
+                case Status(text=text) if text.startswith("waiting for"):
+                    waits = f": {message.header.sender} is {text}"
+    return leader, waits
