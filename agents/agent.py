@@ -100,6 +100,11 @@ class Agent:
         return self._interests
 
     @property
+    def lease(self) -> Lease | None:
+        """What it holds and knows of the team; None before the mission."""
+        return self._lease
+
+    @property
     def grid(self) -> Grid | None:
         """The map of an explorer, as far as it has come."""
         explore = None if self._driver is None else self._driver.explore

@@ -30,7 +30,7 @@ COMMANDS = (
     Entry("sim", "deploy.run.simulate", "The same in one process, in virtual time; the same run folder.",
           "lfa sim paper_path1 --seed 7 --set world.lidar.beams=90"),
     Entry("fuzz", "deploy.run.fuzz", "Hunt for schedules of faults that break the lease protocol.",
-          "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v"),
+          "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v; lfa fuzz --whole"),
     Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",
           "lfa fault kill leader"),
     Entry("forget", "deploy.run.forget", "Robots lost for good: a fleet without memory waits for them no more.",

@@ -53,6 +53,11 @@ class Witness:
         self._status_at = float("-inf")
         self._seq: dict[str, int] = {}
 
+    @property
+    def lease(self) -> Lease | None:
+        """The voter's lease; None before the mission."""
+        return self._lease
+
     def receive(self, received: Received) -> list[Envelope]:
         now = received.at
         match received.message:

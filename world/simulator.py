@@ -7,7 +7,7 @@ reads a clock. Each node has its own monotonic clock (offset and rate), as proce
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from random import Random
 
 from msgspec import Struct
@@ -70,6 +70,7 @@ class Simulator:
         self._heap: list[tuple[float, int, Callable[[], None]]] = []
         self._order = 0
         self._routes: dict[str, list[_Seat]] = {}
+        self._wanted: dict[tuple[frozenset[str], str], bool] = {}
 
     @property
     def names(self) -> list[str]:
@@ -84,23 +85,36 @@ class Simulator:
         self._plan(seat)
         self.at(self.now + VITALS_S, lambda: self._vitals(seat))
 
-    def kill(self, name: str) -> None:
-        """SIGKILL: nothing more comes from it; the others' hints come within milliseconds."""
+    def lives(self, node: Node) -> bool:
+        """Whether this very life goes on."""
+        seat = self._seats.get(node.name)
+        return seat is not None and seat.node is node
+
+    def kill(self, name: str, *, hinted: bool = True) -> None:
+        """SIGKILL: nothing more comes from it; the others' hints, if any, come within milliseconds."""
         seat = self._seats.pop(name)
         seat.host.journal.close()
         self._routes.clear()
         low, high = HINT_DELAY_S
-        self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
+        if hinted:
+            self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
+
+    def hint(self, event: PeerUp | PeerDown, observers: Sequence[str]) -> None:
+        """These are told that a token came or went, whatever is true."""
+        for seat in [self._seats[name] for name in observers if name in self._seats]:
+            self._give(seat, "", event, b"")
 
     def pause(self, name: str) -> None:
         """SIGSTOP: it does nothing, and what comes for it waits."""
         self._seats[name].paused = True
 
-    def resume(self, name: str) -> None:
+    def resume(self, name: str, *, shuffled: bool = False) -> None:
         """SIGCONT: what waited comes at once; of states only the newest, as in a real inbox."""
         seat = self._seats[name]
         seat.paused = False
         waiting, seat.waiting = seat.waiting, []
+        if shuffled:
+            self._random.shuffle(waiting)
         newest = {key: index for index, (key, _, _) in enumerate(waiting) if key}
         for index, (key, message, payload) in enumerate(waiting):
             where = address(key) if key else None
@@ -215,9 +229,16 @@ class Simulator:
         self.at(self.now + delay_s, lambda: self._give(seat, key, message, payload))
 
     def _route(self, key: str) -> list[_Seat]:
-        seats = [seat for seat in self._seats.values() if any(matches(e, key) for e in seat.interests)]
+        seats = [seat for seat in self._seats.values() if self._wants(seat.interests, key)]
         self._routes[key] = seats
         return seats
+
+    def _wants(self, interests: frozenset[str], key: str) -> bool:
+        """Kept, since every life that begins or ends opens all routes anew."""
+        known = self._wanted.get((interests, key))
+        if known is None:
+            known = self._wanted[interests, key] = any(matches(e, key) for e in interests)
+        return known
 
     def _refresh(self, seat: _Seat) -> None:
         """The node's interests changed: it also hears of the tokens that already stand."""

@@ -12,6 +12,7 @@ from math import floor, inf
 import msgspec
 from msgspec import Struct
 
+from protocol.gateway import Gateway
 from protocol.geometry import Pose2D
 from protocol.messages import (
     Ask,
@@ -120,6 +121,11 @@ class World:
             | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in scenario.mission.robots}
             | {alive_key(fleet, name, "*") for name in self._names}
         )
+
+    @property
+    def gateways(self) -> dict[int, Gateway]:
+        """Of each robot, by its id; none before the first call."""
+        return {robot.id: robot.gateway for robot in self._robots}
 
     def next_deadline(self) -> float:
         if self.finished:

@@ -6,6 +6,8 @@ them while a schedule runs, and a recording of real processes can feed them as w
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from msgspec import Struct
 
 from protocol.messages import CmdVel, Config, Electorate, Grant, Member, Promise, Propose, Term, Version
@@ -63,6 +65,15 @@ class Checker:
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
         """The gateway of `robot_id` let `cmd` through, whose stamp is `age` seconds old by the gateway's clock."""
+
+
+def listeners(checkers: Sequence[Checker]) -> dict[str, list[Callable[..., None]]]:
+    """By what there is to hear, the methods of those checkers that want to hear it."""
+    return {
+        name: [getattr(c, name) for c in checkers if getattr(type(c), name) is not getattr(Checker, name)]
+        for name in vars(Checker)
+        if not name.startswith("_")
+    }
 
 
 class Fences:

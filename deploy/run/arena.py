@@ -14,7 +14,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from deploy.look.checkers import Checker
+from deploy.look.checkers import Checker, listeners
 from protocol.effects import AdoptChain, BecomeLeader, Effect, Send, StepDown
 from protocol.gateway import Gateway
 from protocol.geometry import Twist
@@ -69,6 +69,17 @@ class Weather(Struct):
     """Probability of an exponential delay on top, of mean `tail_mean`."""
     tail_mean: float = 0.05
     hint_delay_max: float = 0.005
+
+    def delays(self, random: Random) -> list[float]:
+        """How long each copy of a message takes; none when it is lost."""
+        if self.loss and random.random() < self.loss:
+            return []
+        delay = self.delay_min + (self.delay_max - self.delay_min) * random.random()
+        if self.tail and random.random() < self.tail:
+            delay += random.expovariate(1.0 / self.tail_mean)
+        if self.duplicate and random.random() < self.duplicate:
+            return [delay, delay + random.uniform(0.0, 2.0 * self.tail_mean)]
+        return [delay]
 
 
 class Process:
@@ -152,11 +163,7 @@ class Arena:
 
     def listen(self, checkers: Sequence[Checker]) -> None:
         """Tell these checkers, and only these, what happens from here on."""
-        self._tell: dict[str, list[Callable[..., None]]] = {
-            name: [getattr(c, name) for c in checkers if getattr(type(c), name) is not getattr(Checker, name)]
-            for name in vars(Checker)
-            if not name.startswith("_")
-        }
+        self._tell = listeners(checkers)
 
     # --- the course of time ------------------------------------------------------------------------------------
 
@@ -297,21 +304,13 @@ class Arena:
 
     def _delays(self, src: int, to: int) -> list[float]:
         """How long each copy of a message takes; none when it is lost."""
-        weather, random = self.weather, self.random
         here = abs(src)
         there = to if to >= 0 else self._host_of_gateway(-to)
         if (here, there) in self.cuts:
             return []
         if here == there:
-            return [random.uniform(0.0001, 0.0005)]
-        if weather.loss and random.random() < weather.loss:
-            return []
-        delay = weather.delay_min + (weather.delay_max - weather.delay_min) * random.random()
-        if weather.tail and random.random() < weather.tail:
-            delay += random.expovariate(1.0 / weather.tail_mean)
-        if weather.duplicate and random.random() < weather.duplicate:
-            return [delay, delay + random.uniform(0.0, 2.0 * weather.tail_mean)]
-        return [delay]
+            return [self.random.uniform(0.0001, 0.0005)]
+        return self.weather.delays(self.random)
 
     def _post(self, src: Member, here: int, to: int, body: LeaseBody) -> None:
         """`here` is where it leaves: the id of a host. A negative `to` is a gateway."""

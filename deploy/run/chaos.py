@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Union
 
 from msgspec import Struct, structs
 
@@ -13,6 +15,12 @@ from protocol.messages import Member
 from protocol.mission import WITNESS_ID
 from protocol.quorum import is_quorum
 
+if TYPE_CHECKING:
+    from deploy.run.whole import Whole
+
+Stage = Union["Arena", "Whole"]
+"""Where a schedule is played: leases alone, or whole agents."""
+
 
 class Played(Struct):
     """What one schedule came to."""
@@ -22,13 +30,13 @@ class Played(Struct):
     counts: Counter[str]
     """Faults that took effect, by kind."""
     elections: int
-    arena: Arena
+    arena: Stage
 
 
 class Faults:
     """Carries out a schedule's faults on an arena, counts those that took effect, and heals."""
 
-    def __init__(self, arena: Arena, schedule: Schedule) -> None:
+    def __init__(self, arena: Stage, schedule: Schedule) -> None:
         self.arena = arena
         self.schedule = schedule
         self.counts: Counter[str] = Counter()
@@ -121,32 +129,47 @@ class Faults:
         for robot_id in arena.mission.robots:
             if not arena.gateways[robot_id].alive:
                 arena.start_gateway(robot_id)
-        for process in list(arena.processes.values()):
-            if process.paused:
-                arena.resume(process.id)
+        for target in [i for i in arena.processes if arena.processes[i].paused]:
+            arena.resume(target)
         for target in sorted(arena.processes):
             if not arena.processes[target].alive and (self.schedule.revive_all or not self._quorum_lives()):
                 arena.start(target)
 
     def _quorum_lives(self) -> bool:
         living = [p for p in self.arena.processes.values() if p.alive]
-        newest = max((p.lease.config for p in living), key=lambda c: c.version, default=None)
+        configs = [p.lease.config for p in living if p.lease is not None]
+        newest = max(configs, key=lambda c: c.version, default=None)
         robots = any(p.id != WITNESS_ID for p in living)
         return newest is not None and robots and is_quorum(newest, {p.member for p in living})
 
 
 def play(schedule: Schedule, trace: Trace | None = None) -> Played:
-    """Run one schedule. The same schedule gives the same answer, whatever ran before."""
-    schedule = _copied(schedule)
-    arena = Arena(
+    """Run one schedule on leases and gateways alone. The same schedule gives the same answer, whatever ran before."""
+    return _play(schedule, trace, _arena)
+
+
+def play_whole(schedule: Schedule, trace: Trace | None = None) -> Played:
+    """The same with whole agents, witness and world."""
+    from deploy.run.whole import Whole
+
+    return _play(schedule, trace, Whole)
+
+
+def _arena(schedule: Schedule) -> Stage:
+    return Arena(
         schedule.robots,
         seed=schedule.seed,
         profile=schedule.profile,
         witness=schedule.witness,
         rates=schedule.rates,
-        weather=_copied(schedule).weather,
+        weather=schedule.weather,
         gateways_at_world=schedule.gateways_at_world,
     )
+
+
+def _play(schedule: Schedule, trace: Trace | None, stage: Callable[[Schedule], Stage]) -> Played:
+    schedule = _copied(schedule)
+    arena = stage(_copied(schedule))
     arena.trace = trace
     checkers: list[Checker] = [checker(arena.timing) for checker in SAFETY]
     arena.listen(checkers)
@@ -159,7 +182,7 @@ def play(schedule: Schedule, trace: Trace | None = None) -> Played:
     return Played(schedule, violations, faults.counts, elections, arena)
 
 
-def _liveness(arena: Arena) -> list[Violation]:
+def _liveness(arena: Stage) -> list[Violation]:
     """L1-L4 at the end of a schedule."""
     at, leaders = arena.now, arena.leaders()
     if len(leaders) != 1:

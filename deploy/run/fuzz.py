@@ -9,7 +9,7 @@ import json
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated
@@ -19,13 +19,16 @@ from msgspec import Struct
 
 from deploy.look.checkers import Violation
 from deploy.run.arena import Trace
-from deploy.run.chaos import play
+from deploy.run.chaos import Played, play, play_whole
 from deploy.run.schedules import KINDS, Schedule, draw, without
 from protocol.mission import Refused
 
-CHUNK = 50
+Player = Callable[[Schedule, Trace | None], Played]
+
+CHUNKS: dict[Player, int] = {play: 50, play_whole: 4}
 """Seeds that one worker plays at a time."""
-KINDS_CLAIM_SEEDS = 200
+SEEDS: dict[Player, str] = {play: "1000", play_whole: "60"}
+KINDS_CLAIM_SEEDS = 60
 """From this many seeds on every kind of fault must have taken effect."""
 FAILURES_SHOWN_MAX = 5
 COLUMN = 30
@@ -50,8 +53,9 @@ class Tally(Struct):
 
 
 def command(
-    seeds: Annotated[str, typer.Option(help="How many (1000), or which (5000..5999).")] = "1000",
+    seeds: Annotated[str | None, typer.Option(help="How many (1000, or 60 whole), or which (5000..5999).")] = None,
     seed: Annotated[int | None, typer.Option(help="Play this one only.")] = None,
+    whole: Annotated[bool, typer.Option("--whole", help="Whole agents and the world, not leases alone.")] = False,
     verbose: Annotated[
         bool, typer.Option("-v", "--verbose", help="With --seed: the trace, robots in columns.")
     ] = False,
@@ -59,9 +63,10 @@ def command(
     out: Annotated[Path, typer.Option(help="Where traces of failed seeds are written.")] = Path("runs/fuzz"),
     as_json: Annotated[bool, typer.Option("--json", help="Print the tally as JSON.")] = False,
 ) -> int:
+    player = play_whole if whole else play
     if seed is not None:
-        return _one(seed, verbose)
-    return _hunt(parse_seeds(seeds), jobs, out, as_json)
+        return _one(seed, verbose, player)
+    return _hunt(parse_seeds(seeds or SEEDS[player]), jobs, out, as_json, player)
 
 
 def parse_seeds(text: str) -> range:
@@ -75,9 +80,9 @@ def parse_seeds(text: str) -> range:
     return chosen
 
 
-def _one(seed: int, verbose: bool) -> int:
+def _one(seed: int, verbose: bool, player: Player = play) -> int:
     lines: list[str] = []
-    played = play(draw(seed), columns(lines, draw(seed)) if verbose else None)
+    played = player(draw(seed), columns(lines, draw(seed)) if verbose else None)
     typer.echo(describe(played.schedule))
     for line in lines:
         typer.echo(line)
@@ -87,17 +92,17 @@ def _one(seed: int, verbose: bool) -> int:
     return 1 if played.violations else 0
 
 
-def _hunt(seeds: range, jobs: int, out: Path, as_json: bool) -> int:
+def _hunt(seeds: range, jobs: int, out: Path, as_json: bool, player: Player) -> int:
     if jobs < 1:
         raise Refused(f"--jobs {jobs}: must be 1 or more")
     began, tally = time.perf_counter(), Tally()
-    for part in _played(seeds, jobs):
+    for part in _played(seeds, jobs, player):
         tally.add(part)
     minutes = (time.perf_counter() - began) / 60.0
     missing = [kind for kind in KINDS if kind not in tally.faults] if len(seeds) >= KINDS_CLAIM_SEEDS else []
     for seed in sorted(tally.failed)[:FAILURES_SHOWN_MAX]:
-        typer.echo(f"seed {seed}: {tally.failed[seed][0]}  reproduce: lfa fuzz --seed {seed} -v", err=True)
-        typer.echo(f"  shrunk trace: {_explain(seed, out)}", err=True)
+        typer.echo(f"seed {seed}: {tally.failed[seed][0]}  reproduce: {again(seed, player)}", err=True)
+        typer.echo(f"  shrunk trace: {_explain(seed, out, player)}", err=True)
     if missing:
         typer.echo(f"faults that never took effect: {', '.join(missing)}", err=True)
     if as_json:
@@ -112,8 +117,9 @@ def _hunt(seeds: range, jobs: int, out: Path, as_json: bool) -> int:
     return 1 if tally.failed or missing else 0
 
 
-def _played(seeds: range, jobs: int) -> Iterator[Tally]:
-    parts = [seeds[i : i + CHUNK] for i in range(0, len(seeds), CHUNK)]
+def _played(seeds: range, jobs: int, player: Player) -> Iterator[Tally]:
+    chunk = CHUNKS[player]
+    parts = [(seeds[i : i + chunk], player) for i in range(0, len(seeds), chunk)]
     if jobs == 1:
         yield from map(_play_part, parts)
         return
@@ -121,23 +127,24 @@ def _played(seeds: range, jobs: int) -> Iterator[Tally]:
         yield from pool.map(_play_part, parts)
 
 
-def _play_part(seeds: range) -> Tally:
+def _play_part(part: tuple[range, Player]) -> Tally:
+    seeds, player = part
     tally = Tally()
     for seed in seeds:
-        played = play(draw(seed))
+        played = player(draw(seed), None)
         failed = {seed: [said(v) for v in played.violations]} if played.violations else {}
         tally.add(Tally(1, played.elections, dict(played.counts), failed))
     return tally
 
 
-def shrink(schedule: Schedule, name: str) -> Schedule:
+def shrink(schedule: Schedule, name: str, player: Player = play) -> Schedule:
     """Fewer faults that still break invariant `name`: halves, then quarters, ..., then single ones are left out."""
     size = max(len(schedule.faults) // 2, 1)
     while True:
         index, smaller = 0, False
         while index < len(schedule.faults):
             tried = without(schedule, *range(index, index + size))
-            if any(v.name == name for v in play(tried).violations):
+            if any(v.name == name for v in player(tried, None).violations):
                 schedule, smaller = tried, True
             else:
                 index += size
@@ -146,13 +153,18 @@ def shrink(schedule: Schedule, name: str) -> Schedule:
         size = max(size // 2, 1)
 
 
-def _explain(seed: int, out: Path) -> Path:
+def again(seed: int, player: Player) -> str:
+    """The command that plays a seed once more."""
+    return f"lfa fuzz {'--whole ' if player is play_whole else ''}--seed {seed} -v"
+
+
+def _explain(seed: int, out: Path, player: Player) -> Path:
     """Write the shrunk schedule of a failed seed and its trace."""
-    small = shrink(draw(seed), play(draw(seed)).violations[0].name)
+    small = shrink(draw(seed), player(draw(seed), None).violations[0].name, player)
     lines: list[str] = []
-    played = play(small, columns(lines, small))
+    played = player(small, columns(lines, small))
     out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{seed}.txt"
+    path = out / f"{'whole-' if player is play_whole else ''}{seed}.txt"
     text = [describe(small), *lines, *(said(v) for v in played.violations)]
     path.write_text("\n".join(text) + "\n")
     return path

@@ -1,0 +1,63 @@
+"""What a lease did, in the words of the checkers: the effects of an agent's or a witness's core, noted as it carries
+them out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from agents.agent import Agent
+from protocol.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from protocol.messages import Grant, LeaseNote, Member, Promise, Propose, Release
+from protocol.mission import robot_id_of
+from protocol.witness import Witness
+
+Words = tuple[Any, ...]
+"""The name of a method of `Checker`, and what it is called with."""
+
+
+def overhear(node: Agent | Witness, hear: Callable[[list[Effect]], object]) -> None:
+    """Give `hear` the effects of the node's lease, just before the node carries them out."""
+    name = "_apply" if isinstance(node, Agent) else "_carry_out"
+    carry_out = getattr(node, name)
+
+    def heard(done: list[Effect], now: float) -> Any:
+        hear(done)
+        return carry_out(done, now)
+
+    setattr(node, name, heard)
+
+
+def told(effect: Effect, me: Member, at: float, bond_s: float, true: Callable[[float], float]) -> Iterator[Words]:
+    """`bond_s` is how long a voter is bound in true time; `true` makes that of the node's own."""
+    match effect:
+        case BecomeLeader(term, expiry) | LeaseExtended(term, expiry):
+            yield ("leads", at, me, term, true(expiry))
+        case StepDown():
+            yield ("leads_no_more", at, me)
+        case AdoptChain(config):
+            yield ("adopts", at, me, config)
+        case Send(_, Propose() as body):
+            yield ("proposes", at, me, body)
+            if body.holder == me:  # its own voter's grant as well
+                own = Grant(body.term, body.round, body.config.version, 0.0)
+                yield ("grants", at, me, own, at + bond_s)
+        case Send(_, Grant() as body):
+            yield ("grants", at, me, body, at + bond_s)
+        case Send(_, Release() as body):
+            yield ("releases", at, body.term)
+
+
+def said(note: LeaseNote, at: float) -> Iterator[Words]:
+    """What a message that came says of its sender, who may not have lived to journal that it said it."""
+    source = robot_id_of(note.header.sender)
+    if source is None:
+        return
+    sender = Member(source, note.header.incarnation)
+    match note.body:
+        case Propose() as body:
+            yield ("proposes", at, sender, body)
+        case Promise() as body:
+            yield ("promises", at, sender, body)
+        case Release() as body:
+            yield ("releases", at, body.term)

@@ -1,0 +1,312 @@
+"""Whole agents under a schedule of faults: what `arena.py` is for leases alone.
+
+Agents, witness and world are the real ones, in the simulator, with the codec of the real thing; bodies have no engine.
+It takes what `chaos.py` does to an arena. All gateways live and die with the one world, which goes on from where
+it was; a robot and its gateway are on the robot, so a cut never parts them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from random import Random
+from typing import Any
+
+from msgspec import Struct
+
+from agents.agent import Agent
+from deploy.look.checkers import Checker, listeners
+from deploy.look.overheard import overhear, said, told
+from deploy.run import arena
+from deploy.run.arena import Trace, Weather
+from deploy.run.operator import Operator
+from deploy.run.schedules import Schedule
+from protocol.effects import BecomeLeader, Effect
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.lease import Lease
+from protocol.messages import CmdVel, Fence, LeaseNote, Member, Message, Promise, encode
+from protocol.mission import WITNESS_ID, Leading, Mission, robot_id_of, robot_name
+from protocol.node import Envelope, Node, PeerDown, PeerUp, Received
+from protocol.radio import Air, Radio
+from protocol.timing import timing_of
+from protocol.topics import WORLD_NAME, address
+from protocol.witness import Witness
+from world.kinematic import Kinematic
+from world.memory import resumed
+from world.simulator import LocalClock, Simulator
+from world.spec import Lidar, Scenario, WorldSpec
+from world.world import World
+
+FLEET = "whole"
+ROAD_M = 100.0
+
+
+class Gale(Air):
+    """The arena's weather and cuts, on the simulator's links."""
+
+    def __init__(self, whole: Whole) -> None:
+        super().__init__(Radio(), whole.random)
+        self._whole = whole
+
+    def delays(self, sender: str, receiver: str) -> list[float]:
+        whole = self._whole
+        if whole.cuts and (_place(sender), _place(receiver)) in whole.cuts:
+            return []
+        return whole.weather.delays(whole.random)
+
+
+class Life:
+    """One life of an agent or of the witness."""
+
+    def __init__(self, simulator: Simulator, node: Agent | Witness, member: Member, clock: LocalClock) -> None:
+        self.node = node
+        self.member = member
+        self.id = member.id
+        self.clock = clock
+        self.paused = False
+        self.drawn: tuple[str, bytes] | None = None
+        """The last command said as leader: what a pause may hold back."""
+        self._simulator = simulator
+
+    @property
+    def alive(self) -> bool:
+        return self._simulator.lives(self.node)
+
+    @property
+    def lease(self) -> Lease | None:
+        """None in the first moment of a life."""
+        return self.node.lease
+
+
+class Hardware(Struct):
+    """One life of the world, and so of all gateways."""
+
+    world: World
+    clock: LocalClock
+    alive: bool = True
+
+
+class Whole:
+    def __init__(self, schedule: Schedule) -> None:
+        """Nobody has started yet."""
+        self.random = Random(schedule.seed)
+        leading = Leading(route_m=((ROAD_M, 0.0),))
+        robots = tuple(range(1, schedule.robots + 1))
+        self.mission = Mission(robots, witness=schedule.witness, profile=schedule.profile, leading=leading)
+        self.timing = timing_of(schedule.profile)
+        self.weather: Weather = schedule.weather
+        self.trace: Trace | None = None
+        self.cuts: set[tuple[int, int]] = set()
+        self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots
+        self.rates = schedule.rates
+        self.processes: dict[int, Life] = {}
+        self.gateways: dict[int, Hardware] = {}
+        self.accepted: list[tuple[float, CmdVel]] = []
+        self.log: list[tuple[float, int, Effect]] = []
+        world = WorldSpec(lidar=Lidar(beams=8, rate_hz=2.0))
+        self._scenario = Scenario("A straight road", self.mission, 1e6, world=world, name=FLEET)
+        self._operator = Operator(FLEET, 1)
+        self._lives = 0
+        self._simulator = Simulator(Radio(), schedule.seed)
+        self._simulator.air = Gale(self)
+        self._simulator.taps.append(self._hear)
+        self.listen(())
+
+    def listen(self, checkers: Sequence[Checker]) -> None:
+        """Tell these checkers, and only these, what happens from here on."""
+        self._listeners = listeners(checkers)
+
+    # --- the course of time ------------------------------------------------------------------------------------
+
+    @property
+    def now(self) -> float:
+        return self._simulator.now
+
+    def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
+        """`what(*arguments)` when true time reaches `time`."""
+        self._simulator.at(time, lambda: what(*arguments))
+
+    def run(self, until: float) -> Whole:
+        self._simulator.run(until)
+        return self
+
+    # --- lives -------------------------------------------------------------------------------------------------
+
+    def start_all(self) -> Whole:
+        """The world with its gateways, then everybody at once."""
+        self._start_world(World(FLEET, self._scenario, 1, self._next_life(), start_at=None, bodies=Kinematic))
+        for robot_id in self.ids:
+            self.start(robot_id)
+        return self
+
+    def start(self, robot_id: int) -> None:
+        """A new life, with empty memory; a living one of the same id ends first."""
+        if robot_id in self.processes:
+            self.kill(robot_id)
+        member = Member(robot_id, self._next_life())
+        floor = round(self.now * 1000.0)
+        node: Agent | Witness = (
+            Witness(FLEET, member.incarnation, floor, self.mission)
+            if robot_id == WITNESS_ID
+            else Agent(robot_id, member.incarnation, FLEET, floor, self.mission)
+        )
+        clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
+        life = self.processes[robot_id] = Life(self._simulator, node, member, clock)
+        overhear(node, lambda effects: self._done(life, effects))
+        _before(node, lambda received: self._received(received))
+        self._say(robot_id, f"starts, life {member.incarnation}")
+        self._add(node, clock)
+
+    def kill(self, robot_id: int, *, hinted: bool = True) -> None:
+        life = self.processes[robot_id]
+        if life.alive:
+            self._simulator.kill(robot_name(robot_id), hinted=hinted)
+            self._say(robot_id, "dies")
+            self._tell("leads_no_more", self.now, life.member)
+
+    def exit(self, robot_id: int) -> None:
+        life = self.processes[robot_id]
+        if life.alive and not life.paused:
+            self._simulator.terminate(robot_name(robot_id))
+
+    def hand_over(self, robot_id: int) -> None:
+        """An operator asks all for it; whoever leads obeys."""
+        self._simulator.say(self._operator.orders_key, encode(self._operator.orders("handover", self.now)))
+
+    def pause(self, robot_id: int) -> None:
+        if self.processes[robot_id].alive:
+            self.processes[robot_id].paused = True
+            self._simulator.pause(robot_name(robot_id))
+
+    def resume(self, robot_id: int, shuffled: bool = False) -> None:
+        """SIGCONT: the command that was about to leave leaves, then all that came is handled."""
+        life = self.processes[robot_id]
+        if life.paused and life.alive:
+            life.paused = False
+            if life.drawn is not None:
+                self._simulator.say(*life.drawn)
+            self._simulator.resume(robot_name(robot_id), shuffled=shuffled)
+
+    def start_gateway(self, robot_id: int) -> None:
+        """The world, and with it everybody's gateway, goes on from where it was."""
+        if not self.gateways[robot_id].alive:
+            memory = self.gateways[robot_id].world.memory()
+            scenario = resumed(self._scenario, memory)
+            self._start_world(World(FLEET, scenario, 1, self._next_life(), None, Kinematic, memory))
+
+    def kill_gateway(self, robot_id: int) -> None:
+        hardware = self.gateways[robot_id]
+        if hardware.alive:
+            hardware.alive = False
+            self._simulator.kill(WORLD_NAME)
+            self._say(WITNESS_ID, "world dies")
+
+    def hint(self, about: int, *observers: int, up: bool = False) -> None:
+        member = self.processes[about].member
+        event = (PeerUp if up else PeerDown)(robot_name(about), member.incarnation)
+        self._simulator.hint(event, [robot_name(observer) for observer in observers])
+
+    def latch(self, robot_id: int, incarnation: int) -> None:
+        """The robot's gateway sees its agent's token vanish, whatever is true."""
+        self._simulator.hint(PeerDown(robot_name(robot_id), incarnation), [WORLD_NAME])
+
+    def _start_world(self, world: World) -> None:
+        clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
+        hardware = Hardware(world, clock)
+        self.gateways = dict.fromkeys(self.mission.robots, hardware)
+        receive = world.receive
+        world.receive = lambda received: self._at_gateways(hardware, receive, received)  # type: ignore[method-assign]
+        self._say(WITNESS_ID, "world starts")
+        for robot_id in self.mission.robots:
+            self._tell("gateway_starts", self.now, robot_id, self.now + self.timing.grant_s / clock.rate)
+        self._add(world, clock)
+
+    def _add(self, node: Node, clock: LocalClock) -> None:
+        self._simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {})), clock)
+
+    def _next_life(self) -> int:
+        self._lives += 1
+        return self._lives
+
+    # --- what the checkers are told ----------------------------------------------------------------------------
+
+    def _tell(self, what: str, *facts: Any) -> None:
+        for listen in self._listeners[what]:
+            listen(*facts)
+
+    def _done(self, life: Life, effects: Sequence[Effect]) -> None:
+        for effect in effects:
+            self._say(life.id, arena.told(effect))
+            if isinstance(effect, BecomeLeader):
+                self.log.append((self.now, life.id, effect))
+            for words in told(effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true):
+                self._tell(*words)
+
+    def _received(self, received: Received) -> None:
+        note = received.message
+        if isinstance(note, LeaseNote) and isinstance(note.body, Promise):
+            for words in said(note, self.now):
+                self._tell(*words)
+
+    def _at_gateways(
+        self, hardware: Hardware, receive: Callable[[Received], list[Envelope]], received: Received
+    ) -> list[Envelope]:
+        """What reaches the world; what its gateways make of it."""
+        where, message = address(received.key) if received.key else None, received.message
+        if where is None or not isinstance(message, CmdVel | LeaseNote):
+            return receive(received)
+        name = where.owner if isinstance(message, CmdVel) else (where.to or "").replace("gateway", "robot")
+        robot = robot_id_of(name)
+        refused = _refused(hardware.world, robot)
+        sent = receive(received)
+        if isinstance(message, CmdVel) and _refused(hardware.world, robot) == refused:
+            if message.as_leader:
+                self.accepted.append((self.now, message))
+            self._tell("obeys", self.now, robot, message, received.at - message.gateway.time)
+            self._tell("bars", self.now, robot, message.term)
+        elif isinstance(message, LeaseNote) and isinstance(message.body, Fence):
+            self._tell("bars", self.now, robot, message.body.term)
+        return sent
+
+    def _hear(self, _now: float, key: str, payload: bytes, message: Message) -> None:
+        if isinstance(message, CmdVel) and message.as_leader:
+            life = self.processes.get(robot_id_of(message.header.sender) or WITNESS_ID)
+            if life is not None and life.member.incarnation == message.header.incarnation:
+                life.drawn = key, payload
+
+    def _say(self, who: int, what: str) -> None:
+        if self.trace is not None:
+            self.trace(self.now, who, what)
+
+    # --- what is asked of it -----------------------------------------------------------------------------------
+
+    def leaders(self) -> list[int]:
+        """Ids whose lease is valid at this moment by their own clocks."""
+        living = [(i, life, life.lease) for i, life in sorted(self.processes.items()) if life.alive]
+        return [i for i, life, lease in living if lease is not None and lease.may_command(life.clock.local(self.now))]
+
+    def lease_of(self, robot_id: int) -> Lease:
+        lease = self.processes[robot_id].lease
+        assert lease is not None, robot_id
+        return lease
+
+
+def _before(node: Agent | Witness, hear: Callable[[Received], None]) -> None:
+    """Give `hear` all that comes to the node, just before the node gets it."""
+    receive = node.receive
+
+    def heard(received: Received) -> list[Envelope]:
+        hear(received)
+        return receive(received)
+
+    node.receive = heard  # type: ignore[method-assign]
+
+
+def _refused(world: World, robot: int | None) -> int:
+    """How many commands that robot's gateway has refused so far."""
+    gateway = world.gateways.get(robot) if robot is not None else None
+    return 0 if gateway is None else sum(gateway.refused.values())
+
+
+def _place(name: str) -> int:
+    """The id of a place in the air: 0 is the world with the witness."""
+    return WITNESS_ID if name == WORLD_NAME else robot_id_of(name) or WITNESS_ID

@@ -1,0 +1,58 @@
+"""`lfa fuzz --whole`: whole agents under the same schedules, watched by the same checkers."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from deploy.run.chaos import play_whole
+from deploy.run.fuzz import shrink
+from deploy.run.schedules import KINDS, draw, without
+from protocol.acceptor import Acceptor
+from protocol.gateway import Gateway
+
+SEEDS = (2, 3, 4, 7, 8, 14, 15, 18, 19)
+"""Small teams, which are quick; between them every kind of fault."""
+
+
+def test_whole_agents_keep_every_invariant_and_every_kind_of_fault_takes_effect() -> None:
+    seen: set[str] = set()
+    for seed in SEEDS:
+        played = play_whole(draw(seed))
+        assert played.violations == [], f"reproduce: lfa fuzz --whole --seed {seed} -v"
+        seen |= set(+played.counts)
+    assert seen == set(KINDS)
+
+
+def test_one_seed_is_one_run_under_any_hash_seed() -> None:
+    command = [sys.executable, "-c", "from deploy.cli import main; main()", "fuzz", "--whole", "--seed", "14", "-v"]
+    told = [
+        subprocess.run(command, env={**os.environ, "PYTHONHASHSEED": number}, capture_output=True, check=True).stdout
+        for number in ("1", "2")
+    ]
+    assert told[0] == told[1]
+    assert len(told[0].splitlines()) > 50
+
+
+def test_a_voter_that_forgets_its_bond_is_found_and_few_faults_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = Acceptor.propose
+
+    def careless(self: Acceptor, *arguments: object) -> object:
+        self.bond = None
+        return honest(self, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Acceptor, "propose", careless)
+    monkeypatch.setattr(Acceptor, "bound", lambda self, now: None)
+    bad = without(draw(15), *range(4, len(draw(15).faults)))
+    name = play_whole(bad).violations[0].name
+    small = shrink(bad, name, play_whole)
+    assert len(small.faults) < len(bad.faults)
+    assert any(v.name == name for v in play_whole(small).violations)
+
+
+def test_a_gateway_that_obeys_everybody_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Gateway, "_objection", lambda *_: None)
+    assert "I2" in {violation.name for violation in play_whole(draw(2)).violations}
