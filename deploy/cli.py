@@ -31,6 +31,18 @@ COMMANDS = (
           "lfa sim paper_path1 --seed 7 --set world.lidar.beams=90"),
     Entry("fuzz", "deploy.run.fuzz", "Hunt for schedules of faults that break the lease protocol.",
           "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v; lfa fuzz --whole"),
+    Entry("up", "deploy.fleet.up", "Bring a fleet up on its machines, over ssh, and wait until all of it drives.",
+          "lfa up deploy/fleet.example.toml"),
+    Entry("ps", "deploy.fleet.ps", "What runs on which machine of a fleet.",
+          "lfa ps --json"),
+    Entry("top", "deploy.fleet.top", "A fleet's machines and robots on one screen, live.",
+          "lfa top"),
+    Entry("logs", "deploy.fleet.logs", "The log of one process of a fleet, or of all, wherever it runs.",
+          "lfa logs -f robot3"),
+    Entry("restart", "deploy.fleet.restart", "End one process of a fleet and start it again, wherever it runs.",
+          "lfa restart robot3"),
+    Entry("down", "deploy.fleet.down", "End a fleet on all its machines.",
+          "lfa down"),
     Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",
           "lfa fault kill leader"),
     Entry("forget", "deploy.run.forget", "Robots lost for good: a fleet without memory waits for them no more.",
@@ -103,7 +115,7 @@ def run_cli(name: str, app: typer.Typer) -> int:
     try:
         code = app(standalone_mode=False, prog_name=name)
     except Refused as refused:
-        return _say(name, str(refused))
+        return _say(name, *getattr(refused, "lines", (str(refused),)))
     except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
         return _say(name, error.format_message())
     except typer.Abort:
@@ -123,8 +135,9 @@ def command_app(function: Callable[..., Any], help_text: str, example: str) -> t
     return app
 
 
-def _say(name: str, text: str) -> int:
-    print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
+def _say(name: str, *texts: str) -> int:
+    for text in texts:
+        print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
     return 2
 
 

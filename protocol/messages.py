@@ -438,7 +438,7 @@ class HostOrder(Struct, frozen=True, array_like=True, tag="order"):
     deed: str
     """`report`, `restart`, `logs` or `down`."""
     target: str
-    """A process, or a host; empty: all."""
+    """A process (`robot3`, `a/router`), or a host; empty: all."""
     lines: int = 0
     """Of `logs`: how many of the last lines; later ones follow for a few seconds."""
 

@@ -1,4 +1,4 @@
-"""`lfa schema`: every key of a scenario, for editors (JSON schema) and for people (a table), both made from the types.
+"""`lfa schema`: every key of a scenario or a fleet file, for editors (JSON schema) and people (a table).
 
 What a key means stands below its field in the source, as everywhere in this project; that text is read from there.
 """
@@ -18,6 +18,7 @@ import typer
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo, fields
 
+from deploy.fleet.file import FleetFile
 from world.scenario import Scenario
 
 UNITS = {
@@ -39,35 +40,38 @@ class Key(Struct, frozen=True):
 
 def command(
     markdown: Annotated[bool, typer.Option("--markdown", help="A table for people instead of a JSON schema.")] = False,
+    fleet: Annotated[bool, typer.Option("--fleet", help="Of a fleet file (lfa up) instead of a scenario.")] = False,
 ) -> int:
-    print(table() if markdown else msgspec.json.format(msgspec.json.encode(schema()), indent=1).decode())
+    kind = FleetFile if fleet else Scenario
+    print(table(kind) if markdown else msgspec.json.format(msgspec.json.encode(schema(kind)), indent=1).decode())
     return 0
 
 
-def schema() -> dict[str, Any]:
-    """JSON schema of a scenario file, with the texts of the keys."""
-    made = msgspec.json.schema(Scenario)
-    for name, struct in {kind.__name__: kind for kind in _structs(Scenario)}.items():
+def schema(kind: type[Struct] = Scenario) -> dict[str, Any]:
+    """JSON schema of a scenario file, or of another `kind` of file, with the texts of the keys."""
+    made = msgspec.json.schema(kind)
+    for name, struct in {kind.__name__: kind for kind in _structs(kind)}.items():
         properties = made["$defs"].get(name, {}).get("properties", {})
         for field in fields(struct):
             text = _texts(struct).get(field.name)
             if text and field.encode_name in properties:
                 properties[field.encode_name]["description"] = text
-    made["$defs"]["Scenario"]["properties"].pop("name")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "lfa scenario", **made}
+    made["$defs"][kind.__name__]["properties"].pop("name", None)
+    title = f"lfa {'scenario' if kind is Scenario else 'fleet'}"
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **made}
 
 
-def documented() -> list[Key]:
-    """Every key, in the order of the types; `[]` stands for one of a list."""
-    return list(_keys(Scenario, ""))
+def documented(kind: type[Struct] = Scenario) -> list[Key]:
+    """Every key, in the order of the types; `[]` stands for one of a list, `NAME` for one of a table."""
+    return list(_keys(kind, ""))
 
 
-def table() -> str:
+def table(kind: type[Struct] = Scenario) -> str:
     rows = ["| key | type | unit | default | what |", "| --- | --- | --- | --- | --- |"]
     rows += [
         f"| `{key.path}` | {_cell(key.type)} | {key.unit} | {f'`{_cell(key.default)}`' if key.default else 'required'} "
         f"| {_cell(key.text)} |"
-        for key in documented()
+        for key in documented(kind)
     ]
     return "\n".join(rows)
 
@@ -82,7 +86,8 @@ def _keys(struct: type[Struct], where: str) -> Iterator[Key]:
         if inner is None:
             yield Key(path, _type(kind), _unit(field.encode_name), _default(field), _texts(struct).get(field.name, ""))
         else:
-            yield from _keys(inner, f"{path}[]." if get_origin(kind) is tuple else f"{path}.")
+            one = {tuple: "[]", dict: ".NAME"}.get(get_origin(kind), "")
+            yield from _keys(inner, f"{path}{one}.")
 
 
 def _structs(struct: type[Struct]) -> Iterator[type[Struct]]:

@@ -61,14 +61,14 @@ class Crew:
 
     def __init__(self, folder: Path) -> None:
         self._logs = folder / LOGS
-        self._logs.mkdir()
+        self._logs.mkdir(parents=True, exist_ok=True)
         self._children: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, row: Row) -> None:
         """Raises OSError when no process can be made."""
         death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
-        with (self._logs / f"{row.name}.log").open("ab") as log:
+        with self.log(row.name).open("ab") as log:
             self._children[row.name] = processes.start(row.arguments, log, death, stdin, row.inside)
 
     def runs(self, name: str) -> bool:
@@ -85,17 +85,28 @@ class Crew:
 
     def exit_of(self, name: str) -> str | None:
         """How `name` ended, in words; None while it runs, and before it was started."""
-        child = self._children.get(name)
-        code = None if child is None else child.poll()
+        code = self.code(name)
         if code is None:
             return None
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         last_line = self._last_line(name)
         return f"{name} ended ({how})" + (f": {last_line}" if code > 0 and last_line else "")
 
+    def code(self, name: str) -> int | None:
+        """As of a `Popen`: negative for a signal; None while it runs, and before it was started."""
+        child = self._children.get(name)
+        return None if child is None else child.poll()
+
+    def pid(self, name: str) -> int:
+        """0 while it does not run."""
+        return self._children[name].pid if self.runs(name) else 0
+
+    def log(self, name: str) -> Path:
+        return self._logs / f"{name}.log"
+
     def signal(self, name: str, number: signal.Signals) -> bool:
         """Signal `name`, checked to be still the process that was started; False when it has gone."""
-        identity = self._identity(name)
+        identity = self.identity(name)
         return identity is not None and processes.send(identity, number)
 
     def tell(self, name: str, line: bytes) -> None:
@@ -135,10 +146,10 @@ class Crew:
             child.kill()
             child.wait()
 
-    def _identity(self, name: str) -> Identity | None:
+    def identity(self, name: str) -> Identity | None:
         """A child that has not been waited for keeps its pid: this is who it is now."""
         return processes.identify(self._children[name].pid) if self.runs(name) else None
 
     def _last_line(self, name: str) -> str:
-        lines = (self._logs / f"{name}.log").read_text(errors="replace").strip().splitlines()
+        lines = self.log(name).read_text(errors="replace").strip().splitlines()
         return lines[-1] if lines else ""

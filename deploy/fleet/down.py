@@ -1,0 +1,92 @@
+"""`lfa down`: everything of a fleet ends, on every machine; also where its router is dead."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from deploy.fleet import host
+from deploy.fleet.file import Plan
+from deploy.fleet.hosts import Fleet
+from deploy.fleet.part import parts
+from deploy.fleet.sight import Seen, Sight, find, first_word, sight
+from protocol import clock
+from protocol.mission import Refused
+
+HEAR_S = 2.0
+GONE_S = 8.0
+POLL_S = 0.05
+
+
+def command(
+    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
+) -> int:
+    began = clock.now()
+    seen = find(file, fleet, connect)
+    ended, wrong = asyncio.run(_by_shell(seen.plan)) if seen.plan is not None else _by_word(seen)
+    took_s = round(clock.now() - began, 2)
+    if as_json:
+        print(msgspec.json.encode({"fleet": seen.name, "ended": ended, "wrong": wrong, "took_s": took_s}).decode())
+    else:
+        print(f"fleet {seen.name}: ended on {', '.join(ended) or 'no host'} after {took_s:.1f} s")
+    for line in wrong:
+        print(f"lfa: {line}", file=sys.stderr)
+    return 1 if wrong else 0
+
+
+async def _by_shell(plan: Plan) -> tuple[list[str], list[str]]:
+    """Each machine is asked to end its part, and answers when nothing of it is left."""
+    fleet = Fleet(plan, parts(plan, "", ""))
+    try:
+        await fleet.reach()
+        answers = await fleet.do("stop")
+    finally:
+        await fleet.close()
+    return [name for name, found in answers.items() if found.run], fleet.lines()
+
+
+def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
+    """The others hear it over Zenoh; this machine's own supervisor, if any, by a signal and last of all."""
+    own = seen.part
+    ended: list[str] = []
+    wrong: list[str] = []
+    try:
+        with sight(seen) as view:
+            first_word(view, HEAR_S)
+            far = [name for name in view.names if own is None or name != own.host]
+            wrong = [f"host {name}: is not heard, and may run on" for name in far if name not in view.hosts]
+            far = [name for name in far if name in view.hosts]
+            ended, left = _order_down(view, far)
+            wrong += [f"host {name}: does not end" for name in left]
+    except Refused as refused:
+        if own is None:
+            raise
+        wrong = [f"{refused}: only this host is ended"] if len(own.hosts) > 1 else []
+    if own is not None:
+        host.stop(own)
+        ended.append(own.host)
+    return ended, wrong
+
+
+def _order_down(view: Sight, names: list[str]) -> tuple[list[str], list[str]]:
+    """Those that ended, and those that did not. Whose router the word came through goes last: it may be any."""
+    orders = {name: view.order("down", name) for name in names}
+    left = set(names)
+    until, say_at = clock.now() + GONE_S, 0.0
+    while left and clock.now() < until:
+        if clock.now() >= say_at:
+            say_at = clock.now() + 0.5
+            for name in left:
+                view.say(orders[name])
+        clock.sleep(POLL_S)
+        view.hear()
+        left = {name for name in left if view.living(name)}
+    return [name for name in names if name not in left], sorted(left)

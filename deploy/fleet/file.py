@@ -1,0 +1,262 @@
+"""The fleet file: which machines there are, what runs where, and what becomes of what fails."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from deploy.fleet import tables
+from deploy.run.chosen import choose
+from protocol.mission import Profile, Refused
+from world.scenario import Scenario, draw
+
+NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,30}")
+LOCAL = ("localhost", "127.0.0.1", "::1")
+ROUTER_PORT = 7447
+PORT_MAX = 65535
+
+Policy = Literal["never", "on-failure", "always"]
+
+
+class Machine(Struct, frozen=True, forbid_unknown_fields=True):
+    """One machine. ssh is asked for what is not said: user, port and key come from `~/.ssh/config`."""
+
+    address: str = "localhost"
+    """How the other machines reach it. `localhost`: this machine, without ssh."""
+    ssh: str = ""
+    """What ssh calls it, such as a `Host` of `~/.ssh/config`; else its address."""
+    user: str = ""
+    port: int = 0
+    """Of its ssh server; 0: what ssh's configuration says, else 22."""
+    python: str = ""
+    """The Python that has `lfa` there. Default: `python3`; here: the one that runs this command."""
+    venv: str = ""
+    """A virtual environment there, instead of `python`; `lfa up --install` makes it."""
+    state: str = ""
+    """Folder of logs, journals and sockets. Default: `~/.local/state/lfa/<fleet>/<host>`."""
+    labels: tuple[str, ...] = ()
+    """What `robots.spread` may also call it by."""
+    router_port: int = ROUTER_PORT
+
+    @property
+    def local(self) -> bool:
+        return self.address in LOCAL and not self.ssh
+
+
+class Robots(Struct, frozen=True, forbid_unknown_fields=True):
+    """Which robot runs where."""
+
+    spread: tuple[str, ...] = ()
+    """Machines, or labels, over which robots without a place of their own are dealt out in turn. Default: all."""
+    on: dict[str, str] = {}
+    """Robots with a place of their own: `3 = "pi-3"`."""
+
+
+class Links(Struct, frozen=True, forbid_unknown_fields=True):
+    """How the machines' routers are joined."""
+
+    transport: Literal["tcp"] = "tcp"
+    pairs: tuple[tuple[str, str], ...] = ()
+    """Which routers are joined. Default: each with each."""
+    failover: bool = True
+    """A process whose machine's router is lost goes to the next machine's."""
+
+
+class Restart(Struct, frozen=True, forbid_unknown_fields=True):
+    """What becomes of a process that ends, except for routers: those always start again."""
+
+    policy: Policy = "on-failure"
+    delay_s: float = 0.5
+    """Before the first new start; doubled with each further one within the window."""
+    delay_max_s: float = 10.0
+    window_s: float = 60.0
+    starts_max: int = 5
+    """New starts within the window; then it is given up."""
+
+
+class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
+    """All that `lfa up` needs to know."""
+
+    hosts: dict[str, Machine]
+    scenario: str = "paper_path1"
+    """A shipped scenario, or a file beside this one."""
+    fleet: str = ""
+    """Its name: part of every key. Default: the name of this file."""
+    seed: int = 0
+    set: tuple[str, ...] = ()
+    """Fields of the scenario to be other than they are: `["world.lidar.beams=90"]`."""
+    team: int | None = None
+    """A team of 1..N instead of the scenario's."""
+    profile: Profile | None = None
+    """Timing: `std` on wires, `wifi` on radio. Default: the scenario's."""
+    world: str = ""
+    """The machine of the simulated world. Default: the first."""
+    witness: str = ""
+    """The machine of the witness. Default: the world's, in its process."""
+    robots: Robots = Robots()
+    links: Links = Links()
+    restart: Restart = Restart()
+
+
+class Plan(Struct, frozen=True):
+    """A fleet file that can be obeyed, with nothing left open."""
+
+    path: Path
+    file: FleetFile
+    scenario: Scenario
+    places: dict[int, str]
+    """Robot to machine."""
+
+    @property
+    def name(self) -> str:
+        return self.file.fleet
+
+    @property
+    def hosts(self) -> dict[str, Machine]:
+        return self.file.hosts
+
+    def robots_on(self, host: str) -> tuple[int, ...]:
+        return tuple(robot for robot, place in self.places.items() if place == host)
+
+
+class Mistaken(Refused):
+    """A fleet file with mistakes: one line each."""
+
+    def __init__(self, path: Path, mistakes: list[str]) -> None:
+        self.lines = tuple(f"{path}: {mistake}" for mistake in mistakes)
+        super().__init__("; ".join(self.lines))
+
+
+def is_fleet_file(path: Path) -> bool:
+    """True for a TOML file with a table `hosts`: a scenario has none."""
+    try:
+        return "hosts" in tomllib.loads(path.read_text())
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False
+
+
+def load(path: Path) -> Plan:
+    """The plan in that file. Raises Refused, and Mistaken with every mistake at once."""
+    try:
+        document: dict[str, Any] = tomllib.loads(path.read_text())
+    except OSError as error:
+        raise Refused(f"{path}: cannot be read ({error.strerror}): must be a fleet file in TOML") from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise Refused(f"{path}: no TOML ({' '.join(str(error).split())}): must be a fleet file") from None
+    mistakes: list[str] = []
+    file = tables.read(document, FleetFile, mistakes)
+    if file is None or not file.hosts:
+        raise Mistaken(path, mistakes or ["hosts = {}: must have at least one machine, as [hosts.NAME]"])
+    first = next(iter(file.hosts))
+    file = replace(file, fleet=file.fleet or path.name.partition(".")[0], world=file.world or first)
+    file = replace(file, witness=file.witness or file.world)
+    mistakes += _wrong(file)
+    scenario = _scenario(file, path, mistakes)
+    places = {} if scenario is None else _places(file, scenario.mission.robots, mistakes)
+    if mistakes or scenario is None:
+        raise Mistaken(path, mistakes)
+    return Plan(path, file, scenario, places)
+
+
+def _scenario(file: FleetFile, path: Path, mistakes: list[str]) -> Scenario | None:
+    beside = path.parent / file.scenario
+    overrides = [*file.set, *([f"mission.profile='{file.profile}'"] if file.profile else [])]
+    try:
+        named = str(beside) if beside.suffix == ".toml" else file.scenario
+        return draw(choose(named, overrides, file.team), file.seed)
+    except Refused as refused:
+        mistakes.append(f"scenario = {file.scenario}: {refused}")
+        return None
+
+
+def _places(file: FleetFile, robots: tuple[int, ...], mistakes: list[str]) -> dict[int, str]:
+    """Robots with their own place there, the others dealt out in turn."""
+    right = f"one of {', '.join(map(str, robots))}"
+    for robot, host in file.robots.on.items():
+        if not robot.isdecimal() or int(robot) not in robots:
+            mistakes.append(f"robots.on.{robot} = {host}: no such robot in the scenario: must be {right}")
+    spread = [name for word in file.robots.spread for name in _called(file, word, mistakes)] or list(file.hosts)
+    free = [robot for robot in robots if str(robot) not in file.robots.on]
+    dealt = {robot: spread[n % len(spread)] for n, robot in enumerate(free)}
+    return {robot: file.robots.on.get(str(robot), dealt.get(robot, "")) for robot in robots}
+
+
+def _called(file: FleetFile, word: str, mistakes: list[str]) -> list[str]:
+    named = [name for name, machine in file.hosts.items() if word == name or word in machine.labels]
+    if not named:
+        mistakes.append(f"robots.spread = {word}: must be {_one_of(file.hosts)}, or a label of some")
+    return named
+
+
+def _wrong(file: FleetFile) -> list[str]:
+    """What no single value's type tells."""
+    wrong = [] if NAME.fullmatch(file.fleet) else [f"fleet = {file.fleet}: must be {_NAMES}"]
+    places = {"world": file.world, "witness": file.witness}
+    if file.witness == file.world:
+        del places["witness"]
+    places |= {f"robots.on.{robot}": host for robot, host in file.robots.on.items()}
+    wrong += [
+        f"{key} = {host}: must be {_one_of(file.hosts)}" for key, host in places.items() if host not in file.hosts
+    ]
+    for name, machine in file.hosts.items():
+        wrong += _wrong_machine(name, machine)
+    wrong += _wrong_together(file)
+    for a, b in file.links.pairs:
+        wrong += [f"links.pairs = [{a}, {b}]: {x} must be {_one_of(file.hosts)}" for x in (a, b) if x not in file.hosts]
+    restart = file.restart
+    for key, value, low, high in (
+        ("delay_s", restart.delay_s, 0.0, 600.0),
+        ("delay_max_s", restart.delay_max_s, restart.delay_s, 3600.0),
+        ("window_s", restart.window_s, 1.0, 86400.0),
+        ("starts_max", restart.starts_max, 0, 1000),
+    ):
+        if not low <= value <= high:
+            wrong.append(f"restart.{key} = {value:g}: must be from {low:g} to {high:g}")
+    return wrong
+
+
+def _wrong_machine(name: str, machine: Machine) -> list[str]:
+    where, wrong = f"hosts.{name}", []
+    if not NAME.fullmatch(name):
+        wrong.append(f"{where}: must be called by {_NAMES}")
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.:_-]*", machine.address):
+        wrong.append(f"{where}.address = {machine.address}: must be a host's name or an IP address")
+    if machine.python and machine.venv:
+        wrong.append(f"{where}.venv = {machine.venv}: must not be given beside python")
+    if not 0 <= machine.port <= PORT_MAX:
+        wrong.append(f"{where}.port = {machine.port}: must be a port, 1 to {PORT_MAX}")
+    if not 1 <= machine.router_port <= PORT_MAX:
+        wrong.append(f"{where}.router_port = {machine.router_port}: must be a port, 1 to {PORT_MAX}")
+    if machine.state and not machine.state.startswith(("/", "~/")):
+        wrong.append(f"{where}.state = {machine.state}: must begin with / or ~/")
+    return wrong
+
+
+def _wrong_together(file: FleetFile) -> list[str]:
+    """Machines that cannot be in one fleet."""
+    wrong = []
+    local = [name for name, machine in file.hosts.items() if machine.address in LOCAL]
+    if local and len(local) < len(file.hosts):
+        wrong += [
+            f"hosts.{name}.address = {file.hosts[name].address}: must be an address that the other machines reach"
+            for name in local
+        ]
+    seen: dict[tuple[str, int], str] = {}
+    for name, machine in file.hosts.items():
+        other = seen.setdefault((machine.address, machine.router_port), name)
+        if other != name:
+            at = f"{machine.address}:{machine.router_port}"
+            wrong.append(f"hosts.{name}.router_port = {machine.router_port}: must not be {other}'s, both are at {at}")
+    return wrong
+
+
+def _one_of(hosts: dict[str, Machine]) -> str:
+    return f"one of the hosts: {', '.join(hosts)}"
+
+
+_NAMES = "small letters, digits and '-', at most 31"

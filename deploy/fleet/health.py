@@ -1,0 +1,95 @@
+"""Whether a fleet is healthy, judged by progress: poses flow, and they make one chain. Pure: times come in."""
+
+from __future__ import annotations
+
+from protocol.messages import HostStatus, Message, PoseStamped, Role, Status, Tracking
+from protocol.mission import robot_id_of, robot_name
+
+FRESH_S = 1.0
+GIVEN_UP = ("failed", "refused", "ended")
+
+
+class Health:
+    """Feed it what comes; `missing` says what is not yet as it should be."""
+
+    def __init__(self, robots: tuple[int, ...], hosts: tuple[str, ...]) -> None:
+        self._robots = robots
+        self._hosts = hosts
+        self._poses: dict[int, tuple[float, PoseStamped]] = {}
+        self._ahead: dict[int, tuple[float, int]] = {}
+        self._texts: dict[int, str] = {}
+        self._status: dict[str, tuple[float, HostStatus]] = {}
+
+    def see(self, at: float, message: Message) -> None:
+        robot = robot_id_of(message.header.sender)
+        match message:
+            case HostStatus():
+                self._status[message.host] = (at, message)
+            case PoseStamped() if robot is not None:
+                self._poses[robot] = (at, message)
+            case Tracking() if robot is not None:
+                self._ahead[robot] = (at, message.predecessor)
+            case Status() if robot is not None:
+                self._texts[robot] = message.text
+
+    def lost(self) -> list[str]:
+        """What will not come any more, whatever time it is given: ended processes, and why."""
+        return [
+            f"host {host}: {report.ended or report.name}"
+            for host, (_, status) in sorted(self._status.items())
+            for report in status.processes
+            if report.state in GIVEN_UP
+        ]
+
+    def missing(self, now: float) -> list[str]:
+        """Empty: every robot sends poses, one of them leads, and the others follow each other in one chain."""
+        silent = [f"host {name}: nothing is heard of it" for name in self._hosts if not self._speaks(name, now)]
+        unheard = [
+            f"{robot_name(robot)}: no pose{self._text(robot)}" for robot in self._robots if not self._moves(robot, now)
+        ]
+        if silent or unheard:
+            return silent + unheard
+        return self._chain(now)
+
+    def chain(self, now: float) -> tuple[int, ...]:
+        """From the leader on, as far as each follows one that is in it."""
+        leaders = [
+            (pose.term, robot) for robot, (at, pose) in self._poses.items() if self._leads(pose) and now - at < FRESH_S
+        ]
+        if not leaders:
+            return ()
+        links = {
+            ahead: robot for robot, (at, ahead) in self._ahead.items() if now - at < FRESH_S and self._follows(robot)
+        }
+        chain = [max(leaders)[1]]
+        while (following := links.get(chain[-1])) is not None and following not in chain:
+            chain.append(following)
+        return tuple(chain)
+
+    def _chain(self, now: float) -> list[str]:
+        chain = self.chain(now)
+        if not chain:
+            texts = sorted({text for text in self._texts.values() if text})
+            return [f"nobody leads{f' ({texts[0]})' if texts else ''}"]
+        if len({self._poses[robot][1].term for robot in self._robots}) > 1:
+            return ["not all are in one term"]
+        return [
+            f"{robot_name(robot)}: not in the chain{self._text(robot)}" for robot in self._robots if robot not in chain
+        ]
+
+    def _speaks(self, host: str, now: float) -> bool:
+        return host in self._status and now - self._status[host][0] < 3.0 * FRESH_S
+
+    def _moves(self, robot: int, now: float) -> bool:
+        return robot in self._poses and now - self._poses[robot][0] < FRESH_S
+
+    def _follows(self, robot: int) -> bool:
+        return robot in self._poses and self._poses[robot][1].role is Role.FOLLOWER
+
+    @staticmethod
+    def _leads(pose: PoseStamped) -> bool:
+        return pose.role is Role.LEADER
+
+    def _text(self, robot: int) -> str:
+        text = self._texts.get(robot, "")
+        return f" ({text})" if text else ""

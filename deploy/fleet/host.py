@@ -1,0 +1,191 @@
+"""`python -m deploy.fleet.host check|start|stop`: what `lfa up` and `lfa down` run on each machine, over ssh or here.
+
+A part comes on standard input, one JSON object goes out; what is wrong is one line on standard error and exit code 2.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from deploy.fleet import part as parts
+from deploy.fleet.part import Part
+from deploy.fleet.supervise import LEDGER, end_orphans, living
+from deploy.run import processes
+from deploy.run.folder import SCENARIO
+from protocol import clock
+from protocol.mission import Refused
+from protocol.zenoh_bus import UNIX_PATH_BYTES_MAX, answers, socket_path
+
+READY_S = 15.0
+STOP_S = 8.0
+POLL_S = 0.02
+FREE_MIB_MIN = 64
+LOG = "supervisor.log"
+SYSTEMD = Path("/run/systemd/system")
+
+
+class Found(Struct, frozen=True):
+    """How a machine stands to a fleet."""
+
+    version: str
+    wall_ms: int
+    run: str = ""
+    """Of the supervisor that runs already; empty: none."""
+    digest: str = ""
+    orphans: tuple[str, ...] = ()
+
+
+def check(part: Part) -> Found:
+    """Whether `start` would do. Raises Refused; starts nothing and leaves nothing."""
+    running = living(part.folder)
+    found = Found(version("lfa"), clock.wall_ms())
+    if running is not None:
+        return msgspec.structs.replace(found, run=running.run, digest=running.digest)
+    path = socket_path(part.socket)
+    if path is None or len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
+        raise Refused(f"state = {part.state}: too long for a socket in it: at most {UNIX_PATH_BYTES_MAX} bytes")
+    if path.exists() and answers(part.socket):
+        raise Refused(f"{path}: a router that this fleet did not start answers there: end it, or give another state")
+    _check_place(part)
+    if part.port:
+        _check_port(part.port)
+    if part.world:
+        _check_world()
+    return found
+
+
+def start(part: Part) -> Found:
+    """Bring this machine's part up, so that it outlives the session that asked for it. Raises Refused."""
+    found = check(part)
+    if found.run:
+        return found
+    orphans = end_orphans(part.folder)
+    try:
+        part.run_folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        (part.run_folder / SCENARIO).write_text(part.scenario)
+        path = part.folder / parts.PART
+        path.write_bytes(msgspec.json.encode(part))
+    except OSError as error:
+        raise Refused(f"{part.folder}: {error.strerror}: must be a folder to write to") from None
+    log = part.run_folder / LOG
+    child = _spawn(part, path, log)
+    _await_ready(part, child, log)
+    return msgspec.structs.replace(found, run=part.run, digest=part.digest, orphans=tuple(orphans))
+
+
+def stop(part: Part) -> Found:
+    """End this machine's part and wait until nothing of it is left. Raises Refused when something is."""
+    running = living(part.folder)
+    if running is None:
+        end_orphans(part.folder)
+        (part.folder / LEDGER).unlink(missing_ok=True)
+        return Found(version("lfa"), clock.wall_ms())
+    everybody = (running.supervisor, *running.children)
+    processes.send(running.supervisor, signal.SIGTERM)
+    _wait_gone(everybody, STOP_S)
+    for identity in everybody:
+        processes.send(identity, signal.SIGKILL)
+    left = _wait_gone(everybody, 1.0)
+    if left:
+        raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
+    return Found(version("lfa"), clock.wall_ms(), run=running.run, digest=running.digest)
+
+
+def _wait_gone(everybody: tuple[processes.Identity, ...], within_s: float) -> list[processes.Identity]:
+    until = clock.now() + within_s
+    while True:
+        left = [identity for identity in everybody if processes.identify(identity.pid) == identity]
+        if not left or clock.now() > until:
+            return left
+        clock.sleep(POLL_S)
+
+
+def _check_place(part: Part) -> None:
+    """The nearest folder that exists can be written to, and has room."""
+    place = part.folder
+    while not place.exists():
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        raise Refused(f"state = {part.state}: {place} cannot be written to")
+    free_mib = shutil.disk_usage(place).free >> 20
+    if free_mib < FREE_MIB_MIN:
+        raise Refused(f"state = {part.state}: {free_mib} MiB are free there: must be at least {FREE_MIB_MIN}")
+
+
+def _check_port(port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("", port))
+        except OSError as error:
+            raise Refused(f"router_port = {port}: {error.strerror}: must be a free port") from None
+
+
+def _check_world() -> None:
+    try:
+        import world.world  # noqa: F401 (numpy and pymunk come with it)
+    except ImportError as error:
+        raise Refused(f"the world needs what is not installed ({error.name}): pip install 'lfa[world]'") from None
+
+
+def _spawn(part: Part, path: Path, log: Path) -> subprocess.Popen[bytes]:
+    """The supervisor, under systemd where it runs here, else in a session of its own."""
+    command = [sys.executable, "-m", "deploy.fleet.supervise", str(path)]
+    with log.open("ab") as out:
+        for runner in _runners(part):
+            asked = subprocess.run([*runner, *command], stdout=out, stderr=out, stdin=subprocess.DEVNULL, check=False)
+            if asked.returncode == 0:
+                return subprocess.Popen(["true"])
+        return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True)
+
+
+def _runners(part: Part) -> list[list[str]]:
+    """How to ask systemd, which starts it again should it fail: as the system's unit for root, else as the user's."""
+    if not SYSTEMD.is_dir() or shutil.which("systemd-run") is None:
+        return []
+    unit = ["--unit", f"lfa-{part.fleet}-{part.host}", "--collect", "--property", "Restart=on-failure"]
+    log = ["--property", f"StandardOutput=append:{part.run_folder / LOG}"]
+    return [["systemd-run", *([] if os.getuid() == 0 else ["--user"]), "--quiet", *unit, *log]]
+
+
+def _await_ready(part: Part, child: subprocess.Popen[bytes], log: Path) -> None:
+    """Until its router answers."""
+    until = clock.now() + READY_S
+    while not (living(part.folder) is not None and answers(part.socket)):
+        code = child.poll()
+        if code not in (None, 0) or clock.now() > until:
+            child.kill()
+            child.wait()
+            stop(part)
+            lines = log.read_text(errors="replace").strip().splitlines()
+            raise Refused(f"its supervisor is not ready: {lines[-1] if lines else f'see {log}'}")
+        clock.sleep(POLL_S)
+
+
+DEEDS = {"check": check, "start": start, "stop": stop}
+
+
+def main() -> None:
+    try:
+        part = msgspec.json.decode(sys.stdin.buffer.read(), type=Part)
+        print(msgspec.json.encode(DEEDS[sys.argv[1]](part)).decode())
+    except Refused as refused:
+        print(refused, file=sys.stderr)
+        sys.exit(2)
+    except OSError as error:
+        print(f"{error.filename or 'lfa'}: {error.strerror}", file=sys.stderr)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,145 @@
+"""What one machine is told of its fleet: one small file for its supervisor, and the processes made of it."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from deploy.fleet.file import Machine, Plan, Restart
+from deploy.run.crew import ROUTER_NAME, Row
+from deploy.run.folder import JOURNALS, SCENARIO, toml
+from protocol.mission import WITNESS_NAME, Refused, robot_name
+from protocol.topics import WORLD_NAME
+from world.memory import STATE
+
+PART = "part.json"
+SOCKET = "router.sock"
+USUAL_STATE = "~/.local/state/lfa"
+
+
+class Part(Struct, frozen=True):
+    """One machine's share."""
+
+    fleet: str
+    host: str
+    run: str
+    """Which `lfa up` it belongs to: also the name of the folder of its logs and journals."""
+    digest: str
+    """Of all that the fleet file says: another file, another digest."""
+    version: str
+    state: str
+    """May begin with `~`: whose home that is, is known only there."""
+    scenario: str
+    """As drawn, in TOML."""
+    seed: int
+    robots: tuple[int, ...]
+    world: bool
+    witness: bool
+    """A process of its own for the witness, here."""
+    world_witness: bool
+    """The world's process holds it."""
+    listen: tuple[str, ...]
+    connect: tuple[str, ...]
+    others: tuple[str, ...]
+    """Routers of other machines, for processes that have lost their own."""
+    port: int
+    """Of the router; 0: a unix socket is enough."""
+    restart: Restart
+    hosts: tuple[str, ...]
+    """All machines of the fleet."""
+
+    @property
+    def folder(self) -> Path:
+        """Of this fleet on this machine."""
+        return Path(self.state).expanduser()
+
+    @property
+    def run_folder(self) -> Path:
+        return self.folder / self.run
+
+    @property
+    def socket(self) -> str:
+        return f"unixsock-stream/{self.folder / SOCKET}"
+
+    @property
+    def endpoint(self) -> str:
+        """Where this machine's processes meet: its router, or the next when that one is lost."""
+        return ",".join((self.socket, *self.others))
+
+
+def parts(plan: Plan, run: str, digest: str) -> dict[str, Part]:
+    """Each machine's share of `plan`."""
+    file, names = plan.file, list(plan.hosts)
+    scenario = toml(plan.scenario)
+    mission = plan.scenario.mission
+    made = {}
+    for n, (name, machine) in enumerate(plan.hosts.items()):
+        following = [names[(n + step) % len(names)] for step in range(1, len(names))]
+        made[name] = Part(
+            fleet=plan.name,
+            host=name,
+            run=run,
+            digest=digest,
+            version=version("lfa"),
+            state=machine.state or f"{USUAL_STATE}/{plan.name}/{name}",
+            scenario=scenario,
+            seed=file.seed,
+            robots=plan.robots_on(name),
+            world=name == file.world,
+            witness=mission.witness and name == file.witness and file.witness != file.world,
+            world_witness=mission.witness and file.witness == file.world,
+            listen=() if len(names) == 1 else (_listen(machine),),
+            connect=tuple(endpoint(plan.hosts[far]) for far in names[:n] if _joined(plan, name, far)),
+            others=tuple(endpoint(plan.hosts[far]) for far in following) if file.links.failover else (),
+            port=0 if len(names) == 1 else machine.router_port,
+            restart=file.restart,
+            hosts=tuple(names),
+        )
+    return made
+
+
+def endpoint(machine: Machine) -> str:
+    """Where other machines find its router."""
+    host = f"[{machine.address}]" if ":" in machine.address else machine.address
+    return f"tcp/{host}:{machine.router_port}"
+
+
+def _listen(machine: Machine) -> str:
+    return f"tcp/{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
+
+
+def _joined(plan: Plan, a: str, b: str) -> bool:
+    pairs = plan.file.links.pairs
+    return not pairs or (a, b) in pairs or (b, a) in pairs
+
+
+def rows(part: Part) -> list[Row]:
+    """The processes of this machine, its router first."""
+    folder = part.run_folder
+    team = ("--fleet", part.fleet, "--connect", part.endpoint, "--journal", str(folder / JOURNALS))
+    listen = (word for where in (part.socket, *part.listen) for word in ("--listen", where))
+    connect = (word for where in part.connect for word in ("--connect", where))
+    made = [Row(ROUTER_NAME, ("deploy.fleet.router", *listen, *connect))]
+    if part.world:
+        witness = () if part.world_witness else ("--no-witness",)
+        world = ("world.cli", str(folder / SCENARIO), "--seed", str(part.seed), "--state", str(folder), *team, *witness)
+        row = Row(WORLD_NAME, world, again=("--resume", str(folder)))
+        made.append(row.restarted() if (folder / STATE).exists() else row)
+    if part.witness:
+        made.append(Row(WITNESS_NAME, ("agents.cli", "--role", "witness", "--id", "w", *team)))
+    for robot in part.robots:
+        made.append(Row(robot_name(robot), ("agents.cli", "--role", "follower", "--id", str(robot), *team)))
+    return made
+
+
+def read(path: Path) -> Part:
+    """Raises Refused for a file that is no part of a fleet."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Part)
+    except OSError as error:
+        raise Refused(f"{path}: cannot be read ({error.strerror})") from None
+    except msgspec.DecodeError as error:
+        raise Refused(f"{path}: no part of a fleet ({error}): lfa up writes it") from None

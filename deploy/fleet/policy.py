@@ -1,0 +1,50 @@
+"""When a process that has ended starts again. Pure: times come in as arguments."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from msgspec import Struct
+
+from deploy.fleet.file import Policy, Restart
+
+REFUSED_CODE = 2
+ROUTER = Restart(policy="always", delay_s=0.05, delay_max_s=2.0, window_s=60.0, starts_max=1_000_000)
+"""Without its router a machine is alone: nobody gains by giving it up."""
+
+
+class Verdict(Struct, frozen=True):
+    """`at`: when to start again; None: never, and why in one word."""
+
+    at: float | None
+    word: str
+
+
+class Lives:
+    """The ends of one process, as far as they count."""
+
+    def __init__(self, restart: Restart) -> None:
+        self._restart = restart
+        self._ends: deque[float] = deque()
+
+    def ended(self, code: int, now: float) -> Verdict:
+        """`code` as of a `Popen`: negative for a signal; 2 is a refusal, which another start would not change."""
+        if not _again(self._restart.policy, code):
+            return Verdict(None, "refused" if code == REFUSED_CODE else "ended" if code == 0 else "failed")
+        while self._ends and self._ends[0] <= now - self._restart.window_s:
+            self._ends.popleft()
+        if len(self._ends) >= self._restart.starts_max:
+            return Verdict(None, "failed")
+        delay_s = min(self._restart.delay_s * 2.0 ** min(len(self._ends), 32), self._restart.delay_max_s)
+        self._ends.append(now)
+        return Verdict(now + delay_s, "waiting")
+
+    def forget(self) -> None:
+        """An operator has started it: what was before counts no more."""
+        self._ends.clear()
+
+
+def _again(policy: Policy, code: int) -> bool:
+    if policy == "never" or code == REFUSED_CODE:
+        return False
+    return policy == "always" or code != 0

@@ -1,0 +1,82 @@
+"""`lfa ps`: what runs on which machine of a fleet, as its supervisors tell it."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
+import typer
+
+from deploy.fleet.sight import Sight, find, first_word, sight
+from protocol import clock
+from protocol.mission import robot_id_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+HEAR_S = 2.5
+STATUS_S = 1.2  # each process has told its status by then
+WIDTH_MIN = 80
+
+
+def command(
+    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> int:
+    """1 when a host is silent, or a process does not run."""
+    seen = find(file, fleet, connect)
+    with sight(seen, frozenset({"*/host", "*/status"})) as view:
+        began = clock.now()
+        first_word(view, HEAR_S)
+        while clock.now() < began + STATUS_S:
+            clock.sleep(0.05)
+            view.hear()
+        now = clock.now()
+        facts, silent = rows(view), view.silent(now)
+    if as_json:
+        print(msgspec.json.encode({"fleet": seen.name, "silent": silent, "processes": facts}).decode())
+    else:
+        from rich.console import Console
+
+        console = Console(width=max(WIDTH_MIN, shutil.get_terminal_size().columns))
+        console.print(table(facts))
+        for name in silent:
+            print(f"host {name} is silent")
+    return 1 if silent or not facts or any(row["state"] != "running" for row in facts) else 0
+
+
+def rows(view: Sight) -> list[dict[str, Any]]:
+    """One a process, hosts and processes in their order."""
+    return [
+        {
+            "host": host,
+            "process": report.name,
+            "state": report.state,
+            "pid": report.pid,
+            "starts": report.starts,
+            "up_s": report.up_s,
+            "says": view.texts.get(report.name, ""),
+            "ended": report.ended,
+        }
+        for host in view.names
+        if host in view.hosts
+        for report in sorted(view.hosts[host].processes, key=lambda report: robot_id_of(report.name) or 0)
+    ]
+
+
+def table(facts: list[dict[str, Any]]) -> Table:
+    from rich.table import Table
+
+    made = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    for head in ("host", "process", "state", "pid", "starts", "up", "says"):
+        made.add_column(head, justify="right" if head in ("pid", "starts", "up") else "left", no_wrap=True)
+    for row in facts:
+        style = "" if row["state"] == "running" else "bold red"
+        says = row["says"] if row["state"] == "running" and row["says"] else row["ended"]
+        cells = (row["host"], row["process"], row["state"], str(row["pid"] or ""), str(row["starts"]))
+        made.add_row(*cells, f"{row['up_s']:.0f} s", says, style=style)
+    return made

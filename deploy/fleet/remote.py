@@ -1,0 +1,157 @@
+"""A machine to run commands on: over ssh, with the user's own configuration, keys and known hosts; or this one."""
+
+from __future__ import annotations
+
+import asyncio
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import msgspec
+from msgspec import Struct
+
+from deploy.fleet.file import Machine
+from protocol.mission import Refused
+
+CONNECT_S = 6.0
+COMMAND_S = 40.0
+PYTHON_MIN = (3, 11)
+PROBE = (
+    "import json, sys, time\n"
+    "try:\n"
+    "    from importlib.metadata import version\n"
+    "    lfa = version('lfa')\n"
+    "except Exception:\n"
+    "    lfa = ''\n"
+    "print(json.dumps({'python': list(sys.version_info[:3]), 'lfa': lfa, 'wall_ms': int(time.time() * 1000)}))\n"
+)
+"""For any Python that may be there, with or without `lfa`."""
+
+
+class Done(Struct, frozen=True):
+    """How a command ended."""
+
+    code: int
+    out: bytes
+    err: bytes
+
+    @property
+    def last_line(self) -> str:
+        lines = self.err.decode(errors="replace").strip().splitlines()
+        return lines[-1].strip() if lines else f"exit code {self.code}"
+
+
+class Probed(Struct, frozen=True):
+    """What Python is there, which `lfa` it has (empty: none), and what its clock says."""
+
+    python: tuple[int, int, int]
+    lfa: str
+    wall_ms: int
+
+
+class Shell(Protocol):
+    """Where commands run."""
+
+    async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
+        """Run it to its end. Raises Unreachable when the machine has gone meanwhile."""
+
+    async def close(self) -> None: ...
+
+
+class Unreachable(Exception):
+    """No command can be run there; the text says why, and what would be right."""
+
+
+class Here:
+    """This machine."""
+
+    async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
+        pipe = asyncio.subprocess.PIPE
+        try:
+            child = await asyncio.create_subprocess_exec(*words, stdin=pipe, stdout=pipe, stderr=pipe)
+        except OSError as error:
+            return Done(127, b"", f"{words[0]}: {error.strerror}".encode())
+        out, err = await child.communicate(stdin)
+        return Done(child.returncode or 0, out, err)
+
+    async def close(self) -> None:
+        """Nothing was opened."""
+
+
+class Ssh:
+    """A machine behind ssh; `~` in the first word is the home there."""
+
+    def __init__(self, connection: Any) -> None:
+        self._connection = connection
+
+    async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
+        import asyncssh
+
+        first = f"~/{shlex.quote(words[0][2:])}" if words[0].startswith("~/") else shlex.quote(words[0])
+        command = " ".join([first, *map(shlex.quote, words[1:])])
+        try:
+            done = await self._connection.run(command, input=stdin, encoding=None, timeout=COMMAND_S)
+        except TimeoutError:  # asyncssh's own is one
+            raise Unreachable(f"no answer within {COMMAND_S:g} s to: {words[0]}") from None
+        except (OSError, asyncssh.Error) as error:
+            raise Unreachable(f"lost its connection ({error})") from None
+        return Done(-1 if done.returncode is None else done.returncode, bytes(done.stdout), bytes(done.stderr))
+
+    async def close(self) -> None:
+        self._connection.close()
+        await self._connection.wait_closed()
+
+
+async def reach(machine: Machine) -> Shell:
+    """A shell on `machine`. Raises Unreachable."""
+    if machine.local:
+        return Here()
+    try:
+        import asyncssh
+    except ImportError:
+        raise Refused("ssh needs what is not installed here: pip install 'lfa[deploy]'") from None
+    name = machine.ssh or machine.address
+    said: dict[str, Any] = {"config": [str(path) for path in (Path.home() / ".ssh/config",) if path.exists()]}
+    if machine.user:
+        said["username"] = machine.user
+    if machine.port:
+        said["port"] = machine.port
+    try:
+        connecting = asyncssh.connect(name, connect_timeout=CONNECT_S, login_timeout=CONNECT_S, **said)
+        return Ssh(await asyncio.wait_for(connecting, CONNECT_S + 1.0))
+    except asyncssh.HostKeyNotVerifiable:
+        raise Unreachable(f"ssh knows no key of {name}, or another: connect by hand once (ssh {name})") from None
+    except asyncssh.PermissionDenied:
+        who = f"{machine.user}@{name}" if machine.user else name
+        raise Unreachable(f"refuses your key: must let you in by key (ssh-copy-id {who})") from None
+    except TimeoutError:
+        raise Unreachable(f"cannot be reached by ssh at {name}: no answer within {CONNECT_S:g} s") from None
+    except (OSError, asyncssh.Error, UnicodeError) as error:
+        raise Unreachable(f"cannot be reached by ssh at {name} ({_reason(error)})") from None
+
+
+def python_of(machine: Machine) -> str:
+    if machine.venv:
+        return f"{machine.venv.rstrip('/')}/bin/python"
+    return machine.python or (sys.executable if machine.local else "python3")
+
+
+async def probe(shell: Shell, python: str) -> Probed:
+    """Raises Refused for no Python, or too old a one."""
+    done = await shell.run((python, "-c", PROBE))
+    try:
+        found = msgspec.json.decode(done.out, type=Probed)
+    except msgspec.DecodeError:
+        raise Refused(f"python = {python}: does not run there ({done.last_line}): must be Python 3.11+") from None
+    if found.python < (*PYTHON_MIN, 0):
+        is_ = ".".join(map(str, found.python))
+        raise Refused(f"python = {python}: is {is_} there: must be {'.'.join(map(str, PYTHON_MIN))} or newer")
+    return found
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return " ".join(str(error).split()) or type(error).__name__

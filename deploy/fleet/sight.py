@@ -1,0 +1,162 @@
+"""A fleet of several machines seen from any of them: where it is, what its supervisors say, a word to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from msgspec import Struct
+
+from deploy.fleet import part as parts
+from deploy.fleet.file import Plan, load
+from deploy.fleet.part import Part
+from deploy.look.onlooker import Ear, Fleet, listen
+from deploy.run.processes import own_processes
+from protocol import clock
+from protocol.messages import Header, HostOrder, HostStatus, LogLines, Message, Status, encode
+from protocol.mission import Refused
+from protocol.topics import HOST_PREFIX, OPERATOR_NAME, key
+
+TOPICS = frozenset({"*/host", "*/log", "*/pose", "*/tracking", "*/status", "*/event"})
+SAY_S = 0.4
+POLL_S = 0.02
+SILENT_S = 3.0
+
+
+class Seen(Struct, frozen=True):
+    """A fleet that is meant."""
+
+    name: str
+    endpoint: str
+    hosts: tuple[str, ...]
+    """Empty: not known."""
+    part: Part | None = None
+    """This machine's own, when it is one of them."""
+    plan: Plan | None = None
+
+
+def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
+    """From its file, from its supervisor on this machine, or by name and router. Raises Refused."""
+    if file is not None:
+        plan = load(file)
+        own = next((part for part in here() if part.fleet == plan.name), None)
+        far = ",".join(parts.endpoint(machine) for machine in plan.hosts.values())
+        endpoint = connect or (own.endpoint if own is not None else far)
+        return Seen(plan.name, endpoint, tuple(plan.hosts), own, plan)
+    own_all = [part for part in here() if fleet in (None, part.fleet)]
+    if connect is not None:
+        if fleet is None:
+            raise Refused("--connect needs the fleet's name as well: --fleet NAME")
+        return Seen(fleet, connect, ())
+    names = sorted({part.fleet for part in own_all})
+    if not names:
+        which = "no fleet" if fleet is None else f"no fleet {fleet!r}"
+        raise Refused(f"{which} has a supervisor here: give its fleet file, or --fleet NAME --connect ENDPOINT")
+    if len(names) > 1:
+        raise Refused(f"several fleets run here: say --fleet {' or --fleet '.join(names)}")
+    return Seen(names[0], own_all[0].endpoint, own_all[0].hosts, own_all[0])
+
+
+def here() -> list[Part]:
+    """The parts of this user's supervisors on this machine."""
+    found = []
+    for identity in own_processes():
+        words = identity.arguments
+        if "deploy.fleet.supervise" in words[:-1]:
+            try:
+                found.append(parts.read(Path(words[-1])))
+            except Refused:
+                continue
+    return found
+
+
+class Sight:
+    """What has been heard, newest first in mind: feed it by `hear`."""
+
+    def __init__(self, ear: Ear, seen: Seen) -> None:
+        self._ear = ear
+        self.seen = seen
+        self._life = clock.wall_ms()
+        self._seq = 0
+        self.hosts: dict[str, HostStatus] = {}
+        self.heard_at: dict[str, float] = {}
+        self.texts: dict[str, str] = {}
+        """What each robot says about itself."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.seen.hosts or tuple(sorted(self.hosts))
+
+    def hear(self) -> list[tuple[float, Message]]:
+        """All that has come, with the moments; what is the hosts' is remembered."""
+        heard = []
+        for arrival, message in self._ear.take():
+            heard.append((arrival.at, message))
+            if isinstance(message, HostStatus) and message.header.sender == f"{HOST_PREFIX}{message.host}":
+                self.hosts[message.host] = message
+                self.heard_at[message.host] = arrival.at
+            elif isinstance(message, Status):
+                self.texts[message.header.sender] = message.text
+        return heard
+
+    def silent(self, now: float) -> list[str]:
+        return [name for name in self.names if now - self.heard_at.get(name, -SILENT_S) >= SILENT_S]
+
+    def host_of(self, process: str) -> str | None:
+        for name, status in self.hosts.items():
+            if any(report.name == process for report in status.processes):
+                return name
+        return None
+
+    def order(self, deed: str, target: str = "", lines: int = 0) -> HostOrder:
+        """A new word; `say` it until it is obeyed."""
+        self._seq += 1
+        return HostOrder(Header(OPERATOR_NAME, self._life, self._seq, clock.now()), deed, target, lines)
+
+    def say(self, order: HostOrder) -> None:
+        self._ear.bus.publish(key(self.seen.name, OPERATOR_NAME, "order"), encode(order))
+
+    def obeyed(self, order: HostOrder, host: str) -> bool:
+        status = self.hosts.get(host)
+        return status is not None and status.obeyed == (order.header.incarnation, order.header.seq)
+
+    def say_until(
+        self,
+        order: HostOrder,
+        holds: Callable[[], bool],
+        within_s: float,
+        see: Callable[[float, Message], None] = lambda _at, _message: None,
+    ) -> bool:
+        """Say it again and again until `holds`, False when that does not come within the time."""
+        until, say_at = clock.now() + within_s, 0.0
+        while not holds():
+            now = clock.now()
+            if now > until:
+                return False
+            if now >= say_at:
+                say_at = now + SAY_S
+                self.say(order)
+            clock.sleep(POLL_S)
+            for at, message in self.hear():
+                see(at, message)
+        return True
+
+    def living(self, host: str) -> bool:
+        return bool(self._ear.bus.living(self.seen.name, f"{HOST_PREFIX}{host}"))
+
+
+@contextmanager
+def sight(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[Sight]:
+    """Raises Refused when no router answers."""
+    with listen(Fleet(seen.name, seen.endpoint, ()), topics) as ear:
+        yield Sight(ear, seen)
+
+
+def first_word(view: Sight, within_s: float) -> None:
+    """Until every known host has told its state, or the time is over."""
+    order = view.order("report")
+    view.say_until(order, lambda: bool(view.names) and all(view.obeyed(order, n) for n in view.names), within_s)
+
+
+__all__ = ["LogLines", "Seen", "Sight", "find", "first_word", "here", "sight"]

@@ -1,0 +1,340 @@
+"""`python -m deploy.fleet.supervise PART`: one machine's processes, kept running without anybody's help.
+
+It needs neither the machine that ran `lfa up` nor any other: it starts its own router, its robots and what else lives
+here, starts again what ends (`policy.py`), says once a second how all of it stands (topic `host`) and hears an
+operator's orders (topic `order`). SIGTERM ends everything in order, also when no router is left to be asked through.
+Its children do not outlive it (`tether.py`); what an earlier life may have left all the same is ended first.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import threading
+from collections import OrderedDict
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from deploy.fleet import part as parts
+from deploy.fleet.part import Part
+from deploy.fleet.policy import ROUTER, Lives
+from deploy.fleet.tail import Tail
+from deploy.run import processes
+from deploy.run.crew import ROUTER_NAME, Crew, Row
+from deploy.run.processes import Identity
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.messages import (
+    BadMessage,
+    Header,
+    HostOrder,
+    HostStatus,
+    LogLines,
+    Message,
+    ProcessReport,
+    decode,
+    encode,
+)
+from protocol.mission import Refused
+from protocol.topics import HOST_PREFIX, OPERATOR_NAME, TOPIC, address, key
+from protocol.zenoh_bus import RouterAbsent, ZenohBus
+from world.memory import STATE
+
+LEDGER = "processes.json"
+"""Beside the part: who supervises, and whom; what a later life, `lfa down` and `lfa doctor` go by."""
+TELL_S = 1.0
+STEP_S = 0.1
+JOIN_S = 0.1
+ROUTER_S = 3.0
+LAST_WORDS_S = 0.1
+OPERATORS_MAX = 64
+
+
+class Ledger(Struct, frozen=True):
+    """Who is who on this machine, as far as this fleet is concerned."""
+
+    run: str
+    digest: str
+    supervisor: Identity
+    children: tuple[Identity, ...] = ()
+
+
+def ledger(folder: Path) -> Ledger | None:
+    """What the supervisor of that folder wrote last."""
+    try:
+        return msgspec.json.decode((folder / LEDGER).read_bytes(), type=Ledger)
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
+def living(folder: Path) -> Ledger | None:
+    """The ledger of a supervisor that runs at the moment."""
+    written = ledger(folder)
+    alive = written is not None and processes.identify(written.supervisor.pid) == written.supervisor
+    return written if alive else None
+
+
+def end_orphans(folder: Path) -> list[str]:
+    """End what the last supervisor of that folder has left; their command lines. Only exactly those processes."""
+    written = ledger(folder)
+    if written is None or living(folder) is not None:
+        return []
+    return [" ".join(child.arguments) for child in written.children if processes.send(child, signal.SIGKILL)]
+
+
+class _Ward:
+    """One process in care."""
+
+    def __init__(self, row: Row, lives: Lives) -> None:
+        self.row = row
+        self.lives = lives
+        self.starts = 0
+        self.began = 0.0
+        self.state = "waiting"
+        self.start_at: float | None = 0.0
+        self.ended = ""
+        self.ordered_end = False
+
+    def report(self, pid: int, now: float) -> ProcessReport:
+        up_s = round(now - self.began, 1) if pid else 0.0
+        return ProcessReport(self.row.name, self.state, pid, self.starts, up_s, self.ended)
+
+
+class Supervisor:
+    """All of one machine. Every call comes from the main thread: the kernel takes it for its children's parent."""
+
+    def __init__(self, part: Part) -> None:
+        self._part = part
+        self._me = f"{HOST_PREFIX}{part.host}"
+        self._crew = Crew(part.run_folder)
+        self._wards = {
+            row.name: _Ward(row, Lives(ROUTER if row.name == ROUTER_NAME else part.restart)) for row in parts.rows(part)
+        }
+        self._life = clock.wall_ms()
+        self._seqs: dict[str, int] = {}
+        self._obeyed = (0, 0)
+        self._orders: OrderedDict[int, int] = OrderedDict()
+        """The last number of each operator."""
+        self._book: Ledger | None = None
+        self._began = clock.now()
+        self._tell_at = 0.0
+        self._join_at = 0.0
+        self._wake = threading.Event()
+        self._inbox = Inbox(self._wake)
+        self._bus: ZenohBus | None = None
+        self._tails: dict[str, Tail] = {}
+        self._ending = False
+
+    def run(self) -> int:
+        """Until SIGTERM, Ctrl-C or an order; nothing is left then."""
+        bell, ring = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        signal.set_wakeup_fd(ring)
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: self._stop())
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        try:
+            self._write_ledger()
+            while not self._ending:
+                self._step(clock.now())
+                if not self._wake.is_set():
+                    ready, _, _ = select.select([bell], [], [], STEP_S)
+                    if ready:
+                        os.read(bell, 4096)
+                self._wake.clear()
+            self._end()
+            return 0
+        finally:
+            self._crew.kill_all()
+            for name in (parts.SOCKET, f"{parts.SOCKET}.lock", LEDGER):
+                (self._part.folder / name).unlink(missing_ok=True)
+
+    def _stop(self) -> None:
+        self._ending = True
+
+    def _step(self, now: float) -> None:
+        changed = [ward for ward in self._wards.values() if self._look_after(ward, now)]
+        self._join(now)
+        told = self._hear(now)
+        if changed or told or now >= self._tell_at:
+            self._tell(now)
+        for name, tail in list(self._tails.items()):
+            lines = tail.take(now)
+            if lines:
+                self._say("log", LogLines(self._header("log", now), name, lines))
+            if tail.over(now):
+                del self._tails[name]
+
+    # --- the processes ---------------------------------------------------------------------------------------------
+
+    def _look_after(self, ward: _Ward, now: float) -> bool:
+        """Start it when it is due, notice when it has ended; True when something changed."""
+        name = ward.row.name
+        if ward.start_at is not None:
+            if now < ward.start_at or (name != ROUTER_NAME and self._waits_for_router(now)):
+                return False
+            self._start(ward, now)
+            return True
+        code = self._crew.code(name)
+        if ward.state != "running" or code is None:
+            return False
+        ward.ended = str(self._crew.exit_of(name))
+        print(ward.ended, flush=True)
+        if ward.ordered_end:
+            ward.ordered_end = False
+            ward.start_at, ward.state = now, "waiting"
+            return True
+        verdict = ward.lives.ended(code, now)
+        ward.start_at, ward.state = verdict.at, verdict.word
+        if name == ROUTER_NAME and verdict.at is None:
+            raise Refused(ward.ended)
+        return True
+
+    def _waits_for_router(self, now: float) -> bool:
+        """At the very start, so that nobody has to look for it again and again."""
+        return self._bus is None and now < self._began + ROUTER_S
+
+    def _start(self, ward: _Ward, now: float) -> None:
+        row = ward.row if ward.starts == 0 or not self._remembers(ward) else ward.row.restarted()
+        ward.start_at = None
+        ward.began = now
+        ward.starts += 1
+        try:
+            self._crew.start(row)
+            ward.state = "running"
+        except OSError as error:
+            ward.ended = f"{row.name} cannot be started: {error.strerror}"
+            verdict = ward.lives.ended(1, now)
+            ward.start_at, ward.state = verdict.at, verdict.word
+
+    def _remembers(self, ward: _Ward) -> bool:
+        """A world that ended before it wrote its first state begins anew."""
+        return not ward.row.again or (self._part.run_folder / STATE).exists()
+
+    def _write_ledger(self) -> None:
+        me = processes.identify(os.getpid())
+        assert me is not None
+        children = [self._crew.identity(name) for name in self._wards]
+        book = Ledger(self._part.run, self._part.digest, me, tuple(child for child in children if child is not None))
+        if book == self._book:
+            return
+        self._book = book
+        draft = self._part.folder / f"{LEDGER}.new"
+        try:
+            draft.write_bytes(msgspec.json.encode(book))
+            draft.replace(self._part.folder / LEDGER)
+        except OSError as error:
+            print(f"{draft}: {error.strerror}", flush=True)
+
+    def _end(self) -> None:
+        """Robots and world in order, then one last word, then the router."""
+        self._crew.end([name for name in self._wards if name != ROUTER_NAME])
+        for ward in self._wards.values():
+            if ward.row.name != ROUTER_NAME:
+                ward.state, ward.ended = "ended", "lfa down"
+        self._tell(clock.now())
+        if self._bus is not None:
+            clock.sleep(LAST_WORDS_S)
+            self._bus.close()
+        self._crew.end([ROUTER_NAME])
+
+    # --- what is said and heard ------------------------------------------------------------------------------------
+
+    def _join(self, now: float) -> None:
+        """A session of its own, as soon as a router is there; Zenoh itself comes back from then on."""
+        if self._bus is not None or now < self._join_at:
+            return
+        self._join_at = now + JOIN_S
+        try:
+            bus = ZenohBus(self._part.endpoint, self._inbox)
+        except RouterAbsent:
+            return
+        bus.follow(frozenset({key(self._part.fleet, OPERATOR_NAME, "order")}))
+        bus.announce(self._part.fleet, self._me, self._life)
+        self._bus = bus
+
+    def _hear(self, now: float) -> bool:
+        told = False
+        for arrival in self._inbox.take():
+            where = address(arrival.key)
+            if where is None or where.topic not in TOPIC or not isinstance(arrival.payload, bytes):
+                continue
+            try:
+                order = decode(arrival.payload, HostOrder)
+            except BadMessage:
+                continue
+            if isinstance(order, HostOrder):
+                told = self._obey(order, now) or told
+        return told
+
+    def _obey(self, order: HostOrder, now: float) -> bool:
+        """Each order once, however often it is said; True when it is to be answered."""
+        place, _, name = order.target.rpartition("/")
+        here = not place and name in ("", self._part.host)
+        if place not in ("", self._part.host) or not (here or name in self._wards):
+            return False
+        number = (order.header.incarnation, order.header.seq)
+        if order.header.seq <= self._orders.get(order.header.incarnation, 0):
+            return True
+        self._orders[order.header.incarnation] = order.header.seq
+        if len(self._orders) > OPERATORS_MAX:
+            self._orders.popitem(last=False)
+        self._obeyed = number
+        print(f"order: {order.deed} {order.target}", flush=True)
+        if order.deed == "down" and here:
+            self._ending = True
+        elif order.deed == "restart":
+            for ward in self._wards.values() if here else (self._wards[name],):
+                self._start_again(ward, now)
+        elif order.deed == "logs":
+            for one in self._wards if here else (name,):
+                if order.lines or one not in self._tails:
+                    self._tails[one] = Tail(self._crew.log(one), order.lines, now)
+                self._tails[one].prolong(now)
+        return True
+
+    def _start_again(self, ward: _Ward, now: float) -> None:
+        ward.lives.forget()
+        if self._crew.runs(ward.row.name):
+            ward.ordered_end = True
+            self._crew.signal(ward.row.name, signal.SIGTERM)
+            self._crew.signal(ward.row.name, signal.SIGCONT)
+        else:
+            ward.start_at = now
+
+    def _tell(self, now: float) -> None:
+        self._tell_at = now + TELL_S
+        self._write_ledger()
+        reports = tuple(ward.report(self._crew.pid(name), now) for name, ward in self._wards.items())
+        part = self._part
+        header = self._header("host", now)
+        self._say("host", HostStatus(header, part.host, part.version, part.run, self._obeyed, reports))
+
+    def _say(self, topic: str, message: Message) -> None:
+        if self._bus is not None:
+            self._bus.publish(key(self._part.fleet, self._me, topic), encode(message))
+
+    def _header(self, topic: str, now: float) -> Header:
+        self._seqs[topic] = self._seqs.get(topic, 0) + 1
+        return Header(self._me, self._life, self._seqs[topic], now)
+
+
+def main() -> None:
+    """0 ended in order, 2 refused."""
+    try:
+        part = parts.read(Path(sys.argv[1]))
+        if living(part.folder) is not None:
+            raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
+        for orphan in end_orphans(part.folder):
+            print(f"ended what an earlier life has left: {orphan}", flush=True)
+        sys.exit(Supervisor(part).run())
+    except Refused as refused:
+        print(f"lfa-supervise: {refused}", file=sys.stderr)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,167 @@
+"""`lfa up`: a fleet file becomes processes on its machines, all of them or none; ends when every robot is in the chain.
+
+Whoever runs it is not needed afterwards. Run again it starts what is missing, such as a machine that came back.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from deploy.fleet import sight as sights
+from deploy.fleet.file import Plan, load
+from deploy.fleet.health import Health
+from deploy.fleet.host import Found
+from deploy.fleet.hosts import Fleet
+from deploy.fleet.part import Part, parts
+from deploy.fleet.sight import Seen
+from deploy.run.ending import Interrupts
+from protocol import clock
+from protocol.mission import Refused
+
+POLL_S = 0.05
+HEALTHY_S = 0.3
+"""So long in one piece."""
+
+
+class NotUp(Exception):
+    """The fleet was not brought up; nothing of it is left. A line each, and the exit code."""
+
+    def __init__(self, lines: list[str], code: int) -> None:
+        super().__init__("\n".join(lines))
+        self.lines = lines
+        self.code = code
+
+
+def command(
+    file: Annotated[Path, typer.Argument(help="A fleet file (deploy/fleet.example.toml is one).")],
+    install: Annotated[bool, typer.Option("--install", help="Put this lfa onto the machines first.")] = False,
+    wait: Annotated[float, typer.Option(help="Give up when it is not healthy after so many seconds.")] = 60.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
+) -> int:
+    plan = load(file)
+    began = clock.now()
+    try:
+        with Interrupts() as interrupts:
+            facts = asyncio.run(bring_up(plan, interrupts, may_install=install, wait_s=wait))
+    except NotUp as not_up:
+        if as_json:
+            print(msgspec.json.encode({"fleet": plan.name, "healthy": False, "wrong": not_up.lines}).decode())
+        for line in not_up.lines:
+            print(f"lfa: {line}", file=sys.stderr)
+        return not_up.code
+    took_s = round(clock.now() - began, 2)
+    if as_json:
+        print(msgspec.json.encode({"fleet": plan.name, "healthy": True, "took_s": took_s, **facts}).decode())
+    else:
+        chain = " <- ".join(map(str, facts["chain"]))
+        print(f"fleet {plan.name} is up after {took_s:.1f} s: {chain}")
+        print(f"next: lfa ps {file}, lfa logs -f robot{facts['chain'][0]}, lfa top {file}, lfa down {file}")
+    return 0
+
+
+async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
+    """Raises NotUp, with all that was started here ended again."""
+    digest = _digest(plan)
+    fleet = Fleet(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest))
+    try:
+        await fleet.reach()
+        _all_well(fleet)
+        await fleet.prepare(may_install=may_install)
+        _all_well(fleet)
+        found = await fleet.do("check")
+        _all_well(fleet)
+        _join_those_that_run(plan, fleet, found, digest)
+        fresh = [name for name, one in found.items() if not one.run]
+        _say(f"starting {len(fresh)} of {len(found)} hosts")
+        await fleet.do("start")
+        if fleet.wrong:
+            raise NotUp(fleet.lines(), 1)
+        return await asyncio.to_thread(_await_health, plan, fleet.parts, interrupts, wait_s)
+    except NotUp as not_up:
+        lines = await _take_down(fleet, locals().get("fresh", []))
+        raise NotUp([*not_up.lines, *lines], not_up.code) from None
+    finally:
+        await fleet.close()
+
+
+async def _take_down(fleet: Fleet, names: list[str]) -> list[str]:
+    """End what this very `lfa up` has started; a line for each machine where that did not go well."""
+    if not names:
+        return []
+    before, fleet.wrong = fleet.wrong, {name: "" for name in fleet.parts if name not in names}
+    await fleet.do("stop")
+    left = [f"host {name}: {line}" for name, line in fleet.wrong.items() if line]
+    fleet.wrong = before
+    return left or [f"taken down again: {', '.join(names)}"]
+
+
+def _all_well(fleet: Fleet) -> None:
+    if fleet.wrong:
+        raise NotUp(fleet.lines(), 1 if fleet.unreached == set(fleet.wrong) else 2)
+
+
+def _join_those_that_run(plan: Plan, fleet: Fleet, found: dict[str, Found], digest: str) -> None:
+    """Machines that run already set the run that the others join; they must have been told the same file."""
+    for name, one in found.items():
+        if one.run and one.digest != digest:
+            fleet.wrong[name] = f"runs fleet {plan.name} from another file, or an older state of it: lfa down first"
+    if fleet.wrong:
+        raise NotUp(fleet.lines(), 2)
+    run = max((one.run for one in found.values()), default="")
+    if run:
+        fleet.parts = parts(plan, run, digest)
+
+
+def _await_health(plan: Plan, shares: dict[str, Part], interrupts: Interrupts, wait_s: float) -> dict[str, Any]:
+    """Listens as an onlooker until the judge has nothing to say for a moment. Raises NotUp."""
+    own = next((part for part in sights.here() if part.fleet == plan.name), None)
+    endpoints = [own.socket] if own is not None else []
+    endpoints += [end for part in shares.values() for end in part.others[:1]]
+    seen = Seen(plan.name, ",".join(dict.fromkeys(endpoints)), tuple(plan.hosts), own, plan)
+    health = Health(plan.scenario.mission.robots, tuple(plan.hosts))
+    until, well_since, shown = clock.now() + wait_s, None, ""
+    try:
+        with sights.sight(seen) as view:
+            while True:
+                for at, message in view.hear():
+                    health.see(at, message)
+                now = clock.now()
+                lost, missing = health.lost(), health.missing(now)
+                if lost:
+                    raise NotUp(lost, 1)
+                if interrupts.signal is not None:
+                    raise NotUp([f"ended by {interrupts.signal.name}"], 128 + interrupts.signal)
+                if missing and now > until:
+                    raise NotUp([f"not healthy within {wait_s:g} s:", *missing], 1)
+                well_since = None if missing else well_since or now
+                if well_since is not None and now - well_since >= HEALTHY_S:
+                    return {"chain": health.chain(now), "hosts": list(plan.hosts)}
+                shown = _progress(missing, shown)
+                clock.sleep(POLL_S)
+    except Refused as refused:
+        raise NotUp([str(refused)], 1) from None
+
+
+def _progress(missing: list[str], shown: str) -> str:
+    """Each new state of things once."""
+    text = f"waiting: {missing[0]}{f', and {len(missing) - 1} more' if len(missing) > 1 else ''}" if missing else ""
+    if text and text != shown:
+        _say(text)
+    return text
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _digest(plan: Plan) -> str:
+    said = msgspec.json.encode((plan.file, plan.scenario), order="deterministic")
+    return hashlib.sha256(said).hexdigest()[:8]

@@ -1,0 +1,68 @@
+"""`lfa` as a wheel, made of what is installed here and put onto a machine: only what is missing there is fetched."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import zipfile
+from importlib.metadata import distribution
+from pathlib import Path
+
+import deploy
+from deploy.fleet.file import Machine
+from deploy.fleet.remote import Shell, python_of
+from protocol.mission import Refused
+
+PACKAGES = ("agents", "world", "protocol", "deploy")
+WHEEL = "Wheel-Version: 1.0\nGenerator: lfa\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+WRITE = "import sys; open(sys.argv[1], 'wb').write(sys.stdin.buffer.read())"
+NEEDED = "import msgspec, typer, zenoh"
+
+
+def pack() -> tuple[str, bytes]:
+    """Name and content of the wheel of the packages as they are here."""
+    dist = distribution("lfa")
+    name = f"lfa-{dist.version}"
+    root = Path(deploy.__file__).parent.parent
+    files = {
+        str(path.relative_to(root)): path.read_bytes()
+        for package in PACKAGES
+        for path in sorted((root / package).rglob("*"))
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    files[f"{name}.dist-info/METADATA"] = (dist.read_text("METADATA") or "").encode()
+    files[f"{name}.dist-info/entry_points.txt"] = (dist.read_text("entry_points.txt") or "").encode()
+    files[f"{name}.dist-info/WHEEL"] = WHEEL.encode()
+    record = [f"{path},sha256={_digest(data)},{len(data)}" for path, data in files.items()]
+    record_path = f"{name}.dist-info/RECORD"
+    files[record_path] = ("\n".join([*record, f"{record_path},,"]) + "\n").encode()
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path, data in files.items():
+            archive.writestr(path, data)
+    return f"{name}-py3-none-any.whl", packed.getvalue()
+
+
+async def install(shell: Shell, machine: Machine, wanted: str) -> None:
+    """Put this `lfa` there; a virtual environment that is not there yet is made. Raises Refused."""
+    python = python_of(machine)
+    if machine.venv and (await shell.run((python, "-c", ""))).code != 0:
+        await _must(shell, ("python3", "-m", "venv", machine.venv), f"venv = {machine.venv}")
+    name, data = pack()
+    place = f"/tmp/{name}"
+    await _must(shell, (python, "-c", WRITE, place), "copying lfa", data)
+    pip = (python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+    await _must(shell, (*pip, "--no-deps", "--force-reinstall", place), f"installing lfa {wanted}")
+    if (await shell.run((python, "-c", NEEDED))).code != 0:
+        await _must(shell, (*pip, f"{place}[world]"), f"installing what lfa {wanted} needs")
+
+
+async def _must(shell: Shell, words: tuple[str, ...], doing: str, stdin: bytes = b"") -> None:
+    done = await shell.run(words, stdin)
+    if done.code != 0:
+        raise Refused(f"{doing} fails ({done.last_line})")
+
+
+def _digest(data: bytes) -> str:
+    return base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()

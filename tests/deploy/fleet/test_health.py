@@ -1,0 +1,74 @@
+"""Health is progress: poses that flow and one chain of all, not pids."""
+
+from __future__ import annotations
+
+from deploy.fleet.health import Health
+from protocol.geometry import Pose2D, Twist
+from protocol.messages import Header, HostStatus, PoseStamped, ProcessReport, Role, Term, Tracking
+
+TERM = Term(7, 1, 1)
+
+
+def _host(name: str = "a", state: str = "running", ended: str = "") -> HostStatus:
+    report = ProcessReport("robot1", state, 5, 1, 1.0, ended)
+    return HostStatus(Header(f"host-{name}", 1, 1, 0.0), name, "0", "r", (0, 0), (report,))
+
+
+def _pose(robot: int, role: Role, term: Term = TERM) -> PoseStamped:
+    return PoseStamped(Header(f"robot{robot}", 1, 1, 0.0), 0.0, 0.0, 0.0, 0.0, Twist(0.0, 0.0), 0.0, role, term)
+
+
+def _tracking(robot: int, ahead: int) -> Tracking:
+    header = Header(f"robot{robot}", 1, 1, 0.0)
+    return Tracking(header, ahead, 1.0, 0.0, 0.0, 0.0, Pose2D(0.0, 0.0, 0.0), 0.0, False, "keep")
+
+
+def _whole(at: float = 0.0) -> Health:
+    health = Health((1, 2, 3), ("a",))
+    health.see(at, _host())
+    for robot in (1, 2, 3):
+        health.see(at, _pose(robot, Role.LEADER if robot == 1 else Role.FOLLOWER))
+    health.see(at, _tracking(2, 1))
+    health.see(at, _tracking(3, 2))
+    return health
+
+
+def test_one_chain_of_all_is_healthy() -> None:
+    health = _whole()
+    assert health.missing(0.5) == []
+    assert health.chain(0.5) == (1, 2, 3)
+
+
+def test_old_poses_are_no_progress() -> None:
+    assert _whole().missing(1.5)[0].startswith("robot1: no pose")
+
+
+def test_a_robot_outside_the_chain_is_missing() -> None:
+    health = _whole()
+    health.see(0.1, _tracking(3, 9))
+    assert health.missing(0.5) == ["robot3: not in the chain"]
+
+
+def test_two_terms_are_no_agreement() -> None:
+    health = _whole()
+    health.see(0.1, _pose(3, Role.FOLLOWER, Term(6, 1, 1)))
+    assert health.missing(0.5) == ["not all are in one term"]
+
+
+def test_without_a_leader_nothing_is_healthy() -> None:
+    health = _whole()
+    health.see(0.1, _pose(1, Role.WAITING))
+    assert health.missing(0.5) == ["nobody leads"]
+
+
+def test_a_silent_host_is_named() -> None:
+    health = Health((1,), ("a", "b"))
+    health.see(0.0, _host())
+    health.see(0.0, _pose(1, Role.LEADER))
+    assert health.missing(0.5) == ["host b: nothing is heard of it"]
+
+
+def test_what_is_given_up_will_not_come() -> None:
+    health = _whole()
+    health.see(0.2, _host(state="refused", ended="robot1 ended (exit code 2): lfa-agent: robot1 already runs"))
+    assert health.lost() == ["host a: robot1 ended (exit code 2): lfa-agent: robot1 already runs"]
