@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from deploy.look.figures import Run
+from deploy.look.readings import Run
 from deploy.run import simulate
 from deploy.run.faults import parse_all
 from world.scenario import Scenario, load

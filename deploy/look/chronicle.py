@@ -75,6 +75,11 @@ def faults(events: Sequence[Line]) -> list[FaultDone]:
     return [FaultDone(line["t"], line["deed"], line["robot"]) for line in of_kind(events, "fault")]
 
 
+def asked_by_leader(line: Line) -> bool:
+    """Whether an event `formation` is a leader's own request: not an operator's, nor a follower's echo."""
+    return bool(line.get("by", "operator") != "operator")
+
+
 def reigns(events: Sequence[Line]) -> list[Reign]:
     """Who led, by accepted leader commands over all gateways."""
     found: list[Reign] = []

@@ -1,8 +1,9 @@
 """How well each follower kept its place, from ground truth at equal times and from what it was commanded to keep.
 
-`distance` = D - k^d, `bearing` against the commanded slot (chi + phi^d), `bearing_body` against theta_P + phi^d (the
-paper's), `heading` = wrap(psi_r - theta_F) (control.md, equation table). What was commanded comes from the follower's
-`tracking` messages; where it truly stood comes from the world.
+`distance` = D - k^d, `bearing` against the slot as it is blended (chi + phi), `bearing_asked` against the one that the
+leader asked for last (chi + phi^d), `bearing_body` against theta_P + phi (the paper's), `heading` = wrap(psi_r -
+theta_F) (control.md, equation table). What was commanded comes from the follower's `tracking` messages and the leader's
+requests; where it truly stood comes from the world.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ class Errors(Struct):
     predecessor: Array
     distance: Array
     bearing: Array
+    bearing_asked: Array
     bearing_body: Array
     heading: Array
     avoiding: Mask
@@ -69,7 +71,7 @@ def of_follower(trace: Trace, robot: int) -> Errors | None:
     separation, phi = said[at, 2], said[at, 3]
     ahead = _predecessors(trace, t, said[at, 1])
     dx, dy = own[:, 1] - ahead[:, 1], own[:, 2] - ahead[:, 2]
-    towards = np.arctan2(dy, dx)
+    from_chi = np.arctan2(dy, dx) - _angle_at(t, said, 4)
     distance = np.hypot(dx, dy) - separation
     avoiding = said[at, 7] > 0.5
     changing = _held(_changes(said), at)
@@ -77,8 +79,9 @@ def of_follower(trace: Trace, robot: int) -> Errors | None:
         t=t,
         predecessor=said[at, 1],
         distance=distance,
-        bearing=wrap(towards - _angle_at(t, said, 4) - phi),
-        bearing_body=wrap(towards - ahead[:, 3] - phi),
+        bearing=wrap(from_chi - phi),
+        bearing_asked=wrap(from_chi - _asked(trace, robot, t, phi)),
+        bearing_body=wrap(np.arctan2(dy, dx) - ahead[:, 3] - phi),
         heading=wrap(_angle_at(t, said, 5) - own[:, 3]),
         avoiding=avoiding,
         changing=changing,
@@ -104,6 +107,15 @@ def _predecessors(trace: Trace, t: Array, ids: Array) -> Array:
         truth = trace.truth[int(robot)]
         rows[mine] = truth[np.clip(np.searchsorted(truth[:, 0], t[mine]), 0, truth.shape[0] - 1)]
     return rows
+
+
+def _asked(trace: Trace, robot: int, t: Array, blended: Array) -> Array:
+    """phi^d [rad] that the leader last asked for; until it has asked, what the follower keeps."""
+    requests = trace.commanded.get(robot)
+    if requests is None:
+        return blended
+    last = np.searchsorted(requests[:, 0], t, side="right") - 1
+    return np.where(last < 0, blended, requests[np.maximum(last, 0), 2])
 
 
 def _angle_at(t: Array, said: Array, column: int) -> Array:

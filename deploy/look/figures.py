@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
@@ -20,13 +18,10 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.patches import Circle, Polygon
 
-from deploy.look import chronicle, errors, trace
-from deploy.look import summary as summaries
-from deploy.look.chronicle import Line
+from deploy.look import chronicle, errors
 from deploy.look.errors import Errors
-from deploy.look.trace import Array, Trace
-from deploy.run.folder import scenario_of
-from world.scenario import Scenario
+from deploy.look.readings import Run
+from deploy.look.trace import Array
 from world.terrain import patches_of
 
 if TYPE_CHECKING:
@@ -44,56 +39,19 @@ FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": T
         "svg.hashsalt": "lfa"}  # fmt: skip
 
 
-class Run:
-    """A run in numbers. `truth`: by robot, in `map`, rows of t [s], x, y [m], theta [rad], v [m/s], omega [rad/s].
-    `errors`: by follower (deploy/look/errors.py). `events`: the lines of events.jsonl."""
+def look(run: Run, robot: int) -> dict[str, Any]:
+    """Colour and style of a robot's lines, the same in every figure."""
+    n = run.robots.index(robot) if robot in run.robots else 0
+    if len(run.robots) <= len(COLOURS):
+        return {"color": COLOURS[n], "linestyle": STYLES[n]}
+    return {"color": colormaps["viridis"](0.95 * n / (len(run.robots) - 1)), "linestyle": "-"}
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.scenario: Scenario = scenario_of(folder)
-        self.seen: Trace = trace.read(folder)
-        self.events: list[Line] = chronicle.lines(folder)
 
-    @cached_property
-    def summary(self) -> summaries.Summary:
-        return summaries.read(self.folder)
-
-    @property
-    def truth(self) -> dict[int, Array]:
-        return self.seen.truth
-
-    def figure(self, name: str) -> Figure:
-        """One of FIGURES by its name. Raises KeyError with the names that there are."""
-        if name not in (known := [known for known, *_ in FIGURES]):
-            raise KeyError(f"{name}: must be one of {', '.join(known)}")
-        return drawn(name, self)
-
-    @property
-    def robots(self) -> tuple[int, ...]:
-        return self.scenario.mission.robots
-
-    @cached_property
-    def errors(self) -> dict[int, Errors]:
-        """Of every robot that ever followed."""
-        found = {robot: errors.of_follower(self.seen, robot) for robot in self.robots}
-        return {robot: of for robot, of in found.items() if of is not None}
-
-    @cached_property
-    def reigns(self) -> list[chronicle.Reign]:
-        return chronicle.reigns(self.events)
-
-    def look(self, robot: int) -> dict[str, Any]:
-        """Colour and style of a robot's lines, the same in every figure."""
-        n = self.robots.index(robot) if robot in self.robots else 0
-        if len(self.robots) <= len(COLOURS):
-            return {"color": COLOURS[n], "linestyle": STYLES[n]}
-        return {"color": colormaps["viridis"](0.95 * n / (len(self.robots) - 1)), "linestyle": "-"}
-
-    def label(self, robot: int) -> str | None:
-        """A name for the legend; with many robots only the first, the last and some between have one."""
-        n, many = self.robots.index(robot), len(self.robots)
-        step = max(1, -(-many // LEGEND_MAX))
-        return f"robot {robot}" if n % step == 0 or n == many - 1 else None
+def label(run: Run, robot: int) -> str | None:
+    """A name for the legend; with many robots only the first, the last and some between have one."""
+    n, many = run.robots.index(robot), len(run.robots)
+    step = max(1, -(-many // LEGEND_MAX))
+    return f"robot {robot}" if n % step == 0 or n == many - 1 else None
 
 
 Draw = Callable[[FigureBase, Run], None]
@@ -154,7 +112,7 @@ def _path_flow(figure: FigureBase, run: Run) -> None:
     _ground(axes, run)
     for robot, rows in run.seen.truth.items():
         step = max(1, rows.shape[0] * len(run.seen.truth) // POINTS_MAX)
-        axes.plot(rows[::step, 1], rows[::step, 2], label=run.label(robot), linewidth=1.3, **run.look(robot))
+        axes.plot(rows[::step, 1], rows[::step, 2], label=label(run, robot), linewidth=1.3, **look(run, robot))
     for t in np.linspace(0.0, run.seen.end_s, STANCES):
         _stance(axes, run, float(t))
     goal = run.scenario.mission.goal_m
@@ -170,8 +128,8 @@ def _tracking(figure: FigureBase, run: Run) -> None:
     _lines(b, run, {robot: (e.t, np.degrees(e.bearing)) for robot, e in run.errors.items()})
     _finish(b, run, "(b) Orientation error", "[deg]", last=False, legend=False)
     for robot, (t, v, w) in _velocities(run, leading=True).items():
-        c.plot(*_thin(t, v, POINTS_MAX // 2), label=f"v of robot {robot} [m/s]", **run.look(robot))
-        c.plot(*_thin(t, w, POINTS_MAX // 2), label=f"omega of robot {robot} [rad/s]", alpha=0.5, **run.look(robot))
+        c.plot(*_thin(t, v, POINTS_MAX // 2), label=f"v of robot {robot} [m/s]", **look(run, robot))
+        c.plot(*_thin(t, w, POINTS_MAX // 2), label=f"omega of robot {robot} [rad/s]", alpha=0.5, **look(run, robot))
     _finish(c, run, "(c) Leader velocity", "v [m/s], omega [rad/s]")
     _lines(d, run, {robot: (t, v) for robot, (t, v, _) in _velocities(run, leading=False).items()})
     _finish(d, run, "(d) Follower velocity", "v [m/s]")
@@ -184,7 +142,7 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
     axes, end_s = figure.subplots(), max(run.seen.end_s, 1.0)
     for reign in run.reigns:
         lasted_s = (end_s if reign.until_s is None else reign.until_s) - reign.from_s
-        colour = run.look(reign.robot_id)["color"]
+        colour = look(run, reign.robot_id)["color"]
         axes.barh(reign.robot_id, lasted_s, left=reign.from_s, height=0.6, color=colour, edgecolor="white")
         if lasted_s > TERM_SHARE_MIN * end_s:
             axes.annotate(f"term {reign.term[0]}", (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
@@ -194,7 +152,7 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
             axes.annotate(f"first command after {failover.first_command_ms:.0f} ms", (failover.at_s, failover.leader),
                           xytext=(4, 14), textcoords="offset points", fontsize=8)  # fmt: skip
     _finish(axes, run, "Who led", "robot")
-    shown = [robot for robot in run.robots if len(run.robots) <= LEGEND_MAX or run.label(robot)]
+    shown = [robot for robot in run.robots if len(run.robots) <= LEGEND_MAX or label(run, robot)]
     axes.set_yticks(shown)
     axes.set(xlim=(0.0, end_s), ylim=(max(run.robots) + 0.8, min(run.robots) - 0.8))
 
@@ -206,7 +164,7 @@ def _lease(figure: FigureBase, run: Run) -> None:
     first_n = min((reign.term[0] for reign in run.reigns), default=0)
     for n, reign in enumerate(run.reigns):
         until_s = end_s if reign.until_s is None else reign.until_s
-        colour = run.look(reign.robot_id)["color"]
+        colour = look(run, reign.robot_id)["color"]
         above.barh(0, until_s - reign.from_s, left=reign.from_s, height=0.5, color=colour, edgecolor="white")
         text = f"{reign.cause}: robot {reign.robot_id}, term +{reign.term[0] - first_n}"
         above.annotate(
@@ -215,7 +173,7 @@ def _lease(figure: FigureBase, run: Run) -> None:
         above.axvline(reign.from_s, color=colour, linewidth=0.6)
     above.set(ylim=(-0.3, 1.8), yticks=[], title="Who held the lease, in which term, and what ended the one before")
     for robot, steps in chronicle.places(run.events, run.robots, end_s).items():
-        below.step(*zip(*steps, strict=True), where="post", label=run.label(robot), **run.look(robot))
+        below.step(*zip(*steps, strict=True), where="post", label=label(run, robot), **look(run, robot))
     last = len(run.robots) - 1
     below.set(ylim=(last + 0.5, -0.5), yticks=range(last + 1), xlim=(0.0, end_s))
     _finish(below, run, "The chain after it, as its leader told it", "place in the chain")
@@ -262,7 +220,7 @@ FIGURES: tuple[tuple[str, tuple[float, float], str, Draw], ...] = (
 def _lines(axes: Axes, run: Run, of_robots: dict[int, tuple[Array, Array]]) -> None:
     most = POINTS_MAX // max(1, len(of_robots))
     for robot, (t, y) in of_robots.items():
-        axes.plot(*_unwrapped(*_thin(t, y, most)), label=run.label(robot), linewidth=1.1, **run.look(robot))
+        axes.plot(*_unwrapped(*_thin(t, y, most)), label=label(run, robot), linewidth=1.1, **look(run, robot))
 
 
 def _finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True, legend: bool = True) -> None:
@@ -317,7 +275,7 @@ def _stance(axes: Axes, run: Run, t: float) -> None:
         ahead = None if followed is None or stale else at.get(int(followed.predecessor[i]))
         if ahead is not None:
             axes.plot([row[1], ahead[1]], [row[2], ahead[2]], color="#666666", linewidth=0.7, zorder=3)
-        colour = run.look(robot)["color"]
+        colour = look(run, robot)["color"]
         axes.plot(row[1], row[2], marker=(3, 0, float(np.degrees(row[3])) - 90.0), markersize=8, color=colour, zorder=4)
 
 

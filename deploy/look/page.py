@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from deploy.look import chronicle, figures, summary
-from deploy.look.figures import FIGURES, Run
+from deploy.look.figures import FIGURES
+from deploy.look.readings import Run
 from deploy.look.summary import RobotSummary, Summary
 from deploy.look.trace import messages
 from deploy.run.folder import SCENARIO

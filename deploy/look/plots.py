@@ -24,8 +24,9 @@ def command(folder: Annotated[Path, typer.Argument(help="A run folder.")]) -> in
 def draw(folder: Path) -> list[Path]:
     """Draw all figures of the run in `folder`; their files."""
     from deploy.look import figures
+    from deploy.look.readings import Run
 
-    run = figures.Run(folder)
+    run = Run(folder)
     (folder / FIGURES).mkdir(exist_ok=True)
     paths = []
     for name, *_ in figures.FIGURES:

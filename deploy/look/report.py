@@ -31,7 +31,7 @@ def command(
 def html(folders: list[Path]) -> str:
     """The page about these runs (one or two). Raises Refused for what is no finished run folder."""
     from deploy.look import page
-    from deploy.look.figures import Run
+    from deploy.look.readings import Run
 
     for folder in folders:
         for needed in ("summary.json", "recording.mcap", "scenario.toml"):

@@ -30,8 +30,9 @@ def take(rrd: Path, picture: Path, folder: Path | None) -> str:
     if folder is None:
         raise Refused(f"--screenshot {picture}: {complaint}")
     from deploy.look import figures
+    from deploy.look.readings import Run
 
-    picture.write_bytes(figures.png(figures.overview(figures.Run(folder))))
+    picture.write_bytes(figures.png(figures.overview(Run(folder))))
     return f"{picture} (drawn without the viewer: {complaint})"
 
 

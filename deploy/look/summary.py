@@ -133,7 +133,7 @@ def _robot(robot: int, seen: Trace, events: Sequence[Line]) -> RobotSummary:
         final_speed_mps=None if last is None else abs(float(last[4])),
         contacts=sum(1 for _ in chronicle.of_kind(own, "contact")),
         obstacles_met=_obstacles_met(own),
-        orientation_requests=sum(1 for line in chronicle.of_kind(own, "formation") if line.get("by") == "leader"),
+        orientation_requests=sum(map(chronicle.asked_by_leader, chronicle.of_kind(own, "formation"))),
     )
     followed = errors.of_follower(seen, robot)
     if followed is not None:

@@ -39,6 +39,8 @@ class Trace(Struct):
     cmd_vel: dict[int, Array]
     obstacles: dict[int, Array]
     """t, x, y of each moving body, by its place in the scenario's list."""
+    commanded: dict[int, Array] = {}
+    """t, k^d [m], phi^d [rad] of each follower's slot as the leader asks for it, by robot."""
 
     @property
     def end_s(self) -> float:
@@ -57,8 +59,9 @@ def read(folder: Path) -> Trace:
     """The trace of the run in `folder`; an empty one when nothing was recorded."""
     truth: dict[int, list[Row]] = {}
     obstacles: dict[int, list[Row]] = {}
+    commanded: dict[int, list[Row]] = {}
     said: dict[str, dict[int, list[Row]]] = {topic: {} for topic in _ROWS}
-    for owner, topic, t, message in messages(folder, frozenset({"truth", *_ROWS})):
+    for owner, topic, t, message in messages(folder, frozenset({"truth", "formation", *_ROWS})):
         robot = robot_id_of(owner)
         if owner == TRUTH_OWNER:
             for r in message.robots:
@@ -66,9 +69,14 @@ def read(folder: Path) -> Trace:
                 truth.setdefault(r.id, []).append(row)
             for body in message.obstacles:
                 obstacles.setdefault(body.index, []).append((message.time_s, body.x, body.y))
+        elif topic == "formation":
+            for slot in message.slots:
+                commanded.setdefault(slot.robot, []).append((t, slot.separation_m, slot.phi))
         elif robot is not None and topic in _ROWS:
             said[topic].setdefault(robot, []).append(_ROWS[topic](t, message))
-    return Trace(_arrays(truth), _arrays(said["tracking"]), _arrays(said["cmd_vel"]), _arrays(obstacles))
+    return Trace(
+        _arrays(truth), _arrays(said["tracking"]), _arrays(said["cmd_vel"]), _arrays(obstacles), _arrays(commanded)
+    )
 
 
 def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, float, Any]]:

@@ -1,4 +1,4 @@
-"""`lfa verify`: the invariants' checkers on a run of real processes.
+"""The invariants' checkers on a run of real processes.
 
 The journals hold all that each process was told, by the one clock of the machine. Cores of agents and witness are run
 again on theirs, which gives every effect of every lease; the gateways are run again on the world's, which gives every
@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-import typer
 from msgspec import Struct
 
 from agents.agent import Agent
@@ -48,24 +47,6 @@ class Verdict(Struct, frozen=True):
     happenings: int
     broken: tuple[Violation, ...]
     """With times from the run's first journalled moment on."""
-
-
-def command(
-    folder: Annotated[Path, typer.Argument(help="A run folder with journals.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON.")] = False,
-) -> int:
-    """Exit code 1 when an invariant was broken."""
-    verdict = verify(folder)
-    if as_json:
-        print(msgspec.json.encode(verdict).decode())
-    else:
-        for one in verdict.broken:
-            print(f"{one.name} broken at {one.at:.3f} s: {one.text}")
-        names = ", ".join(checker.name for checker in SAFETY)
-        print(
-            f"{verdict.journals} journals, {verdict.happenings} happenings, {names}: {len(verdict.broken)} violations"
-        )
-    return 1 if verdict.broken else 0
 
 
 def verify(folder: Path) -> Verdict:

@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import pytest
 
 from deploy.look import page, report
-from deploy.look.figures import FIGURES, Run
+from deploy.look.figures import FIGURES, label
+from deploy.look.readings import Run
 from deploy.run.faults import parse_all
 from deploy.run.simulate import run
 from protocol.mission import Refused
@@ -69,7 +70,7 @@ def test_a_large_team_stays_small_on_the_page(tmp_path: Path) -> None:
     html = report.html([_ran(tmp_path / "many", 1, robots=20)])
     assert len(html.encode()) < BYTES_MAX
     run = Run(tmp_path / "many")
-    assert sum(run.label(robot) is not None for robot in run.robots) <= 12
+    assert sum(label(run, robot) is not None for robot in run.robots) <= 12
 
 
 def test_what_is_no_finished_run_is_refused(tmp_path: Path) -> None:

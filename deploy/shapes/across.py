@@ -1,0 +1,99 @@
+"""Those properties of control.md 7.1 that compare runs: path 1 with path 2, and the spikes of many seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+from msgspec import Struct
+
+from deploy.look.readings import Run
+from deploy.shapes import spikes
+from deploy.shapes.bars import Bar, Finding, Measured
+from deploy.shapes.subject import Subject, duration_s, on_course
+from deploy.shapes.table import PATHS
+
+SPIKES_MIN = 20
+"""Fewer pooled spikes say nothing about a rank correlation."""
+CORRELATION_MIN = 0.8
+
+
+class Kept(Struct, frozen=True):
+    """What comparisons need of one run; small, so that a bench can keep many."""
+
+    scenario: str
+    seed: int
+    duration_s: float
+    requests: int
+    """Orientation requests of leaders."""
+    switches: int
+    """From one leading robot to another."""
+    spikes: tuple[tuple[float, float, float], ...]
+    """Width [s], peak [m], duration [s] of the avoidances that it belongs to, of each spike that belongs to one."""
+
+
+def keep(run: Run) -> Kept:
+    name, s = run.summary.scenario, Subject(run)
+    pooled = [(spike, duration_s(s, spike)) for spike in on_course(s)] if name in PATHS else []
+    return Kept(
+        scenario=name,
+        seed=run.summary.seed,
+        duration_s=run.summary.sim_duration_s,
+        requests=len(spikes.requests(run)),
+        switches=sum(a.robot_id != b.robot_id for a, b in pairwise(run.reigns)),
+        spikes=tuple((spike.width_s, spike.peak, lasted_s) for spike, lasted_s in pooled if lasted_s > 0.0),
+    )
+
+
+def across(runs: Sequence[Kept]) -> list[Finding]:
+    """Each comparison; with too few runs of the paper's paths it `needs more runs`, which is no fault."""
+    return [bar.judged(measure(runs)) for bar, measure in COMPARISONS]
+
+
+def _correlation(runs: Sequence[Kept]) -> Measured | None:
+    return _ranked(runs, 2)
+
+
+def _height(runs: Sequence[Kept]) -> Measured | None:
+    return _ranked(runs, 1)
+
+
+def _ranked(runs: Sequence[Kept], other: int) -> Measured | None:
+    """Of the pooled spikes of several runs: width against another of their columns."""
+    pooled = [spike for run in runs for spike in run.spikes]
+    if len(runs) < 2 or len(pooled) < SPIKES_MIN:
+        return None
+    value = spikes.rank_correlation([spike[0] for spike in pooled], [spike[other] for spike in pooled])
+    return Measured(value, f"{len(pooled)} spikes")
+
+
+def _longer(runs: Sequence[Kept]) -> Measured | None:
+    return _least_more(runs, lambda run: run.duration_s)
+
+
+def _more_requests(runs: Sequence[Kept]) -> Measured | None:
+    return _least_more(runs, lambda run: run.requests)
+
+
+def _more_switches(runs: Sequence[Kept]) -> Measured | None:
+    return _least_more(runs, lambda run: run.switches)
+
+
+def _least_more(runs: Sequence[Kept], of: Callable[[Kept], float]) -> Measured | None:
+    """By how much path 1 exceeds path 2 at least: of equal seeds, or of all when no two are equal."""
+    ones, twos = ([run for run in runs if run.scenario == path] for path in PATHS)
+    pairs = [(a, b) for a in ones for b in twos]
+    pairs = [(a, b) for a, b in pairs if a.seed == b.seed] or pairs
+    if not pairs:
+        return None
+    least, seed = min((of(a) - of(b), a.seed) for a, b in pairs)
+    return Measured(least, f"seed {seed}, of {len(pairs)} pairs")
+
+
+COMPARISONS: tuple[tuple[Bar, Callable[[Sequence[Kept]], Measured | None]], ...] = (
+    (Bar("7", "spikes' width by avoidance, rank correlation", ">=", CORRELATION_MIN), _correlation),
+    (Bar("7", "spikes' height by width, rank correlation", ">", 0.0), _height),
+    (Bar("8", "time of path 1 beyond path 2", ">", 0.0, "s"), _longer),
+    (Bar("8", "orientation requests of path 1 beyond path 2", ">", 0.0), _more_requests),
+    (Bar("8", "role switches of path 1 beyond path 2", ">", 0.0), _more_switches),
+)

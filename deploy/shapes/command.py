@@ -1,0 +1,100 @@
+"""`lfa verify`: of each run the lease's invariants and, where it is one of the paper's, the shapes of its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from msgspec import Struct
+
+from deploy.look.checkers import SAFETY, Violation
+from deploy.look.readings import Run
+from deploy.look.summary import SUMMARY
+from deploy.look.verify import verify
+from deploy.shapes import across, bars
+from deploy.shapes.across import Kept
+from deploy.shapes.bars import Finding
+from deploy.shapes.table import PAPER, PATHS, of_run
+from protocol.mission import Refused
+
+
+class Checked(Struct, frozen=True):
+    """All that was found out about one run folder."""
+
+    folder: str
+    scenario: str
+    seed: int
+    journals: int
+    happenings: int
+    broken: tuple[Violation, ...]
+    shapes: tuple[Finding, ...]
+    """Empty when the scenario is none of the paper's."""
+
+
+class Verdict(Struct, frozen=True):
+    ok: bool
+    runs: tuple[Checked, ...]
+    across: tuple[Finding, ...]
+    """Comparisons of the paper's two paths; empty when none of the runs is one of them."""
+
+
+def command(
+    folders: Annotated[list[Path], typer.Argument(help="Run folders with journals; several are compared.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print all findings as JSON.")] = False,
+) -> int:
+    """Exit code 1 when an invariant was broken or a property does not hold."""
+    checked: list[Checked] = []
+    kept: list[Kept] = []
+    for folder in folders:
+        one, of_it = check(folder)
+        checked.append(one)
+        kept += [of_it] if of_it.scenario in PATHS else []
+        if not as_json:
+            _print(one)
+    compared = tuple(across.across(kept)) if kept else ()
+    verdict = Verdict(not any(map(_faulty, checked)) and not _fails(compared), tuple(checked), compared)
+    if as_json:
+        print(msgspec.json.encode(verdict).decode())
+    elif compared:
+        print(f"across {len(kept)} runs of the paper's paths\n" + "\n".join(map(bars.line, compared)))
+    return 0 if verdict.ok else 1
+
+
+def check(folder: Path) -> tuple[Checked, Kept]:
+    """The findings on the run in `folder`. Raises Refused when it is none, or cannot be run again."""
+    lease = verify(folder)
+    if not (folder / SUMMARY).is_file():
+        raise Refused(f"{folder}: no {SUMMARY}, must be the folder of a run that came to its end")
+    run = Run(folder)
+    summary = run.summary
+    known = Checked(
+        str(folder), summary.scenario, summary.seed, lease.journals, lease.happenings, lease.broken, tuple(of_run(run))
+    )
+    return known, across.keep(run)
+
+
+def _faulty(one: Checked) -> bool:
+    return bool(one.broken) or _fails(one.shapes)
+
+
+def _fails(findings: Sequence[Finding]) -> bool:
+    return any(one.status == "fails" for one in findings)
+
+
+def _print(one: Checked) -> None:
+    for violation in one.broken:
+        print(f"{violation.name} broken at {violation.at:.3f} s: {violation.text}")
+    names = ", ".join(checker.name for checker in SAFETY)
+    print(
+        f"{one.folder}: {one.scenario}, seed {one.seed}\n"
+        f"{one.journals} journals, {one.happenings} happenings, {names}: {len(one.broken)} violations"
+    )
+    if not one.shapes:
+        print(f"no scenario of the paper ({', '.join(PAPER)}): the shapes of its figures do not apply")
+        return
+    failed = [finding.name for finding in one.shapes if finding.status == "fails"]
+    print("\n".join(map(bars.line, one.shapes)))
+    print(f"{len(one.shapes)} properties of figures 7, 8, 9 and 11: {len(failed)} fail")

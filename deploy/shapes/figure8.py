@@ -1,0 +1,88 @@
+"""Figure 8, the orientation error, and the order of the chain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+
+import numpy as np
+
+from deploy.look import chronicle
+from deploy.shapes import spikes
+from deploy.shapes.bars import Measured
+from deploy.shapes.subject import Subject, explained, share
+
+REQUEST_S = 3.0
+
+
+def requests_seen(s: Subject) -> Measured:
+    """The first follower's bearing against what it is asked for goes up at once."""
+    asked, mute = spikes.requests(s.run), []
+    for at_s in asked:
+        first = next((robot for robot, e in s.run.errors.items() if _second_in_chain(s, robot, at_s)), None)
+        e = s.run.errors.get(first or 0)
+        window = None if e is None else (e.t >= at_s) & (e.t <= at_s + REQUEST_S)
+        if e is None or window is None or not window.any():
+            continue
+        if np.abs(e.bearing_asked[window]).max() <= spikes.SPIKE_RAD:
+            mute.append(at_s)
+    note = ", ".join(f"none after {at_s:.1f} s" for at_s in mute) if asked else "no request in this run"
+    return Measured(share(len(asked) - len(mute), len(asked)), note)
+
+
+def bearings_explained(s: Subject) -> Measured:
+    return explained(s, s.bearing)
+
+
+def after_switch(s: Subject) -> Measured:
+    """The longest time from a role switch until a follower's bearing is back, or something else disturbs it."""
+    worst, note = nan, "no role switch in this run"
+    for reign in s.run.reigns[1:]:
+        for robot, e in s.run.errors.items():
+            after = (e.t >= reign.from_s) & (e.t <= _undisturbed_until(s, robot, reign.from_s))
+            off = after & (np.abs(e.bearing) >= spikes.BASE_RAD)
+            if not after.any():
+                continue
+            took = float(e.t[np.flatnonzero(off)[-1]]) - reign.from_s if off.any() else 0.0
+            if not took <= worst:
+                worst, note = took, f"robot {robot} after {reign.from_s:.1f} s"
+    return Measured(worst, note)
+
+
+def chain_kept(s: Subject) -> Measured:
+    """Chains that are not the one before, less some, with others at its tail."""
+    before: list[int] = []
+    newest: tuple[object, ...] = ()
+    wrong = []
+    for line in chronicle.of_kind(s.run.events, "chain"):
+        version, chain = (tuple(line["term"] or ()), line.get("seq", 0)), list(line.get("chain", []))
+        if newest and version <= newest:
+            continue
+        kept = [robot for robot in before if robot in chain]
+        if before and chain[: len(kept)] != kept and not _tail_only(before, chain):
+            wrong.append(f"{before} to {chain} at {line['t']:.1f} s")
+        before, newest = chain, version
+    return Measured(len(wrong), ", ".join(wrong))
+
+
+def _second_in_chain(s: Subject, robot: int, at_s: float) -> bool:
+    return len(spikes.upstream(s.run, robot, at_s)) == 2
+
+
+def _undisturbed_until(s: Subject, robot: int, after_s: float) -> float:
+    later = [
+        one.from_s
+        for one in s.episodes
+        if one.kind in ("avoidance", "switch") and one.from_s > after_s
+        and (one.robot is None or one.robot in spikes.upstream(s.run, robot, one.from_s))
+    ]  # fmt: skip
+    return min(later, default=s.end_s)
+
+
+def _tail_only(before: Sequence[int], after: Sequence[int]) -> bool:
+    """Whether `after` is `before` with some robots taken out and others, or the same ones, put at its tail."""
+    kept = 0
+    for robot in before:
+        if kept < len(after) and after[kept] == robot:
+            kept += 1
+    return kept > 0

@@ -1,0 +1,88 @@
+"""Figure 9, the path flow: where the robots went, and what they went round."""
+
+from __future__ import annotations
+
+from math import isfinite, nan
+
+import numpy as np
+
+from deploy.look import chronicle
+from deploy.look.trace import Array
+from deploy.shapes.bars import Measured
+from deploy.shapes.crossed import outside_m, overlap_m
+from deploy.shapes.subject import BASELINE_M, STRAIGHT_RADPS, Subject
+
+SWITCH_S = 8.0
+
+
+def bounded(s: Subject) -> Measured:
+    return Measured(max((outside_m(s.run, rows) for rows in s.run.truth.values()), default=nan))
+
+
+def ends_at_goal(s: Subject) -> Measured:
+    """How much farther from the goal than its place in the chain allows the farthest robot ended."""
+    mission = s.run.scenario.mission
+    chain = chronicle.last_chain(s.run.events)
+    away, note = nan, ""
+    for place, robot in enumerate(chain):
+        rows = s.run.truth.get(robot)
+        if rows is None:
+            continue
+        x, y = rows[-1, 1], rows[-1, 2]
+        over = float(np.hypot(x - mission.goal_m[0], y - mission.goal_m[1])) - place * mission.formation.separation_m
+        if not over <= away:
+            away, note = over, f"robot {robot}"
+    return Measured(away, note)
+
+
+def counts_differ(s: Subject) -> Measured:
+    met = [sum(robot.obstacles_met.values()) for robot in s.run.summary.robots]
+    return Measured(len(set(met)), ", ".join(map(str, met)))
+
+
+def on_new_trace(s: Subject) -> Measured:
+    """Sideways distance of followers from the path of the last new leader, less what their slots ask for."""
+    if len(s.run.reigns) < 2:
+        return Measured(nan, "no role switch in this run")
+    reign = s.run.reigns[-1]
+    path = s.run.truth[reign.robot_id]
+    path = path[path[:, 0] >= reign.from_s]
+    worst, note = nan, ""
+    for robot, e in s.run.errors.items():
+        steady = e.steady & (e.t >= reign.from_s + SWITCH_S) & (np.abs(e.distance) < BASELINE_M)
+        rows = s.run.truth[robot]
+        rows = rows[np.isin(rows[:, 0], e.t[steady]) & (np.abs(rows[:, 5]) < STRAIGHT_RADPS)][::5]
+        off = [_beside(path, row) - _asked_beside(s, robot, reign.robot_id, float(row[0])) for row in rows]
+        off = [one for one in off if isfinite(one)]
+        if off and not (middle := float(np.median(np.abs(off)))) <= worst:
+            worst, note = middle, f"robot {robot}, median"
+    return Measured(worst, note or "no steady way after the switch")
+
+
+def no_overlap(s: Subject) -> Measured:
+    return Measured(overlap_m(s.run))
+
+
+def _beside(path: Array, row: Array) -> float:
+    """Signed distance [m] to the left of a path of the point in `row`, at the path's nearest segment."""
+    gaps = np.hypot(path[:, 1] - row[1], path[:, 2] - row[2])
+    i = int(np.argmin(gaps))
+    if i in (0, path.shape[0] - 1):
+        return nan
+    theta = path[i, 3]
+    return float(np.cos(theta) * (row[2] - path[i, 2]) - np.sin(theta) * (row[1] - path[i, 1]))
+
+
+def _asked_beside(s: Subject, robot: int, leader: int, at_s: float) -> float:
+    """k sin(phi), summed over the hops from `leader` to `robot`; nan when it is not behind that leader."""
+    beside, seen = 0.0, set()
+    while robot != leader:
+        e = s.run.errors.get(robot)
+        said = s.run.seen.tracking.get(robot)
+        if e is None or said is None or robot in seen:
+            return nan
+        seen.add(robot)
+        i = max(0, int(np.searchsorted(said[:, 0], at_s, side="right")) - 1)
+        beside += float(said[i, 2] * np.sin(said[i, 3]))
+        robot = int(said[i, 1])
+    return beside

@@ -1,0 +1,180 @@
+"""Spikes of an error, and the episodes of a run that they belong to (control.md 7.1).
+
+A spike is an excursion: it begins where the error leaves its baseline, ends where it is back, and its peak is above
+the bar; two that are less than `APART_S` apart are one. An episode is a stretch during which a robot did something
+besides following: it avoided, its place in the formation changed, the chain had a new leader, or it was still on
+its way into the chain at the start. What a robot does is felt by those behind it, so a spike belongs to episodes of
+the robot itself and of those ahead of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from msgspec import Struct
+
+from deploy.look import chronicle
+from deploy.look.errors import RECOVERY_S_MAX, Errors, Mask
+from deploy.look.readings import Run
+from deploy.look.trace import Array
+
+APART_S = 1.0
+BASE_M, SPIKE_M = 0.02, 0.05
+BASE_RAD, SPIKE_RAD = 0.05, 0.10
+FELT_S = 3.0
+"""An episode shows within this in the own error, on the way back, and in those of the robots behind."""
+START_S = 0.5
+"""After its first command a follower is on its way into its place."""
+
+
+class Spike(Struct, frozen=True):
+    robot: int
+    from_s: float
+    until_s: float
+    peak: float
+    """Largest magnitude, in the error's unit."""
+
+    @property
+    def width_s(self) -> float:
+        return self.until_s - self.from_s
+
+
+class Episode(Struct, frozen=True):
+    robot: int | None
+    """None: it concerns all."""
+    kind: str
+    """`avoidance`, `formation`, `switch` or `start`."""
+    from_s: float
+    until_s: float
+
+    def touches(self, from_s: float, until_s: float) -> bool:
+        return self.from_s <= until_s and self.until_s >= from_s
+
+
+def stretches(t: Array, mask: Mask, apart_s: float = 0.0) -> list[tuple[float, float]]:
+    """First and last time [s] of each stretch of True; stretches at most `apart_s` apart are one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    found = zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True)
+    return merged(found, apart_s)
+
+
+def merged(spans: Iterable[tuple[float, float]], apart_s: float = 0.0) -> list[tuple[float, float]]:
+    """Spans [s] in order, those at most `apart_s` apart as one."""
+    found: list[tuple[float, float]] = []
+    for from_s, until_s in sorted(spans):
+        if found and from_s - found[-1][1] <= apart_s:
+            found[-1] = (found[-1][0], max(found[-1][1], until_s))
+        else:
+            found.append((from_s, until_s))
+    return found
+
+
+def spikes(robot: int, t: Array, error: Array, base: float, bar: float) -> list[Spike]:
+    """The excursions of `error` from its baseline that exceed `bar`."""
+    size = np.abs(error)
+    found = []
+    for from_s, until_s in stretches(t, size > base, APART_S):
+        peak = float(size[(t >= from_s) & (t <= until_s)].max())
+        if peak > bar:
+            found.append(Spike(robot, from_s, until_s, peak))
+    return found
+
+
+def distance_spikes(run: Run) -> list[Spike]:
+    return [one for robot, e in run.errors.items() for one in spikes(robot, e.t, e.distance, BASE_M, SPIKE_M)]
+
+
+def bearing_spikes(run: Run) -> list[Spike]:
+    return [one for robot, e in run.errors.items() for one in spikes(robot, e.t, e.bearing_asked, BASE_RAD, SPIKE_RAD)]
+
+
+def episodes(run: Run) -> list[Episode]:
+    """All of a run, as its log tells them, in the order of their beginnings."""
+    found = [Episode(robot, "avoidance", *span) for robot in run.robots for span in avoidances(run, robot)]
+    for robot, e in run.errors.items():
+        found += [Episode(robot, "formation", *span) for span in stretches(e.t, e.changing, APART_S)]
+        found.append(Episode(robot, "start", float(e.t[0]), float(e.t[0]) + START_S))
+    found += [Episode(None, "formation", at_s, at_s) for at_s in requests(run)]
+    found += [Episode(None, "switch", reign.from_s, reign.from_s) for reign in run.reigns[1:]]
+    return sorted(found, key=lambda one: one.from_s)
+
+
+def requests(run: Run) -> list[float]:
+    """When the leader asked for another orientation [s]; not what an operator made it ask for."""
+    return [line["t"] for line in chronicle.of_kind(run.events, "formation") if chronicle.asked_by_leader(line)]
+
+
+def avoidances(run: Run, robot: int) -> list[tuple[float, float]]:
+    """From the first decision to the `resume` that ends it, by the robot's own log [s]."""
+    spans: list[tuple[float, float]] = []
+    since: float | None = None
+    for line in chronicle.of_kind(run.events, "decision"):
+        if line["robot"] != robot:
+            continue
+        if line["action"] != "resume":
+            since = line["t"] if since is None else since
+        elif since is not None:
+            spans.append((since, line["t"]))
+            since = None
+    if since is not None:
+        spans.append((since, run.seen.end_s))
+    return merged(spans, APART_S)
+
+
+def upstream(run: Run, robot: int, at_s: float) -> set[int]:
+    """`robot` and all that were ahead of it in the chain at that moment."""
+    found = {robot}
+    while (e := run.errors.get(robot)) is not None and e.t[0] <= at_s:
+        robot = int(e.predecessor[max(0, int(np.searchsorted(e.t, at_s, side="right")) - 1)])
+        if robot in found:
+            break
+        found.add(robot)
+    return found
+
+
+def causes(run: Run, spike: Spike, known: Sequence[Episode]) -> list[Episode]:
+    """The episodes that overlap `spike` or ended within `FELT_S` before it, of the robot itself and of those ahead."""
+    ahead = upstream(run, spike.robot, spike.from_s) | upstream(run, spike.robot, spike.until_s)
+    return [
+        one
+        for one in known
+        if (one.robot is None or one.robot in ahead) and one.touches(spike.from_s - FELT_S, spike.until_s)
+    ]
+
+
+def felt(run: Run, episode: Episode, found: Sequence[Spike]) -> bool:
+    """Whether any spike of the robot itself or of one behind it overlaps `episode`, or follows it at once."""
+    return any(
+        episode.touches(spike.from_s - FELT_S, spike.until_s)
+        and (episode.robot is None or episode.robot in upstream(run, spike.robot, spike.from_s))
+        for spike in found
+    )
+
+
+def quiet(run: Run, robot: int, e: Errors, known: Sequence[Episode]) -> Mask:
+    """The moments of a follower outside of episodes, its own and of those ahead, and of what came of them.
+
+    An excursion from the baseline comes of an episode that it overlaps, or that ended within `RECOVERY_S_MAX` before.
+    """
+    calm = np.ones(e.t.size, dtype=bool)
+    about = [one for one in known if one.robot is None or one.robot in upstream(run, robot, one.from_s)]
+    for one in about:
+        calm &= (e.t < one.from_s) | (e.t > one.until_s)
+    for from_s, until_s in stretches(e.t, np.abs(e.distance) > BASE_M, APART_S):
+        if any(one.touches(from_s - RECOVERY_S_MAX, until_s) for one in about):
+            calm &= (e.t < from_s) | (e.t > until_s)
+    return calm
+
+
+def rank_correlation(a: Sequence[float], b: Sequence[float]) -> float:
+    """Spearman's, ties ranked by their mean; nan where one of both is constant or there are fewer than three."""
+    if len(a) < 3:
+        return float("nan")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(np.corrcoef(_ranks(a), _ranks(b))[0, 1])
+
+
+def _ranks(values: Sequence[float]) -> Array:
+    _, place, count = np.unique(np.asarray(values), return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(count) - 0.5 * (count - 1))[place])

@@ -1,0 +1,71 @@
+"""A run with all that several properties need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from math import nan
+
+from deploy.look import chronicle
+from deploy.look.readings import Run
+from deploy.shapes import spikes
+from deploy.shapes.bars import Measured
+from deploy.shapes.spikes import Episode, Spike
+
+BASELINE_M = spikes.BASE_M
+REST_MPS = 0.01
+STRAIGHT_RADPS = 0.05
+
+
+class Subject:
+    """One recorded run. Distances are in metres, angles in radians, times in seconds."""
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        self.end_s = run.seen.end_s
+
+    @cached_property
+    def episodes(self) -> list[Episode]:
+        return spikes.episodes(self.run)
+
+    @cached_property
+    def distance(self) -> list[Spike]:
+        return spikes.distance_spikes(self.run)
+
+    @cached_property
+    def bearing(self) -> list[Spike]:
+        return spikes.bearing_spikes(self.run)
+
+    def alive(self) -> list[int]:
+        """Followers that stood in the chain at the end."""
+        chain = chronicle.last_chain(self.run.events)[1:]
+        return [robot for robot in chain if robot in self.run.errors]
+
+
+def on_course(s: Subject) -> list[Spike]:
+    """Spikes of the distance but those with which the robots come into their places."""
+    starts = [one for one in s.episodes if one.kind == "start"]
+    return [
+        spike
+        for spike in s.distance
+        if not any(one.robot == spike.robot and one.touches(spike.from_s, spike.until_s) for one in starts)
+    ]
+
+
+def duration_s(s: Subject, spike: Spike) -> float:
+    """How long the avoidances lasted that a spike belongs to, overlaps counted once; 0 with none."""
+    spans = [(one.from_s, one.until_s) for one in spikes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
+    return sum(until_s - from_s for from_s, until_s in spikes.merged(spans))
+
+
+def explained(s: Subject, found: Sequence[Spike]) -> Measured:
+    strays = [spike for spike in found if not spikes.causes(s.run, spike, s.episodes)]
+    return Measured(share(len(found) - len(strays), len(found)), where(strays))
+
+
+def share(part: int, whole: int) -> float:
+    return part / whole if whole else nan
+
+
+def where(found: Sequence[Spike]) -> str:
+    return ", ".join(f"robot {one.robot} from {one.from_s:.1f} to {one.until_s:.1f} s" for one in found)

@@ -1,0 +1,126 @@
+"""`lfa verify` on the paper's runs: spikes and their reasons, and a verdict that a planted fault turns."""
+
+from __future__ import annotations
+
+import json
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.crossing import Crossing
+from agents.strategy import Detour
+from deploy.look.readings import Run
+from deploy.run.simulate import run
+from deploy.shapes import across, spikes
+from deploy.shapes.across import Kept
+from deploy.shapes.bars import Bar, Measured
+from deploy.shapes.command import command
+from deploy.shapes.table import PROPERTIES, of_run
+from protocol.mission import Refused
+from world.scenario import load
+
+T = np.arange(0.0, 10.0, 0.02)
+
+
+def bump(from_s: float, until_s: float, height: float) -> np.ndarray:
+    inside = (from_s < T) & (until_s > T)
+    return np.where(inside, height * np.sin(np.pi * (T - from_s) / (until_s - from_s)), 0.0)
+
+
+# --- spikes -------------------------------------------------------------------------------------------------------
+
+
+def test_a_spike_lasts_from_the_baseline_to_the_baseline_and_has_the_peak_of_its_magnitude() -> None:
+    (found,) = spikes.spikes(2, T, bump(2.0, 5.0, -0.3), spikes.BASE_M, spikes.SPIKE_M)
+    assert (found.from_s, found.until_s) == pytest.approx((2.06, 4.94), abs=0.03)
+    assert found.peak == pytest.approx(0.3, abs=1e-3)
+
+
+def test_what_stays_under_the_bar_is_no_spike_and_a_swing_through_zero_is_one() -> None:
+    assert spikes.spikes(2, T, bump(2.0, 5.0, 0.049), spikes.BASE_M, spikes.SPIKE_M) == []
+    both = bump(2.0, 3.0, 0.2) + bump(3.5, 4.5, -0.2)
+    assert len(spikes.spikes(2, T, both, spikes.BASE_M, spikes.SPIKE_M)) == 1
+    apart = bump(2.0, 3.0, 0.2) + bump(4.5, 5.5, -0.2)
+    assert len(spikes.spikes(2, T, apart, spikes.BASE_M, spikes.SPIKE_M)) == 2
+
+
+def test_rank_correlation_is_spearmans() -> None:
+    assert spikes.rank_correlation([1, 2, 3, 4], [1, 4, 9, 100]) == pytest.approx(1.0)
+    assert spikes.rank_correlation([1, 2, 3, 4], [9, 5, 2, 1]) == pytest.approx(-1.0)
+    # By hand: ranks 1, 2.5, 2.5, 4 and 2, 1, 3, 4.
+    assert spikes.rank_correlation([1, 2, 2, 3], [2, 1, 3, 4]) == pytest.approx(3.0 / (4.5 * 5.0) ** 0.5)
+    assert isnan(spikes.rank_correlation([1, 2], [1, 2]))
+
+
+# --- bars and comparisons -------------------------------------------------------------------------------------------
+
+
+def test_a_bar_tells_what_holds_what_fails_what_there_is_none_of_and_what_takes_more_runs() -> None:
+    bar = Bar("7", "spikes with an event", ">=", 0.9)
+    assert [bar.judged(m).status for m in (Measured(0.9), Measured(0.89), Measured(float("nan")), None)] == [
+        "ok", "fails", "does not apply", "needs more runs"]  # fmt: skip
+
+
+def kept(scenario: str, seed: int, duration_s: float, requests: int = 0, switches: int = 0) -> Kept:
+    wide = tuple((float(n), 0.1 * n, float(n)) for n in range(1, 12))
+    return Kept(scenario, seed, duration_s, requests, switches, wide)
+
+
+def statuses(runs: list[Kept]) -> dict[str, str]:
+    return {one.name: one.status for one in across.across(runs)}
+
+
+def test_one_run_is_too_few_for_every_comparison() -> None:
+    assert set(statuses([kept("paper_path1", 1, 60.0)]).values()) == {"needs more runs"}
+
+
+def test_path_1_has_to_take_longer_in_every_pair_of_equal_seeds() -> None:
+    twos = [kept("paper_path2", seed, 50.0) for seed in (1, 2)]
+    slow, quick = kept("paper_path1", 1, 60.0, 2, 1), kept("paper_path1", 2, 49.0, 2, 1)
+    assert set(statuses([slow, *twos]).values()) == {"ok"}
+    assert statuses([slow, quick, *twos])["time of path 1 beyond path 2"] == "fails"
+
+
+# --- runs ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_papers_second_path_shows_what_its_figures_must(tmp_path: Path) -> None:
+    folder = run(load("paper_path2"), 1, tmp_path / "run").folder
+    failed = [one for one in of_run(Run(folder)) if one.status == "fails"]
+    assert failed == [], "reproduce: lfa sim paper_path2 --seed 1, then lfa verify RUN"
+
+
+def test_with_obstacle_avoidance_switched_off_the_verdict_is_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Detour, "steer", lambda *_: None)
+    monkeypatch.setattr(Crossing, "give_way", lambda _self, _moving, _pose, wanted, _now: wanted)
+    monkeypatch.setattr("agents.driver.safe", lambda wanted, *_: wanted)
+    folder = run(load("paper_path2", ["time_limit_s=25"]), 1, tmp_path / "run").folder
+    assert command([folder], as_json=True) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["runs"][0]["broken"] == [], "the lease is sound all the same"
+    failed = {one["name"] for one in said["runs"][0]["shapes"] if one["status"] == "fails"}
+    assert {"goal reached", "contacts"} <= failed
+    assert not said["ok"]
+
+
+def test_a_run_that_is_none_of_the_papers_is_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = run(load("straight", ["mission.leading.route_m=[[1.0, 0.0]]"], 2), 1, tmp_path / "run").folder
+    assert command([folder], as_json=False) == 0
+    said = capsys.readouterr().out
+    assert "no scenario of the paper" in said
+    assert "needs more runs" not in said
+
+
+def test_a_folder_whose_run_did_not_end_is_refused(tmp_path: Path) -> None:
+    folder = run(load("straight", ["time_limit_s=1"], 2), 1, tmp_path / "run").folder
+    (folder / "summary.json").unlink()
+    with pytest.raises(Refused, match=r"no summary\.json"):
+        command([folder], as_json=False)
+
+
+def test_every_figure_of_the_paper_has_properties() -> None:
+    assert {"7", "8", "9", "11a", "11b", "11c", "11d"} <= {one.bar.figure for one in PROPERTIES}
