@@ -44,7 +44,7 @@ COMMANDS = (
     Entry("down", "deploy.fleet.down", "End a fleet on all its machines.",
           "lfa down"),
     Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",
-          "lfa fault kill leader"),
+          "lfa fault kill leader; lfa fault stop world; lfa fault restart 3; lfa fault cut 1>2"),
     Entry("forget", "deploy.run.forget", "Robots lost for good: a fleet without memory waits for them no more.",
           "lfa forget 3"),
     Entry("formation", "deploy.run.formation", "Ask the leader of a running fleet for another formation.",

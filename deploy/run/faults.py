@@ -44,6 +44,8 @@ LASTING: dict[str, Deed] = {"stop": "continue", "cut": "heal", "loss": "loss"}
 """What can be for a while, and what ends it."""
 
 LEADER = "leader"
+RESTART: Deed = "restart"
+"""Done by whoever started the fleet: to one that runs already, an operator's word asks for it."""
 COMMON = ("router", "world")
 """What can be killed, stopped and continued besides robots, where the fleet runs as processes."""
 RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"

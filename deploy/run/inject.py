@@ -1,7 +1,8 @@
-"""`lfa fault`: do something to a robot, or to the air, of a fleet that runs on this machine, however it was started.
+"""`lfa fault`: do something to a robot, the world, the router or the air of a fleet that runs on this machine, however
+it was started.
 
-Agents are found in the process table by what they were told (`--id`, `--fleet`); the signal goes only to exactly the
-process that was found: same pid, start time, user and command line.
+Processes are found in the process table by what they were told (`--id`, `--fleet`, `--listen`); the signal goes only
+to exactly the process that was found: same pid, start time, user and command line.
 """
 
 from __future__ import annotations
@@ -14,19 +15,23 @@ import typer
 from msgspec import Struct
 
 from deploy.run import processes
-from deploy.run.faults import DEEDS, LEADER, ORDERS, SIGNALS
+from deploy.run.faults import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
 from deploy.run.operator import Operator
 from deploy.run.processes import Identity
 from deploy.run.weather import note
 from protocol import clock
-from protocol.bus import Inbox
-from protocol.messages import BadMessage, PoseStamped, Role, decode, encode
+from protocol.bus import Arrival, Inbox
+from protocol.messages import BadMessage, Event, PoseStamped, Role, decode, encode
 from protocol.mission import Refused, robot_id_of
 from protocol.topics import key
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 
 LISTEN_S = 1.0  # 50 poses of a leader
 SENT_S = 0.05  # the word about a fault leaves before the fault
+
+
+DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7447")
+"""Where a router listens that was told nothing."""
 
 
 class Running(Struct, frozen=True):
@@ -39,33 +44,36 @@ class Running(Struct, frozen=True):
 
 
 def command(
-    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join((*SIGNALS, *ORDERS))}.")],
+    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(DEEDS)}.")],
     target: Annotated[
-        str, typer.Argument(help="A robot's id, or leader; of a cut 3, 1-2, 1,2-3,w or 1>2; of loss a share.")
+        str,
+        typer.Argument(help="A robot's id, leader, world, router; of a cut 3, 1-2, 1,2-3,w or 1>2; of loss a share."),
     ] = "",
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was done as JSON.")] = False,
 ) -> int:
-    if deed not in (*SIGNALS, *ORDERS):
-        raise Refused(f"{deed!r}: must be one of {', '.join((*SIGNALS, *ORDERS))}")
+    if deed not in DEEDS:
+        raise Refused(f"{deed!r}: must be one of {', '.join(DEEDS)}")
     team = one_fleet(agents(), fleet)
     inbox = Inbox()
     bus = _bus(team[0], inbox)
     if deed in ORDERS:
         return _order(deed, target, team, bus, inbox, as_json)
+    if deed == RESTART:
+        return _restart(target, team[0].fleet, bus, inbox, as_json)
     try:
-        victim = _victim(target, team, bus, inbox)
-        operator = Operator(victim.fleet, clock.wall_ms())
-        event = operator.says("fault", clock.now(), deed=deed, robot=victim.robot)
-        bus.publish(operator.key, encode(event))
+        whom, identity = _whom(target, team, bus, inbox)
+        operator = Operator(team[0].fleet, clock.wall_ms())
+        bus.publish(operator.key, encode(operator.says("fault", clock.now(), deed=deed, robot=whom)))
         clock.sleep(SENT_S)
-        done = processes.send(victim.identity, SIGNALS[deed])
+        done = processes.send(identity, SIGNALS[deed])
     finally:
         bus.close()
+    name = f"robot {whom}" if isinstance(whom, int) else whom
     if not done:
-        raise Refused(f"robot {victim.robot}: its process {victim.identity.pid} has gone in the meantime")
-    facts = {"deed": deed, "robot": victim.robot, "fleet": victim.fleet, "pid": victim.identity.pid}
-    said = f"{deed} robot {victim.robot} of {victim.fleet} (process {victim.identity.pid}): {DEEDS[deed]}"
+        raise Refused(f"{name}: its process {identity.pid} has gone in the meantime")
+    facts = {"deed": deed, "robot": whom, "fleet": team[0].fleet, "pid": identity.pid}
+    said = f"{deed} {name} of {team[0].fleet} (process {identity.pid}): {DEEDS[deed]}"
     print(msgspec.json.encode(facts).decode() if as_json else said)
     return 0
 
@@ -89,6 +97,36 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
     line = f"{deed} {whom} in {fleet}: {DEEDS[deed]}"
     print(msgspec.json.encode(facts).decode() if as_json else line)
     return 0
+
+
+def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
+    """Ask the fleet's launcher for it, and wait until it says that it did. Raises Refused when nobody does."""
+    robot = robot_id_of(target if target.startswith("robot") else f"robot{target}")
+    operator = Operator(fleet, clock.wall_ms())
+    try:
+        if robot is None:
+            raise Refused(f"restart {target!r}: must be a robot's id, such as 3")
+        bus.follow(frozenset({operator.key}))
+        bus.publish(operator.orders_key, encode(operator.orders(RESTART, clock.now(), robot=robot)))
+        until = clock.now() + LISTEN_S
+        while not any(_is_done(arrival, robot) for arrival in inbox.take()):
+            if clock.now() > until:
+                raise Refused(f"robot {robot} of {fleet}: runs already, or no lfa run is there that starts it again")
+            clock.sleep(SENT_S)
+    finally:
+        bus.close()
+    facts = {"deed": RESTART, "robot": robot, "fleet": fleet}
+    said = f"{RESTART} robot {robot} of {fleet}: {DEEDS[RESTART]}"
+    print(msgspec.json.encode(facts).decode() if as_json else said)
+    return 0
+
+
+def _is_done(arrival: Arrival, robot: int) -> bool:
+    try:
+        event = decode(arrival.payload, Event) if isinstance(arrival.payload, bytes) else None
+    except BadMessage:
+        return False
+    return isinstance(event, Event) and event.data == event.data | {"deed": RESTART, "robot": robot}
 
 
 def agents() -> list[Running]:
@@ -130,6 +168,26 @@ def one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
     return [agent for agent in running if agent.fleet == (fleet or fleets[0])]
 
 
+def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> tuple[int | str, Identity]:
+    """The robot or the common process that is meant, and its process. Raises Refused."""
+    if target not in COMMON:
+        victim = _victim(target, team, bus, inbox)
+        return victim.robot, victim.identity
+    found = [identity for identity in processes.own_processes() if _is_common(target, identity.arguments, team[0])]
+    if not found:
+        raise Refused(f"{target}: no such process of yours serves fleet {team[0].fleet} here")
+    return target, found[0]
+
+
+def _is_common(name: str, words: Sequence[str], agent: Running) -> bool:
+    """Whether a command line is that of the world, or of the router, of the agent's fleet."""
+    called = {word.rpartition("/")[2] for word in words[:3]}
+    if name == "world":
+        return bool(called & {"world.cli", "lfa-world"}) and option(words, "--fleet", "fleet") == agent.fleet
+    listens = {word.removeprefix("--listen=") for word in words} if "--listen" in " ".join(words) else {*DEFAULT_LISTEN}
+    return bool(called & {"deploy.fleet.router", "lfa-router"}) and agent.endpoint in listens
+
+
 def _victim(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> Running:
     digits = target.removeprefix("robot")
     robot = _leader(team[0].fleet, bus, inbox) if target == LEADER else int(digits) if digits.isdecimal() else None
@@ -138,7 +196,7 @@ def _victim(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -
     victim = next((agent for agent in team if agent.robot == robot), None)
     if victim is None:
         ids = ", ".join(str(agent.robot) for agent in team)
-        raise Refused(f"robot {target!r}: not here, must be 'leader' or one of {ids}")
+        raise Refused(f"robot {target!r}: not here, must be leader, {', '.join(COMMON)} or one of {ids}")
     return victim
 
 

@@ -20,7 +20,7 @@ import typer
 from deploy.run.chosen import choose
 from deploy.run.crew import ROUTER_NAME, Crew, rows
 from deploy.run.ending import Ended, Interrupts, finish, report, reread
-from deploy.run.faults import ORDERS, SIGNALS, Deed, Fault, Schedule, parse_all
+from deploy.run.faults import ORDERS, RESTART, SIGNALS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import About, make
 from deploy.run.operator import Operator
 from deploy.run.progress import Progress, progress
@@ -208,6 +208,10 @@ class _Launch:
             self._expect(message)
         elif isinstance(message, OperatorNote) and message.command == WEATHER:
             self._air.obey(message.arguments)
+        elif isinstance(message, OperatorNote) and message.command == RESTART:
+            robot = message.arguments.get("robot")
+            if robot in self._mission.robots and self._time.known:
+                self._do(RESTART, robot)
         self._referee.see(message)
         self._standing.see(message)
 
@@ -236,7 +240,8 @@ class _Launch:
                     self._say("died", robot=robot_id, how=how)
         if len(self._standing.gone) == len(self._mission.robots) and not self._schedule.pending:
             raise _Aborted("no agent is left")
-        if clock.now() > self._heard_at + max(SILENCE_S_MAX, START_S_MAX if not self._time.known else 0.0):
+        starts = not self._time.known or bool(self._restarted)
+        if clock.now() > self._heard_at + (START_S_MAX if starts else SILENCE_S_MAX):
             raise _Aborted("nothing is heard of the world")
 
     def _revives(self, name: str, view: Progress) -> bool:
@@ -281,10 +286,10 @@ class _Launch:
             )
             return True
         name = robot_name(victim) if isinstance(victim, int) else victim
-        if self._crew.runs(name) == (deed == "restart"):
+        if self._crew.runs(name) == (deed == RESTART):
             return False
         self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
-        if deed == "restart":
+        if deed == RESTART:
             self._doomed.discard(name)
             self._standing.gone.discard(robot_id_of(name) or 0)
             self._start_again(name)

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from deploy.look.verify import verify
+from deploy.run.inject import command as fault
+from protocol.mission import Refused
 from tests.processes.fleet import SHORT, eventually, lfa, running
 from world import memory
 
@@ -42,3 +44,22 @@ def test_without_a_word_about_restarts_the_routers_death_ends_the_run(tmp_path: 
     assert done.returncode == 1, done.stderr + done.stdout
     assert "aborted" in done.stdout
     assert "router ended (SIGKILL)" in done.stdout
+
+
+def test_by_hand_the_world_is_stopped_and_killed_and_a_robot_started_again(tmp_path: Path) -> None:
+    arguments = ("straight", "--robots", "2", "--set", 'restart={world = "on-failure"}')
+    with running(tmp_path / "run", *arguments) as run:
+        run.wait_for("leader_command")
+        fleet = f"straight-{run.launcher.pid}"
+        for deed, target in (("stop", "world"), ("continue", "world"), ("kill", "2"), ("restart", "2")):
+            assert fault(deed, target, fleet) == 0
+        eventually(lambda: len(list((run.folder / "journal").glob("robot2-*.bin"))) == 2, "robot 2 has no second life")
+        with pytest.raises(Refused, match="runs already"):
+            fault("restart", "2", fleet)
+        assert fault("kill", "world", fleet) == 0
+        run.wait_for("restarted")
+        run.launcher.send_signal(signal.SIGTERM)
+        run.launcher.wait(30.0)
+    told = [(line["deed"], line["robot"]) for line in run.events() if line["kind"] == "fault"]
+    assert told == [("stop", "world"), ("continue", "world"), ("kill", 2), ("restart", 2), ("kill", "world")]
+    assert not [line for line in run.events() if line["kind"] == "died"]
