@@ -65,11 +65,11 @@ class Life:
         self.paused = False
         self.drawn: tuple[str, bytes] | None = None
         """The last command said as leader: what a pause may hold back."""
-        self._simulator = simulator
+        self.simulator = simulator
 
     @property
     def alive(self) -> bool:
-        return self._simulator.lives(self.node)
+        return self.simulator.lives(self.node)
 
     @property
     def lease(self) -> Lease | None:
@@ -86,10 +86,10 @@ class Hardware(Struct):
 
 
 class Whole:
-    def __init__(self, schedule: Schedule) -> None:
-        """Nobody has started yet."""
+    def __init__(self, schedule: Schedule, road_m: float = ROAD_M) -> None:
+        """Nobody has started yet; the goal is `road_m` straight ahead of the first robot."""
         self.random = Random(schedule.seed)
-        leading = Leading(route_m=((ROAD_M, 0.0),))
+        leading = Leading(route_m=((road_m, 0.0),))
         robots = tuple(range(1, schedule.robots + 1))
         self.mission = Mission(robots, witness=schedule.witness, profile=schedule.profile, leading=leading)
         self.timing = timing_of(schedule.profile)
@@ -106,9 +106,9 @@ class Whole:
         self._scenario = Scenario("A straight road", self.mission, 1e6, world=world, name=FLEET)
         self._operator = Operator(FLEET, 1)
         self._lives = 0
-        self._simulator = Simulator(Radio(), schedule.seed)
-        self._simulator.air = Gale(self)
-        self._simulator.taps.append(self._hear)
+        self.simulator = Simulator(Radio(), schedule.seed)
+        self.simulator.air = Gale(self)
+        self.simulator.taps.append(self._hear)
         self.listen(())
 
     def listen(self, checkers: Sequence[Checker]) -> None:
@@ -119,14 +119,14 @@ class Whole:
 
     @property
     def now(self) -> float:
-        return self._simulator.now
+        return self.simulator.now
 
     def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
         """`what(*arguments)` when true time reaches `time`."""
-        self._simulator.at(time, lambda: what(*arguments))
+        self.simulator.at(time, lambda: what(*arguments))
 
     def run(self, until: float) -> Whole:
-        self._simulator.run(until)
+        self.simulator.run(until)
         return self
 
     # --- lives -------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ class Whole:
             else Agent(robot_id, member.incarnation, FLEET, floor, self.mission)
         )
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
-        life = self.processes[robot_id] = Life(self._simulator, node, member, clock)
+        life = self.processes[robot_id] = Life(self.simulator, node, member, clock)
         overhear(node, lambda effects: self._done(life, effects))
         _before(node, lambda received: self._received(received))
         self._say(robot_id, f"starts, life {member.incarnation}")
@@ -159,23 +159,23 @@ class Whole:
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
         life = self.processes[robot_id]
         if life.alive:
-            self._simulator.kill(robot_name(robot_id), hinted=hinted)
+            self.simulator.kill(robot_name(robot_id), hinted=hinted)
             self._say(robot_id, "dies")
             self._tell("leads_no_more", self.now, life.member)
 
     def exit(self, robot_id: int) -> None:
         life = self.processes[robot_id]
         if life.alive and not life.paused:
-            self._simulator.terminate(robot_name(robot_id))
+            self.simulator.terminate(robot_name(robot_id))
 
     def hand_over(self, robot_id: int) -> None:
         """An operator asks all for it; whoever leads obeys."""
-        self._simulator.say(self._operator.orders_key, encode(self._operator.orders("handover", self.now)))
+        self.simulator.say(self._operator.orders_key, encode(self._operator.orders("handover", self.now)))
 
     def pause(self, robot_id: int) -> None:
         if self.processes[robot_id].alive:
             self.processes[robot_id].paused = True
-            self._simulator.pause(robot_name(robot_id))
+            self.simulator.pause(robot_name(robot_id))
 
     def resume(self, robot_id: int, shuffled: bool = False) -> None:
         """SIGCONT: the command that was about to leave leaves, then all that came is handled."""
@@ -183,8 +183,8 @@ class Whole:
         if life.paused and life.alive:
             life.paused = False
             if life.drawn is not None:
-                self._simulator.say(*life.drawn)
-            self._simulator.resume(robot_name(robot_id), shuffled=shuffled)
+                self.simulator.say(*life.drawn)
+            self.simulator.resume(robot_name(robot_id), shuffled=shuffled)
 
     def start_gateway(self, robot_id: int) -> None:
         """The world, and with it everybody's gateway, goes on from where it was."""
@@ -197,17 +197,17 @@ class Whole:
         hardware = self.gateways[robot_id]
         if hardware.alive:
             hardware.alive = False
-            self._simulator.kill(WORLD_NAME)
+            self.simulator.kill(WORLD_NAME)
             self._say(WITNESS_ID, "world dies")
 
     def hint(self, about: int, *observers: int, up: bool = False) -> None:
         member = self.processes[about].member
         event = (PeerUp if up else PeerDown)(robot_name(about), member.incarnation)
-        self._simulator.hint(event, [robot_name(observer) for observer in observers])
+        self.simulator.hint(event, [robot_name(observer) for observer in observers])
 
     def latch(self, robot_id: int, incarnation: int) -> None:
         """The robot's gateway sees its agent's token vanish, whatever is true."""
-        self._simulator.hint(PeerDown(robot_name(robot_id), incarnation), [WORLD_NAME])
+        self.simulator.hint(PeerDown(robot_name(robot_id), incarnation), [WORLD_NAME])
 
     def _start_world(self, world: World) -> None:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
@@ -221,7 +221,7 @@ class Whole:
         self._add(world, clock)
 
     def _add(self, node: Node, clock: LocalClock) -> None:
-        self._simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {})), clock)
+        self.simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {})), clock)
 
     def _next_life(self) -> int:
         self._lives += 1

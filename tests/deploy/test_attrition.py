@@ -1,0 +1,49 @@
+"""4 -> 3 -> 2 -> 1: robots killed one after another, in every order, in virtual time."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import pytest
+from msgspec import structs
+
+from deploy.run.arena import Weather
+from deploy.run.schedules import draw
+from deploy.run.whole import Whole
+from protocol.messages import Event, Message
+
+ROBOTS = (1, 2, 3, 4)
+ROAD_M = 4.0
+"""Further than anybody comes before the last one is alone: the dead are obstacles, also on a goal."""
+FIRST_S, EVERY_S = 1.0, 1.5
+"""By the next kill the dead one's vote is gone too (t_remove); faster ones can take the quorum away."""
+ARRIVED_S = 40.0
+
+
+@pytest.mark.parametrize("first", ROBOTS)
+def test_in_every_order_the_chain_is_the_old_one_without_the_dead_and_the_last_one_arrives(first: int) -> None:
+    for order in permutations(ROBOTS, 3):
+        if order[0] == first:
+            _check(order)
+
+
+def _check(order: tuple[int, ...]) -> None:
+    schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), weather=Weather())
+    team = Whole(schedule, ROAD_M)
+    arrived: list[str] = []
+
+    def hear(_now: float, _key: str, _payload: bytes, message: Message) -> None:
+        if isinstance(message, Event) and message.kind == "goal":
+            arrived.append(message.header.sender)
+
+    team.simulator.taps.append(hear)
+    team.start_all().run(FIRST_S)
+    left = list(ROBOTS)
+    for victim in order:
+        team.kill(victim)
+        left.remove(victim)
+        team.run(team.now + EVERY_S)
+        assert team.leaders() == left[:1], f"killed in the order {order}"
+        assert [team.lease_of(robot).chain for robot in left] == [tuple(left)] * len(left), f"killed so far of {order}"
+    team.simulator.run(ARRIVED_S, over=lambda: f"robot{left[0]}" in arrived)
+    assert f"robot{left[0]}" in arrived, f"robot {left[0]}, the last of {order}, does not arrive"
