@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from msgspec import Struct, structs
@@ -40,12 +41,38 @@ class Bus(Protocol):
         """Leave; peers see the token go at once."""
 
 
+class Settable(Protocol):
+    def set(self) -> None:
+        """Something urgent came. Called on any thread."""
+
+
+class Wake:
+    """The loop's one wake-up, set by any thread and by signal handlers.
+
+    `threading.Event` will not do: its lock is not re-entrant, and a signal that comes while the loop itself holds it
+    stops the process for good, in its own handler.
+    """
+
+    def __init__(self) -> None:
+        self._tokens: SimpleQueue[None] = SimpleQueue()
+
+    def set(self) -> None:
+        if self._tokens.empty():
+            self._tokens.put(None)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Until it is set (True) or `timeout_s`, 0 or more, have passed (False); afterwards it is unset."""
+        try:
+            self._tokens.get(timeout=timeout_s)
+        except Empty:
+            return False
+        return True
+
+
 class Inbox:
     """Newest value for state topics, a bounded queue for everything else, one wake-up."""
 
-    def __init__(
-        self, wake: threading.Event | None = None, size_max: int = INBOX_SIZE_MAX, *, every: bool = False
-    ) -> None:
+    def __init__(self, wake: Settable | None = None, size_max: int = INBOX_SIZE_MAX, *, every: bool = False) -> None:
         """`wake` is set when something urgent came; several inboxes of one loop share it.
 
         `every` queues state topics too: a recorder wants all values, not the newest.
@@ -55,7 +82,7 @@ class Inbox:
         self._size_max = size_max
         self._every = every
         self._lock = threading.Lock()
-        self._wake = wake or threading.Event()
+        self._wake = wake or Wake()
         self.dropped = 0
 
     def put(self, arrival: Arrival) -> None:

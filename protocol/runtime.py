@@ -10,7 +10,6 @@ import gc
 import resource
 import signal
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 from random import Random
@@ -19,7 +18,7 @@ from types import FrameType
 from msgspec import Struct
 
 from protocol import clock
-from protocol.bus import Arrival, Inbox, Tokens
+from protocol.bus import Arrival, Inbox, Tokens, Wake
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, OperatorNote, decode
@@ -115,7 +114,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
 
     Waits for a router as long as it takes. Raises Refused when a node's name already lives in the fleet.
     """
-    wake = threading.Event()
+    wake = Wake()
     stop = _on_signals(wake)
     seats: list[_Seat] = []
     weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
@@ -139,10 +138,10 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             seat.host.journal.close()
 
 
-def connect(endpoint: str, inbox: Inbox, stop: threading.Event) -> ZenohBus | None:
+def connect(endpoint: str, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
     """A session with the router at `endpoint`, waiting for it; None when told to stop meanwhile."""
     told = False
-    while not stop.is_set():
+    while not stop.told:
         try:
             return ZenohBus(endpoint, inbox)
         except RouterAbsent:
@@ -153,25 +152,24 @@ def connect(endpoint: str, inbox: Inbox, stop: threading.Event) -> ZenohBus | No
                     flush=True,
                 )
                 told = True
-            stop.wait(CONNECT_RETRY_S)
+            stop.wake.wait(CONNECT_RETRY_S)
     return None
 
 
-def _loop(seats: Sequence[_Seat], wake: threading.Event, stop: threading.Event) -> int:
+def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping) -> int:
     now = clock.now()
     stop_by = None
     vitals = _VitalSigns(now)
     while True:
         deadline = min(seat.next_deadline() for seat in seats)
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
-        wake.clear()
         now = clock.now()
         for seat in seats:
             vitals.lag(seat.step(now))
         if vitals.due(now):
             for seat in seats:
                 seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable), now)
-        if stop.is_set() and stop_by is None:
+        if stop.told and stop_by is None:
             stop_by = now + STOP_GRACE_S
             for seat in seats:
                 seat.tell(Stop(), now)
@@ -182,11 +180,19 @@ def _loop(seats: Sequence[_Seat], wake: threading.Event, stop: threading.Event) 
             return 0
 
 
-def _on_signals(wake: threading.Event) -> threading.Event:
-    stop = threading.Event()
+class _Stopping:
+    """Whether a signal has told this process to end; it wakes the loop as well."""
+
+    def __init__(self, wake: Wake) -> None:
+        self.wake = wake
+        self.told = False
+
+
+def _on_signals(wake: Wake) -> _Stopping:
+    stop = _Stopping(wake)
 
     def order(_signum: int, _frame: FrameType | None) -> None:
-        stop.set()
+        stop.told = True
         wake.set()
 
     signal.signal(signal.SIGTERM, order)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,7 +9,7 @@ from msgspec import Struct
 
 from deploy.run.inject import Running, agents, one_fleet, option
 from deploy.run.processes import own_processes
-from protocol.bus import Arrival, Inbox
+from protocol.bus import Arrival, Inbox, Wake
 from protocol.messages import BadMessage, Message, decode
 from protocol.mission import Refused
 from protocol.topics import TOPIC, address
@@ -42,7 +41,7 @@ def find(fleet: str | None, connect: str | None) -> Fleet:
 class Ear:
     """What comes from one fleet. `wait` sleeps until something wakes it or the time is over."""
 
-    def __init__(self, fleet: Fleet, bus: ZenohBus, inbox: Inbox, wake: threading.Event) -> None:
+    def __init__(self, fleet: Fleet, bus: ZenohBus, inbox: Inbox, wake: Wake) -> None:
         self.fleet = fleet
         self.bus = bus
         self._inbox = inbox
@@ -54,7 +53,6 @@ class Ear:
 
     def wait(self, timeout_s: float) -> None:
         self._wake.wait(timeout_s)
-        self._wake.clear()
 
     def take(self) -> list[tuple[Arrival, Message]]:
         """What has come since the last call; what is no message of ours is left out."""
@@ -65,7 +63,7 @@ class Ear:
 @contextmanager
 def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iterator[Ear]:
     """An ear for the key expressions `topics` (`*/pose`) of `fleet`; `every`: all values of states, not the newest."""
-    wake = threading.Event()
+    wake = Wake()
     inbox = Inbox(wake, INBOX_SIZE_MAX, every=every)
     try:
         bus = ZenohBus(fleet.endpoint, inbox)

@@ -23,7 +23,7 @@ from deploy.run.record import Recorder
 from deploy.run.referee import Verdict
 from deploy.run.worldtime import WorldTime
 from protocol import clock
-from protocol.bus import Arrival, Inbox
+from protocol.bus import Arrival, Inbox, Wake
 from protocol.messages import BadMessage, Event, Header, Message, Truth, decode
 from protocol.mission import robot_id_of
 from protocol.node import PeerDown, PeerUp
@@ -54,7 +54,7 @@ class LastWord(Struct, frozen=True):
 
 def main() -> None:
     task = msgspec.json.decode(sys.argv[1], type=Task)
-    told = threading.Event()
+    told = Wake()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: told.set())
     word: list[LastWord] = []
@@ -73,7 +73,7 @@ def main() -> None:
         shutil.rmtree(task.sockets, ignore_errors=True)
 
 
-def _listen(word: list[LastWord], told: threading.Event) -> None:
+def _listen(word: list[LastWord], told: Wake) -> None:
     """Wait for the launcher's line, or for its end."""
     line = sys.stdin.buffer.readline()
     if line.endswith(b"\n"):

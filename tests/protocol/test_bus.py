@@ -1,8 +1,10 @@
 """The inbox: newest value for states, every message for the rest, bounded, and awake only for what is urgent."""
 
+import signal
 import threading
+from random import Random
 
-from protocol.bus import TOKEN_HOLD_S, Arrival, Inbox, Tokens
+from protocol.bus import TOKEN_HOLD_S, Arrival, Inbox, Tokens, Wake
 from protocol.node import PeerDown, PeerUp, RouterLost
 
 
@@ -84,3 +86,17 @@ def test_after_the_link_is_back_a_vanished_token_is_a_hint_again() -> None:
     tokens.sift([token(2.0, PeerUp("robot1", 3))], 2.0)
     tokens.sift([token(3.0, PeerDown("robot1", 3))], 3.0)
     assert told(tokens.sift([], 3.1)) == [PeerDown("robot1", 3)]
+
+
+def test_a_signal_at_any_moment_of_the_wait_wakes_the_loop() -> None:
+    """`threading.Event` stops for good here: its handler waits for a lock that the interrupted code holds."""
+    wake, random = Wake(), Random(1)
+    before = signal.signal(signal.SIGALRM, lambda *_: wake.set())
+    try:
+        for n in range(2000):
+            signal.setitimer(signal.ITIMER_REAL, random.uniform(1e-6, 1e-4))
+            # One that comes just before the wait is heard after it: the loop's waits are short.
+            assert wake.wait(2e-5) or wake.wait(0.005) or wake.wait(1.0), f"signal {n} was not heard"
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
