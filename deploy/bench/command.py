@@ -1,6 +1,7 @@
 """`lfa bench NAME`: one module a name in this package, each with `run(as_json, ...) -> exit code`.
 
-What else a bench takes (`rows`, `jobs`, `processes`, `kills`, `full`, `minutes`) is what its `run` has parameters for.
+What else a bench takes (`rows`, `jobs`, `processes`, `kills`, `full`, `minutes`, `seeds`) is what its `run` has
+parameters for.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ def command(
     kills: Annotated[int | None, typer.Option(help="Rounds of each fault.")] = None,
     full: Annotated[bool, typer.Option("--full", help="Many more rounds, with their tails.")] = False,
     minutes: Annotated[float | None, typer.Option(help="How long to look on.")] = None,
+    seeds: Annotated[int | None, typer.Option(help="Runs of each scenario, from seed 1 on.")] = None,
 ) -> int:
     """Exit code 1 when a row does not reach its bar."""
     names = _names()
@@ -37,7 +39,7 @@ def command(
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
     run = import_module(f"deploy.bench.{name}").run
     given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None, "figures": figures}
-    given |= {"kills": kills, "full": full or None, "minutes": minutes}
+    given |= {"kills": kills, "full": full or None, "minutes": minutes, "seeds": seeds}
     given = {option: value for option, value in given.items() if value is not None}
     for option in given:
         if option not in signature(run).parameters:
@@ -46,6 +48,8 @@ def command(
         raise Refused(f"--jobs {jobs}: must be at least 1")
     if kills is not None and kills < 1:
         raise Refused(f"--kills {kills}: must be at least 1")
+    if seeds is not None and seeds < 1:
+        raise Refused(f"--seeds {seeds}: must be at least 1")
     if minutes is not None and not 0.0 < minutes < float("inf"):
         raise Refused(f"--minutes {minutes}: must be above 0")
     code: int = run(as_json, **given)

@@ -20,6 +20,7 @@ from msgspec import structs
 from deploy.run.crew import ROUTER_NAME, Crew, Row, rows
 from deploy.run.folder import About, make
 from deploy.run.operator import Operator
+from deploy.run.processes import Identity
 from protocol import clock
 from protocol.bus import Inbox
 from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Tracking, Truth, decode, encode
@@ -110,6 +111,13 @@ class Team:
         if not self._crew.signal(robot_name(robot), number):
             raise Broken(f"robot {robot} is not there to be signalled")
         return at
+
+    def process_of(self, name: str) -> Identity:
+        """Raises Broken when it does not run."""
+        identity = self._crew.identity(name)
+        if identity is None:
+            raise Broken(f"{name} does not run")
+        return identity
 
     def restart(self, *robots: int) -> None:
         """Start agents again that have ended, with empty memory."""

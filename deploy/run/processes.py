@@ -40,6 +40,12 @@ def identify(pid: int) -> Identity | None:
     return None if state in "ZX" else Identity(pid, int(rest[18]), user, tuple(arguments))
 
 
+def cpu_s(identity: Identity) -> float:
+    """Processor time [s] that a process has used so far, of all its threads. Raises OSError when it has gone."""
+    fields = Path(f"/proc/{identity.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def send(identity: Identity, number: signal.Signals) -> bool:
     """Signal exactly that process; False when it has gone."""
     try:

@@ -1,0 +1,102 @@
+"""The shapes of the paper's figures (control.md 7.1) over many seeds of both paths: each property with its worst value.
+
+Every run is a simulated one in a process of its own; what compares runs (path 1 with path 2, rank correlations over the
+pooled spikes) is judged over all of them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from deploy.shapes import across
+from deploy.shapes.across import Kept
+from deploy.shapes.bars import Finding
+from deploy.shapes.table import PATHS
+
+SEEDS = 20
+
+
+class Row(Struct, frozen=True):
+    name: str
+    value: float | None
+    """The worst of all runs; None: nothing of the kind happened in any."""
+    unit: str
+    bar: str
+    holds: int
+    """In so many runs, of those that had anything to judge."""
+    of: int
+    ok: bool
+
+
+def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1) -> int:
+    """Print the rows; 0 when every property holds for every seed."""
+    rows = _rows(seeds, jobs)
+    if as_json:
+        print(msgspec.json.encode({"rows": rows}).decode())
+    else:
+        print("\n".join(map(_line, rows)))
+        print(f"{len(rows)} rows, {sum(not row.ok for row in rows)} below the bar")
+    return 0 if all(row.ok for row in rows) else 1
+
+
+def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], Kept]:
+    """The findings on one run, which leaves nothing behind."""
+    from deploy.look.readings import Run
+    from deploy.run.simulate import run as simulate
+    from deploy.shapes.table import of_run
+    from world.scenario import load
+
+    folder = Path(tempfile.mkdtemp(prefix="lfa-paper-"))
+    try:
+        done = Run(simulate(load(scenario), seed, folder / "run").folder)
+        return scenario, seed, of_run(done), across.keep(done)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _rows(seeds: int, jobs: int) -> list[Row]:
+    kept: list[Kept] = []
+    found: dict[str, dict[str, list[Finding]]] = {path: {} for path in PATHS}
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:  # forked, it would share threads
+        waiting = [pool.submit(one, path, seed) for seed in range(1, seeds + 1) for path in PATHS]
+        for number, future in enumerate(waiting, start=1):
+            scenario, seed, findings, of_it = future.result()
+            kept.append(of_it)
+            for finding in findings:
+                found[scenario].setdefault(f"{finding.figure} {finding.name}", []).append(finding)
+            failed = [f"{f.name} = {f.value:g} ({f.note})" for f in findings if f.status == "fails"]
+            told = f"fails: {'; '.join(failed)}" if failed else "ok"
+            print(f"{number} of {len(waiting)}: {scenario}, seed {seed}: {told}", file=sys.stderr, flush=True)
+    rows = [_row(f"{path} {name}", several) for path in PATHS for name, several in found[path].items()]
+    return rows + [_row(f"both {finding.figure} {finding.name}", [finding]) for finding in across.across(kept)]
+
+
+def _row(name: str, found: Sequence[Finding]) -> Row:
+    judged = [one for one in found if one.value is not None]
+    holds = sum(one.status == "ok" for one in judged)
+    worst = max(judged, key=_badness, default=None)
+    value = None if worst is None else worst.value
+    return Row(name, value, found[0].unit, found[0].bar, holds, len(judged), holds == len(judged))
+
+
+def _badness(finding: Finding) -> float:
+    """How far on the wrong side of its bar a value is."""
+    assert finding.value is not None
+    rule, bar, *_ = finding.bar.split()
+    off = finding.value - float(bar)
+    return abs(off) if rule == "=" else off if rule.startswith("<") else -off
+
+
+def _line(row: Row) -> str:
+    value = "-" if row.value is None else f"{row.value:.4g}"
+    mark = "ok" if row.ok else "BELOW THE BAR"
+    return f"{row.name:<64}{value:>10} {row.unit:<4} bar {row.bar:<11} {row.holds:>3} of {row.of:<3} {mark}"

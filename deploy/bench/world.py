@@ -1,0 +1,90 @@
+"""What the world costs: physics, sensors, terrain and messages of robots that drive about, in processor time a second.
+
+In process, over the world's own time: bytes of commands in, bytes of everything that it says out, without journal and
+wire. With `--processes` also the world's process of a real run, wire and journal included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from time import process_time
+
+from msgspec.structs import replace
+
+from deploy.bench.rows import Quantity, Row, row, show
+from deploy.bench.team import Team
+from deploy.run.processes import cpu_s
+from protocol import clock
+from protocol.geometry import Twist
+from protocol.host import Host
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import CmdVel, GatewayStamp, Header, Term, encode
+from protocol.mission import robot_name
+from protocol.timing import timing_of
+from protocol.topics import WORLD_NAME, key
+from world.scenario import Scenario, draw, load
+from world.spec import Lidar
+from world.world import World
+
+BARS = {4: 15.0, 20: 60.0}
+"""Percent of a core, by robots, with 180 beams at 10 Hz (issue: the world)."""
+SIMULATED_S = 10.0
+COMMAND_S = 0.02
+REAL_S = 10.0
+FLEET, TERM = "bench", Term(5, 1, 1)
+
+
+def run(as_json: bool, processes: bool = False) -> int:
+    """Print the rows; 0 when all hold."""
+    return show(_rows(processes), as_json)
+
+
+def scenario_of(robots: int) -> Scenario:
+    """The shipped course with all kinds of terrain, drawn."""
+    scenario = load("terrain", ["time_limit_s=100000"], robots)
+    return draw(replace(scenario, world=replace(scenario.world, lidar=Lidar(beams=180, rate_hz=10.0))), 1)
+
+
+def _rows(processes: bool) -> Iterator[list[Row]]:
+    for robots, bar in BARS.items():
+        share = 100.0 * simulated(scenario_of(robots))
+        yield [row(f"world/{robots} robots", Quantity("in process", "%", bar), share)]
+    for robots, bar in BARS.items() if processes else ():
+        yield [row(f"world/{robots} robots", Quantity("as a process", "%", bar), 100.0 * _real(scenario_of(robots)))]
+
+
+def simulated(scenario: Scenario) -> float:
+    """Processor time per second of the world's time, with every robot driving and turning."""
+    world = World(FLEET, scenario, 1, 1, start_at=0.0)
+    host = Host(world, Journal(None, Heading(JOURNAL_VERSION, WORLD_NAME, 1, 0, {})))
+    now, number = 0.0, 0
+    shut_s = timing_of(scenario.mission.profile).grant_s + COMMAND_S
+    began: float | None = None
+    while now < shut_s + SIMULATED_S:
+        if began is None and now >= shut_s:
+            began = process_time()
+        now = world.next_deadline()
+        host.tick(now)
+        if round(now / COMMAND_S) > number:
+            number = round(now / COMMAND_S)
+            for robot in scenario.mission.robots:
+                host.message(now, key(FLEET, robot_name(robot), "cmd_vel"), _command(scenario, robot, number, now))
+    assert began is not None
+    return (process_time() - began) / SIMULATED_S
+
+
+def _command(scenario: Scenario, robot: int, number: int, now: float) -> bytes:
+    """Straight on with a slow weave, over whatever comes: some robots climb, some get stuck, some push others."""
+    turn = 0.3 if (number // 50 + robot) % 2 else -0.3
+    first = scenario.mission.robots[0]
+    header = Header(robot_name(robot), 1, number, now)
+    return encode(CmdVel(header, Twist(0.4, turn), TERM, first, robot == first, GatewayStamp(1, now)))
+
+
+def _real(scenario: Scenario) -> float:
+    with Team(scenario) as team:
+        team.await_chain(len(scenario.mission.robots))
+        process = team.process_of(WORLD_NAME)
+        began, used = clock.now(), cpu_s(process)
+        team.wait_until(lambda: clock.now() >= began + REAL_S, "the clock stands", 2.0 * REAL_S)
+        return (cpu_s(process) - used) / (clock.now() - began)

@@ -1,0 +1,47 @@
+"""`lfa bench paper` and `lfa bench world`: the worst of many runs, and rows that a script can read."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from deploy.bench import paper, world
+from deploy.shapes.bars import Bar, Finding, Measured
+
+LESS = Bar("7", "distance error outside of events", "<", 0.02, "m")
+MORE = Bar("7", "spikes with an event", ">=", 0.9)
+NONE = Bar("7", "late spikes", "=", 0.0)
+
+
+def findings(bar: Bar, *values: float) -> list[Finding]:
+    return [bar.judged(Measured(value)) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("bar", "values", "worst", "holds"),
+    [
+        (LESS, (0.01, 0.03, 0.015), 0.03, 2),
+        (MORE, (1.0, 0.85, 0.95), 0.85, 2),
+        (NONE, (0.0, 2.0, 0.0), 2.0, 2),
+        (MORE, (1.0, float("nan")), 1.0, 1),
+        (MORE, (float("nan"),), None, 0),
+    ],
+)
+def test_a_row_has_the_worst_value_and_in_how_many_runs_it_holds(
+    bar: Bar, values: tuple[float, ...], worst: float | None, holds: int
+) -> None:
+    row = paper._row("path", findings(bar, *values))
+    assert (row.value, row.holds) == (worst, holds)
+    assert row.ok == (row.holds == row.of)
+
+
+def test_the_cost_of_a_world_is_a_row_beside_its_bar(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(world, "SIMULATED_S", 0.2)
+    world.run(as_json=True)
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [(row["name"], row["bar"]) for row in rows] == [
+        ("world/4 robots/in process", 15.0), ("world/20 robots/in process", 60.0)]  # fmt: skip
+    assert all(row["value"] > 0.0 for row in rows)
