@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-hosts lint bench model clean setup
+.PHONY: demo test test-hosts test-hosts-short lint bench model clean setup
 
 setup: $(STAMP)
 
@@ -19,9 +19,13 @@ demo: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest
 
-# Each robot in its own network namespace, with its own router; skipped, with the reason, where that cannot be.
+# Machines as network namespaces, each with its own router and sshd; skipped, with the reason, where that cannot be.
+# The whole of it, with bars that must be met; the short form asks what happens, not how fast.
 test-hosts: $(STAMP)
-	$(BIN)/python -m pytest -m hosts -rs tests/hosts
+	$(BIN)/python -m pytest -m hosts -rs --bars tests/hosts
+
+test-hosts-short: $(STAMP)
+	$(BIN)/python -m pytest -m 'hosts and not long' -rs tests/hosts
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -79,6 +79,11 @@ def test_an_agents_process_loads_nothing_heavy() -> None:
     assert _loaded("import agents.cli", NEVER_ON_A_ROBOT) == "[]"
 
 
+def test_what_runs_on_every_machine_of_a_fleet_needs_no_more_than_the_base() -> None:
+    code = "import deploy.fleet.host, deploy.fleet.supervise, deploy.fleet.router"
+    assert _loaded(code, (*NEVER_ON_A_ROBOT[:-2], "asyncssh", "cryptography")) == "[]"
+
+
 def test_help_loads_no_command() -> None:
     heavy = (*NEVER_ON_A_ROBOT[:-1], "zenoh", "agents")
     assert _loaded("from deploy import cli; cli.build([])", heavy) == "[]"

@@ -17,10 +17,9 @@ from msgspec.structs import replace
 from protocol.geometry import Pose2D
 from protocol.mission import Refused
 from protocol.node import Envelope, Received
-from world.spec import Obstacle, Scenario
+from world.spec import STATE, Obstacle, Scenario
 from world.world import Memory, World
 
-STATE = "state.json"
 EVERY_S = 0.1
 
 

@@ -19,6 +19,8 @@ Point = tuple[float, float]
 ROBOTS_MAX = 500
 LENGTH_M_MIN = 0.001
 PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
+STATE = "state.json"
+"""Where a world keeps in its run folder what it remembers over its own death (`memory.py`)."""
 
 
 class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):

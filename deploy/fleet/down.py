@@ -50,7 +50,7 @@ async def _by_shell(plan: Plan) -> tuple[list[str], list[str]]:
         answers = await fleet.do("stop")
     finally:
         await fleet.close()
-    return [name for name, found in answers.items() if found.run], fleet.lines()
+    return [name for name in plan.hosts if name in answers and answers[name].run], fleet.lines()
 
 
 def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
@@ -58,6 +58,9 @@ def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
     own = seen.part
     ended: list[str] = []
     wrong: list[str] = []
+    if own is not None and own.hosts == (own.host,):
+        host.stop(own)
+        return [own.host], []
     try:
         with sight(seen) as view:
             first_word(view, HEAR_S)

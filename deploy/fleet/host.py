@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from deploy.fleet import part as parts
 from deploy.fleet.part import Part
-from deploy.fleet.supervise import LEDGER, end_orphans, living
+from deploy.fleet.supervise import end_orphans, living, sweep
 from deploy.run import processes
 from deploy.run.folder import SCENARIO
 from protocol import clock
@@ -47,6 +47,8 @@ class Found(Struct, frozen=True):
 
 def check(part: Part) -> Found:
     """Whether `start` would do. Raises Refused; starts nothing and leaves nothing."""
+    if part.version != version("lfa"):
+        raise Refused(f"has lfa {version('lfa')}: must be {part.version}, as on the operator's (lfa up --install)")
     running = living(part.folder)
     found = Found(version("lfa"), clock.wall_ms())
     if running is not None:
@@ -88,7 +90,7 @@ def stop(part: Part) -> Found:
     running = living(part.folder)
     if running is None:
         end_orphans(part.folder)
-        (part.folder / LEDGER).unlink(missing_ok=True)
+        sweep(part.folder)
         return Found(version("lfa"), clock.wall_ms())
     everybody = (running.supervisor, *running.children)
     processes.send(running.supervisor, signal.SIGTERM)
@@ -98,6 +100,7 @@ def stop(part: Part) -> Found:
     left = _wait_gone(everybody, 1.0)
     if left:
         raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
+    sweep(part.folder)
     return Found(version("lfa"), clock.wall_ms(), run=running.run, digest=running.digest)
 
 

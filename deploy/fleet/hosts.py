@@ -10,6 +10,7 @@ import msgspec
 from deploy.fleet.file import Machine, Plan
 from deploy.fleet.host import Found
 from deploy.fleet.part import Part
+from deploy.fleet.policy import REFUSED_CODE
 from deploy.fleet.remote import Shell, Unreachable, probe, python_of, reach
 from deploy.fleet.wheel import install
 from protocol import clock
@@ -35,30 +36,30 @@ class Fleet:
 
         await self._each(self._plan.hosts, one)
 
-    async def prepare(self, *, may_install: bool) -> None:
-        """Python, the same `lfa`, the clock; `lfa` is installed where it is missing and that is wanted."""
-
-        async def one(name: str) -> None:
-            shell, machine = self._shells[name], self._plan.hosts[name]
-            wall_ms = await _prepared(shell, machine, self.parts[name].version, may_install=may_install)
-            off_s = (wall_ms - clock.wall_ms()) / 1000.0
-            if abs(off_s) > CLOCK_S_MAX:
-                right = f"must be within {CLOCK_S_MAX:g} s (timedatectl set-ntp true)"
-                raise Refused(f"its wall clock is {abs(off_s):.0f} s {'ahead' if off_s > 0 else 'behind'}: {right}")
-
-        await self._each(self._shells, one)
-
-    async def do(self, deed: str) -> dict[str, Found]:
-        """`check`, `start` or `stop` on each machine that is reached; what they say."""
+    async def check(self, *, may_install: bool) -> dict[str, Found]:
+        """Whether each machine would do: Python, the same `lfa`, clock, port, place. Installs `lfa` where wanted."""
         answers: dict[str, Found] = {}
 
         async def one(name: str) -> None:
-            python, part = python_of(self._plan.hosts[name]), self.parts[name]
-            words = (python, "-m", "deploy.fleet.host", deed)
-            done = await self._shells[name].run(words, msgspec.json.encode(part))
-            if done.code != 0:
-                raise Refused(done.last_line)
-            answers[name] = msgspec.json.decode(done.out, type=Found)
+            shell, machine, part = self._shells[name], self._plan.hosts[name], self.parts[name]
+            if may_install:
+                await install(shell, machine, part.version)
+            found = await _ask(shell, machine, "check", part)
+            off_s = (found.wall_ms - clock.wall_ms()) / 1000.0
+            if abs(off_s) > CLOCK_S_MAX:
+                right = f"must be within {CLOCK_S_MAX:g} s (timedatectl set-ntp true)"
+                raise Refused(f"its wall clock is {abs(off_s):.0f} s {'ahead' if off_s > 0 else 'behind'}: {right}")
+            answers[name] = found
+
+        await self._each(self._shells, one)
+        return answers
+
+    async def do(self, deed: str) -> dict[str, Found]:
+        """`start` or `stop` on each machine that is reached; what they say."""
+        answers: dict[str, Found] = {}
+
+        async def one(name: str) -> None:
+            answers[name] = await _ask(self._shells[name], self._plan.hosts[name], deed, self.parts[name])
 
         await self._each(self._shells, one)
         return answers
@@ -82,13 +83,15 @@ class Fleet:
         await asyncio.gather(*(guarded(name) for name in names if name not in self.wrong))
 
 
-async def _prepared(shell: Shell, machine: Machine, wanted: str, *, may_install: bool) -> int:
-    """The machine's wall clock [ms], once the right `lfa` is there. Raises Refused."""
+async def _ask(shell: Shell, machine: Machine, deed: str, part: Part) -> Found:
+    """What `host.py` there answers. Raises Refused, with the cause when it is Python or another `lfa`."""
     python = python_of(machine)
-    if may_install:
-        await install(shell, machine, wanted)
-    found = await probe(shell, python)
-    if found.lfa != wanted:
-        has = f"has lfa {found.lfa}" if found.lfa else "has no lfa"
-        raise Refused(f"python = {python}: {has}: must be {wanted}, as here (lfa up --install)")
-    return found.wall_ms
+    done = await shell.run((python, "-m", "deploy.fleet.host", deed), msgspec.json.encode(part))
+    if done.code == 0:
+        return msgspec.json.decode(done.out, type=Found)
+    if done.code != REFUSED_CODE or not done.err.strip():
+        found = await probe(shell, python)
+        if found.lfa != part.version:
+            has = f"has lfa {found.lfa}" if found.lfa else "has no lfa"
+            raise Refused(f"python = {python}: {has}: must be {part.version}, as here (lfa up --install)")
+    raise Refused(done.last_line)

@@ -11,7 +11,7 @@ import typer
 
 from deploy.fleet.sight import Sight, find, first_word, sight
 from deploy.fleet.tail import FOLLOW_S
-from deploy.run.ending import Interrupts
+from deploy.run.interrupts import Interrupts
 from protocol import clock
 from protocol.messages import LogLines, Message
 from protocol.mission import Refused

@@ -13,7 +13,7 @@ from deploy.run.crew import ROUTER_NAME, Row
 from deploy.run.folder import JOURNALS, SCENARIO, toml
 from protocol.mission import WITNESS_NAME, Refused, robot_name
 from protocol.topics import WORLD_NAME
-from world.memory import STATE
+from world.spec import STATE
 
 PART = "part.json"
 SOCKET = "router.sock"

@@ -42,7 +42,7 @@ from protocol.messages import (
 from protocol.mission import Refused
 from protocol.topics import HOST_PREFIX, OPERATOR_NAME, TOPIC, address, key
 from protocol.zenoh_bus import RouterAbsent, ZenohBus
-from world.memory import STATE
+from world.spec import STATE
 
 LEDGER = "processes.json"
 """Beside the part: who supervises, and whom; what a later life, `lfa down` and `lfa doctor` go by."""
@@ -84,6 +84,12 @@ def end_orphans(folder: Path) -> list[str]:
     if written is None or living(folder) is not None:
         return []
     return [" ".join(child.arguments) for child in written.children if processes.send(child, signal.SIGKILL)]
+
+
+def sweep(folder: Path) -> None:
+    """What a supervisor leaves behind when it could not do so itself."""
+    for name in (parts.SOCKET, f"{parts.SOCKET}.lock", LEDGER):
+        (folder / name).unlink(missing_ok=True)
 
 
 class _Ward:
@@ -149,8 +155,7 @@ class Supervisor:
             return 0
         finally:
             self._crew.kill_all()
-            for name in (parts.SOCKET, f"{parts.SOCKET}.lock", LEDGER):
-                (self._part.folder / name).unlink(missing_ok=True)
+            sweep(self._part.folder)
 
     def _stop(self) -> None:
         self._ending = True
@@ -238,8 +243,9 @@ class Supervisor:
         self._tell(clock.now())
         if self._bus is not None:
             clock.sleep(LAST_WORDS_S)
-            self._bus.close()
         self._crew.end([ROUTER_NAME])
+        if self._bus is not None:
+            self._bus.close()  # not before: a router that hangs would hold it
 
     # --- what is said and heard ------------------------------------------------------------------------------------
 

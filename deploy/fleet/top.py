@@ -13,7 +13,7 @@ import typer
 from deploy.fleet.ps import rows as processes
 from deploy.fleet.sight import Sight, find, first_word, sight
 from deploy.look.board import Board
-from deploy.run.ending import Interrupts
+from deploy.run.interrupts import Interrupts
 from protocol import clock
 from protocol.mission import Refused, robot_name
 
@@ -36,6 +36,10 @@ def command(
     seen = find(file, fleet, connect)
     if not (once or as_json or sys.stdout.isatty()):
         raise Refused("top needs a terminal: use --once or --json")
+    import rich.console
+    import rich.live
+    import rich.table  # noqa: F401
+
     board = Board()
     with sight(seen) as view:
         first_word(view, HEAR_S)

@@ -22,7 +22,7 @@ from deploy.fleet.host import Found
 from deploy.fleet.hosts import Fleet
 from deploy.fleet.part import Part, parts
 from deploy.fleet.sight import Seen
-from deploy.run.ending import Interrupts
+from deploy.run.interrupts import Interrupts
 from protocol import clock
 from protocol.mission import Refused
 
@@ -74,9 +74,7 @@ async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wai
     try:
         await fleet.reach()
         _all_well(fleet)
-        await fleet.prepare(may_install=may_install)
-        _all_well(fleet)
-        found = await fleet.do("check")
+        found = await fleet.check(may_install=may_install)
         _all_well(fleet)
         _join_those_that_run(plan, fleet, found, digest)
         fresh = [name for name, one in found.items() if not one.run]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import signal
 from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType, TracebackType
-from typing import Any
 
 import msgspec
 from msgspec import Struct
@@ -17,8 +15,6 @@ from deploy.look.summary import Summary
 from deploy.look.table import text
 from deploy.run.folder import About
 from deploy.run.referee import Verdict
-
-ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Ended(Struct, frozen=True):
@@ -37,31 +33,6 @@ class Ended(Struct, frozen=True):
 def reread(folder: Path, ended_by: signal.Signals | None) -> Ended:
     """A run whose summary somebody else has written."""
     return Ended(folder, summaries.read(folder), ended_by)
-
-
-class Interrupts:
-    """While this is open, Ctrl-C and SIGTERM are noted in `signal` instead of ending the process; `count` of them."""
-
-    def __init__(self) -> None:
-        self.signal: signal.Signals | None = None
-        self.count = 0
-        self._before: list[Any] = []
-
-    def __enter__(self) -> Interrupts:
-        self._before = [signal.signal(number, self._note) for number in ENDING_SIGNALS]
-        return self
-
-    def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _tb: TracebackType | None) -> None:
-        for number, before in zip(ENDING_SIGNALS, self._before, strict=True):
-            signal.signal(number, before)
-
-    @property
-    def verdict(self) -> Verdict | None:
-        return None if self.signal is None else Verdict("interrupted", self.signal.name)
-
-    def _note(self, number: int, _frame: FrameType | None) -> None:
-        self.signal = signal.Signals(number)
-        self.count += 1
 
 
 def finish(

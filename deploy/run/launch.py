@@ -19,9 +19,10 @@ import typer
 
 from deploy.run.chosen import choose
 from deploy.run.crew import ROUTER_NAME, Crew, rows
-from deploy.run.ending import Ended, Interrupts, finish, report, reread
+from deploy.run.ending import Ended, finish, report, reread
 from deploy.run.faults import ORDERS, RESTART, SIGNALS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import About, make
+from deploy.run.interrupts import Interrupts
 from deploy.run.operator import Operator
 from deploy.run.progress import Progress, progress
 from deploy.run.recorder import LastWord, Task

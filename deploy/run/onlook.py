@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from deploy.look.onlooker import Ear, Fleet, find, listen, scenario_of_fleet
-from deploy.run.ending import Interrupts
 from deploy.run.folder import RUNS, About, make
+from deploy.run.interrupts import Interrupts
 from deploy.run.record import Recorder
 from deploy.run.worldtime import WorldTime
 from protocol import clock

@@ -11,9 +11,10 @@ import typer
 
 from agents.agent import Agent
 from deploy.run.chosen import choose
-from deploy.run.ending import Ended, Interrupts, finish, report
+from deploy.run.ending import Ended, finish, report
 from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
+from deploy.run.interrupts import Interrupts
 from deploy.run.operator import Operator
 from deploy.run.record import Recorder
 from deploy.run.referee import Referee, Verdict

@@ -80,6 +80,20 @@ class Net:
         self._inside(name, "ip", "link", "set", "eth0", "up")
         self._inside(self._switch, "ip", "link", "set", port, "master", "br0", "up")
 
+    def enter(self, host: int) -> tuple[str, ...]:
+        """The words before a command that is to run on that host."""
+        return _enter(host)
+
+    def address(self, host: int) -> str:
+        return _ip(host)
+
+    def unplug(self, host: int) -> None:
+        """Its cable is out: nothing comes in or goes out, and nobody is told."""
+        self._inside(self._switch, "ip", "link", "set", f"p{host}", "down")
+
+    def plug_in(self, host: int) -> None:
+        self._inside(self._switch, "ip", "link", "set", f"p{host}", "up")
+
     def _inside(self, name: str, *command: str) -> None:
         _run("ip", "netns", "exec", name, *command)
 

@@ -11,6 +11,7 @@ from protocol.messages import Truth
 from protocol.mission import Refused
 from world import memory
 from world.scenario import draw, load
+from world.spec import STATE
 from world.world import World
 
 SCENARIO = draw(load("paper_path1"), 7)
@@ -48,6 +49,6 @@ def test_the_state_of_another_team_is_refused() -> None:
 def test_a_folder_without_a_state_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="--resume"):
         memory.read(tmp_path)
-    (tmp_path / memory.STATE).write_text("{")
+    (tmp_path / STATE).write_text("{")
     with pytest.raises(Refused, match="no state of a world"):
         memory.read(tmp_path)

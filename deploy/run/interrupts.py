@@ -1,0 +1,36 @@
+"""Ctrl-C and SIGTERM as something that a loop looks at."""
+
+from __future__ import annotations
+
+import signal
+from types import FrameType, TracebackType
+from typing import Any
+
+from deploy.run.referee import Verdict
+
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interrupts:
+    """While this is open, Ctrl-C and SIGTERM are noted in `signal` instead of ending the process; `count` of them."""
+
+    def __init__(self) -> None:
+        self.signal: signal.Signals | None = None
+        self.count = 0
+        self._before: list[Any] = []
+
+    def __enter__(self) -> Interrupts:
+        self._before = [signal.signal(number, self._note) for number in ENDING_SIGNALS]
+        return self
+
+    def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _tb: TracebackType | None) -> None:
+        for number, before in zip(ENDING_SIGNALS, self._before, strict=True):
+            signal.signal(number, before)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        return None if self.signal is None else Verdict("interrupted", self.signal.name)
+
+    def _note(self, number: int, _frame: FrameType | None) -> None:
+        self.signal = signal.Signals(number)
+        self.count += 1

@@ -1,0 +1,178 @@
+"""Machines to log in to: each network namespace with an sshd of its own, a throw-away key, and a home for the operator.
+
+The hosts share this machine's files; each has a state folder of its own, as the fleet file says.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from deploy.fleet import part as parts
+from deploy.fleet.part import Part
+from deploy.run import processes
+from deploy.run.processes import Identity
+from protocol import clock
+from tests.hosts.net import Net, missing
+
+OPERATOR = 0
+"""The host that `lfa up` is run on; machine n of the fleet is host n."""
+NAMES = "abcdefgh"
+SSHD = "/usr/sbin/sshd"
+LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+
+
+def why_not() -> str | None:
+    """Why there can be no such machines here, None when there can."""
+    if shutil.which("ssh-keygen") is None or not Path(SSHD).exists():
+        return "needs openssh-server"
+    return missing()
+
+
+class Machines:
+    """Hosts `a`, `b`, ... and the operator's, all in one switch."""
+
+    def __init__(self, net: Net, folder: Path, count: int) -> None:
+        self.net = net
+        self.folder = folder
+        self.names = NAMES[:count]
+        self.home = folder / "home"
+        self.fleet_file = folder / "convoy.toml"
+        self._servers: dict[str, subprocess.Popen[bytes]] = {}
+        self._known: set[Identity] = set()
+
+    # --- made and unmade -------------------------------------------------------------------------------------------
+
+    def open(self) -> None:
+        ssh = self.home / ".ssh"
+        ssh.mkdir(parents=True, mode=0o700)
+        Path("/run/sshd").mkdir(exist_ok=True)
+        for key in (ssh / "id_ed25519", self.folder / "host_key"):
+            subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(key)], check=True)
+        (self.folder / "authorized").write_bytes((ssh / "id_ed25519.pub").read_bytes())
+        known = (self.folder / "host_key.pub").read_text().split()[:2]
+        lines = [f"{self.address(name)} {' '.join(known)}\n" for name in self.names]
+        (ssh / "known_hosts").write_text("".join(lines))
+        for name in self.names:
+            self.serve(name)
+
+    def serve(self, name: str) -> None:
+        """An sshd on that machine."""
+        settings = {
+            "ListenAddress": self.address(name),
+            "HostKey": self.folder / "host_key",
+            "AuthorizedKeysFile": self.folder / "authorized",
+            "PidFile": "none",
+            "UsePAM": "no",
+            "StrictModes": "no",
+            "PasswordAuthentication": "no",
+            "KbdInteractiveAuthentication": "no",
+            "PermitRootLogin": "prohibit-password",
+            "LogLevel": "ERROR",
+        }
+        config = self.folder / f"sshd-{name}"
+        config.write_text("".join(f"{key} {value}\n" for key, value in settings.items()))
+        enter = self.net.enter(self._number(name))
+        log = (self.folder / f"sshd-{name}.log").open("ab")
+        command = [*enter, SSHD, "-D", "-e", "-f", str(config)]
+        self._servers[name] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+
+    def close(self) -> None:
+        """Whatever the fleet has left is ended, and only that."""
+        for name in self.names:
+            self.kill(name)
+        for server in self._servers.values():
+            server.kill()
+            server.wait()
+
+    # --- what they are ---------------------------------------------------------------------------------------------
+
+    def address(self, name: str) -> str:
+        return self.net.address(self._number(name))
+
+    def state(self, name: str) -> Path:
+        return self.folder / name
+
+    def write(self, top: str = "", hosts: Mapping[str, str] | None = None, tail: str = "") -> Path:
+        """A fleet file of all machines; `hosts` adds keys to some of them."""
+        tables = [
+            f'[hosts.{name}]\naddress = "{self.address(name)}"\nuser = "root"\npython = "{sys.executable}"\n'
+            f'state = "{self.state(name)}"\n{(hosts or {}).get(name, "")}\n'
+            for name in self.names
+        ]
+        self.fleet_file.write_text("\n".join([top, *tables, tail]))
+        return self.fleet_file
+
+    def part(self, name: str) -> Part:
+        return parts.read(self.state(name) / parts.PART)
+
+    def processes(self, name: str) -> list[Identity]:
+        """Everything of the fleet that runs on that machine, by its state folder in the command line."""
+        mark = str(self.state(name))
+        found = [
+            one
+            for one in processes.own_processes()
+            if any(word.startswith((f"unixsock-stream/{mark}/", f"{mark}/")) for word in one.arguments)
+        ]
+        self._known.update(found)
+        return found
+
+    def sockets(self, name: str) -> list[str]:
+        listed = Path("/proc/net/unix").read_text().splitlines()
+        return [line.split()[-1] for line in listed if str(self.state(name)) in line] + [
+            str(path) for path in self.state(name).glob("*.sock*")
+        ]
+
+    # --- what is done there ----------------------------------------------------------------------------------------
+
+    def lfa(self, *arguments: str, on: int = OPERATOR, timeout_s: float = 90.0) -> subprocess.CompletedProcess[str]:
+        """`lfa ARGUMENTS`, as the operator would type it on one of the hosts."""
+        environment = {**os.environ, "HOME": str(self.home)}
+        environment.pop("SSH_AUTH_SOCK", None)
+        command = [*self.net.enter(on), *LFA, *arguments]
+        return subprocess.run(
+            command, capture_output=True, text=True, timeout=timeout_s, check=False, env=environment, cwd=self.folder
+        )
+
+    def kill(self, name: str) -> float:
+        """All processes of that machine at once, its supervisor first; the moment just before."""
+        at = clock.now()
+        found = self.processes(name)
+        for one in sorted(found, key=lambda one: "deploy.fleet.supervise" not in one.arguments):
+            processes.send(one, signal.SIGKILL)
+        return at
+
+    def kill_router(self, name: str) -> float:
+        at = clock.now()
+        router = next(one for one in self.processes(name) if "deploy.fleet.router" in one.arguments)
+        assert processes.send(router, signal.SIGKILL)
+        return at
+
+    def host(self, name: str) -> int:
+        return self._number(name)
+
+    def _number(self, name: str) -> int:
+        return self.names.index(name) + 1
+
+
+@contextmanager
+def machines(count: int) -> Iterator[Machines]:
+    """`count` machines and an operator's; none of their processes and files is left afterwards."""
+    folder = Path(tempfile.mkdtemp(prefix="lfa-", dir="/tmp"))
+    try:
+        with Net(count + 1) as net:
+            made = Machines(net, folder, count)
+            try:
+                made.open()
+                yield made
+            finally:
+                made.close()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

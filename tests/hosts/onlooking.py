@@ -1,0 +1,82 @@
+"""An onlooker at one router: what each robot's stream of poses is like there, and which chain stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from deploy.fleet.health import Health
+from deploy.look.onlooker import Ear, Fleet, listen
+from protocol import clock
+from protocol.messages import Event, PoseStamped
+from protocol.mission import robot_id_of
+from tests.hosts.machines import Machines
+
+POLL_S = 0.005
+TOPICS = frozenset({"*/pose", "*/tracking", "*/host", "*/event", "*/status"})
+
+
+class Onlooker:
+    """Poses as they arrive, with the longest silence of each robot since `begin`."""
+
+    def __init__(self, ear: Ear, robots: tuple[int, ...]) -> None:
+        self._ear = ear
+        self.robots = robots
+        self.health = Health(robots, ())
+        self.events: list[Event] = []
+        self._last: dict[int, float] = {}
+        self._gaps: dict[int, float] = {}
+
+    def listen(self) -> None:
+        for arrival, message in self._ear.take():
+            self.health.see(arrival.at, message)
+            robot = robot_id_of(message.header.sender)
+            if isinstance(message, PoseStamped) and robot is not None:
+                self._gaps[robot] = max(self._gaps.get(robot, 0.0), arrival.at - self._last.get(robot, arrival.at))
+                self._last[robot] = arrival.at
+            elif isinstance(message, Event):
+                self.events.append(message)
+
+    def begin(self) -> None:
+        """Measure from here on."""
+        self.listen()
+        self._gaps.clear()
+        self.events.clear()
+
+    def gaps(self) -> dict[int, float]:
+        """Of each robot the longest silence so far, the one that lasts now among them."""
+        now = clock.now()
+        return {
+            robot: max(self._gaps.get(robot, 0.0), now - self._last.get(robot, float("-inf"))) for robot in self.robots
+        }
+
+    def watch(self, duration_s: float) -> None:
+        until = clock.now() + duration_s
+        self.wait(lambda: clock.now() >= until, "the clock stands", duration_s + 5.0)
+
+    def wait(self, holds: Callable[[], bool], complaint: str, within_s: float) -> None:
+        until = clock.now() + within_s
+        while True:
+            self.listen()
+            if holds():
+                return
+            if clock.now() > until:
+                now = clock.now()
+                pytest.fail(f"{complaint} within {within_s:g} s: chain {self.health.chain(now)}, gaps {self.gaps()}")
+            clock.sleep(POLL_S)
+
+    def chain(self) -> tuple[int, ...]:
+        return self.health.chain(clock.now())
+
+    def whole(self, robots: set[int]) -> bool:
+        return set(self.chain()) == robots
+
+
+@contextmanager
+def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[Onlooker]:
+    """At machine `at`'s router, over its unix socket: no network lies between."""
+    part = machines.part(at)
+    with listen(Fleet(part.fleet, part.socket, ()), TOPICS, every=True) as ear:
+        yield Onlooker(ear, robots)

@@ -1,0 +1,136 @@
+"""A fleet of one world and four machines with twelve robots, brought up over ssh; then some are killed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from deploy.bench.team import endless
+from deploy.run.folder import toml
+from protocol import clock
+from tests.hosts.conftest import Figure
+from tests.hosts.machines import OPERATOR, Machines, machines, why_not
+from tests.hosts.onlooking import Onlooker, onlooker
+
+WHY_NOT = why_not()
+pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
+
+ROBOTS = tuple(range(1, 13))
+WORLD = "a"
+UP_S, DOWN_S = 20.0, 5.0
+FAILED_OVER_S, UNTOUCHED_S = 0.5, 0.3
+DRIVES_ON_S = 3.0
+PATIENCE_S = 30.0
+WATCH_S = 3.0
+
+
+@pytest.fixture(scope="module")
+def fleet() -> Iterator[Machines]:
+    with machines(5) as made:
+        (made.folder / "endless.toml").write_text(toml(endless(len(ROBOTS))))
+        made.write('scenario = "endless.toml"', tail='[robots]\nspread = ["b", "c", "d", "e"]')
+        yield made
+        made.lfa("down", str(made.fleet_file))
+
+
+@pytest.fixture(scope="module")
+def up(fleet: Machines) -> tuple[Machines, float]:
+    """The fleet, and how long `lfa up` took to say that all is well."""
+    done = fleet.lfa("up", str(fleet.fleet_file), "--json")
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert sorted(facts["chain"]) == list(ROBOTS)
+    return fleet, facts["took_s"]
+
+
+def _robots_on(machines: Machines, name: str) -> set[int]:
+    return set(machines.part(name).robots)
+
+
+def _quiet(look: Onlooker) -> float:
+    """All are there: the longest silence of any robot while nothing is done to anybody."""
+    look.wait(lambda: look.whole(set(ROBOTS)), "not whole", PATIENCE_S)
+    look.begin()
+    look.watch(WATCH_S)
+    alone = max(look.gaps().values())
+    look.begin()
+    return alone
+
+
+def test_up_ends_with_all_robots_in_one_chain(up: tuple[Machines, float], figure: Figure) -> None:
+    figure("lfa up: 1 world, 4 hosts, 12 robots, until all are healthy", up[1], UP_S)
+
+
+def test_any_machine_tells_what_runs_everywhere(up: tuple[Machines, float]) -> None:
+    fleet = up[0]
+    told = []
+    for name in (WORLD, "c"):
+        done = fleet.lfa("ps", "--json", "--fleet", "convoy", "--connect", fleet.part(name).socket, on=fleet.host(name))
+        assert done.returncode == 0, done.stdout + done.stderr
+        told.append({(row["host"], row["process"]) for row in json.loads(done.stdout)["processes"]})
+    expected = {(n, "router") for n in fleet.names} | {(WORLD, "world")}
+    expected |= {(n, f"robot{r}") for n in fleet.names for r in _robots_on(fleet, n)}
+    assert told == [expected, expected]
+
+
+def test_when_the_operators_machine_is_cut_off_no_robot_notices(up: tuple[Machines, float], figure: Figure) -> None:
+    fleet = up[0]
+    with onlooker(fleet, WORLD, ROBOTS) as look:
+        alone = _quiet(look)
+        fleet.net.unplug(OPERATOR)
+        look.watch(WATCH_S)
+        gaps, leads = look.gaps(), [event for event in look.events if event.kind == "role"]
+        fleet.net.plug_in(OPERATOR)
+    assert leads == []
+    figure("operator's machine cut off: the longest silence of any robot", max(gaps.values()), UNTOUCHED_S, alone)
+
+
+@pytest.mark.parametrize("name", ["b", *(pytest.param(other, marks=pytest.mark.long) for other in "acde")])
+def test_a_killed_router_costs_its_own_robots_little_and_the_others_nothing(
+    up: tuple[Machines, float], figure: Figure, name: str
+) -> None:
+    """They fail over to the next machine's router."""
+    fleet = up[0]
+    own = _robots_on(fleet, name)
+    with onlooker(fleet, "c" if name == "b" else "b", ROBOTS) as look:
+        alone = _quiet(look)
+        fleet.kill_router(name)
+        look.watch(WATCH_S)
+        gaps = look.gaps()
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
+    if own:
+        figure(f"router {name} killed: longest silence of its robots", max(gaps[r] for r in own), FAILED_OVER_S, alone)
+    others = max(gaps[r] for r in ROBOTS if r not in own)
+    figure(f"router {name} killed: longest silence of the others", others, UNTOUCHED_S, alone)
+
+
+def test_a_machine_with_the_leader_dies_and_comes_back_at_the_tail(up: tuple[Machines, float], figure: Figure) -> None:
+    fleet = up[0]
+    with onlooker(fleet, WORLD, ROBOTS) as look:
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole", PATIENCE_S)
+        name = next(n for n in fleet.names if look.chain()[0] in _robots_on(fleet, n))
+        lost = _robots_on(fleet, name)
+        left = set(ROBOTS) - lost
+        look.begin()
+        fleet.net.unplug(fleet.host(name))
+        at = fleet.kill(name)
+        look.wait(lambda: look.whole(left), f"robots {sorted(left)} do not drive on", PATIENCE_S)
+        drives_on_s = clock.now() - at
+        fleet.net.plug_in(fleet.host(name))
+        done = fleet.lfa("up", str(fleet.fleet_file))
+        assert done.returncode == 0, done.stderr
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
+        tail = set(look.chain()[-len(lost) :])
+    figure("host of the leader dead: the chain without its robots", drives_on_s, DRIVES_ON_S)
+    assert tail == lost
+
+
+def test_down_leaves_no_process_and_no_socket(up: tuple[Machines, float], figure: Figure) -> None:
+    fleet = up[0]
+    done = fleet.lfa("down", str(fleet.fleet_file), "--json")
+    assert done.returncode == 0, done.stderr
+    left = {name: [*fleet.processes(name), *fleet.sockets(name)] for name in fleet.names}
+    assert left == {name: [] for name in fleet.names}
+    figure("lfa down: nothing is left on any host", json.loads(done.stdout)["took_s"], DOWN_S)
