@@ -144,7 +144,7 @@ class Agent:
                 lease = self._lease
                 role, term = (Role.WAITING, NO_TERM) if lease is None else (self._role(lease), lease.term)
                 missing = () if lease is None else lease.missing
-                status(self._voice, message, self._driver, missing, role, term, now)
+                status(self._voice, message, self._beliefs, self._driver, missing, role, term, now)
             case Stop():
                 self._stop(now)
             case _ if self._lease is not None and self._driver is not None:
@@ -310,6 +310,8 @@ class Agent:
         self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, told, now)
         self._reports.decision(driver.decision, lease.term, now)
         self._reports.obstacle(driver, pose, now)
+        if role is Role.LEADER and driver.explore is not None:
+            self._reports.plan(driver.explore, pose, now)
         self._mind_stuck(role, pose, now, lease, driver)
         self._mind_goal(role, lease, driver, now)
         if role is Role.LEADER:

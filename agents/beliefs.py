@@ -21,6 +21,8 @@ class Beliefs:
     def __init__(self) -> None:
         self.sensors: Sensors | None = None
         self.sensors_at = -1.0
+        self.rows_heard = self.rows_lost = 0
+        """Of the table, over all robots: a gap in a sender's numbers is rows that never came. How the radio is."""
         self._table: dict[int, tuple[TableRow, float]] = {}
         self._clocks: dict[int, ClockOffset] = {}
         self._told: dict[int, tuple[ObstacleNote, float]] = {}
@@ -37,6 +39,9 @@ class Beliefs:
             return
         if known is None or known[0].header.incarnation != row.header.incarnation:
             self._clocks[robot] = ClockOffset()
+        else:
+            self.rows_lost += row.header.seq - known[0].header.seq - 1
+        self.rows_heard += 1
         self._table[robot] = (row, at)
         self._clocks[robot].heard(row.header.stamp, at)
 

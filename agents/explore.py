@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from agents.mapping import Mapping, Point, bounds
 from agents.planner import Planner
+from agents.tiles import Shown, Tiles
 from protocol.geometry import Pose2D, Twist
 from protocol.messages import LaserScan
 from protocol.mission import Mission
@@ -29,6 +30,15 @@ class Explore:
         self.mapping: Mapping | None = None
         self.planner: Planner | None = None
         self._failures = 0
+        self._tiles: Tiles | None = None
+
+    def shown(self, pose: Pose2D) -> Shown | None:
+        """A tile of the map, for views (agents/tiles.py)."""
+        if self.mapping is None:
+            return None
+        if self._tiles is None:
+            self._tiles = Tiles(self.mapping.grid)
+        return self._tiles.next(pose.x, pose.y)
 
     @property
     def route(self) -> tuple[Point, ...]:

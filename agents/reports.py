@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from agents.beliefs import Beliefs
 from agents.driver import Driver
 from agents.strategy import Decision
 from agents.voice import Voice
 from protocol.geometry import Pose2D, Twist
-from protocol.messages import Level, ObstacleNote, PoseStamped, Role, Status, TableRow, Term, Tracking
+from protocol.messages import Level, ObstacleNote, PlanNote, PoseStamped, Role, Status, TableRow, Term, Tracking
 from protocol.mission import robot_name
 from protocol.node import Vitals
 
+if TYPE_CHECKING:
+    from agents.explore import Explore  # a map and a planner: memory that only explorers need
+
 TRACKING_EVERY = 2
+PLAN_EVERY = 10
+ROUTE_POINTS_MAX = 200
 OBSTACLE_S = 0.5
 TABLE_S = 0.5
 TABLE_ROBOTS_FULL_RATE = 16
@@ -75,8 +82,20 @@ class Reports:
             note = ObstacleNote(header, feature.kind, feature.x, feature.y, feature.radius_m, velocity)
             self._voice.say("obstacles", note)
 
+    def plan(self, explore: Explore, pose: Pose2D, now: float) -> None:
+        """Of who leads through unknown ground: its route, and a tile of its map where there is news."""
+        if self._steps % PLAN_EVERY:
+            return
+        tile = explore.shown(pose)
+        if tile is not None:
+            step = max(1, -(-len(explore.route) // ROUTE_POINTS_MAX))
+            route = (*explore.route[::step], *explore.route[-1:])
+            self._voice.say("plan", PlanNote(self._voice.header("plan", now), route, *tile))
+
     def _tracking(self, driver: Driver, predecessor: int, now: float) -> None:
         r = driver.follower.readout
+        if r.separation_m <= 0.0:  # no step of following was made yet: there is nothing to tell
+            return
         self._voice.say("tracking", Tracking(
             self._voice.header("tracking", now), predecessor, r.separation_m, r.phi, r.chi, r.heading,
             r.slot_map, r.error_m, driver.decision is not None, r.state.value,
@@ -84,8 +103,9 @@ class Reports:
 
 
 def status(
-    voice: Voice, vitals: Vitals, driver: Driver | None, missing: tuple[int, ...], role: Role, term: Term, now: float
-) -> None:
+    voice: Voice, vitals: Vitals, beliefs: Beliefs, driver: Driver | None, missing: tuple[int, ...],
+    role: Role, term: Term, now: float,
+) -> None:  # fmt: skip
     """Diagnostics in the sense of ROS. `driver` is None before the mission is known; `missing` stay away (E18)."""
     counters: dict[str, float] = {
         "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
@@ -93,6 +113,8 @@ def status(
         "undecodable": vitals.undecodable,
         "cpu_percent": round(vitals.cpu_percent, 2),
         "rss_mib": round(vitals.rss_mib, 1),
+        "rows_heard": beliefs.rows_heard,
+        "rows_lost": beliefs.rows_lost,
     }
     text, level = "waiting for the mission", Level.WARN
     if driver is not None:

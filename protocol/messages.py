@@ -7,6 +7,7 @@ clock is the only time that means anything. Between machines only differences of
 from __future__ import annotations
 
 from enum import StrEnum
+from itertools import chain
 from math import isfinite
 from typing import Any
 
@@ -322,6 +323,20 @@ class ObstacleNote(Struct, frozen=True, array_like=True, tag="obstacles"):
     twist_map: tuple[float, float] = (0.0, 0.0)
 
 
+class PlanNote(Struct, frozen=True, array_like=True, tag="plan"):
+    """What who leads through unknown ground knows and intends, for recorder and views: its route, a tile of its map."""
+
+    header: Header
+    route_map: tuple[tuple[float, float], ...]
+    """x, y [m]."""
+    cell_m: float
+    corner_map: tuple[float, float]
+    """The tile's lower left corner [m]."""
+    columns: int
+    cells: bytes
+    """Row by row from the lower left: 0 nobody has looked, 1 free, 2 occupied."""
+
+
 class MissionNote(Struct, frozen=True, array_like=True, tag="mission"):
     header: Header
     mission: Mission
@@ -464,6 +479,7 @@ Message = (
     | Tracking
     | FormationNote
     | ObstacleNote
+    | PlanNote
     | MissionNote
     | Ask
     | OperatorNote
@@ -527,11 +543,21 @@ def _sane(message: Message) -> bool:
             return all(_finite(slot.separation_m, slot.phi) for slot in message.slots)
         case ObstacleNote():
             return _finite(message.x, message.y, message.radius_m, *message.twist_map)
-        case LeaseNote(body=Grant(nonce=nonce)):
+        case PlanNote():
+            whole = message.columns > 0 and len(message.cells) % message.columns == 0
+            return whole and _finite(message.cell_m, *message.corner_map, *chain.from_iterable(message.route_map))
+        case LeaseNote():
+            return _sane_lease(message.body)
+    return True
+
+
+def _sane_lease(body: LeaseBody) -> bool:
+    match body:
+        case Grant(nonce=nonce):
             return isfinite(nonce)
-        case LeaseNote(body=Nack(remaining_s=remaining_s)):
+        case Nack(remaining_s=remaining_s):
             return isfinite(remaining_s)
-        case LeaseNote(body=Propose(nonce=nonce)):
+        case Propose(nonce=nonce):
             return nonce is None or isfinite(nonce)
     return True
 

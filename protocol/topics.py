@@ -53,6 +53,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("lease",        m.LeaseNote,     TEAM,                  None, False, True,  "real_time",  None),
     Topic("formation",    m.FormationNote, ("agent",),            1.0,  True,  True,  "prompt",     3.0),
     Topic("obstacles",    m.ObstacleNote,  ("agent",),            None, False, False, "data",       None),
+    Topic("plan",         m.PlanNote,      ("agent",),            5.0,  False, False, "background", None),
     Topic("operator",     m.OperatorNote,  ("operator",),         None, False, True,  "prompt",     None),
     Topic("status",       m.Status,        TEAM,                  1.0,  True,  False, "background", 3.0),
     Topic("event",        m.Event,         ANYONE,                None, False, False, "background", None),

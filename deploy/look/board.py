@@ -15,6 +15,7 @@ STALE_S = 1.0  # an older pose is not a robot's present one
 LEADER_STEP_S = 1.0
 LEADERS_KEPT = 300
 EVENTS_KEPT = 50
+LISTED_MAX = 12
 DULL = ("peer_up", "peer_down")
 
 
@@ -123,7 +124,9 @@ def told(who: str, kind: str, data: dict[str, Any]) -> str | None:
     """An event as a line for people; None for what says nothing to them."""
     if kind in DULL:
         return None
-    facts = ", ".join(f"{name} {_short(value)}" for name, value in data.items() if name != "t")
+    facts = ", ".join(
+        _short(value) if name == kind else f"{name} {_short(value)}" for name, value in data.items() if name != "t"
+    )
     return f"{who} {kind} {facts}".strip()
 
 
@@ -138,6 +141,8 @@ def _state(role: str, tracking: Tracking | None, status: Status | None) -> str:
 def _short(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.3g}"
+    if isinstance(value, list | tuple) and len(value) > LISTED_MAX:
+        return f"{_short(value[:3])}-...-{_short(value[-1])} ({len(value)})"
     if isinstance(value, list | tuple):
         return "-".join(_short(item) for item in value)
     return str(value)

@@ -1,47 +1,71 @@
-"""The viewer's first sight of a fleet: the world on the left, who leads below it, errors and speeds on the right."""
+"""The viewer's first sight of a fleet: the world on the left, who leads and how the radio is below it; errors, speeds
+and decisions on the right."""
 
 from __future__ import annotations
 
+import rerun as rr
 import rerun.blueprint as rrb
 
 from deploy.look.scene import NAMED_MAX, TIMELINE
 from world.scenario import Scenario, starts_of
 
 MARGIN_M = 1.0
+LIVE_S = 60.0
 
 
-def layout(scenario: Scenario | None, robots: int, *, follow: bool) -> rrb.Blueprint:
-    """A blueprint; `follow` keeps to the newest data. Without a scenario the world's bounds are the viewer's guess."""
+def layout(scenario: Scenario | None, robots: int, *, lasted_s: float | None = None) -> rrb.Blueprint:
+    """A blueprint: of a recording that lasted so long all of it, of a running fleet (None) the last minute.
+
+    Without a scenario the world's bounds are the viewer's guess.
+    """
     few = robots <= NAMED_MAX
+    axis = rrb.TimeAxis(view_range=_shown(lasted_s))
+    legend = rrb.PlotLegend(visible=few)
+
+    def plot(origin: str, name: str, y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(origin=origin, name=name, axis_x=axis, axis_y=y, plot_legend=legend)
+
     world = rrb.Spatial2DView(
         origin="world",
         name="World [m] (y is drawn upwards, shown negative)",
         background=[255, 255, 255],
         visual_bounds=_bounds(scenario),
     )
-    plots = [
-        ("errors/distance", "Distance error D - k [m]"),
-        ("errors/bearing", "Orientation error [deg]"),
-        ("speeds", "Speed [m/s]"),
-    ]
-    legend = rrb.PlotLegend(visible=few)
+    lease = rrb.StateTimelineView(
+        origin="lease" if few else "lease/leader", name="Leader, term and roles", time_view=axis
+    )
+    percent = rrb.ScalarAxis(range=(-2.0, 102.0))
+    below = rrb.Horizontal(lease, plot("radio", "Radio: rows of the table lost [%]", percent), column_shares=[3, 2])
     right = rrb.Vertical(
-        *(rrb.TimeSeriesView(origin=origin, name=name, plot_legend=legend) for origin, name in plots),
+        plot("errors/distance", "Distance error D - k [m]"),
+        plot("errors/bearing", "Orientation error [deg]"),
+        plot("speeds", "Speed [m/s]"),
         rrb.Tabs(
-            rrb.TextLogView(origin="log", name="Decisions and events"),
-            rrb.TimeSeriesView(origin="errors/heading", name="Heading error [deg]", plot_legend=legend),
-            rrb.TimeSeriesView(origin="processes/lag", name="Loop lag [ms]", plot_legend=legend),
+            rrb.TextLogView(
+                origin="log",
+                name="Decisions and events",
+                columns=rrb.TextLogColumns(text_log_columns=["loglevel", "body"]),
+            ),
+            plot("errors/heading", "Heading error [deg]"),
+            plot("processes/lag", "Loop lag [ms]"),
         ),
         row_shares=[3, 3, 2, 3],
     )
-    lease = rrb.StateTimelineView(origin="lease" if few else "lease/leader", name="Leader, term and roles")
-    left = rrb.Vertical(world, lease, row_shares=[3, 1] if few else [6, 1])
+    left = rrb.Vertical(world, below, row_shares=[7, 3] if few else [6, 1])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following" if follow else "paused"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
     )
+
+
+def _shown(lasted_s: float | None) -> rr.TimeRange:
+    if lasted_s is None:
+        cursor = rr.TimeRangeBoundary.cursor_relative
+        return rr.TimeRange(start=cursor(seconds=-LIVE_S), end=cursor(seconds=0.0))
+    ends = rr.TimeRangeBoundary.absolute
+    return rr.TimeRange(start=ends(seconds=0.0), end=ends(seconds=max(lasted_s, 1.0)))
 
 
 def _bounds(scenario: Scenario | None) -> rrb.VisualBounds2D | None:

@@ -2,19 +2,21 @@
 
 Rerun's 2-D views have y downwards: everything in `map` is drawn at (x, -y), so that left is left. Rows pile up per
 entity and leave together with `flush`. Entities: `world/robotN` (pose, with its body and its scan below), `slots`,
-`links` and `trails` of each robot, `errors`, `speeds`, `lease`, `processes` and `log`.
+`links` and `trails` of each robot, `map` and `planned` of who leads through unknown ground, `errors`, `speeds`,
+`lease`, `radio`, `processes` and `log`.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, hypot, nan, pi
 from typing import Any
 
 import numpy as np
 import rerun as rr
 
+from deploy.look import stage
 from deploy.look.board import told
 from protocol.geometry import wrap
 from protocol.mission import Mission, robot_id_of
@@ -22,12 +24,17 @@ from world.spec import WorldSpec
 
 APPLICATION = "lfa"
 TIMELINE = "time"
-TOPICS = frozenset({"pose", "tracking", "scan", "event", "status", "truth", "mission"})
+TOPICS = frozenset({"pose", "tracking", "scan", "event", "status", "truth", "mission", "plan"})
 TRAIL_STEP_M, TRAIL_POINTS_MAX = 0.15, 150
 SPEED_EVERY = 5
 NAMED_MAX = 10  # more names than this would hide the robots
-INK, SOFT, GHOST = (60, 60, 60), (150, 150, 150), (150, 150, 150, 120)
+SOFT, GHOST = (150, 150, 150), (190, 190, 190)
+OUTLINE = rr.components.Radius.ui_points(1.6)
+"""Of robots: seen from any distance."""
+RADIO_S = 10.0
+"""The share of lost rows is of the last so many seconds."""
 LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
+PLANNED = (204, 121, 167)
 ROLE_COLOURS = {"leader": LEADS, "follower": FOLLOWS, "waiting": WAITS, "gone": GONE}
 PALETTE = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (90, 90, 90))
 ALARMS = ("fault", "contact", "failed", "died", "slowed")
@@ -45,6 +52,9 @@ class Scene:
         self._counts: dict[str, int] = {}
         self._roles: dict[int, str] = {}
         self._leader = ""
+        self._planner = ""
+        self._angles: dict[str, float] = {}
+        self._heard: dict[int, deque[tuple[float, float, float]]] = {}
         self._rows: dict[tuple[str, str], list[tuple[float, Any]]] = {}
         self._mission_known = False
         self._named = True
@@ -52,17 +62,11 @@ class Scene:
     # --- what stands still -----------------------------------------------------------------------------------------
 
     def ground(self, world: WorldSpec) -> None:
-        """Walls and obstacles."""
-        walls = [[(x1, -y1), (x2, -y2)] for x1, y1, x2, y2 in world.walls_m]
-        if walls:
-            self._always("world/walls", rr.LineStrips2D(walls, colors=INK, radii=0.05))
+        """Walls, terrain and obstacles."""
+        for entity, what in stage.standing(world):
+            self._always(entity, what)
         for index, obstacle in enumerate(world.obstacles):
-            outline = obstacle.corners_m or _circle(obstacle.radius_m or 0.1)
-            moves = bool(obstacle.waypoints_m) or obstacle.mass_kg is not None
-            place = (0.0, 0.0) if moves else obstacle.center_m
-            strip = [(place[0] + dx, -(place[1] + dy)) for dx, dy in (*outline, outline[0])]
-            self._always(f"world/obstacles/{index}", rr.LineStrips2D([strip], colors=INK, radii=0.03))
-            if moves:
+            if stage.moves(obstacle):
                 self._row("transform", f"world/obstacles/{index}", 0.0, (*obstacle.center_m, 0.0))
 
     def mission(self, mission: Any) -> None:
@@ -72,7 +76,8 @@ class Scene:
         self._mission_known, self._radius_m = True, float(mission.radius_m)
         self._named = len(mission.robots) <= NAMED_MAX
         route = [(float(x), -float(y)) for x, y in mission.leading.route_m]
-        self._always("world/route", rr.LineStrips2D([[(0.0, 0.0), *route]], colors=SOFT, radii=0.015))
+        if mission.leading.motion != "explore":  # there the way is found, and shown as `planned`
+            self._always("world/route", rr.LineStrips2D([[(0.0, 0.0), *route]], colors=SOFT, radii=0.015))
         self._always("world/goal", rr.Points2D([route[-1]], colors=LEADS, radii=0.15, labels=["goal"]))
         for n, robot in enumerate(mission.robots):
             self._dress(robot, n, len(mission.robots))
@@ -80,8 +85,10 @@ class Scene:
     def _dress(self, robot: int, n: int, of: int) -> None:
         """Colours, widths and names that stay."""
         colour = PALETTE[n] if of <= len(PALETTE) else _shade(n / (of - 1))
-        for series in ("errors/distance", "errors/bearing", "errors/heading", "speeds", "processes/lag"):
+        for series in ("errors/distance", "errors/bearing", "errors/heading", "speeds", "processes/lag", "radio"):
             self._always(f"{series}/robot{robot}", rr.SeriesLines(colors=colour, names=f"robot {robot}", widths=1.5))
+        names, colours = list(ROLE_COLOURS), list(ROLE_COLOURS.values())
+        self._always(f"lease/robot{robot}", rr.StateConfiguration(values=names, colors=colours))
         self._always(f"world/trails/robot{robot}", rr.LineStrips2D.from_fields(colors=colour, radii=0.015))
         self._always(f"world/slots/robot{robot}", rr.Points2D.from_fields(colors=GHOST, radii=0.11))
         self._always(f"world/links/robot{robot}", rr.LineStrips2D.from_fields(colors=SOFT, radii=0.012))
@@ -106,7 +113,9 @@ class Scene:
             case "scan" if robot:
                 self._scan(t, robot, message)
             case "status" if robot:
-                self._row("scalar", f"processes/lag/robot{robot}", t, float(message.counters.get("loop_lag_ms", 0.0)))
+                self._status(t, robot, message.counters)
+            case "plan" if robot:
+                self._plan(t, owner, message)
 
     def flush(self) -> None:
         """Send everything that has piled up."""
@@ -152,8 +161,14 @@ class Scene:
         self._row("strip", f"world/links/robot{robot}", t, [(own[0], -own[1]), (ahead[0], -ahead[1])])
         bearing = wrap(atan2(dy, dx) - float(message.chi) - float(message.phi))
         self._row("scalar", f"errors/distance/robot{robot}", t, hypot(dx, dy) - float(message.separation_m))
-        self._row("scalar", f"errors/bearing/robot{robot}", t, bearing * 180.0 / pi)
-        self._row("scalar", f"errors/heading/robot{robot}", t, wrap(float(message.heading) - own[2]) * 180.0 / pi)
+        self._angle(f"errors/bearing/robot{robot}", t, bearing)
+        self._angle(f"errors/heading/robot{robot}", t, wrap(float(message.heading) - own[2]))
+
+    def _angle(self, entity: str, t: float, angle: float) -> None:
+        """In degrees; where it passes +-180 the line has a gap, not a stroke across the plot."""
+        before = self._angles.get(entity, angle)
+        self._angles[entity] = angle
+        self._row("scalar", entity, t, nan if abs(angle - before) > pi else angle * 180.0 / pi)
 
     def _scan(self, t: float, robot: int, message: Any) -> None:
         ranges = np.array(message.ranges_m, dtype=object).astype(np.float32)
@@ -161,6 +176,32 @@ class Scene:
         angles = float(message.angle_min) + float(message.angle_increment) * hit
         points = np.stack([ranges[hit] * np.cos(angles), -ranges[hit] * np.sin(angles)], axis=1)
         self._row("points", f"world/robot{robot}/scan", t, points)
+
+    def _status(self, t: float, robot: int, counters: dict[str, Any]) -> None:
+        self._row("scalar", f"processes/lag/robot{robot}", t, float(counters.get("loop_lag_ms", 0.0)))
+        heard, lost = float(counters.get("rows_heard", 0.0)), float(counters.get("rows_lost", 0.0))
+        past = self._heard.setdefault(robot, deque())
+        if past and heard < past[-1][1]:  # it started anew
+            past.clear()
+        past.append((t, heard, lost))
+        while t - past[0][0] > RADIO_S:
+            past.popleft()
+        came, missed = heard - past[0][1], lost - past[0][2]
+        if came + missed > 0.0:
+            self._row("scalar", f"radio/robot{robot}", t, 100.0 * missed / (came + missed))
+
+    def _plan(self, t: float, owner: str, message: Any) -> None:
+        """Route and a tile of the map of who leads; those of who led before go."""
+        if owner != self._planner:
+            self._say(t, "world/map/tiles", rr.Clear(recursive=True))
+            self._planner = owner
+        cell_m, cells = float(message.cell_m), message.cells
+        x, y = (float(value) for value in message.corner_map)
+        route = [(float(px), -float(py)) for px, py in message.route_map]
+        self._say(t, "world/planned", rr.LineStrips2D([route], colors=PLANNED, radii=0.03))
+        entity = f"world/map/tiles/{owner}/{x:.1f}_{y:.1f}"
+        self._say(t, entity, stage.placed((x, y), cell_m, len(cells) // message.columns))
+        self._say(t, entity, stage.tile(message.columns, cells))
 
     def _event(self, t: float, owner: str, message: Any) -> None:
         data, kind = message.data, message.kind
@@ -179,15 +220,18 @@ class Scene:
         if self._roles.get(robot) == role:
             return
         self._roles[robot] = role
+        if role != "follower":
+            for entity in (f"world/slots/robot{robot}", f"world/links/robot{robot}"):
+                self._say(t, entity, rr.Clear(recursive=False))
         r, colour = self._radius_m, ROLE_COLOURS.get(role, WAITS)
-        circle = _circle(r)
+        circle = stage.circle(r)
         nose = [(-0.5 * r, 0.7 * r), (r, 0.0), (-0.5 * r, -0.7 * r), (-0.5 * r, 0.7 * r)]
-        body = rr.LineStrips2D([[*circle, circle[0]], nose], colors=colour, radii=0.035)
+        body = rr.LineStrips2D([[*circle, circle[0]], nose], colors=colour, radii=OUTLINE)
         self._say(t, f"world/robot{robot}/body", body)
         if self._named:
             name = rr.Points2D([(0.0, 0.0)], colors=colour, radii=0.04, labels=[str(robot)])
             self._say(t, f"world/robot{robot}/name", name)
-        self._say(t, f"lease/roles/robot{robot}", rr.StateChange(state=role))
+        self._say(t, f"lease/robot{robot}", rr.StateChange(state=role))
 
     def _lead(self, t: float, robot: int, term: int) -> None:
         leader = f"robot {robot}, term {term}"
@@ -232,11 +276,6 @@ _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "strip": lambda rows: rr.LineStrips2D.columns(strips=rows),
     "scalar": lambda rows: rr.Scalars.columns(scalars=rows),
 }
-
-
-def _circle(radius_m: float, corners: int = 20) -> tuple[tuple[float, float], ...]:
-    angles = (2.0 * pi * n / corners for n in range(corners))
-    return tuple((radius_m * cos(angle), radius_m * sin(angle)) for angle in angles)
 
 
 def _shade(part: float) -> tuple[int, int, int]:

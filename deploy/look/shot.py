@@ -17,6 +17,8 @@ from deploy.look.view import quiet, viewer_path
 from protocol.mission import Refused
 
 SIZE = "1600x1000"
+SCREEN = "3400x2200x24"
+"""So large that the pointer, in its middle, lies beside the window and shows no hint over what it happens to be on."""
 SHOT_S_MAX = 120.0
 
 
@@ -63,7 +65,7 @@ def _screen() -> Iterator[str | None]:
         yield present
         return
     ours, theirs = os.pipe()
-    command = [xvfb, "-displayfd", str(theirs), "-screen", "0", f"{SIZE}x24", "-nolisten", "tcp"]
+    command = [xvfb, "-displayfd", str(theirs), "-screen", "0", SCREEN, "-nolisten", "tcp"]
     server = subprocess.Popen(command, pass_fds=[theirs], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(theirs)
     try:

@@ -79,13 +79,15 @@ def converted(folder: Path) -> Path:
     scenario = scenario_of(folder)
     stream = rr.RecordingStream(APPLICATION, recording_id=folder.resolve().name)
     unfinished = rrd.with_suffix(".part")
-    stream.save(unfinished, default_blueprint=layout(scenario, len(scenario.mission.robots), follow=True))
+    stream.save(unfinished)
     scene = Scene(stream)
     scene.ground(scenario.world)
     scene.mission(scenario.mission)
-    for owner, topic, t, message in messages(folder, TOPICS):
-        scene.see(t, owner, topic, message)
+    lasted_s = 0.0
+    for owner, topic, lasted_s, message in messages(folder, TOPICS):
+        scene.see(lasted_s, owner, topic, message)
     scene.flush()
+    stream.send_blueprint(layout(scenario, len(scenario.mission.robots), lasted_s=lasted_s))
     stream.disconnect()
     return unfinished.rename(rrd)
 
@@ -99,7 +101,7 @@ def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web
 
     scenario = scenario_of_fleet(fleet)
     stream = rr.RecordingStream(APPLICATION)
-    plan = layout(scenario, len(fleet.team) or 4, follow=True)
+    plan = layout(scenario, len(fleet.team) or 4)
     if screenshot is not None:
         from deploy.look.shot import take
 

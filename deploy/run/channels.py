@@ -2,11 +2,12 @@
 
 On the wire a struct is an array without names. Here it becomes an object, with its tag as `type`. JSON has no
 infinity: a number that is not finite is written as the string "inf", "-inf" or "nan", and the schema says so
-(a scan's +inf, nothing within range, would otherwise be lost as null).
+(a scan's +inf, nothing within range, would otherwise be lost as null). Bytes are base64.
 """
 
 from __future__ import annotations
 
+from base64 import b64encode
 from functools import cache
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -46,6 +47,8 @@ def plain(value: Any) -> Any:
     if kind is tuple or kind is list:
         # Beams and heights are by far the most of all numbers, and need no call each.
         return [plain(item) if type(item) is not float else item if item - item == 0.0 else str(item) for item in value]
+    if kind is bytes:
+        return b64encode(value).decode()
     if kind is dict:
         return {str(name): plain(item) for name, item in value.items()}
     if not issubclass(kind, Struct):

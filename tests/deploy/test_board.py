@@ -66,7 +66,7 @@ def test_counters_come_from_the_status() -> None:
 def test_events_are_told_and_tokens_are_not() -> None:
     event = Event(Header("robot2", 1, 1, 0.0), "chain", Term(), {"chain": [2, 3], "t": 1.0})
     token = Event(Header("recorder", 1, 1, 0.0), "peer_up", None, {})
-    assert [happened.what for happened in _board((1.0, event), (1.0, token)).events] == ["chain chain 2-3"]
+    assert [happened.what for happened in _board((1.0, event), (1.0, token)).events] == ["chain 2-3"]
 
 
 def test_a_robot_unheard_of_has_a_row_too() -> None:

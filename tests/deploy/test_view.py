@@ -88,3 +88,25 @@ def test_a_recording_that_was_cut_off_is_shown_as_far_as_it_goes(folder: Path, t
     recorded = (folder / "recording.mcap").read_bytes()
     (tmp_path / "recording.mcap").write_bytes(recorded[: len(recorded) // 2])
     assert view.converted(tmp_path).is_file(), "a recording cut off is read up to its last whole chunk"
+
+
+def test_map_and_route_of_who_explores_are_in_the_view(tmp_path: Path) -> None:
+    scenario = load("explore", ["time_limit_s=4.0"], 2)
+    folder = run(scenario, 1, tmp_path / "run").folder
+    told = subprocess.run(
+        [view.viewer_path(), "rrd", "print", str(view.converted(folder))], capture_output=True, text=True, check=True
+    )
+    assert " - /world/planned - " in told.stdout
+    assert len(set(re.findall(r"/world/map/tiles/robot1/\S+", told.stdout))) > 1
+
+
+def test_terrain_and_the_share_of_lost_rows_are_in_the_view(tmp_path: Path) -> None:
+    scenario = load("terrain", ["time_limit_s=4.0", "radio.loss=0.3"], 2)
+    folder = run(scenario, 1, tmp_path / "run").folder
+    told = subprocess.run(
+        [view.viewer_path(), "rrd", "print", str(view.converted(folder))], capture_output=True, text=True, check=True
+    )
+    assert "/world/terrain/0" in told.stdout
+    assert "/radio/robot2" in told.stdout
+    lost = [float(s.counters["rows_lost"]) for *_, s in messages(folder, frozenset({"status"})) if s.counters]
+    assert max(lost) > 0.0

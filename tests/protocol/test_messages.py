@@ -25,6 +25,7 @@ SAMPLES: list[m.Message] = [
     m.LeaseNote(HEADER, m.Propose(TERM, CONFIG, 4, m.Member(1, 5), (TERM,), 1.5)),
     m.LeaseNote(HEADER, m.Hello(None)),
     m.TableRow(HEADER, 1.0, 2.0, 0.0, 0.5, 3.0, m.Role.FOLLOWER, (m.Delay(2, 0.001),)),
+    m.PlanNote(HEADER, ((0.0, 1.0), (2.0, 1.5)), 0.1, (-1.0, -2.0), 2, bytes([0, 1, 2, 1])),
     m.Event(HEADER, "decision", None, {"action": "left", "free_m": 0.5}),
 ]
 
@@ -86,10 +87,17 @@ def test_numbers_that_a_core_would_compute_with_are_finite(bad: float) -> None:
         m.Localization(Header("robot1", 1, 1, bad), Pose2D()),
         m.LeaseNote(HEADER, m.Grant(TERM, 1, CONFIG.version, bad)),
         m.FormationNote(HEADER, TERM, 1, (m.Slot(2, bad, 3.0),)),
+        m.PlanNote(HEADER, ((0.0, bad),), 0.1, (0.0, 0.0), 1, b"1"),
     ]
     for message in wrong:
         with pytest.raises(BadMessage):
             decode(encode(message), type(message))
+
+
+@pytest.mark.parametrize("columns", [0, -2, 3])
+def test_a_tile_of_a_map_is_a_whole_rectangle(columns: int) -> None:
+    with pytest.raises(BadMessage):
+        decode(encode(m.PlanNote(HEADER, (), 0.1, (0.0, 0.0), columns, bytes(4))), m.PlanNote)
 
 
 def test_a_message_of_another_topic_is_refused() -> None:

@@ -1,0 +1,74 @@
+"""What stands still in the view: walls, obstacles, terrain, pieces of a map. Pure: shapes in rerun's (x, -y)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from world.spec import Obstacle, WorldSpec
+from world.terrain import Patch, patches_of
+
+INK = (60, 60, 60)
+HOLE, RISE = (86, 130, 180), (190, 140, 60)
+HATCH_M = 0.12
+UNSEEN, FREE, OCCUPIED = (255, 255, 255), (218, 236, 224), (96, 125, 104)
+UNDER_ALL = -20.0
+
+Point = tuple[float, float]
+
+
+def standing(world: WorldSpec) -> Iterator[tuple[str, Any]]:
+    """Entity and drawing of everything that never changes its look; what moves is drawn around (0, 0)."""
+    yield "world/map", rr.AnnotationContext([(0, "unseen", UNSEEN), (1, "free", FREE), (2, "occupied", OCCUPIED)])
+    walls = [[(x1, -y1), (x2, -y2)] for x1, y1, x2, y2 in world.walls_m]
+    if walls:
+        yield "world/walls", rr.LineStrips2D(walls, colors=INK, radii=0.05)
+    for index, patch in enumerate(patches_of(world)):
+        colour = RISE if patch.height_m > 0.0 else HOLE
+        yield f"world/terrain/{index}", rr.LineStrips2D(list(hatched(patch)), colors=colour, radii=0.02)
+    for index, obstacle in enumerate(world.obstacles):
+        outline = obstacle.corners_m or circle(obstacle.radius_m or 0.1)
+        place = (0.0, 0.0) if moves(obstacle) else obstacle.center_m
+        strip = [(place[0] + dx, -(place[1] + dy)) for dx, dy in (*outline, outline[0])]
+        yield f"world/obstacles/{index}", rr.LineStrips2D([strip], colors=INK, radii=0.04)
+
+
+def moves(obstacle: Obstacle) -> bool:
+    return obstacle.moves or obstacle.mass_kg is not None
+
+
+def tile(columns: int, cells: bytes) -> rr.SegmentationImage:
+    """A piece of a map, upper row first; to be put where `placed` says."""
+    rows = np.frombuffer(cells, dtype=np.uint8).reshape(-1, columns)
+    return rr.SegmentationImage(np.minimum(rows, 2)[::-1], opacity=1.0, draw_order=UNDER_ALL)
+
+
+def placed(corner_map: Point, cell_m: float, rows: int) -> rr.Transform3D:
+    """From pixels to metres: an image's origin is its upper left corner."""
+    x, y = float(corner_map[0]), float(corner_map[1]) + rows * cell_m
+    return rr.Transform3D(translation=[x, -y, 0.0], scale=cell_m)
+
+
+def circle(radius_m: float, corners: int = 20) -> tuple[Point, ...]:
+    angles = (2.0 * pi * n / corners for n in range(corners))
+    return tuple((radius_m * cos(angle), radius_m * sin(angle)) for angle in angles)
+
+
+def hatched(patch: Patch) -> Iterator[list[Point]]:
+    """Outline of a piece of floor at another height, and lines across it along its own x."""
+    a, b = patch.half_x_m or patch.radius_m, patch.half_y_m or patch.radius_m
+    corners = circle(patch.radius_m) if patch.radius_m > 0.0 else ((a, -b), (a, b), (-a, b), (-a, -b))
+    yield [_laid(patch, u, v) for u, v in (*corners, corners[0])]
+    lines = max(1, round(2.0 * b / HATCH_M))
+    for n in range(1, lines):
+        v = -b + 2.0 * b * n / lines
+        reach = sqrt(patch.radius_m**2 - v * v) if patch.radius_m > 0.0 else a
+        yield [_laid(patch, -reach, v), _laid(patch, reach, v)]
+
+
+def _laid(patch: Patch, u: float, v: float) -> Point:
+    return patch.x + patch.c * u - patch.s * v, -(patch.y + patch.s * u + patch.c * v)
