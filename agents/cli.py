@@ -14,11 +14,12 @@ import msgspec
 
 from agents.agent import Agent
 from protocol import clock
+from protocol.credentials import credentials
 from protocol.mission import Mission, Refused, check_mission
 from protocol.node import Node
 from protocol.runtime import Options, run
 from protocol.witness import Witness
-from protocol.zenoh_bus import default_endpoint
+from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
 
 ROLES = ("leader", "follower", "witness")
 EXAMPLE = "example: lfa-agent --role follower --id 2"
@@ -37,9 +38,12 @@ def start(arguments: argparse.Namespace) -> int:
     """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
-    options = Options(_fleet(arguments.fleet), endpoint, arguments.journal, arguments.faults)
-    wall_ms = clock.wall_ms()
-    return run([_node(arguments.role, arguments.id, arguments.fleet, wall_ms, mission)], options, wall_ms)
+    fleet, wall_ms = _fleet(arguments.fleet), clock.wall_ms()
+    node = _node(arguments.role, arguments.id, fleet, wall_ms, mission)
+    known = None if arguments.keys is None else credentials(arguments.keys, node.name, wall_ms)
+    lease_ms = LINK_LEASES_MS[arguments.link]
+    options = Options(fleet, endpoint, arguments.journal, arguments.faults, lease_ms, known)
+    return run([node], options, wall_ms)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -51,17 +55,19 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="lfa-agent", description="Run one robot of a fleet until it is stopped.", epilog=EXAMPLE)
     add = parser.add_argument
+    # fmt: off
     add("--role", required=True, help="place it starts in: leader, follower or witness; roles change at run time")
     add("--id", required=True, help="robot id from the mission (1, 2, ...), or w for the witness")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
-    add(
-        "--connect",
-        metavar="ENDPOINT",
-        help="router, like tcp/127.0.0.1:7447; a,b: or the next (default: this machine's)",
-    )
+    add("--connect", metavar="ENDPOINT", help="the router, like tcp/127.0.0.1:7447 (default: this machine's); a,b: "
+        "the first that answers, the next when that is lost")
+    add("--keys", type=Path, metavar="DIR", help="this machine's folder of `lfa keys`, with the robot's certificate")
+    add("--link", choices=sorted(LINK_LEASES_MS), default="std",
+        help="how soon a silent link counts as dead: fast (0.5 s), std (1 s) or wifi (2 s)")
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; else it comes over Zenoh")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
     add("--faults", action="store_true", help="obey an operator's radio weather (lfa fault cut, loss): for tests")
+    # fmt: on
     return parser
 
 

@@ -73,6 +73,8 @@ COMMANDS = (
           "lfa verify runs/paper_path1-20260101-120000 runs/paper_path2-20260101-120100"),
     Entry("map", "deploy.look.mapped", "What an explorer came to know, as a ROS map.yaml and pgm.",
           "lfa map runs/explore-20260101-120000 --out maps"),
+    Entry("keys", "deploy.fleet.keyring", "A fleet's certificates, and who may say what: init, rotate, revoke, show.",
+          "lfa keys init keys --robots 12 --hosts a=10.0.0.1,b=10.0.0.2; lfa keys revoke keys robot3"),
     Entry("bench", "deploy.bench.command", "Measure, beside the bar to be reached.",
           "lfa bench lidar --json"),
     Entry("completion", "deploy.completion", "Print a script that completes commands and options in your shell.",

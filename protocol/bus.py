@@ -13,11 +13,16 @@ from typing import Protocol
 from msgspec import Struct, structs
 
 from protocol.node import PeerDown, PeerUp, RouterLost
-from protocol.topics import TOPIC, address
+from protocol.topics import TOPIC, Address, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
 TOKEN_HOLD_S = 0.001
 """How long a vanished token is held back: six times what was measured between it and the news of a router's death."""
+OWNER_RATE_MAX_HZ = 500.0
+"""Events that one owner of keys may have heard: over twice what a leader of seven voters says at its busiest."""
+OWNER_BURST_MAX = 1000.0
+"""So many may come at once, after a link or a process stood still."""
+OWNERS_MAX = 256
 
 
 class Arrival(Struct, frozen=True, gc=False):
@@ -82,22 +87,37 @@ class Inbox:
         self._size_max = size_max
         self._every = every
         self._lock = threading.Lock()
+        self._allowances: dict[str, tuple[float, float]] = {}
+        """How many more events an owner may have queued, as of when."""
         self._wake = wake or Wake()
         self.dropped = 0
 
     def put(self, arrival: Arrival) -> None:
-        """Called from foreign threads. A full queue drops the newcomer and counts it."""
+        """Called from foreign threads. A full queue drops the newcomer and counts it; so does a flood of one owner."""
         where = address(arrival.key)
         topic = TOPIC.get(where.topic) if where is not None else None
         with self._lock:
             if topic is not None and topic.state and not self._every:
                 self._newest[arrival.key] = arrival
-            elif len(self._queue) < self._size_max:
-                self._queue.append(arrival)
-            else:
+            elif len(self._queue) >= self._size_max or not (self._every or self._allows(where, arrival.at)):
                 self.dropped += 1
+                return
+            else:
+                self._queue.append(arrival)
         if topic is None or topic.wakes:
             self._wake.set()
+
+    def _allows(self, where: Address | None, now: float) -> bool:
+        """A token bucket an owner: whoever floods is heard less, and takes neither time nor room from the others."""
+        if where is None:
+            return True  # the loss of our own link
+        owner = where.owner
+        if owner not in self._allowances and len(self._allowances) >= OWNERS_MAX:
+            self._allowances.clear()
+        left, since = self._allowances.get(owner, (OWNER_BURST_MAX, now))
+        left = min(left + OWNER_RATE_MAX_HZ * max(now - since, 0.0), OWNER_BURST_MAX)
+        self._allowances[owner] = max(left - 1.0, 0.0), max(now, since)
+        return left >= 1.0
 
     def take(self) -> list[Arrival]:
         """All that has come since the last call, oldest first."""

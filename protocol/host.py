@@ -10,7 +10,7 @@ import msgspec
 from protocol.journal import Journal
 from protocol.messages import BadMessage, Message, decode, encode
 from protocol.node import Envelope, Local, Node, Received
-from protocol.topics import TOPIC, address
+from protocol.topics import TOPIC, address, may_sign
 
 Sent = list[tuple[str, bytes]]
 
@@ -26,17 +26,18 @@ class Host:
         self.undecodable = 0
 
     def decoded(self, key: str, payload: bytes) -> Message | None:
-        """The message in bytes that came on `key`; None, counted, when they are none of ours."""
+        """The message in bytes that came on `key`; None, counted, when they are none of ours, or in another's name."""
         where = address(key)
         topic = TOPIC.get(where.topic) if where is not None else None
-        if topic is None:
-            self.undecodable += 1
-            return None
         try:
-            return decode(payload, topic.type)
+            if where is not None and topic is not None:
+                message = decode(payload, topic.type)
+                if may_sign(where, topic, message.header.sender):
+                    return message
         except BadMessage:
-            self.undecodable += 1
-            return None
+            pass
+        self.undecodable += 1
+        return None
 
     def message(self, at: float, key: str, payload: bytes) -> Sent:
         """Bytes came on `key`."""

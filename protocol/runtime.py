@@ -19,6 +19,7 @@ from msgspec import Struct
 
 from protocol import clock
 from protocol.bus import Arrival, Inbox, Tokens, Wake
+from protocol.credentials import Credentials
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, OperatorNote, decode
@@ -39,9 +40,12 @@ class Options(Struct, frozen=True):
 
     fleet: str
     endpoint: str
+    """The router's; or several, `a,b`: the first that answers."""
     journal: Path | None = None
     faults: bool = False
     """Obey an operator's weather: bad radio, made at the receiver."""
+    lease_ms: int = LINK_LEASE_MS
+    credentials: Credentials | None = None
 
 
 class _Seat:
@@ -121,10 +125,10 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     try:
         for node in nodes:
             inbox = Inbox(wake)
-            bus = connect(options.endpoint, inbox, stop)
+            bus = connect(options, inbox, stop)
             if bus is None:
                 return 0
-            _refuse_double(bus, inbox, options.fleet, node)
+            _refuse_double(bus, inbox, options, node)
             started_with = {"fleet": options.fleet, **node.started_with}
             heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
             seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading), weather_key))
@@ -138,16 +142,17 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             seat.host.journal.close()
 
 
-def connect(endpoint: str, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
-    """A session with the router at `endpoint`, waiting for it; None when told to stop meanwhile."""
+def connect(options: Options, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
+    """A session with a router, waiting for it; None when told to stop meanwhile."""
     told = False
     while not stop.told:
         try:
-            return ZenohBus(endpoint, inbox)
+            return ZenohBus(options.endpoint, inbox, options.lease_ms, options.credentials)
         except RouterAbsent:
             if not told:
+                why = "" if options.credentials is None else f", or none that lets {options.credentials.name} in"
                 print(
-                    f"no router at {endpoint}: waiting for one (start it with: lfa-router)",
+                    f"no router at {options.endpoint}{why}: waiting for one (start it with: lfa-router)",
                     file=sys.stderr,
                     flush=True,
                 )
@@ -200,20 +205,21 @@ def _on_signals(wake: Wake) -> _Stopping:
     return stop
 
 
-def _refuse_double(bus: ZenohBus, inbox: Inbox, fleet: str, node: Node) -> None:
+def _refuse_double(bus: ZenohBus, inbox: Inbox, options: Options, node: Node) -> None:
     """A restarted name waits two link leases for its predecessor's token; only if that one still speaks, refuse."""
+    fleet, lease_s = options.fleet, options.lease_ms / 1000.0
     if not bus.living(fleet, node.name):
         return
     bus.follow(frozenset({f"lfa/{fleet}/{node.name}/**"}))
     heard: dict[int, float] = {}
-    patience_until = clock.now() + 2.0 * LINK_LEASE_MS / 1000.0
+    patience_until = clock.now() + 2.0 * lease_s
     while clock.now() < patience_until:
         clock.sleep(0.05)
         heard.update(_speakers(inbox))
         if not bus.living(fleet, node.name):
             break
     else:
-        speaking = [life for life, at in heard.items() if at > clock.now() - LINK_LEASE_MS / 1000.0]
+        speaking = [life for life, at in heard.items() if at > clock.now() - lease_s]
         if speaking:
             raise Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another --id")
     bus.follow(frozenset())

@@ -40,7 +40,7 @@ class Topic(Struct, frozen=True):
 
 
 TEAM = ("agent", "witness", "driver")
-ANYONE = (*TEAM, "operator")
+ANYONE = (*TEAM, "operator", "world")
 
 #         name            type             publishers             rate  state  wakes  priority      timeout
 TOPICS: tuple[Topic, ...] = (
@@ -103,6 +103,16 @@ def address(key: str) -> Address | None:
     if parts[3] not in TOPIC and parts[3] != "alive":
         return None
     return Address(parts[1], parts[2], parts[3], parts[4] if len(parts) == 5 else None)
+
+
+def may_sign(where: Address, topic: Topic, sender: str) -> bool:
+    """Whether a message on the key `where` can be signed by `sender`.
+
+    Routers judge by the key, cores by the header: both must name the same, or whoever may say something on a key of
+    its own could say it in another's name. Only hardware and ground truth are said by who plays them.
+    """
+    plays = "driver" in topic.publishers or "world" in topic.publishers
+    return sender == where.owner or (plays and sender in (WORLD_NAME, where.owner.replace("robot", "driver", 1)))
 
 
 def matches(expression: str, key: str) -> bool:

@@ -17,16 +17,21 @@ import zenoh
 
 from protocol import clock
 from protocol.bus import Arrival, Inbox
-from protocol.mission import Refused
+from protocol.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
+from protocol.mission import Profile, Refused
 from protocol.node import PeerDown, PeerUp, RouterLost
 from protocol.topics import TOPIC, Topic, address, alive_key
 
-LINK_LEASE_MS = 1000
+LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000}
+"""Silence after which a link counts as dead; over radio there are gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
+LINK_LEASE_MS = LINK_LEASES_MS["std"]
 QUEUE_BATCHES = dict.fromkeys(("real_time", "interactive_high", "data", "background"), 16)
 """Zenoh's largest. With its 2 for what is express, a link that a busy machine leaves alone for a few milliseconds
 drops leases and commands: 70 to 370 of 7000 messages in 7 s at a load of 8 on 2 cores; with 16 none."""
 ROUTER_RX_THREADS = 32  # more than the tcp links that can die at once: each blocks one for 10 s (zenoh.md section 2)
+CLIENT_RX_THREADS = 4  # a client has one link at a time, and those it lost within the last 10 s
 UNIX_PATH_BYTES_MAX = 107
+SECURE_PROTOCOLS = ("unixsock-stream", "tls", "quic")
 
 _PRIORITY = {
     "real_time": zenoh.Priority.REAL_TIME,
@@ -57,14 +62,17 @@ class RouterAbsent(ConnectionError):
 class ZenohBus:
     """A client session with declared publishers, followed subscriptions and one liveliness token."""
 
-    def __init__(self, endpoint: str, inbox: Inbox, lease_ms: int = LINK_LEASE_MS) -> None:
+    def __init__(
+        self, endpoint: str, inbox: Inbox, lease_ms: int = LINK_LEASE_MS, credentials: Credentials | None = None
+    ) -> None:
         """`endpoint` may be several, `a,b`: the first that answers, the next when that one is lost.
 
-        Raises RouterAbsent when no router answers, Refused for an endpoint that is none.
+        `credentials` are shown to routers that ask for some, and tell whose routers are trusted. Raises RouterAbsent
+        when no router answers or none lets us in, Refused for an endpoint that is none.
         """
         self._inbox = inbox
         try:
-            self._session = zenoh.open(_config("client", [], endpoint.split(","), lease_ms))
+            self._session = _client(endpoint, lease_ms, credentials)
         except zenoh.ZError as error:
             raise _open_error(endpoint, error) from None
         self._publishers: dict[str, zenoh.Publisher] = {}
@@ -132,19 +140,32 @@ class ZenohBus:
 
 
 def open_router(
-    listen: Sequence[str], connect: Sequence[str] = (), lease_ms: int = LINK_LEASE_MS
+    listen: Sequence[str],
+    connect: Sequence[str] = (),
+    lease_ms: int = LINK_LEASE_MS,
+    credentials: Credentials | None = None,
+    secure: bool = False,
 ) -> Callable[[], None]:
     """Start a router in this process; the returned function closes it.
 
-    Raises Refused when an endpoint cannot be listened on: taken, not permitted, or a path that is too long.
+    `credentials` serve its `tls/` and `quic/` links, both ends of which prove who they are. `secure`: whoever it is,
+    only what the rules in their folder let it say and hear passes, and a unix socket asks for name and password.
+    Raises Refused when an endpoint cannot be listened on: taken, not permitted, not secure, or too long a path.
     """
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {ROUTER_RX_THREADS}))")
     for endpoint in listen:
-        _check_listen(endpoint)
+        _check_listen(endpoint, credentials, secure)
+    config = _config("router", listen, connect, lease_ms, credentials)
+    if secure:
+        assert credentials is not None
+        _insert(config, _guard(credentials))
+    mask = os.umask(0o077)  # for the unix socket: 0600
     try:
-        session = zenoh.open(_config("router", listen, connect, lease_ms))
+        session = zenoh.open(config)
     except zenoh.ZError as error:
         raise Refused(f"listen {' '.join(listen)}: {_reason(error)}") from None
+    finally:
+        os.umask(mask)
 
     def close() -> None:
         session.close()  # type: ignore[no-untyped-call]
@@ -157,16 +178,26 @@ def open_router(
     return close
 
 
-def answers(endpoint: str) -> bool:
-    """True when a router can be opened at `endpoint` at the moment."""
+def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
+    """True when a session can be opened at `endpoint` at the moment."""
     try:
-        zenoh.open(_config("client", [], endpoint.split(","), LINK_LEASE_MS)).close()  # type: ignore[no-untyped-call]
+        _client(endpoint, LINK_LEASE_MS, credentials).close()  # type: ignore[no-untyped-call]
     except zenoh.ZError:
         return False
     return True
 
 
-def _check_listen(endpoint: str) -> None:
+def _client(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
+    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {CLIENT_RX_THREADS}))")
+    return zenoh.open(_config("client", [], endpoint.split(","), lease_ms, credentials))
+
+
+def _check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:
+    protocol = endpoint.partition("/")[0]
+    if secure and protocol not in SECURE_PROTOCOLS:
+        raise Refused(f"listen {endpoint}: not with --secure, must begin with {', '.join(SECURE_PROTOCOLS)}")
+    if credentials is None and protocol in ("tls", "quic"):
+        raise Refused(f"listen {endpoint}: needs a certificate, give --keys")
     path = socket_path(endpoint)
     if path is None:
         return
@@ -180,7 +211,9 @@ def _check_listen(endpoint: str) -> None:
         raise Refused(f"listen {endpoint}: another router answers there, stop it or give another --listen")
 
 
-def _config(mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: int) -> zenoh.Config:
+def _config(
+    mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: int, credentials: Credentials | None
+) -> zenoh.Config:
     settings: dict[str, object] = {
         "mode": mode,
         "listen/endpoints": list(listen),
@@ -193,10 +226,52 @@ def _config(mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: 
         "transport/link/tx/queue/size": QUEUE_BATCHES,
         "transport/shared_memory/enabled": False,
     }
+    if credentials is not None:
+        settings |= _certified(credentials, serves=mode == "router")
+        if mode == "client":
+            settings |= _login(credentials)
     config = zenoh.Config()
+    _insert(config, settings)
+    return config
+
+
+def _insert(config: zenoh.Config, settings: dict[str, Any]) -> None:
     for name, value in settings.items():
         config.insert_json5(name, msgspec.json.encode(value).decode())
-    return config
+
+
+def _certified(credentials: Credentials, *, serves: bool) -> dict[str, Any]:
+    """How a session shows who it is over tls and quic, and whom it takes for a router (zenoh.md section 5)."""
+    certificate, key = str(credentials.certificate), str(credentials.key)
+    tls: dict[str, object] = {
+        "root_ca_certificate": str(credentials.ca),
+        "enable_mtls": True,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+        "close_link_on_expiration": True,
+    }
+    if serves:
+        tls |= {"listen_certificate": certificate, "listen_private_key": key}
+    return {"transport/link/tls": tls}
+
+
+def _login(credentials: Credentials) -> dict[str, Any]:
+    """Name and password, which secure routers ask for on all links; a router with one asks everybody for theirs."""
+    known = credentials.user_and_password()
+    return {} if known is None else {"transport/auth/usrpwd": {"user": known[0], "password": known[1]}}
+
+
+def _guard(credentials: Credentials) -> dict[str, Any]:
+    """What a secure router adds: passwords, and the rules of who may say and hear what. Raises Refused."""
+    folder = credentials.certificate.parent
+    users, access = folder / USERS_FILE, folder / ACCESS_FILE
+    check_private(users)
+    try:
+        rules = msgspec.json.decode(access.read_bytes(), type=dict[str, Any])
+    except (OSError, msgspec.DecodeError) as error:
+        raise Refused(f"{access}: {error}, must be the rules that `lfa keys` wrote") from None
+    users_file = {"transport/auth/usrpwd/dictionary_file": str(users)}
+    return _login(credentials) | users_file | {"transport/link/protocols": SECURE_PROTOCOLS} | rules
 
 
 def _open_error(endpoint: str, error: zenoh.ZError) -> Exception:

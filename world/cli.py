@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Literal, NoReturn
 
 import typer
 
 from protocol import clock
+from protocol.credentials import credentials
 from protocol.mission import Refused
 from protocol.node import Node
 from protocol.runtime import Options, run
+from protocol.topics import WORLD_NAME
 from protocol.witness import Witness
-from protocol.zenoh_bus import default_endpoint
+from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
 from world import memory
 from world.scenario import draw, load
 from world.world import World
@@ -30,6 +32,10 @@ def start(
     robots: Annotated[int | None, typer.Option(help="Size of the team, ids 1 to N.")] = None,
     fleet: Annotated[str, typer.Option(help="Name of the fleet: part of every key.")] = "fleet",
     connect: Annotated[str | None, typer.Option(help="Router, like tcp/127.0.0.1:7447; a,b: or the next.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="This machine's folder of `lfa keys`.")] = None,
+    link: Annotated[
+        Literal["fast", "std", "wifi"], typer.Option(help="How soon a silent link counts as dead: 0.5, 1 or 2 s.")
+    ] = "std",
     journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
     witness: Annotated[bool, typer.Option(help="Hold the mission's witness here.")] = True,
     state: Annotated[Path | None, typer.Option(help="Run folder to keep the bodies' state in, for --resume.")] = None,
@@ -38,8 +44,10 @@ def start(
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
     drawn = draw(load(scenario, set_ or (), robots), seed)
-    options = Options(_fleet(fleet), connect or default_endpoint(), journal, faults)
     wall_ms = clock.wall_ms()
+    known_as = None if keys is None else credentials(keys, WORLD_NAME, wall_ms)
+    endpoint = connect or default_endpoint()
+    options = Options(_fleet(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as)
     known = None if resume is None else memory.read(resume)
     placed = drawn if known is None else memory.resumed(drawn, known)
     world = World(fleet, placed, seed, wall_ms, start_at=clock.now(), memory=known)

@@ -23,6 +23,7 @@ from deploy.run.operator import Operator
 from deploy.run.processes import Identity
 from protocol import clock
 from protocol.bus import Inbox
+from protocol.credentials import Credentials
 from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Tracking, Truth, decode, encode
 from protocol.mission import FormationSpec, Leading, Mission, Profile, robot_id_of, robot_name
 from protocol.radio import WEATHER
@@ -60,13 +61,23 @@ def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
 class Team:
     """Router, world and agents of `scenario`; on leaving the block none of them is left, nor anything on disk."""
 
-    def __init__(self, scenario: Scenario, table: Table | None = None) -> None:
-        """`table` makes of the usual rows, and the folder of sockets, those that are started: all but the recorder."""
+    def __init__(
+        self,
+        scenario: Scenario,
+        table: Table | None = None,
+        credentials: Credentials | None = None,
+        fleet: str | None = None,
+    ) -> None:
+        """`table` makes of the usual rows, and the folder of sockets, those that are started: all but the recorder.
+
+        `credentials` are what the onlooker shows to a router that asks for some; the rules there know `fleet`.
+        """
         self.scenario = scenario
         self.folder = Path(tempfile.mkdtemp(prefix="lfa-"))
         run = make(self.folder / "run", scenario)
         self._endpoint = f"unixsock-stream/{self.folder / 'router.sock'}"
-        self._about = About(scenario.name, "processes", 0, f"bench{clock.wall_ms()}")
+        self._credentials = credentials
+        self._about = About(scenario.name, "processes", 0, fleet or f"bench{clock.wall_ms()}")
         usual = rows(run, self._about, self._endpoint, scenario.mission, "")
         self._rows = {row.name: row for row in (usual if table is None else table(usual, self.folder))}
         self._crew = Crew(run)
@@ -83,8 +94,8 @@ class Team:
     def __enter__(self) -> Team:
         try:
             self._crew.start(self._rows[ROUTER_NAME])
-            self.wait_until(lambda: answers(self._endpoint), "the router does not answer")
-            self._bus = ZenohBus(self._endpoint, self._inbox)
+            self.wait_until(lambda: answers(self._endpoint, self._credentials), "the router does not answer")
+            self._bus = ZenohBus(self._endpoint, self._inbox, credentials=self._credentials)
             self._bus.follow(frozenset(key(self._about.fleet, "*", topic) for topic in TOPICS))
             for name, row in self._rows.items():
                 if name not in (ROUTER_NAME, RECORDER_NAME):

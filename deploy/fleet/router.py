@@ -4,39 +4,80 @@ from __future__ import annotations
 
 import signal
 import sys
-from typing import Annotated
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Literal
 
 import typer
 
 from deploy.cli import command_app, run_cli
-from protocol.zenoh_bus import default_endpoint, open_router
+from protocol import clock
+from protocol.credentials import Credentials, credentials
+from protocol.mission import Refused
+from protocol.topics import HOST_PREFIX
+from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint, open_router
 
-DEFAULT_TCP = "tcp/127.0.0.1:7447"
+DEFAULT_TCP, DEFAULT_TLS = "tcp/127.0.0.1:7447", "tls/127.0.0.1:7447"
+ENDING = {signal.SIGTERM, signal.SIGINT}
 
 
 def command(
     listen: Annotated[
         list[str] | None,
-        typer.Option(help=f"Where to listen, again for more. Default: {default_endpoint()} and {DEFAULT_TCP}."),
+        typer.Option(
+            help=f"Where to listen, again for more. Default: {default_endpoint()} and {DEFAULT_TCP}"
+            f" ({DEFAULT_TLS} with --secure)."
+        ),
     ] = None,
     connect: Annotated[
-        list[str] | None, typer.Option(help="Another machine's router, such as tcp/machine-a:7447.")
+        list[str] | None, typer.Option(help="Another machine's router, such as quic/machine-a:7447.")
     ] = None,
+    keys: Annotated[
+        Path | None, typer.Option(help="This machine's folder of `lfa keys`: serves tls/ and quic/, to its fleet only.")
+    ] = None,
+    secure: Annotated[
+        bool, typer.Option("--secure", help="Pass only what the rules in --keys allow; all else is denied.")
+    ] = False,
+    link: Annotated[
+        Literal["fast", "std", "wifi"], typer.Option(help="How soon a silent link counts as dead: 0.5, 1 or 2 s.")
+    ] = "std",
 ) -> int:
-    """Run until SIGTERM or Ctrl-C."""
-    ending = {signal.SIGTERM, signal.SIGINT}
-    signal.pthread_sigmask(signal.SIG_BLOCK, ending)  # before Zenoh's threads, so that they inherit it
-    endpoints = listen or [default_endpoint(), DEFAULT_TCP]
-    close = open_router(endpoints, connect or ())
-    print(f"router listens at {' '.join(endpoints)}", flush=True)
-    signal.sigwait(ending)
+    """Run until SIGTERM or Ctrl-C; SIGHUP opens it anew, with the keys and rules of that moment."""
+    if secure and keys is None:
+        raise Refused("--secure: needs --keys, a folder that lfa keys init made (DIR/hosts/NAME)")
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | {signal.SIGHUP})  # before Zenoh's threads: they inherit it
+    endpoints = listen or [default_endpoint(), DEFAULT_TLS if secure else DEFAULT_TCP]
+
+    def opened(known: Credentials | None) -> Callable[[], None]:
+        return open_router(endpoints, connect or (), LINK_LEASES_MS[link], known, secure)
+
+    close = opened(None if keys is None else host_credentials(keys))
+    print(f"router listens at {' '.join(endpoints)}{', secure' if secure else ''}", flush=True)
+    while signal.sigwait(ENDING | {signal.SIGHUP}) not in ENDING:
+        try:
+            known = None if keys is None else host_credentials(keys)
+        except Refused as refused:
+            print(f"goes on as it was: {refused}", file=sys.stderr, flush=True)
+            continue
+        close()
+        close = opened(known)
+        print("router opened anew", flush=True)
     close()
     return 0
 
 
+def host_credentials(folder: Path) -> Credentials:
+    """Those of the machine whose folder this is. Raises Refused when it is that of none, or of several."""
+    names = [path.stem for path in folder.glob(f"{HOST_PREFIX}*.pem")]
+    if len(names) != 1:
+        raise Refused(f"{folder}: must hold one machine's keys ({HOST_PREFIX}NAME.pem), like DIR/hosts/NAME")
+    return credentials(folder, names[0], clock.wall_ms())
+
+
 def main() -> None:
     help_text = "The router of this machine: agents and world meet here."
-    sys.exit(run_cli("lfa-router", command_app(command, help_text, "lfa-router --listen tcp/0.0.0.0:7447")))
+    example = "lfa-router --keys keys/hosts/a --listen unixsock-stream//run/lfa/z.sock --listen quic/0.0.0.0:7447"
+    sys.exit(run_cli("lfa-router", command_app(command, help_text, example)))
 
 
 if __name__ == "__main__":

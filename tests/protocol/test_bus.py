@@ -4,7 +4,16 @@ import signal
 import threading
 from random import Random
 
-from protocol.bus import TOKEN_HOLD_S, Arrival, Inbox, Tokens, Wake
+from protocol.bus import (
+    OWNER_BURST_MAX,
+    OWNER_RATE_MAX_HZ,
+    OWNERS_MAX,
+    TOKEN_HOLD_S,
+    Arrival,
+    Inbox,
+    Tokens,
+    Wake,
+)
 from protocol.node import PeerDown, PeerUp, RouterLost
 
 
@@ -100,3 +109,30 @@ def test_a_signal_at_any_moment_of_the_wait_wakes_the_loop() -> None:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+def test_who_floods_is_heard_less_and_nobody_else_is() -> None:
+    inbox = Inbox(size_max=10**6)
+    seconds, per_s = 4, 20_000
+    for n in range(seconds * per_s):
+        inbox.put(Arrival(n / per_s, "lfa/f/robot1/lease/all", b""))
+        if n % 400 == 0:
+            inbox.put(Arrival(n / per_s, "lfa/f/robot2/lease/all", b""))
+    heard = [a.key.split("/")[2] for a in inbox.take()]
+    assert heard.count("robot2") == seconds * per_s // 400
+    assert heard.count("robot1") <= OWNER_BURST_MAX + OWNER_RATE_MAX_HZ * seconds
+    assert inbox.dropped == seconds * per_s - heard.count("robot1")
+
+
+def test_a_recorder_hears_a_flood_whole() -> None:
+    inbox = Inbox(size_max=10**6, every=True)
+    for n in range(5000):
+        inbox.put(Arrival(n * 1e-5, "lfa/f/robot1/lease/all", b""))
+    assert len(inbox.take()) == 5000
+
+
+def test_names_without_end_take_no_memory_without_end() -> None:
+    inbox = Inbox()
+    for n in range(10 * OWNERS_MAX):
+        inbox.put(Arrival(0.0, f"lfa/f/stranger{n}/lease/all", b""))
+    assert len(inbox._allowances) <= OWNERS_MAX

@@ -2,15 +2,17 @@
 
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from protocol.geometry import STILL
 from protocol.host import Host
 from protocol.journal import JOURNAL_VERSION, Heading, Journal, digest, read
-from protocol.messages import Ask, Header, MissionNote, encode
+from protocol.messages import NO_TERM, Ask, Header, Hello, LeaseNote, MissionNote, PoseStamped, Role, encode
 from protocol.mission import Leading, Mission
 from protocol.node import Stop
-from protocol.topics import TOPICS, key
+from protocol.topics import TOPIC, TOPICS, key
 from protocol.witness import Witness
 
 MISSION = Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0))))
@@ -49,3 +51,22 @@ def test_the_journal_holds_each_call_and_the_digest_of_its_answer(tmp_path: Path
 def test_a_witness_without_a_mission_asks_for_one() -> None:
     sent = dict(host_of().tick(0.5))
     assert sent[key("f", "witness", "ask")] == encode(Ask(Header("witness", 1, 0, 0.5), "mission"))
+
+
+@pytest.mark.parametrize(
+    ("at", "sender", "heard"),
+    [
+        ("lfa/f/robot1/lease/all", "robot1", True),
+        ("lfa/f/robot2/lease/all", "robot1", False),
+        ("lfa/f/robot1/pose", "robot2", False),
+    ],
+)
+def test_what_another_than_the_keys_owner_signs_is_counted_and_dropped(at: str, sender: str, heard: bool) -> None:
+    """A router judges by the key, a core by the header: they must agree (replayed lease messages)."""
+    topic = TOPIC[at.split("/")[3]]
+    header = Header(sender, 1, 1, 0.0)
+    pose = PoseStamped(header, 0.0, 0.0, 0.0, 0.0, STILL, 0.0, Role.FOLLOWER, NO_TERM)
+    message = LeaseNote(header, Hello(None)) if topic.type is LeaseNote else pose
+    host = host_of()
+    assert (host.decoded(at, encode(message)) is not None) == heard
+    assert host.undecodable == (0 if heard else 1)

@@ -1,0 +1,132 @@
+"""The fleet's own certificate authority: EC P-256 keys and X.509 certificates (RFC 5280), by `cryptography`.
+
+Only a router's certificate serves: a robot's own cannot stand for a router, whatever address it takes.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePrivateKey, generate_private_key
+from cryptography.hazmat.primitives.hashes import SHA256
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from msgspec import Struct
+
+from protocol.mission import Refused
+
+CA_DAYS = 3650.0
+BACKDATED = timedelta(hours=1)
+"""A machine whose clock is a little behind takes a fresh certificate too."""
+RENEW_BEFORE = timedelta(days=30)
+
+
+class Authority(Struct, frozen=True):
+    """Who signs."""
+
+    certificate: x509.Certificate
+    key: EllipticCurvePrivateKey
+
+
+def found(certificate: Path, key: Path, fleet: str) -> None:
+    """A new authority, in two files."""
+    private = generate_private_key(SECP256R1())
+    name = _name(f"lfa fleet {fleet}")
+    usage = x509.KeyUsage(False, False, False, False, False, True, True, False, False)
+    signed = (
+        _begun(name, name, private, CA_DAYS)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(usage, critical=True)
+        .sign(private, SHA256())
+    )
+    write_key(key, private)
+    _write_certificate(certificate, signed)
+
+
+def load(certificate: Path, key: Path) -> Authority:
+    """Raises Refused when the files hold no authority of ours."""
+    try:
+        private = load_pem_private_key(key.read_bytes(), None)
+        signed = x509.load_pem_x509_certificate(certificate.read_bytes())
+    except (OSError, ValueError, TypeError) as error:
+        raise Refused(f"{certificate}, {key}: {error}, must be a fleet's authority (lfa keys init)") from None
+    if not isinstance(private, EllipticCurvePrivateKey) or private.public_key() != signed.public_key():
+        raise Refused(f"{key}: does not belong to {certificate}")
+    return Authority(signed, private)
+
+
+def issue(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...], days: float) -> None:
+    """A new key and certificate at `stem`.key and .pem; one with `addresses` (names or IPs) may serve there."""
+    private = generate_private_key(SECP256R1())
+    usages = [ExtendedKeyUsageOID.CLIENT_AUTH] + ([ExtendedKeyUsageOID.SERVER_AUTH] if addresses else [])
+    signed = (
+        _begun(_name(common_name), ca.certificate.subject, private, days)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(x509.ExtendedKeyUsage(usages), critical=False)
+        .add_extension(x509.SubjectAlternativeName(_names(addresses or (common_name,))), critical=False)
+        .sign(ca.key, SHA256())
+    )
+    write_key(stem.with_name(f"{stem.name}.key"), private)
+    _write_certificate(stem.with_name(f"{stem.name}.pem"), signed)
+
+
+def fits(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...]) -> bool:
+    """Whether what lies at `stem` is by this authority, says this, and lasts a while (or half its life) longer."""
+    try:
+        found = x509.load_pem_x509_certificate(stem.with_name(f"{stem.name}.pem").read_bytes())
+        private = load_pem_private_key(stem.with_name(f"{stem.name}.key").read_bytes(), None)
+        found.verify_directly_issued_by(ca.certificate)
+        said = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except (OSError, ValueError, TypeError, InvalidSignature, x509.ExtensionNotFound):
+        return False
+    life = found.not_valid_after_utc - found.not_valid_before_utc
+    left = found.not_valid_after_utc - datetime.now(UTC)
+    same = list(said) == _names(addresses or (common_name,)) and found.subject == _name(common_name)
+    return same and private.public_key() == found.public_key() and left > min(RENEW_BEFORE, life / 2)
+
+
+def write_key(path: Path, key: EllipticCurvePrivateKey) -> None:
+    """PKCS8, 0600 from the first byte on."""
+    text = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    with suppress(FileNotFoundError):
+        path.unlink()
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(text)
+
+
+def _write_certificate(path: Path, certificate: x509.Certificate) -> None:
+    path.write_bytes(certificate.public_bytes(Encoding.PEM))
+
+
+def _begun(subject: x509.Name, issuer: x509.Name, key: EllipticCurvePrivateKey, days: float) -> x509.CertificateBuilder:
+    now = datetime.now(UTC)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - BACKDATED)
+        .not_valid_after(now + timedelta(days=days))
+    )
+
+
+def _name(common_name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
+
+
+def _names(addresses: tuple[str, ...]) -> list[x509.GeneralName]:
+    """IP addresses as such, everything else as a name in DNS."""
+    names: list[x509.GeneralName] = []
+    for address in addresses:
+        try:
+            names.append(x509.IPAddress(ip_address(address)))
+        except ValueError:
+            names.append(x509.DNSName(address))
+    return names

@@ -1,0 +1,261 @@
+"""A fleet's certificates, passwords and rules on disk: made, renewed, revoked, and laid out a folder a machine.
+
+    DIR/ca.pem, ca.key       the fleet's own authority; the key never leaves the operator's machine
+    DIR/fleet.json           who joins where, under which common name (no secrets)
+    DIR/issued/              certificate, key and password of everybody
+    DIR/hosts/a/             all that machine `a` needs, and no more: `scp -r DIR/hosts/a a:/etc/lfa/keys`
+        ca.pem, host-a.*     of its router and supervisor (the only certificates that serve)
+        robot1.pem .key .password   of those who run there, of operator and recorder
+        access.json, users   what its router lets pass with `--secure`
+
+For `lfa up` and others who call it:
+
+    plan = spread("fleet", hosts={"a": ("10.0.0.1",), "b": ("10.0.0.2",)}, robots=range(1, 13))
+    make(folder, plan)                       # as often as one likes: only what is missing, expiring or misplaced
+    folder_of(folder, "a")                   # to be copied to machine a, and given to its processes as --keys
+    revoke(folder, ["robot3"]); rotate(folder, ["robot4"])
+
+A process there takes `--keys /etc/lfa/keys` and is who its name says (`protocol/credentials.py`); `lfa-router --keys
+DIR` serves `tls/` and `quic/`, with `--secure` under the rules. Files are 0600, folders 0700.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct, structs
+
+from deploy.fleet import authority
+from deploy.fleet.access import Plan, driver_of, host_name, rules, sayable
+from protocol.credentials import ACCESS_FILE, CA_FILE, USERS_FILE, validity
+from protocol.mission import WITNESS_NAME, Refused, robot_name
+from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
+
+REGISTRY, ISSUED, HOSTS, CA_KEY = "fleet.json", "issued", "hosts", "ca.key"
+DAYS = 365.0
+KINDS = ("pem", "key", "password")
+
+
+class Registry(Struct, frozen=True):
+    """`fleet.json`."""
+
+    plan: Plan
+    common_names: dict[str, str] = {}
+    """Of those who are let in: what their certificates say. After a revocation never the same again."""
+    revoked: dict[str, int] = {}
+    """How often each was."""
+
+    def members(self) -> list[str]:
+        return [*map(host_name, self.plan.hosts), *self.plan.places]
+
+
+class Shown(Struct, frozen=True):
+    """One line of `lfa keys show`."""
+
+    name: str
+    state: str
+    """`valid`, `expired` or `revoked`."""
+    common_name: str
+    until: str
+    """UTC."""
+    joins_at: tuple[str, ...]
+    says: tuple[str, ...]
+    """The key expressions that it may publish on."""
+
+
+def spread(
+    fleet: str,
+    hosts: Mapping[str, Sequence[str]],
+    robots: Iterable[int],
+    places: Mapping[str, Sequence[str]] | None = None,
+    drivers: Iterable[int] = (),
+) -> Plan:
+    """A plan: robots in turn over the machines, each with the next machine's router as its second.
+
+    `places` says otherwise for some (`{"robot3": ["b"]}`); `drivers` are the robots whose hardware is not the
+    world's. World and witness are on the first machine (a place for `witness` is that of one that runs alone),
+    operator and recorder may join anywhere. Raises Refused.
+    """
+    names = list(hosts)
+    if not names:
+        raise Refused("hosts: must be at least one machine")
+    drawn = {robot_name(robot): _turn(names, n) for n, robot in enumerate(robots)}
+    drawn[WORLD_NAME] = _turn(names, 0)
+    drawn |= {driver_of(robot_name(robot)): drawn.get(robot_name(robot), ()) for robot in drivers}
+    drawn |= {OPERATOR_NAME: tuple(names), RECORDER_NAME: tuple(names)}
+    for name, where in (places or {}).items():
+        strange = [host for host in where if host not in names]
+        if name not in (*drawn, WITNESS_NAME) or strange or not where:
+            raise Refused(f"place {name}={'+'.join(where)}: must be a member, at machines among {', '.join(names)}")
+        drawn[name] = tuple(where)
+        if driver_of(name) in drawn and driver_of(name) not in (places or {}):
+            drawn[driver_of(name)] = tuple(where)
+    if homeless := [name for name, where in drawn.items() if not where]:
+        raise Refused(f"drivers: {', '.join(homeless)} drives no robot of this fleet")
+    return Plan(fleet, {host: tuple(addresses) for host, addresses in hosts.items()}, drawn)
+
+
+def _turn(names: list[str], n: int) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((names[n % len(names)], names[(n + 1) % len(names)])))
+
+
+def make(folder: Path, plan: Plan, days: float = DAYS) -> list[str]:
+    """Everything that `plan` needs, in `folder`; whose certificates were made or renewed. Raises Refused."""
+    try:
+        _private_folder(folder)
+        known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
+        if known.plan.fleet != plan.fleet:
+            raise Refused(f"{folder}: holds the keys of fleet {known.plan.fleet!r}, give another folder")
+        if not (folder / CA_KEY).exists():
+            authority.found(folder / CA_FILE, folder / CA_KEY, plan.fleet)
+        registry = structs.replace(known, plan=plan)
+        return _lay_out(folder, registry, days, renew=())
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[str]:
+    """New keys and certificates for `names` (all when empty); who was revoked comes back, as a stranger to old keys.
+
+    Old ones stay valid until they expire, so that whoever runs goes on; `revoke` is for stolen ones. Raises Refused.
+    """
+    registry = load(folder)
+    chosen = list(names) or [name for name in registry.members() if name in registry.common_names]
+    _check_names(registry, chosen)
+    back = {name: f"{name}.{registry.revoked[name] + 1}" for name in chosen if name not in registry.common_names}
+    registry = structs.replace(registry, common_names=registry.common_names | back)
+    try:
+        return _lay_out(folder, registry, days, renew=chosen)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def revoke(folder: Path, names: Sequence[str]) -> list[str]:
+    """`names` leave all allow lists; the machines whose rules changed. Routers read them when they open: restart."""
+    registry = load(folder)
+    _check_names(registry, names)
+    count = {name: registry.revoked.get(name, 0) + 1 for name in names if name in registry.common_names}
+    left = {name: common for name, common in registry.common_names.items() if name not in names}
+    try:
+        _lay_out(folder, structs.replace(registry, common_names=left, revoked=registry.revoked | count), DAYS, renew=())
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    return list(registry.plan.hosts)
+
+
+def show(folder: Path, now_ms: int) -> list[Shown]:
+    """All members, as of the wall clock's `now_ms` [ms]. Raises Refused."""
+    registry, shown = load(folder), []
+    for name in registry.members():
+        common = registry.common_names.get(name)
+        until = validity(folder / ISSUED / f"{name}.pem")[1] if common else None
+        state = "revoked" if until is None else "expired" if until.timestamp() * 1000.0 < now_ms else "valid"
+        at = registry.plan.places.get(name, (name.removeprefix("host-"),))
+        text = "" if until is None else f"{until:%Y-%m-%d %H:%M}"
+        shown.append(Shown(name, state, common or "", text, at, tuple(sayable(name, registry.plan)) if common else ()))
+    return shown
+
+
+def folder_of(folder: Path, host: str) -> Path:
+    """What machine `host` needs."""
+    return folder / HOSTS / host
+
+
+def load(folder: Path) -> Registry:
+    """Raises Refused when `folder` holds no fleet's keys."""
+    path = folder / REGISTRY
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Registry)
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}, make it with: lfa keys init {folder}") from None
+    except msgspec.DecodeError as error:
+        raise Refused(f"{path}: {error}, must be what `lfa keys` wrote") from None
+
+
+def _check_names(registry: Registry, names: Sequence[str]) -> None:
+    strange = [name for name in names if name not in registry.members()]
+    if strange:
+        raise Refused(f"{strange[0]}: no member of fleet {registry.plan.fleet}, must be like robot1, world or host-a")
+
+
+def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]) -> list[str]:
+    """Issue what is missing, then write every machine's folder anew; who got a new certificate."""
+    issued = folder / ISSUED
+    for inner in (issued, folder / HOSTS):
+        _private_folder(inner)
+    ca = authority.load(folder / CA_FILE, folder / CA_KEY)
+    fresh = {name: name for name in registry.members() if name not in registry.revoked}
+    registry = structs.replace(registry, common_names=fresh | registry.common_names)
+    made = []
+    for name in registry.members():
+        stem = issued / name
+        common = registry.common_names.get(name)
+        if common is None:
+            _remove(stem)
+            continue
+        addresses = _addresses(name, registry.plan)
+        if name in renew or not authority.fits(stem, ca, common, addresses):
+            authority.issue(stem, ca, common, addresses, days)
+            made.append(name)
+        _password(stem.with_name(f"{name}.password"), common)
+    for host in registry.plan.hosts:
+        _lay_out_host(folder, registry, host)
+    _write(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
+    return made
+
+
+def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
+    plan, here = registry.plan, folder_of(folder, host)
+    _private_folder(here)
+    kept = [name for name in (*plan.kept_at(host), host_name(host)) if name in registry.common_names]
+    wanted = {CA_FILE, ACCESS_FILE, USERS_FILE} | {f"{name}.{kind}" for name in kept for kind in KINDS}
+    for path in here.iterdir():
+        if path.name not in wanted:
+            path.unlink()
+    _write(here / CA_FILE, (folder / CA_FILE).read_bytes())
+    for file in (f"{name}.{kind}" for name in kept for kind in KINDS):
+        _write(here / file, (folder / ISSUED / file).read_bytes())
+    joining = [name for name in (*plan.at(host), *map(host_name, plan.hosts)) if name in registry.common_names]
+    _write(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
+    _write(here / ACCESS_FILE, msgspec.json.format(msgspec.json.encode(rules(plan, host, registry.common_names))))
+
+
+def _addresses(name: str, plan: Plan) -> tuple[str, ...]:
+    """Where a router may be called; nobody else's certificate serves."""
+    for host, addresses in plan.hosts.items():
+        if name == host_name(host):
+            return tuple(dict.fromkeys((host, *addresses, "localhost", "127.0.0.1", "::1")))
+    return ()
+
+
+def _password(path: Path, common_name: str) -> None:
+    if not path.exists() or not path.read_text().startswith(f"{common_name}:"):
+        _write(path, f"{common_name}:{secrets.token_urlsafe(24)}\n".encode())
+
+
+def _remove(stem: Path) -> None:
+    for kind in KINDS:
+        stem.with_name(f"{stem.name}.{kind}").unlink(missing_ok=True)
+
+
+def _private_folder(path: Path) -> None:
+    path.mkdir(parents=True, exist_ok=True)
+    path.chmod(0o700)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """0600 from the first byte on, and whole or not at all."""
+    beside = path.with_name(f".{path.name}.new")
+    beside.unlink(missing_ok=True)
+    with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(data)
+    shutil.move(beside, path)
+
+
+def _unwritable(folder: Path, error: OSError) -> Refused:
+    return Refused(f"{error.filename or folder}: {error.strerror}, must be a folder that can be written")

@@ -1,0 +1,119 @@
+"""Who a process is on the wire: its certificate, its key and its password, as `lfa keys` lays them into one folder.
+
+Only the files are looked at here, without a library of cryptography: an agent stays light. Zenoh reads keys and
+certificates by itself; a secret is never held in a value that could be printed.
+"""
+
+from __future__ import annotations
+
+import binascii
+from datetime import UTC, datetime
+from pathlib import Path
+
+from msgspec import Struct
+
+from protocol.mission import Refused
+
+CA_FILE = "ca.pem"
+ACCESS_FILE = "access.json"
+USERS_FILE = "users"
+FOREIGN_BITS = 0o077
+CERTIFICATE_BYTES_MAX = 64 * 1024
+_BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
+_UTC_TIME, _CONTEXT_0 = 0x17, 0xA0
+
+
+class Credentials(Struct, frozen=True):
+    """Where the proof lies that one is `name`; `password_file` (`user:password`) is what secure routers ask for
+    besides, None where there is none."""
+
+    name: str
+    ca: Path
+    certificate: Path
+    key: Path
+    password_file: Path | None
+
+    def user_and_password(self) -> tuple[str, str] | None:
+        """Read anew at each use, so that it is part of no value."""
+        if self.password_file is None:
+            return None
+        user, _, password = self.password_file.read_text().strip().partition(":")
+        return user, password
+
+
+def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
+    """Those of `name` in `folder` (`ca.pem`, `<name>.pem`, `<name>.key` and perhaps `<name>.password`).
+
+    Raises Refused when one is missing, readable by others, or not valid at the wall clock's `wall_ms` [ms].
+    """
+    certificate, key, password = (folder / f"{name}.{kind}" for kind in ("pem", "key", "password"))
+    for path in (folder / CA_FILE, certificate):
+        check_valid(path, wall_ms)
+    for path in (key, password) if password.exists() else (key,):
+        check_private(path)
+    return Credentials(name, folder / CA_FILE, certificate, key, password if password.exists() else None)
+
+
+def check_private(path: Path) -> None:
+    """Raises Refused when others than the owner may read the file at `path`, or nobody can."""
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}, must be a file that `lfa keys` made") from None
+    if mode & FOREIGN_BITS:
+        raise Refused(f"{path}: others may read it (mode {mode & 0o777:04o}), must be 0600")
+
+
+def check_valid(path: Path, wall_ms: int) -> None:
+    """Raises Refused when the certificate at `path` is none, or not valid at the wall clock's `wall_ms` [ms]."""
+    begins, ends = validity(path)
+    now = datetime.fromtimestamp(wall_ms / 1000.0, UTC)
+    if now > ends:
+        raise Refused(f"{path}: expired on {ends:%Y-%m-%d %H:%M} UTC, renew it (lfa keys rotate)")
+    if now < begins:
+        raise Refused(f"{path}: valid only from {begins:%Y-%m-%d %H:%M} UTC, is this machine's clock right?")
+
+
+def validity(path: Path) -> tuple[datetime, datetime]:
+    """From when until when the certificate at `path` is valid. Raises Refused when it is none."""
+    try:
+        with path.open("rb") as file:
+            text = file.read(CERTIFICATE_BYTES_MAX)
+        return _validity(binascii.a2b_base64(text.partition(_BEGIN)[2].partition(_END)[0]))
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}, must be a certificate in PEM") from None
+    except (ValueError, IndexError):
+        raise Refused(f"{path}: must be a certificate in PEM") from None
+
+
+def _validity(der: bytes) -> tuple[datetime, datetime]:
+    """RFC 5280, 4.1: Certificate { TBSCertificate { [0] version, serial, signature, issuer, validity, .. } .. }."""
+    at = _element(der, _element(der, 0)[1])[1]
+    if der[at] == _CONTEXT_0:
+        at = _element(der, at)[2]
+    for _ in ("serial", "signature", "issuer"):
+        at = _element(der, at)[2]
+    begins = _element(der, at)[1]
+    return _time(der, begins), _time(der, _element(der, begins)[2])
+
+
+def _element(der: bytes, at: int) -> tuple[int, int, int]:
+    """Tag, start and end of the content of the element at `at` (X.690, 8.1)."""
+    length, start = der[at + 1], at + 2
+    if length >= 0x80:
+        start += length & 0x7F
+        length = int.from_bytes(der[at + 2 : start], "big")
+    if start + length > len(der):
+        raise ValueError("truncated")
+    return der[at], start, start + length
+
+
+def _time(der: bytes, at: int) -> datetime:
+    """UTCTime has years 1950 to 2049 in two digits (RFC 5280, 4.1.2.5), GeneralizedTime four."""
+    tag, start, end = _element(der, at)
+    text = der[start:end].decode("ascii")
+    if tag == _UTC_TIME:
+        text = ("19" if text[:2] >= "50" else "20") + text
+    year, *rest = int(text[:4]), *(int(text[n : n + 2]) for n in range(4, 14, 2))
+    month, day, hour, minute, second = rest
+    return datetime(year, month, day, hour, minute, second, tzinfo=UTC)

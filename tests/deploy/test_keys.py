@@ -1,0 +1,287 @@
+"""`lfa keys`: what lies where, who may say what, and what a rotation and a revocation change."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from deploy.fleet import authority, keys
+from deploy.fleet.access import Plan, rules, sayable
+from deploy.fleet.keyring import planned
+from protocol.credentials import check_valid, credentials, validity
+from protocol.mission import Refused
+from protocol.topics import TOPICS, Topic, matches
+from protocol.zenoh_bus import _check_listen
+from tests.processes.fleet import lfa
+
+DAY_MS = 86_400_000
+SPEAKS = {
+    "robot1": {"agent"},
+    "world": {"world", "witness", "driver"},
+    "driver3": {"driver"},
+    "operator": {"operator"},
+    "host-a": {"host"},
+    "recorder": set(),
+}
+
+
+def plan(robots: int = 3, **more: Any) -> Plan:
+    return keys.spread("f", {"a": ("10.0.0.1",), "b": ()}, range(1, robots + 1), **more)
+
+
+def may(name: str, key: str, within: Plan) -> bool:
+    return any(matches(said, key) for said in sayable(name, within))
+
+
+# --- who may say what ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
+@pytest.mark.parametrize("name", SPEAKS)
+def test_a_topic_may_be_said_by_its_publishers_and_by_nobody_else(name: str, topic: Topic) -> None:
+    said = any(key.split("/")[3] == topic.name for key in sayable(name, plan(drivers=[3])))
+    assert said == bool(SPEAKS[name] & set(topic.publishers))
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "allowed"),
+    [
+        ("robot1", "lfa/f/robot1/cmd_vel", True),
+        ("robot1", "lfa/f/robot2/cmd_vel", False),
+        ("robot1", "lfa/f/robot1/lease/gateway2", True),
+        ("robot1", "lfa/f/robot1/sensors", False),
+        ("robot1", "lfa/other/robot1/pose", False),
+        ("robot1", "lfa/f/robot1/alive/7", True),
+        ("robot1", "lfa/f/sim/truth", False),
+        ("world", "lfa/f/robot1/sensors", True),
+        ("world", "lfa/f/robot3/sensors", False),
+        ("world", "lfa/f/robot1/cmd_vel", False),
+        ("world", "lfa/f/sim/truth", True),
+        ("world", "lfa/f/witness/lease/robot1", True),
+        ("driver3", "lfa/f/robot3/sensors", True),
+        ("driver3", "lfa/f/robot3/lease/all", True),
+        ("driver3", "lfa/f/robot3/lease/robot1", False),
+        ("driver3", "lfa/f/robot3/pose", False),
+        ("driver3", "lfa/f/driver3/status", True),
+        ("operator", "lfa/f/operator/operator", True),
+        ("operator", "lfa/f/robot1/cmd_vel", False),
+    ],
+)
+def test_one_speaks_under_its_own_name(name: str, key: str, allowed: bool) -> None:
+    assert may(name, key, plan(drivers=[3])) == allowed
+
+
+def test_a_recorder_says_nothing() -> None:
+    assert sayable("recorder", plan()) == []
+
+
+def test_a_router_admits_from_a_neighbour_only_who_may_join_there() -> None:
+    within = plan(places={"robot1": ["a"], "robot2": ["b"], "robot3": ["b", "a"], "world": ["a"]})
+    guard = rules(within, "a", {name: name for name in (*within.places, "host-a", "host-b")})["access_control"]
+    said = {rule["id"]: rule["key_exprs"] for rule in guard["rules"]}
+    assert "lfa/f/robot2/pose" in said["say-host-b"] and "lfa/f/robot3/pose" in said["say-host-b"]
+    assert not [key for key in said["say-host-b"] if "robot1" in key or "world" in key or "sim" in key]
+    assert "say-robot3" in said and "say-robot2" not in said, "robot 3 may fail over to a, robot 2 may not"
+
+
+def test_every_rule_is_for_somebody_and_every_subject_has_rules() -> None:
+    guard = rules(plan(), "a", {name: name for name in (*plan().places, "host-a", "host-b")})["access_control"]
+    used = {rule for policy in guard["policies"] for rule in policy["rules"]}
+    assert used == {rule["id"] for rule in guard["rules"]}
+    assert {s for policy in guard["policies"] for s in policy["subjects"]} == {s["id"] for s in guard["subjects"]}
+    assert all(rule["permission"] == "allow" for rule in guard["rules"])
+    assert guard["enabled"] and guard["default_permission"] == "deny"
+
+
+# --- what lies where -------------------------------------------------------------------------------------------------
+
+
+def test_a_machine_has_the_keys_of_those_who_run_there_and_no_others(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan())
+    names = {path.stem for path in keys.folder_of(tmp_path / "k", "b").glob("*.key")}
+    assert names == {"host-b", "robot2", "operator", "recorder"}
+    assert not list((tmp_path / "k" / "hosts").rglob("ca.key"))
+
+
+def test_everything_secret_is_for_the_owner_only(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        keys.make(tmp_path / "k", plan())
+    finally:
+        os.umask(before)
+    files = [
+        path for path in (tmp_path / "k").rglob("*") if path.suffix in (".key", ".password") or path.name == "users"
+    ]
+    assert len(files) > 10
+    assert {stat.S_IMODE(path.stat().st_mode) for path in files} == {0o600}
+    assert {stat.S_IMODE(p.stat().st_mode) for p in (tmp_path / "k").rglob("*") if p.is_dir()} == {0o700}
+
+
+def test_making_again_keeps_everything(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan())
+    before = contents(tmp_path / "k")
+    assert keys.make(tmp_path / "k", plan()) == []
+    assert contents(tmp_path / "k") == before
+
+
+def test_a_plan_that_grows_adds_and_a_robot_that_moves_takes_its_keys_along(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan(2))
+    assert keys.make(tmp_path / "k", plan(3, places={"robot1": ["b"]})) == ["robot3"]
+    assert not (keys.folder_of(tmp_path / "k", "a") / "robot1.key").exists()
+    assert (keys.folder_of(tmp_path / "k", "b") / "robot1.key").exists()
+
+
+def test_what_expires_soon_or_serves_another_address_is_renewed(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan(1))
+    ca = authority.load(tmp_path / "k" / "ca.pem", tmp_path / "k" / "ca.key")
+    authority.issue(tmp_path / "k" / "issued" / "robot1", ca, "robot1", (), 0.001)
+    moved = keys.spread("f", {"a": ("10.0.0.9",), "b": ()}, [1])
+    assert sorted(keys.make(tmp_path / "k", moved)) == ["host-a", "robot1"]
+
+
+def test_a_rotation_renews_keys_and_keeps_names_and_passwords(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan())
+    before, at = contents(tmp_path / "k"), "issued/robot2"
+    assert keys.rotate(tmp_path / "k", ["robot2"]) == ["robot2"]
+    after = contents(tmp_path / "k")
+    assert after[f"{at}.key"] != before[f"{at}.key"] and after[f"{at}.pem"] != before[f"{at}.pem"]
+    assert after[f"{at}.password"] == before[f"{at}.password"]
+    assert after["hosts/b/robot2.key"] == after[f"{at}.key"]
+    assert after["issued/robot1.key"] == before["issued/robot1.key"]
+
+
+def test_a_revoked_robot_leaves_all_lists_and_comes_back_under_another_common_name(tmp_path: Path) -> None:
+    folder = tmp_path / "k"
+    keys.make(folder, plan())
+    keys.revoke(folder, ["robot3"])
+    assert not list(folder.rglob("robot3.*"))
+    for host in "ab":
+        access = json.loads((keys.folder_of(folder, host) / "access.json").read_text())["access_control"]
+        assert not [s for s in access["subjects"] if "robot3" in (s.get("cert_common_names"), *s.get("usernames", ()))]
+        assert not [r for r in access["rules"] if "/robot3/cmd_vel" in str(r["key_exprs"])]
+        assert "robot3" not in (keys.folder_of(folder, host) / "users").read_text()
+    assert keys.make(folder, plan()) == [], "making again must not let it in again"
+    assert keys.rotate(folder, ["robot3"]) == ["robot3"]
+    assert keys.load(folder).common_names["robot3"] == "robot3.2"
+    assert (keys.folder_of(folder, "a") / "robot3.password").read_text().startswith("robot3.2:")
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+# --- what a process makes of it --------------------------------------------------------------------------------------
+
+
+def test_the_validity_read_without_a_library_is_the_certificates(tmp_path: Path) -> None:
+    from cryptography import x509
+
+    keys.make(tmp_path / "k", plan(1))
+    for path in (tmp_path / "k").rglob("*.pem"):
+        certificate = x509.load_pem_x509_certificate(path.read_bytes())
+        assert validity(path) == (certificate.not_valid_before_utc, certificate.not_valid_after_utc)
+
+
+@pytest.mark.parametrize(("offset_days", "words"), [(400, "expired on"), (-2, "clock right?")])
+def test_a_certificate_out_of_its_time_is_refused(tmp_path: Path, offset_days: int, words: str) -> None:
+    keys.make(tmp_path / "k", plan(1))
+    path = tmp_path / "k" / "issued" / "robot1.pem"
+    now_ms = int(validity(path)[0].timestamp() * 1000.0) + DAY_MS
+    check_valid(path, now_ms)
+    with pytest.raises(Refused, match=words.replace("?", r"\?")):
+        check_valid(path, now_ms + offset_days * DAY_MS)
+
+
+def test_a_key_that_others_may_read_is_refused(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan(1))
+    home = keys.folder_of(tmp_path / "k", "a")
+    now_ms = int(validity(home / "robot1.pem")[0].timestamp() * 1000.0) + 1
+    assert credentials(home, "robot1", now_ms).name == "robot1"
+    (home / "robot1.key").chmod(0o640)
+    with pytest.raises(Refused, match=r"0640.*must be 0600"):
+        credentials(home, "robot1", now_ms)
+
+
+def test_credentials_that_are_printed_tell_no_secret(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan(1))
+    home = keys.folder_of(tmp_path / "k", "a")
+    now_ms = int(validity(home / "robot1.pem")[0].timestamp() * 1000.0) + 1
+    known = credentials(home, "robot1", now_ms)
+    login = known.user_and_password()
+    assert login is not None and login[1] not in repr(known)
+
+
+@pytest.mark.parametrize("junk", [b"", b"junk", b"-----BEGIN CERTIFICATE-----\nMIIB\n-----END CERTIFICATE-----\n"])
+def test_what_is_no_certificate_is_refused(tmp_path: Path, junk: bytes) -> None:
+    path = tmp_path / "x.pem"
+    path.write_bytes(junk)
+    with pytest.raises(Refused, match="must be a certificate in PEM"):
+        validity(path)
+
+
+def test_a_truncated_certificate_is_refused(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan(1))
+    whole = (tmp_path / "k" / "ca.pem").read_bytes().splitlines()
+    path = tmp_path / "x.pem"
+    for lines in range(1, len(whole) - 2):
+        path.write_bytes(b"\n".join((*whole[:lines], whole[-1])))
+        with pytest.raises(Refused, match="must be a certificate in PEM"):
+            validity(path)
+
+
+def test_a_secure_router_listens_at_nothing_plain(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match="not with --secure"):
+        _check_listen("tcp/127.0.0.1:7447", None, secure=True)
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+
+def test_init_show_revoke_as_one_types_them(tmp_path: Path) -> None:
+    folder = str(tmp_path / "k")
+    assert lfa("keys", "init", folder, "--robots", "2", "--hosts", "a=10.0.0.1+a.lan,b").returncode == 0
+    assert json.loads(lfa("keys", "revoke", folder, "robot2", "--json").stdout) == {
+        "revoked": ["robot2"],
+        "restart": ["a", "b"],
+    }
+    shown = {line["name"]: line for line in json.loads(lfa("keys", "show", folder, "--json").stdout)}
+    assert shown["robot2"]["state"] == "revoked" and shown["robot1"]["state"] == "valid"
+    assert shown["robot1"]["joins_at"] == ["a", "b"]
+    assert "lfa/fleet/robot1/pose" in shown["robot1"]["says"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("fleet", "a,a", 3, [], []), "each once"),
+        (("fleet", "a,b", 0, [], []), "--robots 0"),
+        (("fleet", "a,b", 3, ["robot9=a"], []), "robot9=a"),
+        (("fleet", "a,b", 3, ["robot1=c"], []), "robot1=c"),
+        (("fleet", "a,b", 3, [], [7]), "driver7"),
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused(options: Sequence[Any], words: str) -> None:
+    with pytest.raises(Refused, match=words):
+        planned(*options)
+
+
+@pytest.mark.parametrize("names", [["robot9"], ["robot1", "nobody"]])
+def test_strangers_are_refused_and_nothing_changes(tmp_path: Path, names: list[str]) -> None:
+    keys.make(tmp_path / "k", plan())
+    before = contents(tmp_path / "k")
+    for deed in (keys.revoke, keys.rotate):
+        with pytest.raises(Refused, match="no member of fleet f"):
+            deed(tmp_path / "k", names)
+    assert contents(tmp_path / "k") == before
+
+
+def test_a_folder_of_another_fleet_is_refused(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan())
+    with pytest.raises(Refused, match="holds the keys of fleet 'f'"):
+        keys.make(tmp_path / "k", keys.spread("g", {"a": ()}, [1]))

@@ -1,0 +1,157 @@
+"""A fleet behind a secured router, and what an attacker has: any certificate, any password, and Zenoh itself."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from deploy.bench.team import Team, endless
+from deploy.fleet import authority, keys
+from deploy.run.crew import ROUTER_NAME, Row
+from protocol import clock
+from protocol.credentials import Credentials, credentials
+from protocol.topics import RECORDER_NAME
+
+FLEET, ROBOTS = "secured", 3
+WHOLE_S, HEARD_S = 20.0, 5.0
+TRAITOR = "robot3"
+"""The robot whose keys the attacker has: the last of the chain."""
+REVOKED, ELSEWHERE = "robot4", "robot5"
+"""Members that do not run: one revoked, one whose place is machine `b`."""
+
+
+class Attacked:
+    """The fleet, the folders of keys, and how to reach its router."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.unix = ""
+        self.port = free_port()
+        self.tls = f"tls/127.0.0.1:{self.port}"
+        self.keys = folder / "keys"
+        places = {f"robot{n}": ["a"] for n in range(1, 5)} | {ELSEWHERE: ["b"], "world": ["a"]}
+        keys.make(self.keys, keys.spread(FLEET, {"a": (), "b": ()}, range(1, 6), places))
+        shutil.copytree(self.keys / "issued", folder / "stolen")
+        keys.revoke(self.keys, [REVOKED])
+        self.home = keys.folder_of(self.keys, "a")
+        self.team = Team(endless(ROBOTS), self._table, self._credentials(RECORDER_NAME), FLEET)
+
+    def _credentials(self, name: str) -> Credentials:
+        return credentials(self.home, name, clock.wall_ms())
+
+    def _table(self, usual: Sequence[Row], sockets: Path) -> list[Row]:
+        """Robot 2 joins over tls with its certificate, everybody else over the unix socket by password."""
+        self.unix = usual[0].arguments[-1]
+        listen = ("deploy.fleet.router", "--listen", self.unix, "--listen", self.tls, *self._keys(True))
+        rows = [Row(ROUTER_NAME, listen)]
+        for row in usual:
+            if row.name not in (ROUTER_NAME, RECORDER_NAME):
+                endpoint = self.tls if row.name == "robot2" else self.unix
+                told = (endpoint if word.startswith("unixsock") else word for word in row.arguments)
+                rows.append(Row(row.name, (*told, *self._keys(False)), again=row.again))
+        return rows
+
+    def _keys(self, secure: bool) -> tuple[str, ...]:
+        return ("--keys", str(self.home)) + (("--secure",) if secure else ())
+
+    def drives_on(self) -> None:
+        """Everybody is in one chain, whose first robot leads it, and all poses keep coming."""
+        self.team.wait_until(lambda: self.team.chain() == (1, 2, 3), "the fleet does not drive on", WHOLE_S)
+
+    # --- what an attacker opens -------------------------------------------------------------------------------------
+
+    def open(self, endpoint: str, name: str | None = TRAITOR, folder: Path | None = None, **more: Any) -> zenoh.Session:
+        """A session with the certificate and password of `name`, as `folder` has them."""
+        config: dict[str, Any] = {
+            "mode": "client",
+            "connect/endpoints": [endpoint],
+            "scouting/multicast/enabled": False,
+            "transport/link/tx/lease": 1000,
+        }
+        if name is not None:
+            at = folder or self.folder / "stolen"
+            user, _, password = (at / f"{name}.password").read_text().strip().partition(":")
+            config["transport/auth/usrpwd"] = {"user": user, "password": password}
+            config["transport/link/tls"] = tls(at.parent / "keys" / "ca.pem", at / name)
+        parsed = zenoh.Config()
+        for key, value in (config | more).items():
+            parsed.insert_json5(key, json.dumps(value))
+        return zenoh.open(parsed)
+
+    def refused(self, endpoint: str, name: str | None = TRAITOR, folder: Path | None = None, **more: Any) -> bool:
+        """Whether the router lets no such session in."""
+        try:
+            self.open(endpoint, name, folder, **more).close()
+        except zenoh.ZError:
+            return True
+        return False
+
+    def passes(self, attack: Callable[[zenoh.Session], object], listen: str, name: str = TRAITOR) -> bool:
+        """Whether somebody who hears all on `listen` hears the bytes `b"attack"` of what `attack` does.
+
+        Afterwards the attacker says something that it may say: when that has come, so would have the rest.
+        """
+        heard: list[tuple[str, bytes, bool]] = []
+
+        def hear(sample: zenoh.Sample) -> None:
+            deleted = sample.kind == zenoh.SampleKind.DELETE
+            heard.append((str(sample.key_expr), sample.payload.to_bytes(), deleted))
+
+        with self.open(self.unix, RECORDER_NAME) as onlooker, self.open(self.unix, name) as attacker:
+            onlooker.declare_subscriber(f"lfa/{FLEET}/{listen}", hear)
+            onlooker.declare_subscriber(f"lfa/{FLEET}/{name}/event", hear)
+            own = attacker.declare_publisher(f"lfa/{FLEET}/{name}/event")
+            until = clock.now() + HEARD_S
+            while not own.matching_status.matching and clock.now() < until:
+                clock.sleep(0.005)
+            attack(attacker)
+            own.put(b"done")
+            while not any(payload == b"done" for _, payload, _ in heard):
+                assert clock.now() < until, "what the attacker may say does not come either"
+                clock.sleep(0.005)
+        return any(payload[:6] == b"attack" or deleted for _, payload, deleted in heard)
+
+
+def tls(ca: Path, stem: Path) -> dict[str, Any]:
+    return {
+        "root_ca_certificate": str(ca),
+        "enable_mtls": True,
+        "connect_private_key": f"{stem}.key",
+        "connect_certificate": f"{stem}.pem",
+    }
+
+
+def forge(folder: Path, name: str, ca_folder: Path, days: float = 1.0) -> Path:
+    """A folder with the password of `name` and a certificate by the authority in `ca_folder`; the folder."""
+    folder.mkdir()
+    ca = authority.load(ca_folder / "ca.pem", ca_folder / "ca.key")
+    authority.issue(folder / name, ca, name, (), days)
+    shutil.copy(folder.parent / "stolen" / f"{name}.password", folder)
+    return folder
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextmanager
+def attacked() -> Iterator[Attacked]:
+    folder = Path(tempfile.mkdtemp(prefix="lfa-"))
+    try:
+        made = Attacked(folder)
+        with made.team:
+            made.team.await_chain(ROBOTS, WHOLE_S)
+            yield made
+    finally:
+        shutil.rmtree(folder)

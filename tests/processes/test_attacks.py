@@ -1,0 +1,287 @@
+"""Attacks on a secured fleet, each refused while the fleet drives on: the attacker has all of robot 3's keys."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import stat
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from deploy.fleet import authority, keys
+from protocol import clock
+from protocol.credentials import ACCESS_FILE
+from protocol.messages import MESSAGE_BYTES_MAX, Status, decode
+from protocol.topics import RECORDER_NAME, TOPIC
+from tests.processes.fleet import eventually
+from tests.processes.secured import ELSEWHERE, FLEET, REVOKED, TRAITOR, Attacked, attacked, forge, free_port, tls
+
+pytestmark = pytest.mark.processes
+
+BASE = f"lfa/{FLEET}"
+FLOOD_S = 3.0
+REPLAYED = 20
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[Attacked]:
+    with attacked() as made:
+        yield made
+
+
+@pytest.fixture
+def fleet(shared: Attacked) -> Iterator[Attacked]:
+    yield shared
+    shared.drives_on()
+
+
+# --- who is not let in -----------------------------------------------------------------------------------------------
+
+
+def test_no_certificate(fleet: Attacked) -> None:
+    nobody = {"transport/link/tls": {"root_ca_certificate": str(fleet.keys / "ca.pem")}}
+    assert fleet.refused(fleet.tls, None, **nobody)
+    assert not fleet.refused(fleet.tls), "nor is one with a certificate"
+
+
+def test_a_certificate_of_another_authority(fleet: Attacked, tmp_path: Path) -> None:
+    authority.found(tmp_path / "ca.pem", tmp_path / "ca.key", FLEET)
+    assert fleet.refused(fleet.tls, TRAITOR, forge(fleet.folder / "foreign", TRAITOR, tmp_path))
+
+
+def test_an_expired_certificate(fleet: Attacked) -> None:
+    assert fleet.refused(fleet.tls, TRAITOR, forge(fleet.folder / "expired", TRAITOR, fleet.keys, days=-0.01))
+    assert not fleet.refused(fleet.tls, TRAITOR, forge(fleet.folder / "fresh", TRAITOR, fleet.keys))
+
+
+def test_a_revoked_robots_old_keys(fleet: Attacked) -> None:
+    assert fleet.refused(fleet.tls, REVOKED)
+    assert fleet.refused(fleet.unix, REVOKED)
+
+
+def test_no_password_on_the_unix_socket(fleet: Attacked) -> None:
+    assert fleet.refused(fleet.unix, None)
+
+
+def test_a_wrong_password_on_the_unix_socket(fleet: Attacked) -> None:
+    guess = {"transport/auth/usrpwd": {"user": "robot1", "password": "guess"}}
+    assert fleet.refused(fleet.unix, None, **guess)
+
+
+def test_the_unix_socket_of_another_user(fleet: Attacked) -> None:
+    path = Path(fleet.unix.removeprefix("unixsock-stream/"))
+    assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0
+
+
+def test_plain_tcp_to_the_tls_port(fleet: Attacked) -> None:
+    assert fleet.refused(f"tcp/127.0.0.1:{fleet.port}")
+    with socket.create_connection(("127.0.0.1", fleet.port), timeout=5.0) as raw:
+        raw.sendall(b"\x00" * 4096)
+        assert raw.recv(4096)[:1] in (b"", b"\x15"), "anything but a TLS alert"
+
+
+def test_a_robots_certificate_in_the_routers_place(fleet: Attacked) -> None:
+    """Robot 3's computer listens as a router: nobody's session takes its certificate for one."""
+    endpoint, stolen = f"tls/127.0.0.1:{free_port()}", fleet.folder / "stolen"
+    own = tls(fleet.keys / "ca.pem", stolen / TRAITOR)
+    own |= {"listen_private_key": f"{stolen / TRAITOR}.key", "listen_certificate": f"{stolen / TRAITOR}.pem"}
+    config = {"mode": "router", "connect/endpoints": [], "listen/endpoints": [endpoint], "transport/link/tls": own}
+    with fleet.open("", TRAITOR, **config):
+        assert fleet.refused(endpoint, "robot1")
+
+
+# --- what is not passed on -------------------------------------------------------------------------------------------
+
+
+def put(key: str, payload: bytes = b"attack") -> Callable[[zenoh.Session], object]:
+    return lambda session: [session.put(f"{BASE}/{key}", payload) for _ in range(3)]
+
+
+FORGED = {
+    "robot1's pose": ("robot1/pose", "*/pose"),
+    "robot1's cmd_vel": ("robot1/cmd_vel", "*/cmd_vel"),
+    "robot1's lease to all": ("robot1/lease/all", "*/lease/*"),
+    "robot1's lease to robot2": ("robot1/lease/robot2", "*/lease/*"),
+    "the witness's lease": ("witness/lease/all", "*/lease/*"),
+    "all poses at once": ("*/pose", "*/pose"),
+    "all keys at once": ("**", "**"),
+    "robot1's sensors": ("robot1/sensors", "*/sensors"),
+    "its own sensors, which its hardware says": (f"{TRAITOR}/sensors", "*/sensors"),
+    "robot1's status": ("robot1/status", "*/status"),
+    "an operator's word": ("operator/operator", "*/operator"),
+    "another mission": ("world/mission", "*/mission"),
+    "ground truth": ("sim/truth", "sim/*"),
+}
+
+
+@pytest.mark.parametrize("attack", FORGED)
+def test_what_robot3s_keys_cannot_say(fleet: Attacked, attack: str) -> None:
+    forged, listen = FORGED[attack]
+    assert not fleet.passes(put(forged), listen)
+
+
+def test_what_robot3s_keys_can_say(fleet: Attacked) -> None:
+    """Or the table above would show nothing."""
+    assert fleet.passes(put(f"{TRAITOR}/obstacles"), "*/obstacles")
+
+
+def test_deleting_anothers_key(fleet: Attacked) -> None:
+    assert not fleet.passes(lambda session: session.delete(f"{BASE}/robot1/pose"), "*/pose")
+
+
+def test_an_oversized_message(fleet: Attacked) -> None:
+    longest = b"attack".ljust(MESSAGE_BYTES_MAX, b".")
+    assert fleet.passes(put(f"{TRAITOR}/obstacles", longest[:-100]), "*/obstacles")
+    assert not fleet.passes(put(f"{TRAITOR}/obstacles", longest + b"."), "*/obstacles")
+
+
+def test_the_password_of_one_with_the_certificate_of_another(fleet: Attacked) -> None:
+    mixed = fleet.folder / "mixed"
+    mixed.mkdir()
+    for kind, owner in (("pem", TRAITOR), ("key", TRAITOR), ("password", "robot1")):
+        shutil.copy(fleet.folder / "stolen" / f"{owner}.{kind}", mixed / f"mixed.{kind}")
+    heard: list[str] = []
+    with fleet.open(fleet.unix, RECORDER_NAME) as onlooker, fleet.open(fleet.tls, "mixed", mixed) as attacker:
+        onlooker.declare_subscriber(f"{BASE}/robot1/obstacles", lambda sample: heard.append(str(sample.key_expr)))
+        attacker.put(f"{BASE}/robot1/obstacles", b"attack")
+        assert not fleet.passes(put("robot1/obstacles"), "robot1/obstacles")
+    assert heard == []
+
+
+def test_a_forged_liveliness_token(fleet: Attacked) -> None:
+    with fleet.open(fleet.unix, RECORDER_NAME) as onlooker, fleet.open(fleet.unix) as attacker:
+        forged = attacker.liveliness().declare_token(f"{BASE}/robot1/alive/9")
+        real = attacker.liveliness().declare_token(f"{BASE}/{TRAITOR}/alive/9")
+        own = f"{BASE}/{TRAITOR}/alive/9"
+        eventually(lambda: _tokens(onlooker, own) == [own], "robot 3's own, said later, does not come either")
+        assert f"{BASE}/robot1/alive/9" not in _tokens(onlooker, f"{BASE}/robot1/alive/*")
+        forged.undeclare()
+        real.undeclare()
+
+
+def test_a_foreign_queryable(fleet: Attacked) -> None:
+    asked: list[str] = []
+    with fleet.open(fleet.unix, RECORDER_NAME) as onlooker, fleet.open(fleet.unix) as attacker:
+        attacker.declare_queryable(f"{BASE}/robot1/**", lambda query: asked.append(str(query.key_expr)))
+        assert not fleet.passes(put("robot1/pose"), "*/pose")
+        assert list(onlooker.get(f"{BASE}/robot1/status", timeout=1.0)) == []
+    assert asked == []
+
+
+def test_the_routers_inner_space(fleet: Attacked) -> None:
+    with fleet.open(fleet.unix) as attacker:
+        assert list(attacker.get("@/*/router", timeout=1.0)) == []
+        attacker.put("@/local/router/config/access_control/enabled", b"false")
+    assert not fleet.passes(put("robot1/pose"), "*/pose")
+
+
+def test_ground_truth_is_not_heard_by_a_robot(fleet: Attacked) -> None:
+    heard: set[str] = set()
+    with fleet.open(fleet.unix) as attacker:
+        attacker.declare_subscriber(f"{BASE}/**", lambda sample: heard.add(str(sample.key_expr)))
+        attacker.declare_subscriber(f"{BASE}/sim/truth", lambda sample: heard.add(str(sample.key_expr)))
+        eventually(lambda: len(heard) > 10, lambda: f"robot 3 hears no more than {heard}")
+    assert not [key for key in heard if "/sim/" in key]
+
+
+def test_a_neighbour_router_speaks_only_for_those_who_live_there(fleet: Attacked) -> None:
+    """Machine b is taken over whole: its router has no rules any more, and passes on whatever it is told."""
+    endpoint, home = f"unixsock-stream/{fleet.folder / 'b.sock'}", keys.folder_of(fleet.keys, "b")
+    (home / ACCESS_FILE).write_text('{"access_control": {"enabled": false}}')
+    command = [sys.executable, "-m", "deploy.fleet.router", "--keys", str(home), "--secure", "--listen", endpoint]
+    taken = subprocess.Popen([*command, "--connect", fleet.tls], stdout=subprocess.PIPE, text=True)
+    try:
+        assert taken.stdout is not None
+        taken.stdout.readline()
+        heard: set[str] = set()
+        with fleet.open(fleet.unix, RECORDER_NAME) as onlooker, fleet.open(endpoint, ELSEWHERE) as behind:
+            onlooker.declare_subscriber(f"{BASE}/*/obstacles", lambda sample: heard.add(str(sample.key_expr)))
+
+            def arrives() -> bool:
+                for robot in ("robot1", ELSEWHERE):
+                    behind.put(f"{BASE}/{robot}/obstacles", b"attack")
+                return f"{BASE}/{ELSEWHERE}/obstacles" in heard
+
+            eventually(arrives, "what those may say who live there does not come either")
+        assert heard == {f"{BASE}/{ELSEWHERE}/obstacles"}
+    finally:
+        taken.kill()
+        taken.communicate()
+
+
+# --- what is passed on, and harms nobody -----------------------------------------------------------------------------
+
+
+def test_old_messages_of_another_played_again_on_the_own_key(fleet: Attacked) -> None:
+    """Routers let robot 3 say them on its own key; every core sees that another signed them, and counts them."""
+    with fleet.open(fleet.unix) as attacker:
+        old: list[bytes] = []
+        statuses: list[Status] = []
+        attacker.declare_subscriber(f"{BASE}/robot1/lease/all", lambda sample: old.append(sample.payload.to_bytes()))
+        attacker.declare_subscriber(f"{BASE}/robot2/status", lambda sample: statuses.append(_status(sample)))
+        eventually(lambda: len(old) >= REPLAYED and bool(statuses), "no lease message of robot 1 comes")
+        before = statuses[-1].counters["undecodable"]
+        for payload in old[:REPLAYED]:
+            attacker.put(f"{BASE}/{TRAITOR}/lease/all", payload)
+            clock.sleep(0.002)
+        counted = before + REPLAYED / 2  # those that come in one batch are a flood to the router
+        eventually(lambda: statuses[-1].counters["undecodable"] >= counted, "robot 2 has not counted them")
+
+
+def test_old_messages_of_another_played_again_on_its_key(fleet: Attacked) -> None:
+    old: list[bytes] = []
+    with fleet.open(fleet.unix) as attacker:
+        attacker.declare_subscriber(f"{BASE}/robot1/lease/all", lambda sample: old.append(sample.payload.to_bytes()))
+        eventually(lambda: len(old) >= REPLAYED, "no lease message of robot 1 comes")
+    before = set(old)
+    heard: list[bytes] = []
+    with fleet.open(fleet.unix, RECORDER_NAME) as onlooker:
+        onlooker.declare_subscriber(f"{BASE}/robot1/lease/all", lambda sample: heard.append(sample.payload.to_bytes()))
+
+        def again(session: zenoh.Session) -> None:
+            for payload in old:
+                session.put(f"{BASE}/robot1/lease/all", payload)
+
+        assert not fleet.passes(again, "nothing")
+        eventually(lambda: len(heard) >= REPLAYED, "nor does what robot 1 itself says")
+    assert not before & set(heard)
+
+
+def test_a_flood(fleet: Attacked) -> None:
+    """As fast as it can, on its own keys and on others': nobody but robot 3 loses its place, and poses keep coming."""
+    poses = Counter[str]()
+    with fleet.open(fleet.unix, RECORDER_NAME) as onlooker, fleet.open(fleet.unix) as attacker:
+        onlooker.declare_subscriber(f"{BASE}/*/pose", lambda sample: poses.update([str(sample.key_expr)]))
+        keys_ = [f"{TRAITOR}/lease/all", f"{TRAITOR}/obstacles", f"{TRAITOR}/pose", "robot1/pose"]
+        flood = [attacker.declare_publisher(f"{BASE}/{key}") for key in keys_]
+        begun, sent = clock.now(), 0
+        while clock.now() < begun + FLOOD_S:
+            for publisher in flood * 25:
+                publisher.put(b"attack" * 30)
+            sent += len(flood) * 25
+            fleet.team.listen()
+            clock.sleep(0.001)  # about 70 000 a second: more would be a fight for this machine's processors
+        lasted_s = clock.now() - begun
+    print(f"{sent / lasted_s:.0f} messages/s, poses of robots: {dict(poses)}")
+    assert sent > 1000 * FLOOD_S
+    expected = TOPIC["pose"].rate_hz * lasted_s  # type: ignore[operator]
+    assert min(poses[f"{BASE}/robot{n}/pose"] for n in (1, 2)) > 0.6 * expected, poses
+    assert fleet.team.chain()[:2] in ((1, 2), ()), fleet.team.describe()
+    assert not [event for event in fleet.team.events if event.kind == "lease" and event.header.stamp > begun]
+
+
+def _status(sample: zenoh.Sample) -> Status:
+    status = decode(sample.payload.to_bytes(), Status)
+    assert isinstance(status, Status)
+    return status
+
+
+def _tokens(session: zenoh.Session, key: str) -> list[str]:
+    replies = session.liveliness().get(key, timeout=1.0)
+    return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
