@@ -66,23 +66,28 @@ def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> fl
         return inf
     sign = 1.0 if v > 0.0 else -1.0
     if abs(omega) <= STRAIGHT_RADPS * abs(v):
-        return min((_straight(sign * x, y, half_width_m) for x, y in points), default=inf)
+        return min((_straight(sign * x, y, half_width_m) for x, y in points if abs(y) < half_width_m), default=inf)
     radius = abs(v / omega)
     left = 1.0 if omega * sign > 0.0 else -1.0
-    return min((_bent(sign * x, left * y, radius, half_width_m) for x, y in points), default=inf)
+    center_y, inner_m, outer_m = left * radius, radius - half_width_m, radius + half_width_m
+    free_m = inf
+    for x, y in points:  # most points are off the bend: they are passed over without a call
+        from_center = hypot(x, y - center_y)
+        if inner_m < from_center < outer_m and from_center > 0.0:
+            free_m = min(free_m, _bent(sign * x, left * y, from_center, radius, half_width_m))
+    return free_m
 
 
 def _straight(x: float, y: float, half_width_m: float) -> float:
-    if x <= 0.0 or abs(y) >= half_width_m:
+    """The way along the x axis until the body's edge meets a point that is less than `half_width_m` off it."""
+    if x <= 0.0:
         return inf
     return max(0.0, x - sqrt(half_width_m * half_width_m - y * y))
 
 
-def _bent(x: float, y: float, radius: float, half_width_m: float) -> float:
-    """Forward motion on a left bend about (0, radius); the way until the body's edge meets the point."""
-    from_center = hypot(x, y - radius)
-    if abs(from_center - radius) >= half_width_m or from_center == 0.0:
-        return inf
+def _bent(x: float, y: float, from_center: float, radius: float, half_width_m: float) -> float:
+    """Forward motion on a left bend about (0, radius); the way until the body's edge meets the point, which is
+    `from_center` away from that centre and on the bend."""
     if hypot(x, y) < half_width_m:
         return inf if x <= 0.0 else 0.0
     # The body touches the point while the angle between them, seen from the bend's centre, is at most this.

@@ -28,6 +28,8 @@ LINK_LEASE_MS = LINK_LEASES_MS["std"]
 QUEUE_BATCHES = dict.fromkeys(("real_time", "interactive_high", "data", "background"), 16)
 """Zenoh's largest. With its 2 for what is express, a link that a busy machine leaves alone for a few milliseconds
 drops leases and commands: 70 to 370 of 7000 messages in 7 s at a load of 8 on 2 cores; with 16 none."""
+FOLLOWED_AT_ONCE = ("cmd_vel",)
+"""Not sent by themselves: the pose that each control step says next takes them along, one write for the two."""
 ROUTER_RX_THREADS = 32  # more than the tcp links that can die at once: each blocks one for 10 s (zenoh.md section 2)
 CLIENT_RX_THREADS = 4  # a client has one link at a time, and those it lost within the last 10 s
 UNIX_PATH_BYTES_MAX = 107
@@ -115,7 +117,7 @@ class ZenohBus:
             key,
             congestion_control=zenoh.CongestionControl.DROP,
             priority=_PRIORITY[topic.priority],
-            express=topic.priority == "real_time",
+            express=topic.priority == "real_time" and topic.name not in FOLLOWED_AT_ONCE,
         )
 
     def _subscribe(self, key: str) -> Any:
