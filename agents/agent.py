@@ -6,19 +6,18 @@ moment. A robot that becomes leader commands at once.
 
 from __future__ import annotations
 
-from math import floor, inf
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from agents.beliefs import Beliefs
 from agents.config import CONTROL_PERIOD_S
+from agents.distress import Distress
 from agents.driver import Driver
 from agents.orders import Orders
 from agents.reports import Reports, status
-from agents.stuck import POSE_LOST
 from agents.voice import Voice
-from protocol.geometry import STILL, Pose2D, Twist
+from protocol.geometry import STILL, Twist
 from protocol.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
 from protocol.messages import (
     NO_TERM,
@@ -48,12 +47,6 @@ if TYPE_CHECKING:
     from agents.mapping import Grid
 
 ASK_S = 0.5
-HANDOVER_S = 2.0
-"""At least between two hand-overs that a stuck leader asks for."""
-TRAP_M = 0.8
-"""Radius of the place that a stuck leader tells the others to keep out of."""
-PLACE_M = 1.0
-"""Side of the cell within which being stuck twice is being stuck in the same place."""
 
 
 class Agent:
@@ -70,13 +63,10 @@ class Agent:
         self._driver: Driver | None = None
         self._orders: Orders | None = None
         self._reports: Reports | None = None
+        self._distress: Distress | None = None
         self._next_ask = 0.0
         self._next_control = 0.0
         self._arrived = False
-        self._stuck: str | None = None
-        self._failed = False
-        self._next_handover = 0.0
-        self._given_up: list[tuple[int, int]] = []
         self._stopping = False
         self._interests = self._wanted()
         self.refusal: str | None = None
@@ -213,8 +203,7 @@ class Agent:
             assert self._orders is not None
             self._orders.order(str(note.arguments.get("side")), "operator", lease.chain[1:], lease.term, now)
         elif note.command == "handover":
-            self._command(STILL, Role.FOLLOWER, now)
-            self._apply(lease.request_handover(now), now)
+            self._hand_over(lease, now)
 
     def _forget(self, note: OperatorNote, now: float, lease: Lease) -> None:
         """Lives that are dead for good: the lease needs them no more for its next attempt (E20)."""
@@ -240,6 +229,7 @@ class Agent:
         self._mission = mission
         self._orders = Orders(self._voice, mission, self._driver.formation)
         self._reports = Reports(self._voice, len(mission.robots))
+        self._distress = Distress(self._id, mission, self._voice, self._beliefs)
         me = Member(self._id, self.incarnation)
         self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor)
         self._next_control = now
@@ -283,11 +273,13 @@ class Agent:
         chain = self._lease.chain
         place = chain.index(self._id) if self._id in chain else 0
         ahead = chain[place - 1] if place > 0 else None
+        if self._id not in chain and chain and self._driver.stuck is not None:
+            ahead = chain[-1]  # E22: closed over, it tries to come behind the last
         before = self._driver.predecessor
         self._driver.follow_robot(ahead, len(chain) - 1)
         if (before.robot if before is not None else None) != ahead:
             self._interests = self._wanted()
-            role = Role.FOLLOWER if place > 0 else Role.WAITING
+            role = Role.FOLLOWER if ahead is not None else Role.WAITING
             self._event("role", now, {"role": role.value, "predecessor": ahead}, self._lease.config.version.term)
 
     # --- control ----------------------------------------------------------------------------------------------------
@@ -295,7 +287,7 @@ class Agent:
     def _control(self, now: float) -> None:
         """One control step: where am I, what am I, where to, and say it."""
         assert self._lease is not None and self._driver is not None
-        assert self._reports is not None and self._orders is not None
+        assert self._reports is not None and self._orders is not None and self._distress is not None
         lease, driver = self._lease, self._driver
         known = driver.estimator.pose_at(now)
         if known is None:
@@ -312,50 +304,24 @@ class Agent:
         self._reports.obstacle(driver, pose, now)
         if role is Role.LEADER and driver.explore is not None:
             self._reports.plan(driver.explore, pose, now)
-        self._mind_stuck(role, pose, now, lease, driver)
-        self._mind_goal(role, lease, driver, now)
+        if self._distress.step(role, pose, lease, driver, now):
+            self._hand_over(lease, now)
+            return
         if role is Role.LEADER:
             self._orders.lead(driver.lead, lease.chain[1:], lease.term, now)
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
 
-    def _mind_stuck(self, role: Role, pose: Pose2D, now: float, lease: Lease, driver: Driver) -> None:
-        """A stuck robot says so; a leader gives the lease to the next in chain, once for each place (section 7)."""
-        if driver.stuck != self._stuck:
-            self._stuck = driver.stuck
-            self._event("stuck", now, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
-        if driver.stuck is None or role is not Role.LEADER or now < self._next_handover:
-            return
-        self._next_handover = now + HANDOVER_S
-        place = (floor(pose.x / PLACE_M), floor(pose.y / PLACE_M))
-        if driver.stuck == POSE_LOST:  # no fault of the place: it comes back with the hardware that starts again
-            if len(lease.chain) > 1:
-                self._command(STILL, Role.FOLLOWER, now)
-                self._apply(lease.request_handover(now), now)
-            return
-        if place in self._given_up or len(lease.chain) == 1:
-            self._event("failed", now, {"reason": f"robot {self._id} is stuck again: {driver.stuck}"})
-            self._next_handover = inf
-            return
-        self._given_up.append(place)
-        header = self._voice.header("obstacles", now)
-        self._voice.say("obstacles", ObstacleNote(header, "trap", pose.x, pose.y, TRAP_M))
+    def _hand_over(self, lease: Lease, now: float) -> None:
         self._command(STILL, Role.FOLLOWER, now)
         self._apply(lease.request_handover(now), now)
-
-    def _mind_goal(self, role: Role, lease: Lease, driver: Driver, now: float) -> None:
-        """A leader that has found its goal out of reach says so once: the mission has failed."""
-        failure = None if driver.explore is None else driver.explore.failure
-        if role is Role.LEADER and failure is not None and not self._failed:
-            self._failed = True
-            self._event("failed", now, {"reason": failure}, lease.term)
 
     def _role(self, lease: Lease) -> Role:
         if lease.role is Role.LEADER:
             return Role.LEADER
-        in_chain = self._id in lease.chain and lease.chain.index(self._id) > 0
-        return Role.FOLLOWER if in_chain and self._driver is not None and self._driver.predecessor else Role.WAITING
+        follows = self._driver is not None and self._driver.predecessor is not None
+        return Role.FOLLOWER if follows and self._id != (lease.chain or (0,))[0] else Role.WAITING
 
     def _command(self, twist: Twist, role: Role, now: float) -> None:
         """The gateway's stamp is read before the lease is checked (lease.md section 5): no stamp, no command."""

@@ -56,6 +56,11 @@ class Beliefs:
         row = known[0]
         return Pose2D(row.x, row.y, row.theta)
 
+    def stuck(self, robot: int, now: float) -> bool:
+        """Whether `robot` says that it is stuck; what it said long ago does not count."""
+        known = self._table.get(robot)
+        return known is not None and known[0].stuck and now - known[1] <= (TOPIC["table"].timeout_s or 0.0)
+
     def delays(self, robots: tuple[int, ...], now: float) -> tuple[Delay, ...]:
         """Least (receive - send) of these robots' rows: their half of a round trip (control.md 3.3)."""
         clocks = [(robot, self._clocks.get(robot)) for robot in robots]
@@ -66,14 +71,15 @@ class Beliefs:
         if note.kind == "moving" and (robot in self._told or len(self._told) < ROBOTS_MAX):
             self._told[robot] = (note, at)
 
-    def moving(self, seen: list[Feature], now: float) -> list[Feature]:
-        """`seen`, and what others saw moving elsewhere, as of `now`."""
+    def moving(self, seen: list[Feature], here: Pose2D, now: float) -> list[Feature]:
+        """`seen`, and what others saw moving elsewhere, as of `now`; not what is where this robot itself is."""
         known = list(seen)
         for note, at in self._told.values():
             if now - at <= TOLD_S:
                 vx, vy = note.twist_map
                 x, y = note.x + vx * (now - at), note.y + vy * (now - at)
-                if all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
+                own = hypot(x - here.x, y - here.y) < SAME_M
+                if not own and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
                     known.append(Feature("moving", x, y, note.radius_m, vx, vy))
         return known
 

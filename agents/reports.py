@@ -50,8 +50,8 @@ class Reports:
             self._tracking(driver, driver.predecessor.robot, now)
         if now >= self._next_table:
             self._next_table = now + self._table_s
-            header, delays = voice.header("table", now), beliefs.delays(near, now)
-            voice.say("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays))
+            header, delays, stuck = voice.header("table", now), beliefs.delays(near, now), driver.stuck is not None
+            voice.say("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck))
 
     def decision(self, decision: Decision | None, term: Term, now: float) -> None:
         """Each change of what a robot does about its surroundings, with the values that decided it."""

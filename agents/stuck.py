@@ -1,4 +1,4 @@
-"""When a robot is stuck: conditions S1 to S5 of control.md section 7, each with the reason in words."""
+"""When a robot is stuck: conditions S1 to S5 of control.md section 7, each with the reason in words; and until when."""
 
 from __future__ import annotations
 
@@ -17,6 +17,49 @@ POSE_LOST_S = 1.0
 POSE_LOST = "S5: own pose lost"
 TURN_S_MIN = 1.0
 """U-turns nearer together are one: an action that flickers."""
+FREED_M = 0.5
+"""So far from where it got stuck, a robot is free again,"""
+CALM_S = 5.0
+"""or when nothing has held it for so long."""
+
+
+class Plight:
+    """Whether one robot is stuck: from the first condition that holds until it is free again."""
+
+    def __init__(self, *, again: bool = True) -> None:
+        self._stuck = Stuck(again=again)
+        self._at: Pose2D | None = None
+        self._held_at = 0.0
+        self.reason: str | None = None
+
+    def begin(self, *, leading: bool) -> None:
+        """A new role. Whoever leads starts anew; who was stuck as leader is so still as a follower."""
+        self._stuck.reset()
+        if leading:
+            self.reason = None
+
+    def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> None:
+        """One control step on the way; arguments as of `Stuck.watch`."""
+        held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
+        if held is None:
+            self._ease(pose, now)
+            return
+        if self.reason is None or self._at is None:
+            self._at = pose
+        self.reason, self._held_at = held, now
+
+    def rest(self, pose: Pose2D, now: float) -> None:
+        """One control step in which nothing is wanted."""
+        self._stuck.reset()
+        self._ease(pose, now)
+
+    def _ease(self, pose: Pose2D, now: float) -> None:
+        if self.reason is None or self._at is None:
+            return
+        freed = hypot(pose.x - self._at.x, pose.y - self._at.y) >= FREED_M
+        if freed or now - self._held_at >= CALM_S or self.reason == POSE_LOST:
+            self.reason, self._at = None, None
+            self._stuck.reset()
 
 
 class Stuck:

@@ -53,7 +53,7 @@ SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 """How many seconds of the fastest clock one second of the slowest may last."""
 HELLO_HEARTBEATS = 3
 FORGET_GRANTS = 3
-"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
+"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E22)."""
 
 
 def gateway_of(robot_id: int) -> str:
@@ -74,6 +74,8 @@ class Lease:
         self.config: Config = first_config(mission)
         self.leader: int | None = None
         """Id of the holder of the newest term heard of; None once its lease has run out as seen from here."""
+        self.left_out: frozenset[int] = frozenset()
+        """Ids that a leader keeps out of its chain although they live: robots that are stuck (E22)."""
         self.released = False
         """A requested release is complete: the last words are out and the process may end."""
         self._timing = timing
@@ -544,10 +546,13 @@ class Lease:
             superseded = self._lives.get(member.id, -1) > member.incarnation
             return member == self.me or not (superseded or holder.silent(member, now, silence_s))
 
-        here = [m for m in config.chain if not self._is_down(m) and stays(m, timing.chain_silence_s)]
+        def out(member: Member) -> bool:
+            return self._is_down(member) or (member.id in self.left_out and member != self.me)
+
+        here = [m for m in config.chain if not out(m) and stays(m, timing.chain_silence_s)]
         asking = [m for m in holder.said_hello if not self._is_down(m) and stays(m, timing.chain_silence_s)]
         holder.said_hello.clear()
-        chain = (*here, *(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here))))
+        chain = (*here, *(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here)) and not out(m)))
         kept = tuple(m for m in config.voters if stays(m, timing.remove_silence_s))
         witness = next((m for m in (*kept, *asking) if m.id == WITNESS_ID), None)
         voters = chosen(kept, chain, witness)

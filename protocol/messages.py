@@ -276,6 +276,7 @@ class TableRow(Struct, frozen=True, array_like=True, tag="table"):
     odometer_m: float
     role: Role
     delays: tuple[Delay, ...] = ()
+    stuck: bool = False
 
 
 class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):

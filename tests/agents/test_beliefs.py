@@ -1,8 +1,13 @@
 """What a robot has heard of others is fresh, stale, or not believed."""
 
+from msgspec.structs import replace
+
 from agents.beliefs import TOLD_S, Beliefs
 from agents.features import Feature
+from protocol.geometry import Pose2D
 from protocol.messages import Header, ObstacleNote, Role, TableRow
+
+AWAY = Pose2D(-5.0, 0.0, 0.0)
 
 
 def row(seq: int, x: float, life: int = 1) -> TableRow:
@@ -32,19 +37,36 @@ def test_a_stale_row_is_no_place() -> None:
 def test_what_another_saw_moving_moves_on_and_is_forgotten() -> None:
     beliefs = Beliefs()
     beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
-    [feature] = beliefs.moving([], 0.5)
+    [feature] = beliefs.moving([], AWAY, 0.5)
     assert feature.x == 1.1
-    assert beliefs.moving([], TOLD_S + 0.1) == []
+    assert beliefs.moving([], AWAY, TOLD_S + 0.1) == []
 
 
 def test_what_one_sees_oneself_counts_once() -> None:
     beliefs = Beliefs()
     beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
     own = Feature("moving", 1.2, 0.1, 0.25, 0.2, 0.0)
-    assert beliefs.moving([own], 0.0) == [own]
+    assert beliefs.moving([own], AWAY, 0.0) == [own]
 
 
 def test_what_another_saw_standing_does_not_move() -> None:
     beliefs = Beliefs()
     beliefs.hear_obstacle(2, told("stationary", 1.0), 0.0)
-    assert beliefs.moving([], 0.1) == []
+    assert beliefs.moving([], AWAY, 0.1) == []
+
+
+def test_what_another_saw_moving_is_not_the_robot_itself() -> None:
+    beliefs = Beliefs()
+    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
+    assert beliefs.moving([], Pose2D(1.0, 0.1, 0.0), 0.0) == []
+    assert len(beliefs.moving([], AWAY, 0.0)) == 1
+
+
+def test_a_robot_is_stuck_as_long_as_it_says_so() -> None:
+    beliefs = Beliefs()
+    assert not beliefs.stuck(2, 0.0)
+    beliefs.hear_row(2, replace(row(1, 0.0), stuck=True), 1.0)
+    assert beliefs.stuck(2, 3.9)
+    assert not beliefs.stuck(2, 4.1)
+    beliefs.hear_row(2, row(2, 0.0), 4.2)
+    assert not beliefs.stuck(2, 4.2)

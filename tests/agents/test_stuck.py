@@ -1,6 +1,6 @@
 """S1 to S5: when a robot is stuck, and when it only waits."""
 
-from agents.stuck import CELL_ENTRIES, STILL_S, TURNS, WAITING_S, Stuck
+from agents.stuck import CALM_S, CELL_ENTRIES, FREED_M, STILL_S, TURNS, WAITING_S, Plight, Stuck
 from protocol.geometry import STILL, Pose2D, Twist
 
 AHEAD = Twist(0.4, 0.0)
@@ -67,3 +67,35 @@ def test_a_reset_forgets() -> None:
         stuck.watch(Pose2D(), AHEAD, None, 0.0, 0.02 * n)
     stuck.reset()
     assert stuck.watch(Pose2D(), AHEAD, None, 0.0, 4.02) is None
+
+
+def in_a_plight() -> Plight:
+    plight = Plight()
+    for n in range(150):
+        plight.watch(Pose2D(), STILL, "blocked", 0.0, 0.02 * n)
+    assert plight.reason is not None
+    return plight
+
+
+def test_who_is_stuck_is_so_until_it_is_half_a_metre_away() -> None:
+    plight = in_a_plight()
+    plight.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.1)
+    assert plight.reason is not None
+    plight.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.2)
+    assert plight.reason is None
+
+
+def test_or_until_nothing_has_held_it_for_a_while() -> None:
+    plight = in_a_plight()
+    plight.rest(Pose2D(), 2.9 + CALM_S)
+    assert plight.reason is not None
+    plight.rest(Pose2D(), 3.1 + CALM_S)
+    assert plight.reason is None
+
+
+def test_a_stuck_leader_is_stuck_as_a_follower_and_a_new_leader_begins_anew() -> None:
+    plight = in_a_plight()
+    plight.begin(leading=False)
+    assert plight.reason is not None
+    plight.begin(leading=True)
+    assert plight.reason is None

@@ -334,6 +334,19 @@ def test_e9_a_robot_that_was_out_returns_at_the_tail() -> None:
     assert team.changes() in ([], [(1, "BecomeLeader")]), "only the leader's own term may have been raised"
 
 
+def test_e22_a_robot_left_out_stays_out_though_it_asks_and_returns_at_the_tail() -> None:
+    team = Team()
+    team.lease_of(1).left_out = frozenset({2})
+    team.run(3.0)
+    assert team.lease_of(1).chain == team.lease_of(2).chain == team.lease_of(4).chain == (1, 3, 4)
+    assert len(team.lease_of(1).config.voters) == 5, "it lives: it votes"
+    team.lease_of(1).left_out = frozenset()
+    team.run(5.0)
+    assert team.lease_of(2).chain == team.lease_of(4).chain == (1, 3, 4, 2)
+    assert team.changes() in ([], [(1, "BecomeLeader")]), "only the leader's own term may have been raised"
+    assert team.safe()
+
+
 def test_e9_the_leader_that_was_killed_returns_at_the_tail() -> None:
     team = Team()
     team.kill(1)

@@ -1,0 +1,87 @@
+"""What a robot does about being stuck, its own plight and its team's (control.md section 7; rule E22).
+
+A leader that is stuck gives the lease to the next in chain, once for each place; the mission fails when it is stuck
+there again. A follower says that it is stuck; when the leader has waited for it long enough, the chain closes over it.
+It goes on trying to come behind the last of the chain, and is taken in again there when it is free.
+"""
+
+from __future__ import annotations
+
+from math import floor, inf
+
+from agents.beliefs import Beliefs
+from agents.driver import Driver
+from agents.stuck import POSE_LOST
+from agents.voice import Voice
+from protocol.geometry import Pose2D
+from protocol.lease import Lease
+from protocol.messages import ObstacleNote, Role
+from protocol.mission import Mission
+
+HANDOVER_S = 2.0
+"""At least between two hand-overs that a stuck leader asks for."""
+TRAP_M = 0.8
+"""Radius of the place that a stuck leader tells the others to keep out of."""
+PLACE_M = 1.0
+"""Side of the cell within which being stuck twice is being stuck in the same place."""
+
+
+class Distress:
+    """Of one robot; `step` after each control step."""
+
+    def __init__(self, robot_id: int, mission: Mission, voice: Voice, beliefs: Beliefs) -> None:
+        self._id = robot_id
+        self._robots = mission.robots
+        self._voice = voice
+        self._beliefs = beliefs
+        self._said: str | None = None
+        self._failed = False
+        self._next_handover = 0.0
+        self._given_up: list[tuple[int, int]] = []
+
+    def step(self, role: Role, pose: Pose2D, lease: Lease, driver: Driver, now: float) -> bool:
+        """Say what has changed. True when the lease is to be handed over now."""
+        if driver.stuck != self._said:
+            self._said = driver.stuck
+            self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
+        if role is not Role.LEADER:
+            lease.left_out = frozenset()
+            return False
+        lease.left_out = self._left_out(lease, driver, now)
+        failure = None if driver.explore is None else driver.explore.failure
+        if failure is not None:
+            self._fail(failure, lease, now)
+        return driver.stuck is not None and now >= self._next_handover and self._gives_up(pose, lease, driver, now)
+
+    def _left_out(self, lease: Lease, driver: Driver, now: float) -> frozenset[int]:
+        """The stuck ones that are out stay out; those within go once the leader has waited for them."""
+        within = () if driver.leading.waited_out else lease.chain
+        stuck = {robot for robot in self._robots if robot not in within and self._beliefs.stuck(robot, now)}
+        for robot in stuck & set(lease.chain) - lease.left_out:
+            self._event("left_out", now, lease, {"robot_left": robot})
+        return frozenset(stuck)
+
+    def _gives_up(self, pose: Pose2D, lease: Lease, driver: Driver, now: float) -> bool:
+        """Hand over, or fail."""
+        self._next_handover = now + HANDOVER_S
+        if driver.stuck == POSE_LOST:  # no fault of the place: it comes back with the hardware that starts again
+            return len(lease.chain) > 1
+        place = (floor(pose.x / PLACE_M), floor(pose.y / PLACE_M))
+        if place in self._given_up or len(lease.chain) == 1:
+            self._next_handover = inf
+            again = "stuck again" if place in self._given_up else "stuck, and nobody is left to lead"
+            self._fail(f"robot {self._id} is {again}: {driver.stuck}", lease, now)
+            return False
+        self._given_up.append(place)
+        header = self._voice.header("obstacles", now)
+        self._voice.say("obstacles", ObstacleNote(header, "trap", pose.x, pose.y, TRAP_M))
+        return True
+
+    def _fail(self, reason: str, lease: Lease, now: float) -> None:
+        """The mission has failed; said once."""
+        if not self._failed:
+            self._failed = True
+            self._event("failed", now, lease, {"reason": reason})
+
+    def _event(self, kind: str, now: float, lease: Lease, data: dict[str, object]) -> None:
+        self._voice.event(kind, now, lease.term, data)
