@@ -29,6 +29,8 @@ class Situation(Struct, frozen=True):
     rear_m: float = inf
     closest_m: float = inf
     """Closest approach predicted, of what moves."""
+    crept: bool = False
+    """It was crept towards for as long as is worth it."""
     crossable: bool = False
     """The wheels can bridge or climb it."""
     room_m: float = 0.5
@@ -80,7 +82,9 @@ TABLE: tuple[Row, ...] = (
     Row("pothole", "too large, a side is free", lambda s: _known(s) and _beside(s), "aside", ANGLE),
     Row("pothole", "its end is not in sight", _behind, "u_turn", ANGLE),
     Row("stationary", "a side is free", lambda s: _known(s) and _beside(s), "aside", MOTION),
-    Row("stationary", "both sides barred", _behind, "u_turn", MOTION),
+    Row("stationary", "both sides barred", lambda s: _known(s) and _behind(s), "u_turn", MOTION),
+    Row("stationary", "its end is not in sight", lambda s: not _known(s) and not s.crept, "creep", MOTION),
+    Row("stationary", "its end stays out of sight", lambda s: not _known(s) and _behind(s), "u_turn", MOTION),
     Row("bump", "low enough", lambda s: _known(s) and s.crossable, "climb", ANGLE),
     Row("bump", "too high, a side is free", _beside, "aside", ANGLE),
     Row("bump", "too high, both sides barred", _behind, "u_turn", ANGLE),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
+from math import hypot, sqrt
 from typing import Literal
 
 from msgspec import Struct
@@ -28,6 +28,9 @@ ANCHOR_S = 1.0
 """It moves when it is that fast now and was so on average over at least this long."""
 EDGE_M = 0.1
 """What reaches to within this of the end of sight is seen in part only: its centre would seem to move."""
+TOUCH_M = 0.35
+HIDDEN_RAD = 0.06
+"""Two neighbouring beams of a scan of 180 are half of this apart."""
 TRACKS_MAX = 64
 
 
@@ -40,6 +43,8 @@ class Feature(Struct, frozen=True, gc=False):
     radius_m: float
     vx: float = 0.0
     vy: float = 0.0
+    whole: bool = True
+    """Both its ends are in sight: its width is known."""
 
     def at(self, later_s: float) -> Point:
         """Where it is `later_s` from now."""
@@ -68,31 +73,53 @@ class Tracker:
 
     def __init__(self) -> None:
         self._tracks: list[_Track] = []
-        self._walls: list[Feature] = []
+        self._seen: list[tuple[list[Point], Feature | _Track]] = []
+        """The newest scan's things with their points."""
 
     def update(
         self, points_map: Sequence[Point], eye: Point, mates: Sequence[Point], mate_m: float, now: float
     ) -> None:
         """Points of one scan in beam order, seen from `eye`; what is within `mate_m` of a team-mate is left out."""
-        self._walls = []
+        self._seen = []
         self._tracks = [track for track in self._tracks if now - track.seen_at <= FORGET_S]
-        for cluster in _clusters(points_map):
+        clusters = _clusters(points_map)
+        for n, cluster in enumerate(clusters):
             x, y, radius_m = _circle(cluster, eye)
+            ends = (cluster[0], clusters[n - 1][-1]), (cluster[-1], clusters[(n + 1) % len(clusters)][0])
+            whole = len(clusters) == 1 or not any(_hidden(end, beside, eye) for end, beside in ends)
             if _extent(cluster) > (FLAT_WALL_M if _flat(cluster) else WALL_M):
-                self._walls.append(Feature("wall", x, y, radius_m))
-            elif any(hypot(px - eye[0], py - eye[1]) > SIGHT_M - EDGE_M for px, py in (cluster[0], cluster[-1])):
+                self._seen.append((cluster, Feature("wall", x, y, radius_m, whole=whole)))
+            elif _at_the_edge(cluster, eye) or any(
+                hypot(x - mx, y - my) < mate_m or _touches(cluster, mx, my) for mx, my in mates
+            ):
                 continue
-            elif not any(hypot(x - mx, y - my) < mate_m for mx, my in mates):
-                self._follow(x, y, radius_m, now)
+            elif not whole:  # what comes out from behind another thing would seem to move
+                self._seen.append((cluster, Feature("stationary", x, y, radius_m, whole=False)))
+            else:
+                track = self._follow(x, y, radius_m, now)
+                if track is not None:
+                    self._seen.append((cluster, track))
+
+    def nearest(self, x: float, y: float, now: float) -> tuple[Feature, float] | None:
+        """The thing of the newest scan that comes nearest to (x, y) in `map`, and how near that is [m]."""
+        apart = [
+            (min((px - x) ** 2 + (py - y) ** 2 for px, py in points), n) for n, (points, _) in enumerate(self._seen)
+        ]
+        if not apart:
+            return None
+        square, n = min(apart)
+        thing = self._seen[n][1]
+        return thing if isinstance(thing, Feature) else _feature(thing, now), sqrt(square)
 
     def features(self, now: float) -> list[Feature]:
         """All things as of `now`."""
-        return self._walls + [_feature(track, now) for track in self._tracks]
+        walls = [thing for _, thing in self._seen if isinstance(thing, Feature)]
+        return walls + [_feature(track, now) for track in self._tracks]
 
     def moving(self, now: float) -> list[Feature]:
         return [_feature(track, now) for track in self._tracks if track.moves()]
 
-    def _follow(self, x: float, y: float, radius_m: float, now: float) -> None:
+    def _follow(self, x: float, y: float, radius_m: float, now: float) -> _Track | None:
         best, best_m = None, SAME_M
         for track in self._tracks:
             dt = now - track.seen_at
@@ -100,9 +127,10 @@ class Tracker:
             if dt > 0.0 and apart < best_m:
                 best, best_m = track, apart
         if best is None:
-            if len(self._tracks) < TRACKS_MAX:
-                self._tracks.append(_Track(x, y, radius_m, now, [(now, x, y)]))
-            return
+            if len(self._tracks) >= TRACKS_MAX:
+                return None
+            self._tracks.append(_Track(x, y, radius_m, now, [(now, x, y)]))
+            return self._tracks[-1]
         dt = now - best.seen_at
         rx, ry = x - best.x - best.vx * dt, y - best.y - best.vy * dt
         best.x, best.y = x - (1.0 - ALPHA) * rx, y - (1.0 - ALPHA) * ry
@@ -111,6 +139,7 @@ class Tracker:
         best.seen_at = now
         if now - best.anchors[-1][0] >= ANCHOR_S:
             best.anchors = [best.anchors[-1], (now, best.x, best.y)]
+        return best
 
 
 def _clusters(points: Sequence[Point]) -> list[list[Point]]:
@@ -124,6 +153,24 @@ def _clusters(points: Sequence[Point]) -> list[list[Point]]:
     if len(runs) > 1 and hypot(runs[0][0][0] - runs[-1][-1][0], runs[0][0][1] - runs[-1][-1][1]) < GAP_M:
         runs[0] = runs.pop() + runs[0]
     return runs
+
+
+def _at_the_edge(cluster: Sequence[Point], eye: Point) -> bool:
+    return any(hypot(px - eye[0], py - eye[1]) > SIGHT_M - EDGE_M for px, py in (cluster[0], cluster[-1]))
+
+
+def _touches(cluster: Sequence[Point], x: float, y: float) -> bool:
+    """Some of it may be a team-mate at (x, y): as that one moves on, the rest would seem to move."""
+    return any((px - x) * (px - x) + (py - y) * (py - y) < TOUCH_M * TOUCH_M for px, py in cluster)
+
+
+def _hidden(end: Point, beside: Point, eye: Point) -> bool:
+    """A thing may go on behind another one that is nearer and hardly apart from its end as the eye sees them."""
+    far, near = hypot(end[0] - eye[0], end[1] - eye[1]), hypot(beside[0] - eye[0], beside[1] - eye[1])
+    if near > far - GAP_M:
+        return False
+    across = (end[0] - eye[0]) * (beside[1] - eye[1]) - (end[1] - eye[1]) * (beside[0] - eye[0])
+    return abs(across) < HIDDEN_RAD * near * far
 
 
 def _circle(cluster: Sequence[Point], eye: Point) -> tuple[float, float, float]:
@@ -156,4 +203,5 @@ def _feature(track: _Track, now: float) -> Feature:
     dt = now - track.seen_at
     if not track.moves():
         return Feature("stationary", track.x, track.y, track.radius_m)
-    return Feature("moving", track.x + track.vx * dt, track.y + track.vy * dt, track.radius_m, track.vx, track.vy)
+    x, y = track.x + track.vx * dt, track.y + track.vy * dt
+    return Feature("moving", x, y, track.radius_m, track.vx, track.vy)

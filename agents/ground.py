@@ -64,7 +64,8 @@ class Ground:
         self._seen_at: dict[tuple[int, int], float] = {}
         self._crossable: dict[tuple[int, int], float] = {}
         """Near edges of what can be crossed, and when they were seen last."""
-        self._kinds: dict[tuple[int, int], BarKind] = {}
+        self._kinds: dict[tuple[int, int], tuple[BarKind, float]] = {}
+        """Class and width [m] of the floor that bars a cell."""
         self.ahead: GroundFeature | None = None
         """The nearest feature that can be crossed and lies ahead."""
         self.decision: Decision | None = None
@@ -107,7 +108,7 @@ class Ground:
         count = ceil(2.0 * pi * radius_m / CELL_M)
         for n in range(count):
             angle = 2.0 * pi * n / count
-            self._bar_cell(x + radius_m * cos(angle), y + radius_m * sin(angle), kind, SEEN_MIN, now)
+            self._bar_cell(x + radius_m * cos(angle), y + radius_m * sin(angle), kind, 2.0 * radius_m, SEEN_MIN, now)
 
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
         """What bars the way nearer than `within_m`, in `base_link`."""
@@ -118,14 +119,14 @@ class Ground:
                 near.append((c * dx + s * dy, c * dy - s * dx))
         return near
 
-    def kind_near(self, x: float, y: float, within_m: float) -> BarKind | None:
-        """Class of the barred floor nearest to (x, y) in `map`."""
-        best, kind = within_m * within_m, None
+    def nearest(self, x: float, y: float, within_m: float) -> tuple[BarKind, float] | None:
+        """Class and width of the barred floor nearest to (x, y) in `map`."""
+        best, found = within_m * within_m, None
         for (i, j), seen in self._cells.items():
             apart = ((i + 0.5) * CELL_M - x) ** 2 + ((j + 0.5) * CELL_M - y) ** 2
             if seen >= SEEN_MIN and apart < best:
-                best, kind = apart, self._kinds[i, j]
-        return kind
+                best, found = apart, self._kinds[i, j]
+        return found
 
     def _barred(self) -> list[Point]:
         return [((i + 0.5) * CELL_M, (j + 0.5) * CELL_M) for (i, j), n in self._cells.items() if n >= SEEN_MIN]
@@ -147,17 +148,19 @@ class Ground:
         last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
         x = feature.near_m
         while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
-            self._bar_cell(pose_map.x + c * x - s * y, pose_map.y + s * x + c * y, feature.kind, 1, now)
+            self._bar_cell(
+                pose_map.x + c * x - s * y, pose_map.y + s * x + c * y, feature.kind, feature.width_m, 1, now
+            )
             x += profile.increment_m
 
-    def _bar_cell(self, x: float, y: float, kind: BarKind, seen: int, now: float) -> None:
+    def _bar_cell(self, x: float, y: float, kind: BarKind, width_m: float, seen: int, now: float) -> None:
         cell = floor(x / CELL_M), floor(y / CELL_M)
         if cell not in self._cells and len(self._cells) >= CELLS_MAX:
             return
         before = self._cells.get(cell, 0)
         if before < SEEN_MIN and now - self._seen_at.get(cell, -inf) > AGAIN_S:
             before = 0
-        self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, kind
+        self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, (kind, width_m)
 
 
 def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:

@@ -6,17 +6,22 @@ the way to its target has been free for a while.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import atan2, cos, hypot, inf, pi, sin
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from agents.perception import Point, free_along
-from protocol.geometry import Twist, wrap
+from agents.config import CONTROL_PERIOD_S
+from agents.decisions import Class, Row, Situation, decide
+from agents.perception import Point, free_along, sides
+from protocol.geometry import STILL, Twist, wrap
 from protocol.mission import Limits
 
 STEP_RAD = pi / 24
-SIDES_STEPS = 24
+ASIDE_STEPS, ALL_STEPS = 18, 30
+"""Directions up to 135 degrees off the wanted one lead past a thing, the others back; a side once taken reaches beyond
+the opposite direction, so that it does not flip there."""
 WIDE_M = 0.20
 """Kept from the body's surface where there is room."""
 NARROW_M = 0.08
@@ -29,6 +34,12 @@ CLEAR_S = 0.4
 HOLD_S = 1.0
 """A decision is held at least this long."""
 TURN_GAIN = 2.5
+BACK, AHEAD = Twist(-0.15, 0.0), Twist(1.0, 0.0)
+SKIN_M = 0.03
+SWING_M = 0.05
+"""Beside the radius: what the robot needs to turn on the spot."""
+CREEP_MPS, CREEP_S, CREEP_FREE_M = 0.1, 2.0, 0.25
+"""Towards what has no visible end, to see it, for a bounded time."""
 IN_PLACE_RAD = 0.9
 
 
@@ -36,20 +47,37 @@ class Decision(Struct, frozen=True):
     """What a detour does now, with the values that it was decided by, for the log."""
 
     action: str
-    """`left`, `right`, `u_turn`, `blocked`; of what moves: `slow`, `wait`, `back`."""
+    """`left`, `right`, `u_turn`, `back`, `creep`, `blocked`; of what moves: `slow`, `wait`, `back`; on the ground:
+    `overcome`, `climb`."""
     free_m: float
     """Clear way along the motion that was wanted."""
     bearing: float
     """Chosen direction in `base_link` [rad]."""
-    kind: str = "stationary"
-    """Class of what is met: `stationary`, `moving`, `wall`, `pothole`, `bump` or `ditch`."""
+    kind: Class = "stationary"
+    """Class of what is met."""
     condition: str = ""
     """The row of the decision table, by its condition, and what the decision updates (decisions.py)."""
     updates: str = ""
 
 
+class Thing(Struct, frozen=True):
+    """What bars the way."""
+
+    kind: Class = "stationary"
+    width_m: float = 0.0
+    """As far as seen; inf when its end is out of sight."""
+
+
+class _Openings(Struct, frozen=True):
+    """The open direction nearest to the wanted one on either side, and the one that leads back; None where none is."""
+
+    left: float | None
+    right: float | None
+    rear: float | None
+
+
 class Detour:
-    """Whether a robot goes its wanted way or round something, with hysteresis."""
+    """Whether a robot goes its wanted way or round something, by the decision table, with hysteresis."""
 
     def __init__(self, radius_m: float, limits: Limits) -> None:
         self._radius_m = radius_m
@@ -58,23 +86,38 @@ class Detour:
         """A leader turns more slowly than its drive could: its followers' slots swing with it."""
         self.decision: Decision | None = None
         """None while the wanted way is taken."""
+        self._thing = Thing()
         self._side = 0.0
+        self._side_at = -inf
+        self._acted_at = -inf
         self._clear_since: float | None = None
         self._since = -inf
+        self._crept_s = 0.0
 
     def steer(
-        self, points: Sequence[Point], target: Point, wanted: Twist, speed_mps: float, now: float
+        self,
+        points: Sequence[Point],
+        target: Point,
+        wanted: Twist,
+        speed_mps: float,
+        now: float,
+        thing: Callable[[float], Thing] = lambda free_m: Thing(),
     ) -> Twist | None:
-        """The twist of a detour towards `target` (both in `base_link`), or None: the wanted twist may go on."""
+        """The twist of a detour towards `target` (both in `base_link`), or None: the wanted twist may go on.
+
+        `thing` tells what bars the way so far ahead [m]; it is asked once, when the detour begins.
+        """
         blocked_m = self._blocked(points, wanted)
         if self.decision is None and blocked_m is None:
             return None
         if self.decision is None:
             self._since, self._clear_since = now, None
+            self._side, self._crept_s = 0.0, 0.0
+            self._thing = thing(inf if blocked_m is None else blocked_m)
         elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
             return None
-        return self._round(points, target, speed_mps, inf if blocked_m is None else blocked_m)
+        return self._round(points, target, speed_mps, inf if blocked_m is None else blocked_m, now)
 
     def _blocked(self, points: Sequence[Point], wanted: Twist) -> float | None:
         """The free way along `wanted` when it is too short, None when it is long enough."""
@@ -95,35 +138,93 @@ class Detour:
             self._clear_since = now
         return now - self._clear_since >= CLEAR_S
 
-    def _round(self, points: Sequence[Point], target: Point, speed_mps: float, free_m: float) -> Twist:
+    def _round(self, points: Sequence[Point], target: Point, speed_mps: float, free_m: float, now: float) -> Twist:
+        """The row of the table that holds, and the twist of its action."""
         towards = atan2(target[1], target[0])
         reach = min(max(hypot(*target), 0.3), REACH_M)
-        for margin_m in (WIDE_M, NARROW_M):
-            bearing = self._direction(points, towards, reach, self._radius_m + margin_m)
-            if bearing is not None:
-                break
-        if bearing is None:
-            self.decision = Decision("blocked", free_m, towards)
-            return Twist(0.0, 0.0)
-        offset = wrap(bearing - towards)
-        self._side = self._side if offset == 0.0 else (1.0 if offset > 0.0 else -1.0)
-        action = "u_turn" if abs(bearing) > 0.75 * pi else "left" if self._side > 0.0 else "right"
-        self.decision = Decision(action, free_m, bearing)
-        return self._towards(points, bearing, speed_mps)
+        openings = self._openings(points, towards, reach)
+        row = self._row(points, openings, free_m)
+        side = self._chosen_side(openings, towards, now)
+        twist = STILL
+        action, bearing = "blocked" if row is None else row.action, towards
+        match action:
+            case "aside":
+                bearing = (openings.left if side > 0.0 else openings.right) or 0.0
+                action = "left" if side > 0.0 else "right"
+                twist = self._towards(points, bearing, speed_mps)
+            case "u_turn" if (rear := openings.rear or self._rear(points, towards, reach)) is not None:
+                bearing = rear
+                twist = self._towards(points, bearing, speed_mps)
+            case "back" | "u_turn" if free_along(points, BACK, self._radius_m + SKIN_M) > SKIN_M:
+                action, bearing, twist = "back", pi, BACK
+            case "creep":
+                bearing = 0.0
+                twist = Twist(CREEP_MPS, 0.0) if free_m > CREEP_FREE_M else STILL
+                self._crept_s += CONTROL_PERIOD_S
+            case _:
+                action = "blocked"
+        self._say(action, free_m, bearing, row if action != "blocked" else None, now)
+        return twist
 
-    def _direction(self, points: Sequence[Point], towards: float, reach: float, half_width_m: float) -> float | None:
-        """The open direction nearest to `towards`; those on the side taken so far count as nearer."""
-        best, best_cost = None, inf
-        for n in range(SIDES_STEPS + 1):
-            offset = n * STEP_RAD
-            if offset >= best_cost:
-                break
-            for side in (1.0, -1.0):
-                cost = offset + (KEEP_SIDE_RAD if n > 0 and side * self._side < 0.0 else 0.0)
-                bearing = wrap(towards + side * offset)
-                if cost < best_cost and _open(points, bearing, reach, half_width_m):
-                    best, best_cost = bearing, cost
-        return best
+    def _row(self, points: Sequence[Point], openings: _Openings, free_m: float) -> Row | None:
+        """The table's row for what was met: an opening is as wide as the robot needs, whatever lies beside it."""
+        rear_m = sides(points)[2]
+        ahead_m = self._radius_m + min(free_m, free_along(points, AHEAD, self._radius_m))
+        kind = "stationary" if self._thing.kind == "moving" else self._thing.kind
+        return decide(
+            Situation(
+                kind,
+                ahead_m,
+                self._thing.width_m,
+                left_m=inf if openings.left is not None else 0.0,
+                right_m=inf if openings.right is not None else 0.0,
+                rear_m=inf if openings.rear is not None else rear_m - self._radius_m,
+                crept=self._crept_s >= CREEP_S,
+                swing_m=self._radius_m + SWING_M,
+            )
+        )
+
+    def _openings(self, points: Sequence[Point], towards: float, reach_m: float) -> _Openings:
+        """With room to spare where there is, else just not touching."""
+        for margin_m in (WIDE_M, NARROW_M):
+            half_width_m = self._radius_m + margin_m
+            left = _first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
+            right = _first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
+            if left is not None or right is not None:
+                return _Openings(left, right, None)
+        return _Openings(None, None, self._rear(points, towards, reach_m))
+
+    def _rear(self, points: Sequence[Point], towards: float, reach_m: float) -> float | None:
+        side = self._side or 1.0
+        for margin_m in (WIDE_M, NARROW_M):
+            half_width_m = self._radius_m + margin_m
+            rear = _first_open(points, towards, side, ASIDE_STEPS + 1, ALL_STEPS, reach_m, half_width_m)
+            if rear is not None:
+                return rear
+        return None
+
+    def _chosen_side(self, openings: _Openings, towards: float, now: float) -> float:
+        """The side that needs less turning; the one taken before counts as nearer, and is kept for a while."""
+        left = inf if openings.left is None else abs(wrap(openings.left - towards))
+        right = inf if openings.right is None else abs(wrap(openings.right - towards))
+        if left == right == inf:
+            return self._side
+        side = 1.0 if left + KEEP_SIDE_RAD * (self._side < 0.0) <= right + KEEP_SIDE_RAD * (self._side > 0.0) else -1.0
+        held = now - self._side_at < HOLD_S and (left if self._side > 0.0 else right) < inf
+        if side != self._side and not (held and self._side != 0.0):
+            self._side, self._side_at = side, now
+        return self._side
+
+    def _say(self, action: str, free_m: float, bearing: float, row: Row | None, now: float) -> None:
+        """What is logged keeps its name for a while, unless there is no way at all."""
+        before = self.decision
+        held = before is not None and now - self._acted_at < HOLD_S and "blocked" not in (action, before.action)
+        if before is not None and (held or action == before.action):
+            self.decision = replace(before, free_m=free_m, bearing=bearing)
+            return
+        self._acted_at = now
+        condition, updates = ("", "") if row is None else (row.name, row.updates)
+        self.decision = Decision(action, free_m, bearing, self._thing.kind, condition, updates)
 
     def _towards(self, points: Sequence[Point], bearing: float, speed_mps: float) -> Twist:
         omega_max = self.omega_max_radps
@@ -133,6 +234,17 @@ class Detour:
         free_m = free_along(points, Twist(1.0, 0.0), self._radius_m + NARROW_M)
         braking = (self._limits.a_max_mps2 * max(0.0, free_m - 0.1)) ** 0.5
         return Twist(min(speed_mps, braking) * cos(bearing), omega)
+
+
+def _first_open(
+    points: Sequence[Point], towards: float, side: float, first: int, last: int, reach_m: float, half_width_m: float
+) -> float | None:
+    """The open direction nearest to `towards` among steps `first` to `last` to one side of it."""
+    for n in range(first, last + 1):
+        bearing = wrap(towards + side * n * STEP_RAD)
+        if _open(points, bearing, reach_m, half_width_m):
+            return bearing
+    return None
 
 
 def _open(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: float) -> bool:

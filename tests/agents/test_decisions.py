@@ -21,6 +21,8 @@ CASES = [
     (S("pothole", 1.0, inf), "u_turn"),
     (S("stationary", 1.0, 0.4), "aside"),
     (S("stationary", 1.0, 0.4, left_m=0.1, right_m=0.1), "u_turn"),
+    (S("stationary", 1.0, inf), "creep"),
+    (S("stationary", 1.0, inf, crept=True), "u_turn"),
     (S("bump", 1.0, 0.1, crossable=True), "climb"),
     (S("bump", 1.0, 0.1), "aside"),
     (S("bump", 1.0, 0.1, left_m=0.1, right_m=0.1), "u_turn"),

@@ -56,16 +56,16 @@ def test_what_wheels_can_do_decides(feature: tuple[float, float, float], kind: s
         assert ground.points(Pose2D(), 2.0) == []
     else:
         assert ground.ahead is None
-        assert ground.kind_near(0.6, 0.0, 0.5) == kind
+        assert ground.nearest(0.6, 0.0, 0.5)[0] == kind
         assert ground.points(Pose2D(), 2.0) != []
 
 
 def test_a_hole_on_one_line_is_a_pothole() -> None:
-    assert looked_at(profile((0.5, 0.9, -0.2), lines=(1,))).kind_near(0.6, 0.0, 0.5) == "pothole"
+    assert looked_at(profile((0.5, 0.9, -0.2), lines=(1,))).nearest(0.6, 0.0, 0.5)[0] == "pothole"
 
 
 def test_a_hole_with_a_round_edge_is_a_pothole() -> None:
-    assert looked_at(profile((0.5, 0.9, -0.2), shift=-0.15)).kind_near(0.6, 0.0, 0.5) == "pothole"
+    assert looked_at(profile((0.5, 0.9, -0.2), shift=-0.15)).nearest(0.6, 0.0, 0.5)[0] == "pothole"
 
 
 def test_one_bad_reading_is_no_hole() -> None:
@@ -92,7 +92,7 @@ def test_a_missing_reading_is_neither_hole_nor_floor() -> None:
     rows = profile((0.5, 0.9, -0.2)).heights_m
     holed = tuple(tuple(nan if n == 12 else h for n, h in enumerate(row)) for row in rows)
     ground = looked_at(GroundProfile(HEADER, 0.1, STEP, (0.12, 0.0, -0.12), holed))
-    assert ground.kind_near(0.6, 0.0, 0.5) == "ditch"
+    assert ground.nearest(0.6, 0.0, 0.5)[0] == "ditch"
 
 
 def test_what_has_no_visible_end_is_judged_from_nearer_by() -> None:
