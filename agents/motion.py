@@ -1,4 +1,4 @@
-"""How a leader drives: along way-points or point to point, slow enough for all behind it, to rest at the goal.
+"""How a leader drives: along way-points, point to point or straight for the goal, to rest there.
 
 The route is known to every robot, and each keeps its own progress on it, so that whoever leads next goes on from
 where the team is.
@@ -79,12 +79,18 @@ class Lead:
         self._limits = limits
         self._route: Route | None = None
         self._planned = leading.motion == "explore"
+        self._reactive = leading.motion == "reactive"
+        self._from_m: float | None = None
         self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
         self._s = 0.0
 
     def track(self, pose: Pose2D) -> None:
         """Keep the progress up, leader or not."""
-        if self._route is None and self._planned:
+        if self._reactive:
+            straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
+            self._from_m = straight if self._from_m is None else self._from_m
+            self._s = max(self._s, self._from_m - straight)
+        if self._route is None and (self._planned or self._reactive):
             return
         if self._route is None:
             self._route = self._first_route(pose)
@@ -110,8 +116,13 @@ class Lead:
         return self._leading.route_m[-1]
 
     @property
+    def route(self) -> Route | None:
+        """None before the own pose is known, and for who drives without one."""
+        return self._route
+
+    @property
     def progress_m(self) -> float:
-        """Arc length of the route so far; 0 before the own pose is known."""
+        """Arc length of the route so far, or how much nearer the goal is; 0 before the own pose is known."""
         return self._s
 
     def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
@@ -137,20 +148,23 @@ class Lead:
 
     def ahead(self, pose: Pose2D, by_m: float = DETOUR_AHEAD_M) -> Point:
         """The point of the route `by_m` ahead, in `base_link`: where a detour is to lead back to."""
-        assert self._route is not None
-        return _in_base(pose, self._route.point(self._s + by_m))
+        if self._route is not None:
+            return in_base(pose, self._route.point(self._s + by_m))
+        x, y = in_base(pose, self.goal)
+        share = min(1.0, by_m / max(hypot(x, y), 1e-9))
+        return share * x, share * y
 
     def step(self, pose: Pose2D, twist: Twist, slots: Sequence[Slot], speed_max_mps: float) -> Twist:
         """The wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
         self.track(pose)
-        route = self._route
-        if route is None:
+        if self._route is None and not self._reactive:
             return Twist(0.0, 0.0)
         straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
         if straight <= 0.3 * self._leading.goal_tolerance_m:
             return Twist(0.0, 0.0)
-        near_end = route.length_m - self._s < self._look_ahead_m
-        target = _in_base(pose, self.goal if near_end else route.point(self._s + self._look_ahead_m))
+        left_m = straight if self._route is None else self._route.length_m - self._s
+        near_end = left_m < self._look_ahead_m
+        target = in_base(pose, self.goal) if near_end else self.ahead(pose, self._look_ahead_m)
         braking = (2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5
         v = min(self._cruise(slots), braking, speed_max_mps, abs(twist.linear_x) + 0.05)
         bearing = atan2(target[1], target[0])
@@ -173,8 +187,9 @@ class Lead:
         Backwards over the way that braking from cruise takes: nothing further ahead can matter, and a new leader's
         first command does not wait for the whole route.
         """
-        assert self._route is not None
         route, cruise = self._route, self._leading.cruise_mps
+        if route is None:
+            return cruise
         braking = 2.0 * BRAKING_SHARE * self._leading.acceleration_mps2
         first, last = route.segment(self._s), route.segment(self._s + cruise * cruise / braking)
         speed = cruise
@@ -192,7 +207,8 @@ class Lead:
         return Route(points)
 
 
-def _in_base(pose: Pose2D, point: Point) -> Point:
+def in_base(pose: Pose2D, point: Point) -> Point:
+    """`point` (in `map`) as seen from `pose`."""
     dx, dy = point[0] - pose.x, point[1] - pose.y
     c, s = cos(pose.theta), sin(pose.theta)
     return c * dx + s * dy, c * dy - s * dx

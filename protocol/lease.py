@@ -53,7 +53,7 @@ SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 """How many seconds of the fastest clock one second of the slowest may last."""
 HELLO_HEARTBEATS = 3
 FORGET_GRANTS = 3
-"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E22)."""
+"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
 
 
 def gateway_of(robot_id: int) -> str:

@@ -6,7 +6,8 @@ units; a value that no robot could obey is refused with one line that names the 
 
 from __future__ import annotations
 
-from math import inf, isfinite, pi
+from itertools import pairwise
+from math import hypot, inf, isfinite, pi
 from typing import Literal
 
 from msgspec import Struct
@@ -15,7 +16,7 @@ WITNESS_ID = 0
 WITNESS_NAME = "witness"
 
 Side = Literal["left", "right", "column", "zigzag"]
-Motion = Literal["path_following", "point_to_point", "explore"]
+Motion = Literal["path_following", "point_to_point", "trajectory", "reactive", "explore"]
 TieBreak = Literal["witness", "head", "none"]
 ColdStart = Literal["full_house", "majority"]
 Shrink = Literal["dynamic", "static"]
@@ -81,8 +82,13 @@ class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     """How a leader drives."""
 
     motion: Motion = "path_following"
+    """Along the way-points; straight to the goal and back to that line after a detour (`point_to_point`); along the
+    way-points by `times_s` (`trajectory`); wherever is free towards the goal, with no line to go back to (`reactive`);
+    or on a route of its own through ground that it maps (`explore`)."""
     route_m: tuple[tuple[float, float], ...] = ()
     """Way-points in `map`; the last is the goal."""
+    times_s: tuple[float, ...] = ()
+    """With `trajectory`: when each way-point is due, the first at 0. A new leader goes on from where it stands."""
     cruise_mps: float = 0.5
     acceleration_mps2: float = 0.5
     goal_tolerance_m: float = 0.10
@@ -166,12 +172,28 @@ def check_mission(mission: Mission) -> Mission:
             f"a number from {low:g} to {high:g}" if high < inf else f">= {low:g}",
         )
     _require(len(mission.leading.route_m) >= 1, "mission.leading.route_m", "[]", "at least one way-point [x, y]")
+    _check_times(mission.leading)
     for orientation in mission.leading.orientations:
         fine = isfinite(orientation.at_m) and orientation.at_m >= 0.0
         _require(fine, "mission.leading.orientations.at_m", orientation.at_m, ">= 0, metres along the route")
     for point in mission.leading.route_m:
         _require(all(isfinite(c) for c in point), "mission.leading.route_m", point, "finite coordinates [m]")
     return mission
+
+
+def _check_times(leading: Leading) -> None:
+    """A trajectory has a time for each way-point, and no leg that needs more than `cruise_mps`."""
+    times, points, where = leading.times_s, leading.route_m, "mission.leading.times_s"
+    if leading.motion != "trajectory":
+        _require(not times, where, list(times), 'left out without motion = "trajectory"')
+        return
+    _require(len(times) == len(points) >= 2, where, list(times), f"a time for each of the {len(points)} way-points")
+    rising = all(isfinite(b) and a < b for a, b in pairwise(times)) and times[0] == 0.0
+    _require(rising, where, list(times), "rising from 0")
+    for (a, b), (p, q) in zip(pairwise(times), pairwise(points), strict=True):
+        needed_mps = hypot(q[0] - p[0], q[1] - p[1]) / (b - a)
+        right = f"later: this leg needs {needed_mps:.2f} m/s, more than cruise_mps = {leading.cruise_mps:g}"
+        _require(needed_mps <= leading.cruise_mps, where, b, right)
 
 
 def _ranges(mission: Mission) -> list[tuple[str, float, float, float]]:

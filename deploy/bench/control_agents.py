@@ -158,7 +158,7 @@ def clock_errors() -> tuple[float]:
 def _let_wave(agent: Agent, lead: Lead) -> None:
     """No mission can ask a leader for a wave: what it drives is replaced once it has one."""
     assert agent._driver is not None
-    agent._driver.lead = lead
+    agent._driver.leading.lead = lead
 
 
 def _deviation(values: list[float]) -> float:

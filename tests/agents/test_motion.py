@@ -1,11 +1,12 @@
 """How a leader drives: progress on the route, rest at the goal, and bends that the whole chain can keep up with."""
 
-from math import hypot, pi
+from math import atan2, hypot, pi
 
 import pytest
 
 from agents.formation import slots_of
 from agents.motion import CORNER_RADIUS_M, Lead, Route
+from agents.timetable import Timetable
 from protocol.geometry import STILL, Pose2D, Twist, along_arc
 from protocol.mission import FormationSpec, Leading, Limits
 
@@ -69,6 +70,60 @@ def test_in_a_bend_the_leader_slows_for_the_outermost_follower() -> None:
     fastest_in_bend = max(t.linear_x for p, t in team if p.x > 7.0 and -1.0 < p.y < -0.5)
     assert max(t.linear_x for p, t in alone if p.x > 7.0 and -1.0 < p.y < -0.5) == pytest.approx(0.5, abs=0.01)
     assert fastest_in_bend < 0.4
+
+
+def test_reactive_goes_for_the_goal_from_wherever_it_is() -> None:
+    lead, pose = Lead(Leading(motion="reactive", route_m=CORNERED), LIMITS), Pose2D(3.0, 2.0, 0.0)
+    lead.begin(pose)
+    assert lead.route is None
+    x, y = lead.ahead(pose, 1.0)
+    assert hypot(x, y) == pytest.approx(1.0)
+    assert atan2(y, x) == pytest.approx(atan2(6.0, 5.0))
+    assert lead.progress_m == 0.0
+    lead.track(Pose2D(8.0, 7.0, 0.0))
+    assert lead.progress_m == pytest.approx(hypot(5.0, 6.0) - 1.0)
+
+
+TIMED = Leading(motion="trajectory", route_m=((0.0, 0.0), (2.0, 0.0), (8.0, 0.0)), times_s=(0.0, 8.0, 20.0))
+
+
+def timed(pause: tuple[float, float] = (99.0, 99.0)) -> dict[float, tuple[float, float]]:
+    """Of each half second: how far the leader has come, and how far it should be; it is held up during `pause`."""
+    lead, table, pose, twist = Lead(TIMED, LIMITS), Timetable(TIMED), Pose2D(), STILL
+    lead.begin(pose)
+    assert lead.route is not None
+    table.begin(lead.route, lead.progress_m, 0.0)
+    course = {}
+    for n in range(round(24.0 / DT)):
+        now = n * DT
+        course[now] = (pose.x, table.due_m(now))
+        wanted = lead.step(pose, twist, (), table.speed(lead.progress_m, now))
+        v = 0.0 if pause[0] <= now < pause[1] else max(twist.linear_x - DT, min(twist.linear_x + DT, wanted.linear_x))
+        twist = Twist(v, wanted.angular_z)
+        pose = along_arc(pose, twist, DT)
+    return course
+
+
+def test_a_trajectory_is_kept_to_by_the_clock() -> None:
+    course = timed()
+    late = [due - x for now, (x, due) in course.items() if 3.0 < now < 18.0]
+    assert max(map(abs, late)) < 0.3
+    assert course[20.0][0] == pytest.approx(8.0, abs=0.3)
+
+
+def test_a_delay_on_a_trajectory_is_made_up_for() -> None:
+    course = timed(pause=(2.0, 5.0))
+    assert course[5.0][1] - course[5.0][0] > 0.5
+    assert course[18.0][1] - course[18.0][0] < 0.3
+
+
+def test_a_new_leader_takes_the_trajectory_up_where_it_stands() -> None:
+    lead, table = Lead(TIMED, LIMITS), Timetable(TIMED)
+    lead.begin(Pose2D(2.0, 0.3, 0.0))
+    assert lead.route is not None
+    table.begin(lead.route, lead.progress_m, 500.0)
+    assert table.due_m(500.0) == pytest.approx(2.0, abs=0.01)
+    assert table.due_m(506.0) == pytest.approx(5.0, abs=0.01)
 
 
 def test_a_route_of_one_point_begins_where_the_robot_stands() -> None:

@@ -23,6 +23,18 @@ REFUSED = [
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, 0.0),), cruise_mps=3.0)), "mission.leading.cruise"),
 ]
 
+TIMED = Leading(motion="trajectory", route_m=((0.0, 0.0), (5.0, 0.0)), times_s=(0.0, 12.0))
+REFUSED += [
+    (msgspec.structs.replace(GOOD, leading=msgspec.structs.replace(TIMED, **wrong)), says)
+    for wrong, says in (
+        ({"times_s": ()}, "a time for each of the 2 way-points"),
+        ({"times_s": (1.0, 12.0)}, "rising from 0"),
+        ({"times_s": (0.0, float("nan"))}, "rising from 0"),
+        ({"times_s": (0.0, 8.0)}, "more than cruise_mps = 0.5"),
+        ({"motion": "path_following"}, "left out without"),
+    )
+]
+
 
 @pytest.mark.parametrize(("mission", "says"), REFUSED, ids=[says for _, says in REFUSED])
 def test_refused_in_one_line_that_names_the_field(mission: Mission, says: str) -> None:
@@ -34,3 +46,5 @@ def test_refused_in_one_line_that_names_the_field(mission: Mission, says: str) -
 
 def test_a_good_mission_is_taken_as_it_is() -> None:
     assert check_mission(GOOD) is GOOD
+    timed = msgspec.structs.replace(GOOD, leading=TIMED)
+    assert check_mission(timed) is timed

@@ -1,0 +1,130 @@
+"""What a leader wants: the mission's motion, slowed for the team behind it.
+
+Which motion it is (along a route, to a point, by a timetable, reactively, through unknown ground) is the mission's;
+that the team keeps up is the same for all (control.md sections 2.2 and 7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import atan2
+from typing import TYPE_CHECKING
+
+from agents.beliefs import Beliefs
+from agents.formation import Formation
+from agents.motion import Lead
+from agents.perception import Point, free_along
+from agents.safety import SKIN_M
+from protocol.geometry import STILL, Pose2D, Twist, distance
+from protocol.messages import Slot
+from protocol.mission import Mission
+
+if TYPE_CHECKING:
+    from agents.explore import Explore
+    from agents.timetable import Timetable
+
+GAP_SLOW = 1.5
+GAP_WAIT = 2.0
+"""Of k^d: the leader slows, then waits, while a gap of its chain is wider."""
+GAP_WAIT_S_MAX = 15.0
+LOOK_M = 2.0
+LEADER_OMEGA_MAX_RADPS = 0.6
+"""A slot at k^d = 1.2 m then swings at 0.7 m/s."""
+SWING_S, SWING_SHARE = 10.0, 0.7
+"""After an orientation request the leader goes at this share of its cruise speed for so long."""
+DETOUR_SHARE = 0.7
+NOSE_M, NOSE_RAD, NOSE_RADPS, NOSE_MPS = 0.05, 0.2, 0.5, 0.1
+"""Free way ahead, bearing of the route, and speeds when an explorer's nose is at a wall."""
+LOOK_ROUND_M = 0.35
+
+
+class Leadership:
+    """One robot's side of it; `begin` starts a reign."""
+
+    def __init__(self, mission: Mission, formation: Formation, beliefs: Beliefs) -> None:
+        self._mission = mission
+        self._formation = formation
+        self._beliefs = beliefs
+        self.lead = Lead(mission.leading, mission.limits)
+        self.explore: Explore | None = None
+        self._timetable: Timetable | None = None
+        if mission.leading.motion == "explore":
+            from agents.explore import Explore  # a map and a planner: memory that only explorers need
+
+            self.explore = Explore(mission)
+        elif mission.leading.motion == "trajectory":
+            from agents.timetable import Timetable
+
+            self._timetable = Timetable(mission.leading)
+        self._waiting_since: float | None = None
+        self._asked: dict[int, float] = {}
+        self._swings_until = 0.0
+        self.waited_out = False
+        """It has waited for its team as long as is allowed."""
+
+    @property
+    def waiting(self) -> bool:
+        """For its team, standing or slowly."""
+        return self._waiting_since is not None
+
+    def begin(self, pose: Pose2D, now: float) -> None:
+        """Leadership starts here."""
+        self._waiting_since, self.waited_out = None, False
+        self.lead.begin(pose)
+        if self._timetable is not None and self.lead.route is not None:
+            self._timetable.begin(self.lead.route, self.lead.progress_m, now)
+
+    def work(self, leads: bool, pose: Pose2D, mates: Callable[[float], Sequence[Pose2D]], now: float) -> None:
+        """One step's share of mapping and planning, where the ground is unknown."""
+        if self.explore is not None and self.explore.work(leads, pose, mates(now), now):
+            self.lead.take(self.explore.route, pose)
+
+    def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
+        """The wanted twist, and the speed that a detour may have."""
+        slots = [] if self._formation.trace else [self._formation.slot_of(robot) for robot in chain[1:]]
+        speed = self._mission.leading.cruise_mps
+        if self._timetable is not None:
+            speed = self._timetable.speed(self.lead.progress_m, now)
+        speed *= self._patience(chain, pose, now) * self._swing(slots, now)
+        return self.lead.step(pose, last, slots, speed), DETOUR_SHARE * speed
+
+    def target(self, pose: Pose2D) -> Point:
+        """Where a detour is to lead back to, in `base_link`."""
+        return self.lead.ahead(pose, min(LOOK_M, self.lead.remaining_m(pose)))
+
+    def exploring(self, points: list[Point], pose: Pose2D, wanted: Twist) -> Twist:
+        """Along the planned route; where the nose is at a wall, turned towards the route first, or backed away."""
+        if self.explore is None or not self.explore.route:
+            return STILL
+        half_width_m = self._mission.radius_m + SKIN_M
+        if wanted.linear_x <= 0.0 or free_along(points, wanted, half_width_m) > NOSE_M:
+            return wanted
+        x, y = self.lead.ahead(pose, LOOK_ROUND_M)
+        if abs(atan2(y, x)) > NOSE_RAD:
+            return Twist(0.0, NOSE_RADPS if y > 0.0 else -NOSE_RADPS)
+        return Twist(-NOSE_MPS, 0.0) if free_along(points, Twist(-1.0, 0.0), half_width_m) > NOSE_M else STILL
+
+    def _swing(self, slots: Sequence[Slot], now: float) -> float:
+        """Share of the cruise speed while the formation changes: the last robot's slot swings with all before it."""
+        asked = {slot.robot: slot.phi for slot in slots}
+        if any(self._asked.get(robot, phi) != phi for robot, phi in asked.items()):
+            self._swings_until = now + SWING_S
+        self._asked = asked
+        return SWING_SHARE if now < self._swings_until else 1.0
+
+    def _patience(self, chain: tuple[int, ...], pose: Pose2D, now: float) -> float:
+        """Share of the cruise speed that lets the team keep up: less while a gap is wide, 0 for a bounded time."""
+        ahead: Pose2D | None = pose
+        widest = 0.0
+        for robot in chain[1:]:
+            here = self._beliefs.pose_of(robot, now)
+            if here is not None and ahead is not None:
+                widest = max(widest, distance(ahead, here) / self._formation.slot_of(robot).separation_m)
+            ahead = here
+        if widest <= GAP_WAIT:
+            self._waiting_since, self.waited_out = None, False
+            return 1.0 if widest <= GAP_SLOW else 0.5
+        if self._waiting_since is None:
+            self._waiting_since = now
+        self.waited_out = now - self._waiting_since >= GAP_WAIT_S_MAX
+        return 0.5 if self.waited_out else 0.0

@@ -1,0 +1,57 @@
+"""Trajectory tracking: a route whose way-points are due at given times (the paper's second type of motion).
+
+Where the leader should be is a point that moves along the route; its speed is that point's, plus a share of how far the
+leader is behind it. A detour costs time that is made up for, as far as `cruise_mps` allows.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+
+from agents.motion import Route
+from protocol.mission import Leading
+
+GAIN_PER_S = 0.5
+LAG_M_MAX = 5.0
+"""Farther behind than this, hurrying on has no more effect."""
+
+
+class Timetable:
+    """Of one leader. Its clock starts when it begins to lead, at the time that is due where it stands."""
+
+    def __init__(self, leading: Leading) -> None:
+        self._leading = leading
+        self._at_m: list[float] = []
+        self._zero = 0.0
+
+    def begin(self, route: Route, progress_m: float, now: float) -> None:
+        """Take the trajectory up at `progress_m` along `route`."""
+        self._at_m, low = [], 0.0
+        for x, y in self._leading.route_m:
+            low = route.nearest(x, y, low)
+            self._at_m.append(low)
+        self._zero = now - _between(progress_m, self._at_m, self._leading.times_s)
+
+    def due_m(self, now: float) -> float:
+        """Arc length [m] of the point where the leader should be."""
+        return _between(now - self._zero, self._leading.times_s, self._at_m)
+
+    def speed(self, progress_m: float, now: float) -> float:
+        """Speed [m/s] for the next step, from 0 to `cruise_mps`."""
+        if not self._at_m:
+            return 0.0
+        due_m = self.due_m(now)
+        pace = (self.due_m(now + 0.5) - due_m) / 0.5
+        behind_m = min(due_m - progress_m, LAG_M_MAX)
+        return max(0.0, min(self._leading.cruise_mps, pace + GAIN_PER_S * behind_m))
+
+
+def _between(x: float, xs: Sequence[float], ys: Sequence[float]) -> float:
+    """Piecewise linear from `xs` to `ys`, clamped to the ends."""
+    if x <= xs[0]:
+        return ys[0]
+    if x >= xs[-1]:
+        return ys[-1]
+    n = bisect_right(xs, x) - 1
+    return ys[n] + (ys[n + 1] - ys[n]) * (x - xs[n]) / (xs[n + 1] - xs[n])
