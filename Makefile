@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-hosts test-hosts-short lint bench model clean setup
+.PHONY: demo test test-hosts test-hosts-short test-campaign lint bench model clean setup
 
 setup: $(STAMP)
 
@@ -26,6 +26,10 @@ test-hosts: $(STAMP)
 
 test-hosts-short: $(STAMP)
 	$(BIN)/python -m pytest -m 'hosts and not long' -rs tests/hosts
+
+# Such machines under drawn faults, round after round: LFA_ROUNDS of them (default 100, some 10 minutes).
+test-campaign: $(STAMP)
+	$(BIN)/python -m pytest -m campaign -rs -s tests/hosts
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

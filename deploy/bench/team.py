@@ -36,6 +36,8 @@ START_S_MAX = 20.0
 SPEAKING_S = 0.15
 """Whoever has sent no pose for this long is not there."""
 SETTLED_S = 0.5
+REST_MPS = 1e-3
+"""Who is no faster stands."""
 EVENTS_MAX = 4096
 TOPICS = ("event", "tracking", "pose", "truth")
 
@@ -56,6 +58,10 @@ def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
     formation = FormationSpec(separation_m=3.0)
     mission = Mission(tuple(range(1, robots + 1)), profile=profile, formation=formation, leading=leading)
     return Scenario("A bench's endless course", mission, 1e6, name="endless")
+
+
+def _name(whom: int | str) -> str:
+    return robot_name(whom) if isinstance(whom, int) else whom
 
 
 class Team:
@@ -88,6 +94,8 @@ class Team:
         self.tracking: list[Tracking] = []
         self.speeds_mps: dict[int, float] = {}
         """True speed of each robot, as the world last said."""
+        self.moved_at: dict[int, float] = {}
+        """When each robot last moved, by the world's stamp."""
         self._poses: dict[int, PoseStamped] = {}
         self._chains: dict[int, tuple[tuple[Any, ...], tuple[int, ...]]] = {}
 
@@ -116,11 +124,11 @@ class Team:
 
     # --- what can be done to it ------------------------------------------------------------------------------------
 
-    def signal(self, robot: int, number: signal.Signals) -> float:
-        """Signal an agent; the moment just before."""
-        at = clock.now()
-        if not self._crew.signal(robot_name(robot), number):
-            raise Broken(f"robot {robot} is not there to be signalled")
+    def signal(self, whom: int | str, number: signal.Signals) -> float:
+        """Signal an agent by its robot's id, or another process by its name; the moment just before."""
+        at, name = clock.now(), _name(whom)
+        if not self._crew.signal(name, number):
+            raise Broken(f"{name} is not there to be signalled")
         return at
 
     def process_of(self, name: str) -> Identity:
@@ -130,14 +138,15 @@ class Team:
             raise Broken(f"{name} does not run")
         return identity
 
-    def restart(self, *robots: int) -> None:
-        """Start agents again that have ended, with empty memory."""
-        for robot in robots:
-            name = robot_name(robot)
+    def restart(self, *ended: int | str) -> None:
+        """Start processes again that have ended: agents with empty memory, a world from where it was."""
+        for whom in ended:
+            name = _name(whom)
             if not self._crew.wait([name], START_S_MAX):
                 raise Broken(f"{name} does not end")
-            self._poses.pop(robot, None)  # what its earlier life said counts no more
-            self._chains.pop(robot, None)
+            if isinstance(whom, int):
+                self._poses.pop(whom, None)  # what its earlier life said counts no more
+                self._chains.pop(whom, None)
             self._crew.start(self._rows[name].restarted())
 
     def start(self, row: Row) -> None:
@@ -183,6 +192,8 @@ class Team:
                 self._poses[robot] = message
             case Truth():
                 self.speeds_mps = {robot.id: abs(robot.linear_x) for robot in message.robots}
+                moving = (robot for robot, speed_mps in self.speeds_mps.items() if speed_mps > REST_MPS)
+                self.moved_at |= dict.fromkeys(moving, message.header.stamp)
             case Tracking():
                 self.tracking.append(message)
             case Event():

@@ -66,6 +66,15 @@ def verify(folder: Path) -> Verdict:
     return Verdict(len(paths), len(happenings), tuple(Violation(v.name, v.at - began, v.text) for v in broken))
 
 
+def obeyed(folder: Path) -> Iterator[tuple[float, CmdVel]]:
+    """The commands of a run that gateways let through, and when; also of one that goes on."""
+    timing = timing_of(scenario_of(folder).mission.profile)
+    for path in sorted((folder / JOURNALS).glob(f"{WORLD_NAME}-*.bin")):
+        for happening in _happenings(path, timing):
+            if happening.words[0] == "obeys":
+                yield happening.at, happening.words[3]
+
+
 def _happenings(path: Path, timing: Timing) -> Iterator[Happening]:
     try:
         heading, entries = journal.read(path)

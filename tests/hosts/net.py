@@ -109,6 +109,11 @@ class Net:
         """Every tcp link of that host is reset with the next packet, until `heal`."""
         self._rules(host, "ip saddr != 127.0.0.1 meta l4proto tcp reject with tcp reset")
 
+    def lose(self, percent: int) -> None:
+        """So many of all packets between hosts are lost: on tcp links it shows as delay."""
+        for host in self.hosts:
+            self._rules(host, f"ip saddr != 127.0.0.1 numgen random mod 100 < {percent} drop")
+
     def heal(self) -> None:
         for host in self.hosts:
             self._inside(_name(host), "nft", f"add table {TABLE}; delete table {TABLE}")

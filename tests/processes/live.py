@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from deploy.bench.team import Team, endless
+from deploy.bench.team import REST_MPS, Team, endless
+from deploy.look.verify import obeyed
+from protocol import clock, journal
 from protocol.messages import Event, Term
+from protocol.mission import robot_name
+from protocol.timing import timing_of
+from protocol.topics import address
 
 ROBOTS = 4
 WHOLE_S = 15.0
@@ -38,3 +43,44 @@ def check_terms(live: Team) -> None:
 
 def _commands(live: Team) -> list[Event]:
     return sorted((e for e in live.events if e.kind == "leader_command"), key=lambda e: e.header.stamp)
+
+
+def pass_time(live: Team, for_s: float) -> None:
+    until = clock.now() + for_s
+    live.wait_until(lambda: clock.now() >= until, "the clock stands", for_s + WHOLE_S)
+
+
+# --- L7: a side without a quorum comes to rest ---------------------------------------------------------------------
+
+T_DR_S = 0.5
+LATE_S = 0.3
+"""What a busy machine may add before it moves bodies on; the bounds themselves are checked in virtual time."""
+
+
+def last_heard(live: Team, robot: int, topic: str, senders: Sequence[str]) -> float:
+    """When the robot last heard one of these on that topic, by its journal."""
+    lives = (live.folder / "run" / "journal").glob(f"{robot_name(robot)}-*.bin")
+    _, entries = journal.read(max(lives))
+    places = ((entry.at, address(entry.key)) for entry in entries if entry.key)
+    return max(at for at, where in places if where is not None and where.topic == topic and where.owner in senders)
+
+
+def check_minority(live: Team, side: Sequence[int], others: Sequence[int], led: bool) -> None:
+    """`side`, in the order of the chain, has been without a quorum for a while: L7 from what its first one heard last.
+
+    `led`: its first is the leader; otherwise that one's predecessor is the last of `others`.
+    """
+    timing = timing_of(live.scenario.mission.profile)
+    stop_s = live.scenario.mission.limits.v_max_mps / live.scenario.mission.limits.a_max_mps2
+    first = side[0]
+    if led:
+        voters = [robot_name(robot) for robot in (*others, 0)]
+        until = last_heard(live, first, "lease", voters) + timing.act_s + timing.deadman_s
+        commands = [at for at, cmd in obeyed(live.folder / "run") if cmd.as_leader and cmd.holder in side]
+        assert max(commands) <= until, f"robot {first} was obeyed {max(commands) - until:.3f} s too long"
+    else:
+        until = last_heard(live, first, "pose", [robot_name(others[-1])]) + T_DR_S
+    slowed_s = sum(e.data["stood_still_s"] for e in live.events if e.kind == "slowed")
+    late_s = live.moved_at[first] - until - stop_s - slowed_s
+    assert late_s <= LATE_S, f"robot {first} came to rest {late_s:.3f} s too late"
+    live.wait_until(lambda: all(live.speeds_mps[robot] <= REST_MPS for robot in side), "no rest behind it", WHOLE_S)
