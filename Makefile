@@ -39,6 +39,11 @@ lint: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/lfa bench lidar
 
+# A thousand schedules of faults on leases and gateways, and some on whole robots.
+fuzz: $(STAMP)
+	$(BIN)/lfa fuzz --seeds 1000 --jobs 2
+	$(BIN)/lfa fuzz --whole --seeds 60 --jobs 2
+
 model: $(STAMP)
 	$(BIN)/python -m tests.model
 
