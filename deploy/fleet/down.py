@@ -10,11 +10,12 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.fleet import host
+from deploy.fleet import host, journals
 from deploy.fleet.file import Plan
 from deploy.fleet.hosts import Fleet
 from deploy.fleet.part import parts
 from deploy.fleet.sight import Seen, Sight, find, first_word, sight
+from deploy.run.folder import JOURNALS
 from protocol import clock
 from protocol.mission import Refused
 
@@ -27,11 +28,14 @@ def command(
     file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
     fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Bring its journals into this folder (lfa replay).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
 ) -> int:
     began = clock.now()
     seen = find(file, fleet, connect)
     ended, wrong = asyncio.run(_by_shell(seen.plan)) if seen.plan is not None else _by_word(seen)
+    if keep is not None:
+        wrong += _bring(seen, keep)
     took_s = round(clock.now() - began, 2)
     if as_json:
         print(msgspec.json.encode({"fleet": seen.name, "ended": ended, "wrong": wrong, "took_s": took_s}).decode())
@@ -40,6 +44,15 @@ def command(
     for line in wrong:
         print(f"lfa: {line}", file=sys.stderr)
     return 1 if wrong else 0
+
+
+def _bring(seen: Seen, keep: Path) -> list[str]:
+    """The journals of all machines, or without a fleet file of this one; what went wrong."""
+    keep.mkdir(parents=True, exist_ok=True)
+    if seen.plan is not None:
+        return journals.fetch(seen.plan, keep)[1]
+    journals.copy({seen.part.run_folder / JOURNALS} if seen.part is not None else set(), keep)
+    return []
 
 
 async def _by_shell(plan: Plan) -> tuple[list[str], list[str]]:

@@ -15,6 +15,7 @@ from deploy.look.chronicle import Failover, FaultDone, Line, Reign, Violation
 from deploy.look.errors import Errors
 from deploy.look.trace import Array, Trace
 from deploy.run.folder import About, scenario_of
+from deploy.run.record import Recording
 from deploy.run.referee import Verdict
 from world.scenario import Outcome
 
@@ -70,6 +71,8 @@ class Summary(Struct, kw_only=True):
     faults: list[FaultDone]
     assertions: list[Assertion]
     violations: list[Violation]
+    recording: Recording | None = None
+    """None when its recorder died before it could count."""
 
     @property
     def exit_code(self) -> int:

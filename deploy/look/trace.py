@@ -1,6 +1,7 @@
 """A recording as numbers: `recording.mcap` to numpy arrays per robot.
 
-Reads from the front, so a file whose writer was killed gives everything up to its last whole chunk.
+Reads from the front, so a file whose writer was killed gives everything up to its last whole chunk. A recording in
+several files is read as one.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from zstandard import ZstdError
 
 from deploy.run import channels
-from deploy.run.record import RECORDING
+from deploy.run.record import RECORDING, parts
 from protocol.mission import Refused, robot_id_of
 from protocol.topics import TOPIC, TRUTH_OWNER
 
@@ -92,10 +93,13 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
 
 def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
     """Channel (`/robot1/pose`), time [s] and JSON of every message on `topics`, in the order of the recording."""
+    for path in parts(folder):
+        yield from _recorded(path, topics)
+
+
+def _recorded(path: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
     wanted: dict[int, str] = {}
-    if not (folder / RECORDING).exists():
-        return
-    with (folder / RECORDING).open("rb") as stream:
+    with path.open("rb") as stream:
         for chunk in _chunks(stream):
             for opcode, body in _records(chunk):
                 if opcode == Opcode.CHANNEL:

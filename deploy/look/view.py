@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from deploy.look.onlooker import Fleet, find, listen, scenario_of_fleet
-from deploy.run.record import RECORDING
+from deploy.run.record import RECORDING, parts
 from deploy.run.worldtime import WorldTime
 from protocol import clock
 from protocol.messages import Ask, Header, Truth, encode
@@ -74,7 +74,7 @@ def converted(folder: Path) -> Path:
     source, rrd = folder / RECORDING, folder / RRD
     if not source.is_file():
         raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
-    if rrd.is_file() and rrd.stat().st_mtime > source.stat().st_mtime:
+    if rrd.is_file() and rrd.stat().st_mtime > max(path.stat().st_mtime for path in parts(folder)):
         return rrd
     scenario = scenario_of(folder)
     stream = rr.RecordingStream(APPLICATION, recording_id=folder.resolve().name)

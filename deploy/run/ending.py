@@ -14,6 +14,7 @@ from deploy.look import summary as summaries
 from deploy.look.summary import Summary
 from deploy.look.table import text
 from deploy.run.folder import About
+from deploy.run.record import Recording
 from deploy.run.referee import Verdict
 
 
@@ -42,9 +43,11 @@ def finish(
     duration_s: float,
     faults_left: Sequence[str],
     ended_by: signal.Signals | None,
+    recording: Recording | None = None,
 ) -> Ended:
     """Read the closed recording back and write `summary.json`."""
     summary = summaries.summarize(folder, about, verdict, duration_s, faults_left)
+    summary.recording = recording
     summaries.write(folder, summary)
     return Ended(folder, summary, ended_by)
 

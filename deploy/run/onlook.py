@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from deploy.fleet import journals
+from deploy.fleet.file import load
 from deploy.look.onlooker import Ear, Fleet, find, listen, scenario_of_fleet
 from deploy.run.folder import RUNS, About, make
 from deploy.run.interrupts import Interrupts
@@ -18,6 +21,7 @@ from protocol.messages import Truth
 from protocol.mission import Refused
 
 POLL_S = 0.05
+SPLIT_MB = 256.0
 
 
 def command(
@@ -25,29 +29,42 @@ def command(
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; default runs/<fleet>-<time>.")] = None,
     seconds: Annotated[float, typer.Option(help="End after so long; 0 goes on.")] = 0.0,
+    split_mb: Annotated[float, typer.Option(help="Go on in a new file once one has so many MB; 0: never.")] = SPLIT_MB,
+    keep: Annotated[int, typer.Option(help="Keep the first and the newest files, so many in all; 0: all.")] = 0,
+    hosts: Annotated[Path | None, typer.Option(help="A fleet file: bring its machines' journals too.")] = None,
 ) -> int:
+    if not split_mb >= 0.0 or keep < 0:
+        raise Refused(f"--split-mb {split_mb:g} --keep {keep}: must be 0 or more")
+    plan = None if hosts is None else load(hosts)
     found = find(fleet, connect)
     with listen(found, frozenset({"**"}), every=True) as ear, Interrupts() as interrupts:
         folder = _folder(found, out)
-        recorder = Recorder(folder, About(found.name, "onlooker", 0, found.name).metadata())
+        about = About(found.name, "onlooker", 0, found.name).metadata()
+        recorder = Recorder(folder, about, split_bytes=round(1e6 * split_mb), keep=keep)
+        kept = journals.of_processes(found.name)
         print(f"records fleet {found.name} into {folder}", flush=True)
-        begun, count, seen = clock.now(), 0, WorldTime()
+        begun, seen = clock.now(), WorldTime()
         while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
             clock.sleep(POLL_S)
-            count += _write(ear, recorder, seen, begun)
-        recorder.close()
-    print(f"{count} messages, {ear.dropped} lost: {folder}")
-    return 0 if count and not ear.dropped else 1
+            _write(ear, recorder, seen, begun)
+        recording = recorder.close()
+    came = journals.copy(kept | journals.of_processes(found.name), folder)
+    if plan is not None:
+        fetched, wrong = journals.fetch(plan, folder)
+        came += fetched
+        for line in wrong:
+            print(f"lfa: {line}", file=sys.stderr)
+    files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
+    print(f"{recording.messages} messages, {ear.dropped} lost, {files}, {came} journals: {folder}")
+    return 0 if recording.messages and not ear.dropped else 1
 
 
-def _write(ear: Ear, recorder: Recorder, seen: WorldTime, begun: float) -> int:
+def _write(ear: Ear, recorder: Recorder, seen: WorldTime, begun: float) -> None:
     """Times are the world's, or since the start of the recording where no world tells its own."""
-    heard = ear.take()
-    for arrival, message in heard:
+    for arrival, message in ear.take():
         if isinstance(message, Truth):
             seen.see(arrival.at, message.time_s)
         recorder.record(seen.of(arrival.at) if seen.known else arrival.at - begun, arrival.key, message)
-    return len(heard)
 
 
 def _folder(fleet: Fleet, out: Path | None) -> Path:

@@ -11,6 +11,7 @@ from typing import IO
 
 import msgspec
 from mcap.writer import CompressionType, Writer
+from msgspec import Struct
 
 from deploy.run import channels
 from protocol.messages import Event, Message
@@ -18,6 +19,8 @@ from protocol.mission import robot_id_of
 from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
 
 RECORDING = "recording.mcap"
+PART = "recording-{}.mcap"
+"""Of a recording in several files, those after the first."""
 EVENTS = "events.jsonl"
 FLUSH_S = 1.0  # what a SIGKILL of the recorder may cost
 ONLOOKERS = (WORLD_NAME, OPERATOR_NAME, RECORDER_NAME)
@@ -26,19 +29,44 @@ CHUNK_BYTES_MAX = 4 * 1024 * 1024
 _line_encoder = msgspec.json.Encoder(order="deterministic")
 
 
-class Recorder:
-    """Writes both files; every message goes to the recording, an Event to its own line as well."""
+class Recording(Struct, kw_only=True):
+    """What there is of a recording, and what it lost."""
 
-    def __init__(self, folder: Path, about: dict[str, str]) -> None:
+    messages: int
+    files: int
+    bytes: int
+    missing: int = 0
+    """Gaps in the senders' numbers: messages that never came."""
+    dropped: int = 0
+    """Came, and found the recorder's inbox full."""
+    undecodable: int = 0
+
+
+def parts(folder: Path) -> list[Path]:
+    """The files of the recording in `folder`, oldest first; empty when there is none."""
+    first, later = folder / RECORDING, folder.glob(PART.format("*"))
+    return [first, *sorted(later)] if first.is_file() else []
+
+
+class Recorder:
+    """Writes both files; every message goes to the recording, an Event to its own line as well.
+
+    With `split_bytes` the recording goes on in a new file once one has that size; of these the first, which knows the
+    mission, and the newest are kept, `keep` in all (0: all).
+    """
+
+    def __init__(self, folder: Path, about: dict[str, str], *, split_bytes: int = 0, keep: int = 0) -> None:
         """`about` (scenario, fleet, mode, seed) goes into the recording. Raises OSError when a file cannot be made."""
-        self._events: IO[bytes] = open(folder / EVENTS, "wb", buffering=0)  # noqa: SIM115 (closed by close)
-        self._stream: IO[bytes] = open(folder / RECORDING, "wb")  # noqa: SIM115
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES_MAX, compression=CompressionType.ZSTD)
-        self._writer.start(profile="", library="lfa")
-        self._writer.add_metadata("run", about)
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[type, int] = {}
+        self._folder = folder
+        self._about = about
+        self._split_bytes = split_bytes
+        self._keep = keep
+        self._number = 0
+        self._bytes = 0
+        self._messages = 0
         self._flushed_at = 0.0
+        self._events: IO[bytes] = open(folder / EVENTS, "wb", buffering=0)  # noqa: SIM115 (closed by close)
+        self._open()
 
     def record(self, t: float, key: str, message: Message) -> None:
         """`message` travelled on `key`, `t` [s] since the run's start; what came before that is given as 0."""
@@ -48,6 +76,7 @@ class Recorder:
             channel = self._channels[key] = self._open_channel(key, type(message))
         stamp_ns = round(t * 1e9)
         self._writer.add_message(channel, stamp_ns, channels.encode(message), stamp_ns, message.header.seq)
+        self._messages += 1
         if isinstance(message, Event):
             self._events.write(event_line(t, message))
         self.flush_when_due(t)
@@ -57,11 +86,32 @@ class Recorder:
         if t >= self._flushed_at + FLUSH_S:
             self._flushed_at = t
             self._writer.flush()  # type: ignore[no-untyped-call]
+            if 0 < self._split_bytes <= self._stream.tell():
+                self._close()
+                self._open()
 
-    def close(self) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stream.close()
+    def close(self) -> Recording:
+        self._close()
         self._events.close()
+        return Recording(messages=self._messages, files=self._number, bytes=self._bytes)
+
+    def _open(self) -> None:
+        """Go on in a new file; each can be read without the others."""
+        self._number += 1
+        name = RECORDING if self._number == 1 else PART.format(f"{self._number:04}")
+        self._stream: IO[bytes] = open(self._folder / name, "wb")  # noqa: SIM115 (closed by _close)
+        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES_MAX, compression=CompressionType.ZSTD)
+        self._writer.start(profile="", library="lfa")
+        self._writer.add_metadata("run", self._about)
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[type, int] = {}
+        if 0 < self._keep < self._number:
+            (self._folder / PART.format(f"{self._number - self._keep + 1:04}")).unlink(missing_ok=True)
+
+    def _close(self) -> None:
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._bytes += self._stream.tell()
+        self._stream.close()
 
     def _open_channel(self, key: str, kind: type) -> int:
         """`lfa/<fleet>/robot1/pose` is recorded as `/robot1/pose`."""

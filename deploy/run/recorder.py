@@ -19,7 +19,7 @@ from msgspec import Struct
 from deploy.run.ending import finish
 from deploy.run.folder import About
 from deploy.run.operator import Operator
-from deploy.run.record import Recorder
+from deploy.run.record import Recorder, Recording
 from deploy.run.referee import Verdict
 from deploy.run.worldtime import WorldTime
 from protocol import clock
@@ -67,8 +67,8 @@ def main() -> None:
         clock.sleep(LAST_WORDS_S)
     tape.wind()
     last = word[0] if word else LastWord(Verdict("aborted", "the launcher died"), clock.now() - begun, ())
-    tape.close(last.verdict)
-    finish(Path(task.folder), task.about, last.verdict, last.duration_s, last.faults_left, None)
+    recording = tape.close(last.verdict)
+    finish(Path(task.folder), task.about, last.verdict, last.duration_s, last.faults_left, None, recording)
     if not word:
         shutil.rmtree(task.sockets, ignore_errors=True)
 
@@ -90,7 +90,6 @@ class _Tape:
         self._incarnation = clock.wall_ms()
         self._key = key(fleet, RECORDER_NAME, "event")
         self._seq = 0
-        self._recorded = 0
         self._undecodable = 0
         self._missing = 0
         self._last_seq: dict[tuple[str, str, int], int] = {}
@@ -111,7 +110,6 @@ class _Tape:
             if isinstance(message, Truth):
                 self._time.see(arrival.at, message.time_s)
             self._recorder.record(self._time.of(arrival.at), where, message)
-            self._recorded += 1
             self._count_missing(where, message.header)
         self._recorder.flush_when_due(self._time.of(clock.now()))
 
@@ -123,14 +121,17 @@ class _Tape:
         self._missing += max(0, header.seq - before - 1)
         self._last_seq[stream] = max(before, header.seq)
 
-    def close(self, verdict: Verdict) -> None:
+    def close(self, verdict: Verdict) -> Recording:
         now = clock.now()
         end = self._operator.says("end", now, outcome=verdict.outcome, reason=verdict.reason)
         self._recorder.record(self._time.of(now), self._operator.key, end)
-        self._recorder.close()
+        recording = self._recorder.close()
         self._bus.close()
-        lost = f"{self._missing} missing, {self._inbox.dropped} dropped"
-        print(f"{self._recorded} recorded, {self._undecodable} undecodable, {lost}")
+        recording.missing, recording.dropped = self._missing, self._inbox.dropped
+        recording.undecodable = self._undecodable
+        lost = f"{recording.missing} missing, {recording.dropped} dropped"
+        print(f"{recording.messages} recorded, {recording.undecodable} undecodable, {lost}")
+        return recording
 
     def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
         """Key and message to be recorded; a liveliness change is an event of the recorder's own."""

@@ -16,7 +16,7 @@ from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
 from deploy.run.interrupts import Interrupts
 from deploy.run.operator import Operator
-from deploy.run.record import Recorder
+from deploy.run.record import Recorder, Recording
 from deploy.run.referee import Referee, Verdict
 from deploy.run.weather import note
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
@@ -67,7 +67,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     with Interrupts() as interrupts:
         verdict = run.play(Schedule(faults), interrupts)
     duration_s = time.perf_counter() - started
-    return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal)
+    return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, run.recording)
 
 
 class _Run:
@@ -85,6 +85,7 @@ class _Run:
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
         self.faults_left: list[str] = []
+        self.recording: Recording | None = None
 
     def play(self, schedule: Schedule, interrupts: Interrupts) -> Verdict:
         """Start the team, run until it is over, close the recording and the journals."""
@@ -98,7 +99,7 @@ class _Run:
         verdict = self._until_over(schedule, interrupts)
         self.faults_left = [str(fault) for fault in schedule.pending]
         self._say("end", outcome=verdict.outcome, reason=verdict.reason)
-        self._recorder.close()
+        self.recording = self._recorder.close()
         for journal in self._journals.values():
             journal.close()
         return verdict

@@ -10,10 +10,11 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 
 from deploy.look import chronicle, trace
 from deploy.run import channels
-from deploy.run.record import EVENTS, RECORDING, Recorder
+from deploy.run.record import EVENTS, RECORDING, Recorder, parts
 from protocol.messages import (
     Event,
     Header,
@@ -100,6 +101,46 @@ def test_a_killed_recorder_loses_no_more_than_a_second(tmp_path: Path) -> None:
     for step in range(226):
         recorder.record(step * 0.02, key("f", "sim", "truth"), _truth(step * 0.02))
     assert trace.read(tmp_path).end_s > 4.5 - 1.1  # never closed
+
+
+def _record_many(folder: Path, **options: int) -> Recorder:
+    """A minute of ground truth, with an event at its start."""
+    recorder = Recorder(folder, {"seed": "1"}, **options)
+    for step in range(3000):
+        recorder.record(step * 0.02, key("f", "sim", "truth"), _truth(step * 0.02))
+    return recorder
+
+
+def test_a_recording_in_several_files_is_read_as_one(tmp_path: Path) -> None:
+    recording = _record_many(tmp_path, split_bytes=20_000).close()
+    assert recording.files == len(parts(tmp_path)) > 2
+    assert recording.messages == 3000
+    assert recording.bytes == sum(path.stat().st_size for path in parts(tmp_path))
+    rows = trace.read(tmp_path).truth[1]
+    assert rows.shape[0] == 3000
+    assert (rows[1:, 0] > rows[:-1, 0]).all()
+
+
+def test_each_of_several_files_can_be_read_by_itself(tmp_path: Path) -> None:
+    _record_many(tmp_path, split_bytes=20_000).close()
+    for path in parts(tmp_path):
+        with path.open("rb") as stream:
+            seen = [(schema.name, channel.topic) for schema, channel, _ in make_reader(stream).iter_messages()]
+        assert set(seen) == {("lfa.Truth", "/sim/truth")}
+
+
+def test_of_several_files_the_first_and_the_newest_are_kept(tmp_path: Path) -> None:
+    recorder = _record_many(tmp_path, split_bytes=20_000, keep=2)
+    recorder.close()
+    first, newest = parts(tmp_path)
+    assert first.name == RECORDING
+    assert trace.read(tmp_path).end_s > 59.0
+    assert newest.name > "recording-0002.mcap"
+
+
+def test_a_killed_recorder_of_several_files_loses_no_more_than_a_second(tmp_path: Path) -> None:
+    _record_many(tmp_path, split_bytes=20_000)  # never closed
+    assert trace.read(tmp_path).end_s > 59.98 - 1.1
 
 
 def test_an_event_is_a_line_about_the_robot_that_it_is_about(tmp_path: Path) -> None:

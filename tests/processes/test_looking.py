@@ -10,7 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from deploy.look import trace
+from deploy.run.record import parts
 from protocol.zenoh_bus import answers
+from tests.deploy.agreement import differing
 from tests.processes.fleet import LFA, eventually, lfa, running
 
 
@@ -32,6 +34,12 @@ def test_every_core_returns_the_same_again(tmp_path: Path) -> None:
     again = lfa("replay", folder, "--robot", "all")
     assert again.returncode == 0, again.stdout + again.stderr
     assert len(again.stdout.splitlines()) == 7, "five lives of four robots, the witness and the world"
+    assert differing(Path(folder), killed=("robot1",)) == [], (
+        "first and last message of each topic: recording against journals"
+    )
+    recording = json.loads((Path(folder) / "summary.json").read_text())["recording"]
+    assert recording["messages"] > 3000
+    assert recording["dropped"] == 0
 
 
 def test_an_operator_sees_a_fleet_and_changes_its_formation(tmp_path: Path) -> None:
@@ -82,9 +90,21 @@ def test_what_is_not_there_is_said_in_one_line() -> None:
 def test_a_running_fleet_can_be_recorded_from_outside(tmp_path: Path) -> None:
     with running(tmp_path / "run", "straight", "--robots", "2") as run:
         run.wait_for("leader_command")
-        fleet, out = f"straight-{run.launcher.pid}", tmp_path / "outside"
-        done = lfa("record", "--fleet", fleet, "--seconds", "2", "--out", str(out))
+        fleet, out, cut = f"straight-{run.launcher.pid}", tmp_path / "outside", tmp_path / "cut"
+        recorder = subprocess.Popen([*LFA, "record", "--fleet", fleet, "--out", str(cut)], stdout=subprocess.DEVNULL)
+        split = ("--split-mb", "0.02", "--out", str(out))
+        done = lfa("record", "--fleet", fleet, "--seconds", "3", *split)
+        eventually(lambda: cut.is_dir() and trace.read(cut).end_s > 0.0, "nothing was recorded")
+        killed_at = trace.read(run.folder).end_s
+        eventually(lambda: trace.read(run.folder).end_s > killed_at, "the run stands")
+        recorder.kill()
+        recorder.wait()
     assert done.returncode == 0, done.stdout + done.stderr
-    assert ", 0 lost:" in done.stdout
+    assert ", 0 lost, " in done.stdout
+    assert len(parts(out)) > 1
     assert set(trace.read(out).truth) == {1, 2}
     assert (out / "scenario.toml").is_file()
+    assert trace.read(cut).end_s > killed_at - 1.1, "SIGKILL may cost the last second, no more"
+    again = lfa("replay", str(out), "--robot", "all")
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert {line.split("-")[0] for line in again.stdout.splitlines()} == {"robot1", "robot2", "witness", "world"}

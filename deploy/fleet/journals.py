@@ -1,0 +1,82 @@
+"""A fleet's journals, brought into one folder: of this machine's processes, or over ssh of all in a fleet file."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import shutil
+import tarfile
+from pathlib import Path
+
+from deploy.fleet.file import Plan
+from deploy.fleet.part import Part, parts
+from deploy.fleet.remote import Unreachable, python_of, reach
+from deploy.run.folder import JOURNALS
+from deploy.run.inject import option
+from deploy.run.processes import own_processes
+from protocol.mission import Refused
+
+PACK = (
+    "import pathlib, sys, tarfile\n"
+    "runs = sorted(pathlib.Path(sys.argv[1]).expanduser().glob('*/journal'), key=lambda run: run.stat().st_mtime)\n"
+    "with tarfile.open(fileobj=sys.stdout.buffer, mode='w|') as packed:\n"
+    "    for path in (path for run in runs[-1:] for path in sorted(run.glob('*.bin'))):\n"
+    "        packed.add(path, path.name)\n"
+)
+"""Run there: the journals of the newest run, as a tar file."""
+
+
+def of_processes(fleet: str) -> set[Path]:
+    """Folders that this user's processes of `fleet` on this machine keep their journals in."""
+    found = (list(identity.arguments) for identity in own_processes())
+    named = [option(words, "--journal", "") for words in found if option(words, "--fleet", "") == fleet]
+    return {Path(name) for name in named if name}
+
+
+def copy(folders: set[Path], run: Path) -> int:
+    """Copy what these folders hold into `run`'s; how many. One that is still written is whole up to its last entry."""
+    journals = [path for folder in sorted(folders) for path in sorted(folder.glob("*.bin"))]
+    if journals:
+        (run / JOURNALS).mkdir(exist_ok=True)
+    for path in journals:
+        shutil.copyfile(path, run / JOURNALS / path.name)
+    return len(journals)
+
+
+def fetch(plan: Plan, run: Path) -> tuple[int, list[str]]:
+    """Bring the newest run's journals of every machine of `plan` into `run`'s folder: how many, and what went wrong."""
+    return asyncio.run(_fetch(plan, run))
+
+
+async def _fetch(plan: Plan, run: Path) -> tuple[int, list[str]]:
+    shares = parts(plan, "", "")
+    answers = await asyncio.gather(*(_of_machine(plan, name, shares[name], run) for name in plan.hosts))
+    wrong = [f"host {name}: {said}" for name, said in zip(plan.hosts, answers, strict=True) if isinstance(said, str)]
+    return sum(answer for answer in answers if isinstance(answer, int)), wrong
+
+
+async def _of_machine(plan: Plan, name: str, part: Part, run: Path) -> int | str:
+    """How many came, or what is wrong."""
+    machine = plan.hosts[name]
+    try:
+        shell = await reach(machine)
+        try:
+            done = await shell.run((python_of(machine), "-c", PACK, part.state))
+        finally:
+            await shell.close()
+    except (Unreachable, Refused) as error:
+        return str(error)
+    return unpack(done.out, run) if done.code == 0 else f"gives no journals: {done.last_line}"
+
+
+def unpack(packed: bytes, run: Path) -> int:
+    """Regular files called `*.bin` only, whatever else a machine has sent; none is put outside of the folder."""
+    (run / JOURNALS).mkdir(parents=True, exist_ok=True)
+    count = 0
+    with tarfile.open(fileobj=io.BytesIO(packed), mode="r|") as files:
+        for member in files:
+            content = files.extractfile(member) if member.isreg() else None
+            if content is not None and Path(member.name).suffix == ".bin":
+                (run / JOURNALS / Path(member.name).name).write_bytes(content.read())
+                count += 1
+    return count
