@@ -41,6 +41,8 @@ COMMANDS = (
           "lfa logs -f robot3"),
     Entry("restart", "deploy.fleet.restart", "End one process of a fleet and start it again, wherever it runs.",
           "lfa restart robot3"),
+    Entry("doctor", "deploy.fleet.doctor", "What keeps a fleet's machines, or this one, from running.",
+          "lfa doctor deploy/fleet.example.toml"),
     Entry("down", "deploy.fleet.down", "End a fleet on all its machines.",
           "lfa down"),
     Entry("fault", "deploy.run.inject", "Do something to a robot of a running fleet.",

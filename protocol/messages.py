@@ -429,6 +429,8 @@ class ProcessReport(Struct, frozen=True, array_like=True, gc=False):
     pid: int
     """0 while it does not run."""
     starts: int
+    began_ms: int
+    """Wall clock of its machine at its last start: the incarnation of what it says is no older."""
     up_s: float
     ended: str
     """How its last life ended, in words; empty when it never did."""

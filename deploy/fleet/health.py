@@ -81,7 +81,12 @@ class Health:
         return host in self._status and now - self._status[host][0] < 3.0 * FRESH_S
 
     def _moves(self, robot: int, now: float) -> bool:
-        return robot in self._poses and now - self._poses[robot][0] < FRESH_S
+        """Its poses flow, and are those of the process that its supervisor started: not a namesake's elsewhere."""
+        if robot not in self._poses or now - self._poses[robot][0] >= FRESH_S:
+            return False
+        reports = [r for _, status in self._status.values() for r in status.processes if r.name == robot_name(robot)]
+        incarnation = self._poses[robot][1].header.incarnation
+        return all(report.state == "running" and incarnation >= report.began_ms for report in reports)
 
     def _follows(self, robot: int) -> bool:
         return robot in self._poses and self._poses[robot][1].role is Role.FOLLOWER

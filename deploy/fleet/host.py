@@ -1,10 +1,11 @@
-"""`python -m deploy.fleet.host check|start|stop`: what `lfa up` and `lfa down` run on each machine, over ssh or here.
+"""`python -m deploy.fleet.host check|start|stop|listen`: what the operator's commands run on each machine.
 
 A part comes on standard input, one JSON object goes out; what is wrong is one line on standard error and exit code 2.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -29,6 +30,7 @@ from protocol.zenoh_bus import UNIX_PATH_BYTES_MAX, answers, socket_path
 READY_S = 15.0
 STOP_S = 8.0
 POLL_S = 0.02
+LISTEN_S = 4.0
 FREE_MIB_MIN = 64
 LOG = "supervisor.log"
 SYSTEMD = Path("/run/systemd/system")
@@ -43,6 +45,8 @@ class Found(Struct, frozen=True):
     """Of the supervisor that runs already; empty: none."""
     digest: str = ""
     orphans: tuple[str, ...] = ()
+    router: bool = False
+    """It answers."""
 
 
 def check(part: Part) -> Found:
@@ -52,7 +56,8 @@ def check(part: Part) -> Found:
     running = living(part.folder)
     found = Found(version("lfa"), clock.wall_ms())
     if running is not None:
-        return msgspec.structs.replace(found, run=running.run, digest=running.digest)
+        there = answers(part.socket)
+        return msgspec.structs.replace(found, run=running.run, digest=running.digest, router=there)
     path = socket_path(part.socket)
     if path is None or len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
         raise Refused(f"state = {part.state}: too long for a socket in it: at most {UNIX_PATH_BYTES_MAX} bytes")
@@ -175,7 +180,16 @@ def _await_ready(part: Part, child: subprocess.Popen[bytes], log: Path) -> None:
         clock.sleep(POLL_S)
 
 
-DEEDS = {"check": check, "start": start, "stop": stop}
+def listen(part: Part) -> Found:
+    """Listen where the router would, until somebody comes or a few seconds are over: is the port open?"""
+    with socket.create_server(("", part.port)) as server:
+        server.settimeout(LISTEN_S)
+        with contextlib.suppress(TimeoutError):
+            server.accept()[0].close()
+    return Found(version("lfa"), clock.wall_ms())
+
+
+DEEDS = {"check": check, "start": start, "stop": stop, "listen": listen}
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable, Mapping
 
 import msgspec
@@ -44,7 +45,7 @@ class Fleet:
             shell, machine, part = self._shells[name], self._plan.hosts[name], self.parts[name]
             if may_install:
                 await install(shell, machine, part.version)
-            found = await _ask(shell, machine, "check", part)
+            found = await ask(shell, machine, "check", part)
             off_s = (found.wall_ms - clock.wall_ms()) / 1000.0
             if abs(off_s) > CLOCK_S_MAX:
                 right = f"must be within {CLOCK_S_MAX:g} s (timedatectl set-ntp true)"
@@ -59,7 +60,7 @@ class Fleet:
         answers: dict[str, Found] = {}
 
         async def one(name: str) -> None:
-            answers[name] = await _ask(self._shells[name], self._plan.hosts[name], deed, self.parts[name])
+            answers[name] = await ask(self._shells[name], self._plan.hosts[name], deed, self.parts[name])
 
         await self._each(self._shells, one)
         return answers
@@ -83,12 +84,13 @@ class Fleet:
         await asyncio.gather(*(guarded(name) for name in names if name not in self.wrong))
 
 
-async def _ask(shell: Shell, machine: Machine, deed: str, part: Part) -> Found:
+async def ask(shell: Shell, machine: Machine, deed: str, part: Part) -> Found:
     """What `host.py` there answers. Raises Refused, with the cause when it is Python or another `lfa`."""
     python = python_of(machine)
     done = await shell.run((python, "-m", "deploy.fleet.host", deed), msgspec.json.encode(part))
     if done.code == 0:
-        return msgspec.json.decode(done.out, type=Found)
+        with contextlib.suppress(msgspec.DecodeError):  # no Python of ours: the probe tells what it is
+            return msgspec.json.decode(done.out, type=Found)
     if done.code != REFUSED_CODE or not done.err.strip():
         found = await probe(shell, python)
         if found.lfa != part.version:

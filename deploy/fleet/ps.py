@@ -73,7 +73,7 @@ def table(facts: list[dict[str, Any]]) -> Table:
 
     made = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for head in ("host", "process", "state", "pid", "starts", "up", "says"):
-        made.add_column(head, justify="right" if head in ("pid", "starts", "up") else "left", no_wrap=True)
+        made.add_column(head, justify="right" if head in ("pid", "starts", "up") else "left", no_wrap=head != "says")
     for row in facts:
         style = "" if row["state"] == "running" else "bold red"
         says = row["says"] if row["state"] == "running" and row["says"] else row["ended"]

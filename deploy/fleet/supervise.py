@@ -100,6 +100,7 @@ class _Ward:
         self.lives = lives
         self.starts = 0
         self.began = 0.0
+        self.began_ms = 0
         self.state = "waiting"
         self.start_at: float | None = 0.0
         self.ended = ""
@@ -107,7 +108,7 @@ class _Ward:
 
     def report(self, pid: int, now: float) -> ProcessReport:
         up_s = round(now - self.began, 1) if pid else 0.0
-        return ProcessReport(self.row.name, self.state, pid, self.starts, up_s, self.ended)
+        return ProcessReport(self.row.name, self.state, pid, self.starts, self.began_ms, up_s, self.ended)
 
 
 class Supervisor:
@@ -205,7 +206,7 @@ class Supervisor:
     def _start(self, ward: _Ward, now: float) -> None:
         row = ward.row if ward.starts == 0 or not self._remembers(ward) else ward.row.restarted()
         ward.start_at = None
-        ward.began = now
+        ward.began, ward.began_ms = now, clock.wall_ms()
         ward.starts += 1
         try:
             self._crew.start(row)

@@ -96,7 +96,7 @@ def _screen(view: Sight, board: Board) -> Group:
     made = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for head in ("host", "process", "state", "starts", "role", "ahead", "off slot", "pose", "CPU", "mem", "says"):
         left = head in ("host", "process", "state", "role", "says")
-        made.add_column(head, justify="left" if left else "right", no_wrap=True, overflow="ellipsis")
+        made.add_column(head, justify="left" if left else "right", no_wrap=head != "says")
     for row in facts["processes"]:
         robot = robots.get(row["process"], {})
         style = "bold red" if row["state"] != "running" else "bold green" if robot.get("role") == "leader" else ""

@@ -73,7 +73,6 @@ async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wai
     fleet = Fleet(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest))
     try:
         await fleet.reach()
-        _all_well(fleet)
         found = await fleet.check(may_install=may_install)
         _all_well(fleet)
         _join_those_that_run(plan, fleet, found, digest)

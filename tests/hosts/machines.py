@@ -63,12 +63,14 @@ class Machines:
         for name in self.names:
             self.serve(name)
 
-    def serve(self, name: str) -> None:
-        """An sshd on that machine."""
+    def serve(self, name: str, authorized: str = "authorized") -> None:
+        """An sshd on that machine, in place of the one that may run there, and who may log in."""
+        if name in self._servers:
+            self._end_server(self._servers.pop(name))
         settings = {
             "ListenAddress": self.address(name),
             "HostKey": self.folder / "host_key",
-            "AuthorizedKeysFile": self.folder / "authorized",
+            "AuthorizedKeysFile": self.folder / authorized,
             "PidFile": "none",
             "UsePAM": "no",
             "StrictModes": "no",
@@ -89,8 +91,12 @@ class Machines:
         for name in self.names:
             self.kill(name)
         for server in self._servers.values():
-            server.kill()
-            server.wait()
+            self._end_server(server)
+
+    @staticmethod
+    def _end_server(server: subprocess.Popen[bytes]) -> None:
+        server.kill()
+        server.wait()
 
     # --- what they are ---------------------------------------------------------------------------------------------
 
@@ -100,15 +106,32 @@ class Machines:
     def state(self, name: str) -> Path:
         return self.folder / name
 
-    def write(self, top: str = "", hosts: Mapping[str, str] | None = None, tail: str = "") -> Path:
-        """A fleet file of all machines; `hosts` adds keys to some of them."""
-        tables = [
-            f'[hosts.{name}]\naddress = "{self.address(name)}"\nuser = "root"\npython = "{sys.executable}"\n'
-            f'state = "{self.state(name)}"\n{(hosts or {}).get(name, "")}\n'
-            for name in self.names
-        ]
-        self.fleet_file.write_text("\n".join([top, *tables, tail]))
+    def write(self, top: str = "", hosts: Mapping[str, Mapping[str, str]] | None = None, tail: str = "") -> Path:
+        """A fleet file of all machines; `hosts` says some things about some of them otherwise."""
+        lines = [top]
+        for name in self.names:
+            said = {"address": self.address(name), "user": "root", "python": sys.executable}
+            said |= {"state": str(self.state(name)), **(hosts or {}).get(name, {})}
+            lines += [f"[hosts.{name}]", *(f'{key} = "{value}"' for key, value in said.items())]
+        self.fleet_file.write_text("\n".join([*lines, tail, ""]))
         return self.fleet_file
+
+    def python(self, name: str, *, version: str | None = None, startup: str = "") -> str:
+        """A virtual environment that sees all that this one has; its `lfa` calls itself `version`."""
+        venv = self.folder / f"venv-{name}"
+        site = venv / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
+        site.mkdir(parents=True)
+        (venv / "bin").mkdir()
+        (venv / "bin/python").symlink_to(Path(sys.executable).resolve())
+        (venv / "pyvenv.cfg").write_text(f"home = {Path(sys.executable).resolve().parent}\n")
+        (site / "all.pth").write_text("".join(f"{path}\n" for path in sys.path if path.endswith("-packages")))
+        (site / "here.pth").write_text(f"{Path.cwd()}\n")
+        (site / "sitecustomize.py").write_text(startup)
+        if version is not None:
+            (site / f"lfa-{version}.dist-info").mkdir()
+            metadata = f"Metadata-Version: 2.1\nName: lfa\nVersion: {version}\n"
+            (site / f"lfa-{version}.dist-info/METADATA").write_text(metadata)
+        return str(venv / "bin/python")
 
     def part(self, name: str) -> Part:
         return parts.read(self.state(name) / parts.PART)

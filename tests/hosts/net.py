@@ -114,6 +114,10 @@ class Net:
         for host in self.hosts:
             self._rules(host, f"ip saddr != 127.0.0.1 numgen random mod 100 < {percent} drop")
 
+    def close_port(self, host: int, port: int) -> None:
+        """As a firewall does it: whoever knocks hears nothing."""
+        self._rules(host, f"tcp dport {port} drop")
+
     def heal(self) -> None:
         for host in self.hosts:
             self._inside(_name(host), "nft", f"add table {TABLE}; delete table {TABLE}")

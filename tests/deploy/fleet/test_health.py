@@ -9,8 +9,8 @@ from protocol.messages import Header, HostStatus, PoseStamped, ProcessReport, Ro
 TERM = Term(7, 1, 1)
 
 
-def _host(name: str = "a", state: str = "running", ended: str = "") -> HostStatus:
-    report = ProcessReport("robot1", state, 5, 1, 1.0, ended)
+def _host(name: str = "a", state: str = "running", ended: str = "", began_ms: int = 0) -> HostStatus:
+    report = ProcessReport("robot1", state, 5, 1, began_ms, 1.0, ended)
     return HostStatus(Header(f"host-{name}", 1, 1, 0.0), name, "0", "r", (0, 0), (report,))
 
 
@@ -47,6 +47,12 @@ def test_a_robot_outside_the_chain_is_missing() -> None:
     health = _whole()
     health.see(0.1, _tracking(3, 9))
     assert health.missing(0.5) == ["robot3: not in the chain"]
+
+
+def test_poses_of_a_namesake_elsewhere_are_not_those_of_the_fleets_robot() -> None:
+    health = _whole()
+    health.see(0.1, _host(began_ms=2))
+    assert health.missing(0.5)[0].startswith("robot1: no pose")
 
 
 def test_two_terms_are_no_agreement() -> None:

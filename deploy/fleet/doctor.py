@@ -1,0 +1,166 @@
+"""`lfa doctor`: what keeps a fleet, or this machine, from running: each check on a line, with what would be right."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from msgspec import Struct
+
+from deploy.fleet import part as parts
+from deploy.fleet import sight
+from deploy.fleet.file import Machine, Plan, load
+from deploy.fleet.host import Found
+from deploy.fleet.hosts import CLOCK_S_MAX, ask
+from deploy.fleet.part import Part
+from deploy.fleet.remote import PYTHON_MIN, Probed, Shell, Unreachable, probe, python_of, reach
+from protocol import clock
+from protocol.mission import Refused
+from protocol.zenoh_bus import answers, default_endpoint
+
+EXTRAS = {"world": ("numpy", "pymunk"), "view": ("mcap", "matplotlib", "rerun"), "deploy": ("asyncssh", "rich")}
+KNOCK_S = 3.0
+
+
+class Finding(Struct, frozen=True):
+    """One check."""
+
+    host: str
+    check: str
+    ok: bool
+    says: str
+
+
+def command(
+    file: Annotated[Path | None, typer.Argument(help="A fleet file: all its machines. Without: this one.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> int:
+    """1 when something is wrong."""
+    found = this_machine() if file is None else asyncio.run(examine(load(file)))
+    if as_json:
+        print(msgspec.json.encode({"ok": all(one.ok for one in found), "findings": found}).decode())
+    else:
+        for one in found:
+            print(f"{'ok   ' if one.ok else 'WRONG'}  {one.host:<12} {one.check:<12} {one.says}")
+    return 0 if all(one.ok for one in found) else 1
+
+
+# --- this machine -----------------------------------------------------------------------------------------------------
+
+
+def this_machine() -> list[Finding]:
+    """Python, `lfa` and what it needs, and the routers of the fleets that run here."""
+    is_ = ".".join(map(str, sys.version_info[:3]))
+    found = [_finding("here", "python", sys.version_info >= PYTHON_MIN, is_, "3.11 or newer")]
+    try:
+        found.append(Finding("here", "lfa", True, version("lfa")))
+    except PackageNotFoundError:
+        found.append(Finding("here", "lfa", False, "is not installed: pip install lfa"))
+    for extra, modules in EXTRAS.items():
+        absent = [module for module in modules if find_spec(module) is None]
+        says = "there" if not absent else f"without {', '.join(absent)}: pip install 'lfa[{extra}]' where it is needed"
+        found.append(Finding("here", f"[{extra}]", True, says))
+    running = sight.here()
+    for part in running:
+        found += _own_part(part)
+    if not running:
+        there = answers(default_endpoint())
+        says = f"{default_endpoint()} {'answers' if there else 'does not answer: lfa-router, or lfa up, starts one'}"
+        found.append(Finding("here", "router", there, says))
+    return found
+
+
+def _own_part(part: Part) -> list[Finding]:
+    """The router here, and those of the other machines as they are seen from here."""
+    found = [_router(part.host, answers(part.socket))]
+    far = [end for end in part.others if not answers(end)]
+    says = "all answer" if not far else f"{', '.join(far)} do not answer: must be up, and their ports open"
+    return [*found, Finding(part.host, "other hosts", not far, says)] if part.others else found
+
+
+# --- all machines of a file -------------------------------------------------------------------------------------------
+
+
+async def examine(plan: Plan) -> list[Finding]:
+    """Every machine of `plan`, all at once. Starts nothing, but for a moment's listening where a router would."""
+    shares = parts.parts(plan, "", "")
+    each = await asyncio.gather(*(_examine(name, machine, shares[name]) for name, machine in plan.hosts.items()))
+    return [finding for found in each for finding in found]
+
+
+async def _examine(name: str, machine: Machine, part: Part) -> list[Finding]:
+    try:
+        shell = await reach(machine)
+    except Unreachable as error:
+        return [Finding(name, "ssh", False, str(error))]
+    how = "here, without ssh" if machine.local else f"lets us in at {machine.ssh or machine.address}"
+    found = [Finding(name, "ssh", True, how)]
+    try:
+        asked = clock.wall_ms()
+        probed = await probe(shell, python_of(machine))
+        found += _probed(name, probed, part, (asked + clock.wall_ms()) / 2.0)
+        if probed.lfa == part.version:
+            found += await _place(name, shell, machine, part)
+    except (Unreachable, Refused) as error:
+        found.append(Finding(name, "python", False, str(error)))
+    finally:
+        await shell.close()
+    return found
+
+
+def _probed(name: str, probed: Probed, part: Part, here_ms: float) -> list[Finding]:
+    off_s = (probed.wall_ms - here_ms) / 1000.0
+    says = f"{off_s:+.1f} s off this one's"
+    right = f"within {CLOCK_S_MAX:g} s (timedatectl set-ntp true)"
+    return [
+        Finding(name, "python", True, ".".join(map(str, probed.python))),
+        _finding(name, "lfa", probed.lfa == part.version, probed.lfa or "none", f"{part.version} (lfa up --install)"),
+        _finding(name, "clock", abs(off_s) <= CLOCK_S_MAX, says, right),
+    ]
+
+
+async def _place(name: str, shell: Shell, machine: Machine, part: Part) -> list[Finding]:
+    """Folder, router and port; whether the port is open is tried from here."""
+    try:
+        state: Found = await ask(shell, machine, "check", part)
+    except Refused as refused:
+        return [Finding(name, "place", False, str(refused))]
+    found = [Finding(name, "place", True, part.state)]
+    if state.run:
+        found.append(_router(name, state.router))
+    if part.port == 0 or machine.local:
+        return found
+    open_ = await (asyncio.to_thread(answers, parts.endpoint(machine)) if state.run else _knock(shell, machine, part))
+    right = "reachable from here: a firewall, or a router that is not up?"
+    return [*found, _finding(name, "port", open_, f"{parts.endpoint(machine)}", right)]
+
+
+async def _knock(shell: Shell, machine: Machine, part: Part) -> bool:
+    """Somebody listens there for a moment; whether we get through."""
+    listening = asyncio.create_task(ask(shell, machine, "listen", part))
+    until = clock.now() + KNOCK_S
+    through = False
+    while not through and not listening.done() and clock.now() < until:
+        try:
+            opening = asyncio.open_connection(machine.address, machine.router_port)
+            _, writer = await asyncio.wait_for(opening, 0.5)
+            writer.close()
+            through = True
+        except (OSError, TimeoutError):
+            await asyncio.sleep(0.1)
+    await listening
+    return through
+
+
+def _router(host: str, there: bool) -> Finding:
+    return Finding(host, "router", there, "answers" if there else f"does not answer: see lfa logs {host}/router")
+
+
+def _finding(host: str, check: str, ok: bool, says: str, right: str) -> Finding:
+    return Finding(host, check, ok, says if ok else f"{says}: must be {right}")
