@@ -383,8 +383,8 @@ class Lease:
             return
         # Who has no vote stands last: it is needed only when nobody who has one can lead.
         named = is_first(self.config) or self.me in self.config.voters
-        patience_s = 0.0 if named else self._timing.chain_silence_s
-        self._elect_at = at + patience_s + self._rank(self.me.id) * self._timing.rank_step_s
+        place = self._rank(self.me.id) + (0 if named else len(self.config.voters))
+        self._elect_at = at + place * self._timing.rank_step_s
 
     def _stand(self, now: float, effects: list[Effect]) -> None:
         """A new candidacy under a term above all that was heard of. A leader may stand too: it raises its term."""
@@ -496,7 +496,8 @@ class Lease:
                 self._stand(now, effects)  # E10
         elif newer and candidate is None and holder is None:
             self._adopt(body.config, now, effects)
-            self._elect_after(now + self._grant_s)
+            # Who holds a lease under it, if anybody, speaks within a heartbeat, or is told of by this very refusal.
+            self._elect_after(now + max(body.remaining_s * SLOWEST, self._timing.heartbeat_s))
 
     # --- leading -----------------------------------------------------------------------------------------------
 

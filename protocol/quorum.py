@@ -11,10 +11,14 @@ from collections.abc import Container, Mapping
 
 from protocol.messages import Config, Electorate, Member
 
+NEVER = float("-inf")
+
 
 def is_half(voters: tuple[Member, ...], tie: Member | None, present: Container[Member]) -> bool:
     """More than half of `voters`, or one half with the tie-breaker."""
-    count = sum(voter in present for voter in voters)
+    count = 0
+    for voter in voters:
+        count += voter in present
     return 2 * count > len(voters) or (2 * count == len(voters) and tie is not None and tie in present)
 
 
@@ -41,10 +45,25 @@ def electors(config: Config) -> tuple[Member, ...]:
 
 def quorum_time(config: Config, times: Mapping[Member, float]) -> float | None:
     """The latest t such that a quorum has `times` at or after t; None while no quorum has any."""
-    newest_first = sorted(((times[m], m) for m in electors(config) if m in times), reverse=True)
-    present: list[Member] = []
-    for time, member in newest_first:
-        present.append(member)
-        if 2 * len(present) >= len(config.voters) and is_quorum(config, present):
-            return time
-    return None
+    time = _half_time(config.voters, config.tie, times)
+    previous = config.previous
+    if previous is not None:
+        before = (
+            min((times.get(m, NEVER) for m in previous.voters), default=NEVER)
+            if previous.rule == "all"
+            else _half_time(previous.voters, previous.tie, times)
+        )
+        time = min(time, before)
+    return None if time == NEVER else time
+
+
+def _half_time(voters: tuple[Member, ...], tie: Member | None, times: Mapping[Member, float]) -> float:
+    """`is_half` from the other side: as many voters as are needed have reached this time."""
+    if not voters:
+        return NEVER
+    newest_first = sorted([times.get(m, NEVER) for m in voters], reverse=True)
+    half, odd = divmod(len(voters), 2)
+    time = newest_first[half]
+    if not odd and tie is not None:
+        time = max(time, min(newest_first[half - 1], times.get(tie, NEVER)))
+    return time

@@ -1,6 +1,7 @@
 """Which sets of voters decide."""
 
 from itertools import combinations
+from random import Random
 
 import pytest
 
@@ -13,6 +14,7 @@ def members(*ids: int) -> tuple[Member, ...]:
 
 
 W = Member(0, 1)
+RULES = ("half", "all")
 
 
 @pytest.mark.parametrize(
@@ -72,6 +74,21 @@ def test_the_quorum_time_is_the_newest_that_a_quorum_has_reached() -> None:
     times = dict(zip(members(1, 2, 3, 9), (1.0, 5.0, 3.0, 9.0), strict=True))
     assert quorum_time(config, times) == 3.0
     assert quorum_time(config, {members(1)[0]: 1.0}) is None
+
+
+def test_the_quorum_time_is_what_the_quorums_say() -> None:
+    """For every pair of small electorates and every order of times: the latest t whose members make a quorum."""
+    random = Random(7)
+    for _ in range(3000):
+        ids = members(0, 1, 2, 3, 4)
+        voters = tuple(random.sample(ids, random.randint(0, 5)))
+        tie = random.choice((None, *voters))
+        before = tuple(random.sample(ids, random.randint(1, 5)))
+        previous = random.choice((None, Electorate(before, random.choice((None, *before)), random.choice(RULES))))
+        config = Config(Version(NO_TERM, 0), voters, tie, previous, voters)
+        times = {m: float(random.randint(0, 3)) for m in ids if random.random() < 0.8}
+        reached = [t for t in times.values() if is_quorum(config, {m for m, at in times.items() if at >= t})]
+        assert quorum_time(config, times) == max(reached, default=None), (config, times)
 
 
 def test_the_electors_of_a_joint_config_are_both_sets_each_once() -> None:
