@@ -36,10 +36,10 @@ class Candidate:
         self._act_s = timing.act_s
         self._fences_asked: set[Grantee] = set()
         self._pause_s = 2.0 * timing.rank_step_s
-        self._pause_s_max = 2.0 * timing.heartbeat_s
+        self._pause_s_max = timing.heartbeat_s
 
     def asked(self, now: float) -> None:
-        """A PREPARE leaves: each pause is longer than the one before, up to two heartbeats."""
+        """A PREPARE leaves: each pause is longer than the one before, up to a heartbeat."""
         self.ask_at = now + self._pause_s
         self._fences_asked.clear()
         self._bound_until = now

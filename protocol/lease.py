@@ -477,7 +477,9 @@ class Lease:
             self._lonely_from = now + self._lonely_s  # somebody holds a lease
         candidate, holder = self._candidate, self._holder
         newer = body.config.version > self.config.version
-        if candidate is not None and body.term == candidate.term:
+        # Whatever a voter refuses, it tells what it will refuse next: asking on under a lower term is in vain.
+        in_vain = candidate is not None and candidate.holder is None and body.promised > candidate.term
+        if candidate is not None and (body.term == candidate.term or in_vain):
             if newer:
                 self._adopt(body.config, now, effects)
             beaten = candidate.refused(src, self.config) if body.promised > candidate.term else False

@@ -1,116 +1,16 @@
-"""The invariants I1-I8 of protocol/README.md as objects that watch from outside.
-
-They see true time and what left each process and each gateway, nothing of anybody's state: the fuzzer feeds
-them while a schedule runs, and a recording of real processes can feed them as well.
-"""
+"""The invariants I1-I8 of protocol/README.md as objects that watch from outside. L1-L7 are in `liveness.py`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
-from msgspec import Struct
-
+from deploy.look.checker import EARLY_S, LONG_AGO, Checker, WithFences
+from deploy.look.checker import member_text as _m
+from deploy.look.checker import term_text as _t
 from protocol.messages import CmdVel, Config, Electorate, Grant, Member, Promise, Propose, Term, Version
 from protocol.quorum import is_quorum
 from protocol.timing import CLOCK_RATE_ERROR, Timing
 
-EARLY_S = 1e-6
-"""Rounding of clock conversions."""
-LONG_AGO = float("-inf")
 
-
-class Violation(Struct, frozen=True):
-    """What was broken, when (true time [s]), and by what."""
-
-    name: str
-    at: float
-    text: str
-
-
-class Checker:
-    """One invariant. It overrides what it needs to hear; `violations` is what it found."""
-
-    name = ""
-
-    def __init__(self, timing: Timing) -> None:
-        self.timing = timing
-        self.violations: list[Violation] = []
-
-    def broken(self, at: float, text: str) -> None:
-        self.violations.append(Violation(self.name, at, text))
-
-    def leads(self, at: float, who: Member, term: Term, until: float) -> None:
-        """`who` holds `term`, new or extended, and believes so until true time `until`."""
-
-    def leads_no_more(self, at: float, who: Member) -> None:
-        """It stepped down, or its process ended."""
-
-    def adopts(self, at: float, who: Member, config: Config) -> None: ...
-
-    def promises(self, at: float, who: Member, promise: Promise) -> None:
-        """A promise reached the candidate that `promise.term` names."""
-
-    def proposes(self, at: float, who: Member, propose: Propose) -> None: ...
-
-    def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
-        """`voter` is bound to the holder of `grant.term` until true time `until`."""
-
-    def releases(self, at: float, term: Term) -> None:
-        """A RELEASE of `term` left its holder."""
-
-    def bars(self, at: float, robot_id: int, below: Term) -> None:
-        """The gateway of `robot_id` refuses every term under `below` from here on, by a fence or a command."""
-
-    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None: ...
-
-    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
-        """The gateway of `robot_id` let `cmd` through, whose stamp is `age` seconds old by the gateway's clock."""
-
-
-def listeners(checkers: Sequence[Checker]) -> dict[str, list[Callable[..., None]]]:
-    """By what there is to hear, the methods of those checkers that want to hear it."""
-    return {
-        name: [getattr(c, name) for c in checkers if getattr(type(c), name) is not getattr(Checker, name)]
-        for name in vars(Checker)
-        if not name.startswith("_")
-    }
-
-
-class Fences:
-    """What each gateway refuses at a moment: the knowledge that I1, I4 and I8 share."""
-
-    def __init__(self) -> None:
-        self._least: dict[int, Term] = {}
-        self._shut_until: dict[int, float] = {}
-
-    def bars(self, robot_id: int, below: Term) -> None:
-        self._least[robot_id] = max(self._least.get(robot_id, below), below)
-
-    def gateway_starts(self, robot_id: int, shut_until: float) -> None:
-        self._least.pop(robot_id, None)
-        self._shut_until[robot_id] = shut_until
-
-    def refuses(self, robot_id: int, term: Term, until: float) -> bool:
-        """No command of `term` moves `robot_id`, now and until `until`."""
-        least = self._least.get(robot_id)
-        return (least is not None and term < least) or until <= self._shut_until.get(robot_id, LONG_AGO)
-
-
-class _WithFences(Checker):
-    """A checker that has to know what is fenced."""
-
-    def __init__(self, timing: Timing) -> None:
-        super().__init__(timing)
-        self.fences = Fences()
-
-    def bars(self, at: float, robot_id: int, below: Term) -> None:
-        self.fences.bars(robot_id, below)
-
-    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
-        self.fences.gateway_starts(robot_id, shut_until)
-
-
-class LeaseExclusivity(_WithFences):
+class LeaseExclusivity(WithFences):
     name = "I1"
 
     def __init__(self, timing: Timing) -> None:
@@ -127,7 +27,10 @@ class LeaseExclusivity(_WithFences):
                 continue
             lower, holder, end = min((term, who, until), (its_term, other, its_until))
             if not self.fences.refuses(holder.id, lower, end):
-                self.broken(at, f"{_t(term)} of {_m(who)} and {_t(its_term)} of {_m(other)} are valid together")
+                self.broken(
+                    at,
+                    f"{_t(term)} of {_m(who)} and {_t(its_term)} of {_m(other)} are valid together",
+                )
 
     def leads_no_more(self, at: float, who: Member) -> None:
         self._valid.pop(who, None)
@@ -141,9 +44,23 @@ class Acting(Checker):
         self._highest = Term()
         self._of_gateway: dict[int, Term] = {}
         self._holder: dict[Term, int] = {}
+        self._remembering: set[Member] = set()
+        self._wall_stepped = False
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
         self._of_gateway.pop(robot_id, None)
+
+    def wall_steps(self, at: float, host: int) -> None:
+        self._wall_stepped = True
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._remembering.add(who)
+
+    def ends(self, at: float, who: Member) -> None:
+        """When nobody is left who remembers a term, the wall clocks alone keep the order (E1)."""
+        self._remembering.discard(who)
+        if self._wall_stepped and not self._remembering:
+            self._highest = Term()
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
         if cmd.term < self._of_gateway.get(robot_id, cmd.term):
@@ -177,7 +94,7 @@ class OneHolder(Checker):
             self.broken(at, f"{_t(propose.term)} proposed by {_m(who)}")
 
 
-class OneBond(_WithFences):
+class OneBond(WithFences):
     name = "I4"
 
     def __init__(self, timing: Timing) -> None:
@@ -203,7 +120,10 @@ class OneBond(_WithFences):
         handed_over = issued_by == (other.id, other.incarnation) or (other, voter) in self._gifts
         free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
         if not free and not self.fences.refuses(other.id, term, its_until):
-            self.broken(at, f"{_m(voter)} granted {_t(grant.term)} to {_m(holder)}, bound to {_t(term)} of {_m(other)}")
+            self.broken(
+                at,
+                f"{_m(voter)} granted {_t(grant.term)} to {_m(holder)}, bound to {_t(term)} of {_m(other)}",
+            )
         self._bond[voter] = (grant.term, holder, until)
 
 
@@ -278,7 +198,7 @@ class NoAmnesiacVote(Checker):
             self.broken(at, f"{_t(propose.term)} proposed on promises of {sorted(_m(m) for m in promised)}")
 
 
-class Residual(_WithFences):
+class Residual(WithFences):
     name = "I8"
 
     def __init__(self, timing: Timing) -> None:
@@ -294,7 +214,8 @@ class Residual(_WithFences):
             if cmd.holder != old.holder and at < rest_at and not self.fences.refuses(old.holder, old.term, at):
                 early = (rest_at - at) * 1000.0
                 self.broken(
-                    at, f"{_t(cmd.term)} obeyed {early:.1f} ms before {_t(old.term)} of {old.holder} is at rest"
+                    at,
+                    f"{_t(cmd.term)} obeyed {early:.1f} ms before {_t(old.term)} of {old.holder} is at rest",
                 )
         self._last = (at - age, cmd)
 
@@ -309,11 +230,3 @@ SAFETY: tuple[type[Checker], ...] = (
     NoAmnesiacVote,
     Residual,
 )
-
-
-def _t(term: Term) -> str:
-    return f"({term.n},{term.issuer},{term.incarnation})"
-
-
-def _m(member: Member) -> str:
-    return f"{member.id}/{member.incarnation}"

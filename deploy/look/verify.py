@@ -17,7 +17,8 @@ from msgspec import Struct
 
 from agents.agent import Agent
 from deploy.look.again import call, node_of
-from deploy.look.checkers import SAFETY, Violation, listeners
+from deploy.look.checker import Violation, listeners
+from deploy.look.checkers import SAFETY
 from deploy.look.overheard import Words, overhear, said, told
 from deploy.run.folder import JOURNALS, scenario_of
 from protocol import journal

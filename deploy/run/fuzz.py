@@ -17,9 +17,9 @@ from typing import Annotated
 import typer
 from msgspec import Struct
 
-from deploy.look.checkers import Violation
-from deploy.run.arena import Trace
+from deploy.look.checker import Violation
 from deploy.run.chaos import Played, play, play_whole
+from deploy.run.network import Trace
 from deploy.run.schedules import KINDS, Schedule, draw, without
 from protocol.mission import Refused
 

@@ -10,14 +10,18 @@ from random import Random
 
 from msgspec import Struct, structs
 
-from deploy.run.arena import Weather
+from deploy.run.network import Weather
 from protocol.mission import Profile
 from protocol.timing import CLOCK_RATE_ERROR
 
 FAULTS_UNTIL_S = 4.0
 DURATION_S = 8.0
 WARM_UP_S = 0.6
-FAULTS_MEAN = 26
+FAULTS_MEAN = 30
+CALM_SHARE = 0.05
+"""Schedules without a fault: nobody may stop leading (L5)."""
+SINGLE_SHARE = 0.05
+"""Schedules in which a leader is killed and nothing else happens: the next in the chain leads (L6)."""
 LEADER_SHARE = 0.4
 """Of the faults with one target, how many are aimed at whoever leads at that moment."""
 
@@ -48,7 +52,14 @@ class Schedule(Struct, frozen=True):
     revive_all: bool
     """At the end of the faults every dead process starts again; else only as many as a quorum needs."""
 
+    @property
+    def is_single(self) -> bool:
+        """A leader is killed in fair weather, and that is all."""
+        kinds = [fault.kind for fault in self.faults]
+        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.weather == FAIR
 
+
+FAIR = Weather()
 KINDS: tuple[str, ...] = (
     "kill",
     "restart",
@@ -61,12 +72,15 @@ KINDS: tuple[str, ...] = (
     "burst",
     "duplicate",
     "tail",
+    "reorder",
+    "clock_step",
     "false_hint",
     "hand_over",
     "gateway",
     "witness",
 )
-"""Kinds that a schedule may draw; `burst` is a short total loss, `gateway` and `witness` are a crash with a restart."""
+"""Kinds that a schedule may draw; `burst` is a short total loss, `gateway` and `witness` are a crash with a restart,
+`clock_step` is a restart at which the wall clock is wrong (no other clock can be stepped)."""
 
 
 def draw(seed: int) -> Schedule:
@@ -76,7 +90,13 @@ def draw(seed: int) -> Schedule:
     witness = random.random() < 0.9
     ids = tuple(range(1, robots + 1))
     kinds = [kind for kind in KINDS if random.random() < 0.4 and (witness or kind != "witness")] or ["kill"]
-    mean = 0.0 if random.random() < 0.05 else FAULTS_MEAN
+    share = random.random()
+    weather = _weather(random)
+    faults = [_fault(random, kinds, ids) for _ in range(_count(random, FAULTS_MEAN))]
+    if share < CALM_SHARE:
+        faults = []
+    elif share < CALM_SHARE + SINGLE_SHARE:
+        faults, weather = [Fault(random.uniform(1.5, FAULTS_UNTIL_S), "kill", (LEADER,))], FAIR
     return Schedule(
         seed=seed,
         robots=robots,
@@ -84,8 +104,8 @@ def draw(seed: int) -> Schedule:
         profile=random.choices(("std", "fast", "wifi"), (0.7, 0.15, 0.15))[0],
         gateways_at_world=witness and random.random() < 0.5,
         rates={i: _rate(random) for i in (*ids, 0, *(-i for i in ids))},
-        faults=tuple(sorted((_fault(random, kinds, ids) for _ in range(_count(random, mean))), key=_when)),
-        weather=_weather(random),
+        faults=tuple(sorted(faults, key=_when)),
+        weather=weather,
         revive_all=random.random() < 0.5,
     )
 
@@ -132,6 +152,10 @@ def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> Fault:
             return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
         case "tail":
             return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.05, 0.5))
+        case "reorder":
+            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
+        case "clock_step":
+            return Fault(at, kind, (target,), lasts, random.choice((-1.0, 1.0)) * random.uniform(1.0, 3600.0))
         case "false_hint":
             observers = tuple(i for i in (*ids, 0) if random.random() < random.choice((0.3, 1.0)))
             return Fault(at, kind, (target, *observers), lasts, float(random.random() < 0.3))

@@ -14,12 +14,12 @@ from typing import Any
 from msgspec import Struct
 
 from agents.agent import Agent
-from deploy.look.checkers import Checker, listeners
+from deploy.look.checker import Checker, listeners
 from deploy.look.overheard import overhear, said, told
-from deploy.run import arena
-from deploy.run.arena import Trace, Weather
+from deploy.run import traced
+from deploy.run.network import Trace, Weather
 from deploy.run.operator import Operator
-from deploy.run.schedules import Schedule
+from deploy.run.schedules import FAULTS_UNTIL_S, Schedule
 from protocol.effects import BecomeLeader, Effect
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.lease import Lease
@@ -27,7 +27,7 @@ from protocol.messages import CmdVel, Fence, LeaseNote, Member, Message, Promise
 from protocol.mission import WITNESS_ID, Leading, Mission, robot_id_of, robot_name
 from protocol.node import Envelope, Node, PeerDown, PeerUp, Received
 from protocol.radio import Air, Radio
-from protocol.timing import timing_of
+from protocol.timing import CONTROL_PERIOD_S, timing_of
 from protocol.topics import WORLD_NAME, address
 from protocol.witness import Witness
 from world.kinematic import Kinematic
@@ -51,7 +51,8 @@ class Gale(Air):
         whole = self._whole
         if whole.cuts and (_place(sender), _place(receiver)) in whole.cuts:
             return []
-        return whole.weather.delays(whole.random)
+        latest_s = whole.late_at - whole.now
+        return [delay_s for delay_s in whole.weather.delays(whole.random) if delay_s <= latest_s]
 
 
 class Life:
@@ -63,6 +64,8 @@ class Life:
         self.id = member.id
         self.clock = clock
         self.paused = False
+        self.leaving = False
+        """Was told to exit, and says its last words."""
         self.drawn: tuple[str, bytes] | None = None
         """The last command said as leader: what a pause may hold back."""
         self.simulator = simulator
@@ -96,6 +99,9 @@ class Whole:
         self.weather: Weather = schedule.weather
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
+        self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max
+        """What leaves before the faults end and would arrive later never does."""
+        self.wall_ms: dict[int, int] = {}
         self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots
         self.rates = schedule.rates
         self.processes: dict[int, Life] = {}
@@ -143,7 +149,7 @@ class Whole:
         if robot_id in self.processes:
             self.kill(robot_id)
         member = Member(robot_id, self._next_life())
-        floor = round(self.now * 1000.0)
+        floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         node: Agent | Witness = (
             Witness(FLEET, member.incarnation, floor, self.mission)
             if robot_id == WITNESS_ID
@@ -154,6 +160,7 @@ class Whole:
         overhear(node, lambda effects: self._done(life, effects))
         _before(node, lambda received: self._received(received))
         self._say(robot_id, f"starts, life {member.incarnation}")
+        self._tell("lives", self.now, member)
         self._add(node, clock)
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
@@ -162,10 +169,12 @@ class Whole:
             self.simulator.kill(robot_name(robot_id), hinted=hinted)
             self._say(robot_id, "dies")
             self._tell("leads_no_more", self.now, life.member)
+            self._tell("ends", self.now, life.member)
 
     def exit(self, robot_id: int) -> None:
         life = self.processes[robot_id]
         if life.alive and not life.paused:
+            life.leaving = True
             self.simulator.terminate(robot_name(robot_id))
 
     def hand_over(self, robot_id: int) -> None:
@@ -209,6 +218,36 @@ class Whole:
         """The robot's gateway sees its agent's token vanish, whatever is true."""
         self.simulator.hint(PeerDown(robot_name(robot_id), incarnation), [WORLD_NAME])
 
+    # --- the network -------------------------------------------------------------------------------------------
+
+    def part(self, pairs: set[tuple[int, int]]) -> None:
+        """From now on nothing passes from the first to the second of each pair."""
+        self.cuts |= pairs
+        self._tell("parts", self.now, self.cuts)
+
+    def mend(self, pairs: set[tuple[int, int]]) -> None:
+        self.cuts -= pairs
+        self._tell("parts", self.now, self.cuts)
+
+    def heal(self) -> None:
+        self.cuts.clear()
+        self._tell("parts", self.now, self.cuts)
+
+    def lose_late(self, within_s: float) -> None:
+        """Nothing is on its way for longer than that (`late_at`); from now on nothing is late."""
+        self.late_at = float("inf")
+
+    def step_wall(self, robot_id: int, by_s: float) -> None:
+        """A host's wall clock is set wrong."""
+        self.wall_ms[robot_id] = round(by_s * 1000.0)
+        self._tell("wall_steps", self.now, robot_id)
+
+    def tell_healed(self) -> None:
+        for life in self.processes.values():
+            if not life.alive:
+                self._tell("ends", self.now, life.member)
+        self._tell("heals", self.now, 4.0 * self.weather.delay_max + CONTROL_PERIOD_S)
+
     def _start_world(self, world: World) -> None:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
         hardware = Hardware(world, clock)
@@ -235,7 +274,7 @@ class Whole:
 
     def _done(self, life: Life, effects: Sequence[Effect]) -> None:
         for effect in effects:
-            self._say(life.id, arena.told(effect))
+            self._say(life.id, traced.told(effect))
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, life.id, effect))
             for words in told(effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true):

@@ -10,7 +10,8 @@ import msgspec
 import typer
 from msgspec import Struct
 
-from deploy.look.checkers import SAFETY, Violation
+from deploy.look.checker import Violation
+from deploy.look.checkers import SAFETY
 from deploy.look.readings import Run
 from deploy.look.summary import SUMMARY
 from deploy.look.verify import verify

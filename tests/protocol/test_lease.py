@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from deploy.look.checkers import SAFETY, Checker
+from deploy.look.checker import Checker
+from deploy.look.checkers import SAFETY
 from deploy.run.arena import Arena
 from protocol.acceptor import Acceptor
 from protocol.effects import BecomeLeader, Effect, LeaseExtended, Send, StepDown

@@ -1,0 +1,288 @@
+"""The invariants L1-L7 of protocol/README.md: that somebody leads, soon, alone and steadily.
+
+L1-L4 hold after the last fault, against the bounds of the design's section 6; they need to be told of it (`heals`)
+and of the end (`over`). L5 is for runs without faults, L6 for the crash of a leader and nothing else, L7 for any run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set
+
+from deploy.look.checker import EARLY_S, LONG_AGO, Checker
+from deploy.look.checker import member_text as _m
+from deploy.look.checker import term_text as _t
+from protocol.messages import CmdVel, Config, Member, Term, Version
+from protocol.mission import WITNESS_ID
+from protocol.quorum import electors, is_quorum
+from protocol.timing import CLOCK_RATE_ERROR, Timing
+
+NEVER = float("inf")
+SETTLED_S = 1.0
+"""How long after t_remove chain and versions may still change (L2, L3)."""
+
+
+class _AfterFaults(Checker):
+    """A checker of what holds some time after the last fault."""
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self.alive: dict[int, Member] = {}
+        self.healed_at = NEVER
+        self._step_s = timing.rank_step_s
+
+    def lives(self, at: float, who: Member) -> None:
+        self.alive[who.id] = who
+
+    def ends(self, at: float, who: Member) -> None:
+        self.alive.pop(who.id, None)
+
+    def heals(self, at: float, step_s: float) -> None:
+        self.healed_at, self._step_s = at, max(step_s, self._step_s)
+
+    @property
+    def led_by(self) -> float:
+        """When somebody must lead: T_grant + 4 delta N later, delta as the table wants it for this network."""
+        robots = sum(i != WITNESS_ID for i in self.alive)
+        grant_s = self.timing.grant_s / (1.0 - CLOCK_RATE_ERROR)
+        return self.healed_at + grant_s + 4.0 * self._step_s * robots
+
+    @property
+    def settled_by(self) -> float:
+        return self.healed_at + self.timing.remove_silence_s + SETTLED_S
+
+
+class OneActs(_AfterFaults):
+    name = "L1"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._acting: tuple[float, int] | None = None
+        """When the first command after the faults came of whoever acts now, and its id."""
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        if at < self.healed_at or not cmd.as_leader:
+            return
+        if self._acting is None or self._acting[1] != robot_id:
+            self._acting = (at, robot_id)
+
+    def over(self, at: float) -> None:
+        if self._acting is None:
+            self.broken(at, "nobody acted after the last fault")
+        elif self._acting[0] > self.led_by:
+            late_ms = (self._acting[0] - self.led_by) * 1000.0
+            since = (self._acting[0] - self.healed_at) * 1000.0
+            self.broken(at, f"robot {self._acting[1]} acts {since:.0f} ms after the last fault, {late_ms:.0f} ms late")
+
+
+class AllInChain(_AfterFaults):
+    name = "L2"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._config: dict[Member, Config] = {}
+        self._complete_since = NEVER
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._config[who] = config
+        self._look(at)
+
+    def lives(self, at: float, who: Member) -> None:
+        super().lives(at, who)
+        self._look(at)
+
+    def ends(self, at: float, who: Member) -> None:
+        super().ends(at, who)
+        self._config.pop(who, None)
+        self._look(at)
+
+    def _look(self, at: float) -> None:
+        robots = {m for i, m in self.alive.items() if i != WITNESS_ID}
+        complete = set(self._chain()) == robots
+        self._complete_since = min(self._complete_since, at) if complete else NEVER
+
+    def _chain(self) -> tuple[Member, ...]:
+        """The newest that somebody alive knows."""
+        newest = max(self._config.values(), key=_version, default=None)
+        return () if newest is None else newest.chain
+
+    def over(self, at: float) -> None:
+        if self._complete_since > self.settled_by:
+            chain = [_m(m) for m in self._chain()]
+            lives = [_m(m) for i, m in sorted(self.alive.items()) if i != WITNESS_ID]
+            self.broken(at, f"chain {chain} since {self._complete_since:.3f}, alive are {lives}")
+
+
+class OneVersion(_AfterFaults):
+    name = "L3"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._version: dict[int, Version] = {}
+        self._equal_since = NEVER
+
+    def lives(self, at: float, who: Member) -> None:
+        super().lives(at, who)
+        self._version[who.id] = Version()
+        self._look(at)
+
+    def ends(self, at: float, who: Member) -> None:
+        super().ends(at, who)
+        self._version.pop(who.id, None)
+        self._look(at)
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._version[who.id] = config.version
+        self._look(at)
+
+    def _look(self, at: float) -> None:
+        equal = len(set(self._version.values())) == 1
+        self._equal_since = min(self._equal_since, at) if equal else NEVER
+
+    def over(self, at: float) -> None:
+        if self._equal_since > self.settled_by:
+            known = {i: f"{_t(v.term)}.{v.seq}" for i, v in sorted(self._version.items())}
+            self.broken(at, f"versions {known}, equal since {self._equal_since:.3f}")
+
+
+class Obeyed(_AfterFaults):
+    name = "L4"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._last = LONG_AGO
+        self._silence: tuple[float, float] | None = None
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        if cmd.as_leader:
+            self._hear(at)
+
+    def over(self, at: float) -> None:
+        self._hear(at)
+        if self._silence is not None:
+            last, then = self._silence
+            self.broken(then, f"no leader command obeyed for {(then - last) * 1000.0:.0f} ms")
+
+    def _hear(self, at: float) -> None:
+        """A robot that has a leader is never still for longer than the deadman and the way of a command."""
+        patience_s = self.timing.deadman_s / (1.0 - CLOCK_RATE_ERROR) + self._step_s
+        since = max(self._last, self.led_by) if self.healed_at < NEVER else at
+        if at - since > patience_s and self._silence is None:
+            self._silence = (since, at)
+        self._last = at
+
+
+class Steady(Checker):
+    name = "L5"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._holder: Member | None = None
+
+    def leads(self, at: float, who: Member, term: Term, until: float) -> None:
+        if self._holder is None:
+            self._holder = who
+        elif self._holder != who:
+            self.broken(at, f"{_m(who)} leads after {_m(self._holder)}, and nothing happened to that one")
+            self._holder = who
+
+    def leads_no_more(self, at: float, who: Member) -> None:
+        if who == self._holder:
+            self.broken(at, f"{_m(who)} stopped leading, and nothing happened to it")
+
+
+class NextInChain(Checker):
+    name = "L6"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._alive: set[Member] = set()
+        self._config: dict[Member, Config] = {}
+        self._leader: Member | None = None
+        self._expected: Member | None = None
+
+    def lives(self, at: float, who: Member) -> None:
+        self._alive.add(who)
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._config[who] = config
+
+    def leads(self, at: float, who: Member, term: Term, until: float) -> None:
+        if self._expected is not None and who != self._expected:
+            self.broken(at, f"{_m(who)} leads, next in the chain was {_m(self._expected)}")
+        self._leader, self._expected = who, None
+
+    def ends(self, at: float, who: Member) -> None:
+        """Where no quorum is left, nobody is next."""
+        self._alive.discard(who)
+        config = self._config.get(who)
+        if who == self._leader and config is not None and is_quorum(config, self._alive):
+            self._expected = next(iter(config.chain[1:]), None)
+
+
+class StopsWithoutQuorum(Checker):
+    name = "L7"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._alive: set[Member] = set()
+        self._cuts: Set[tuple[int, int]] = frozenset()
+        self._config: dict[int, Config] = {}
+        self._reached: dict[int, float] = {}
+        """When each id was last connected, both ways, with a living quorum of its config."""
+        self._given: set[tuple[int, Term]] = set()
+
+    def lives(self, at: float, who: Member) -> None:
+        self._alive.add(who)
+
+    def ends(self, at: float, who: Member) -> None:
+        self._note(at)
+        self._alive.discard(who)
+
+    def parts(self, at: float, cuts: Set[tuple[int, int]]) -> None:
+        self._note(at)
+        self._cuts = frozenset(cuts)
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._note_one(at, who.id)
+        self._config[who.id] = config
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        if not cmd.as_leader or self._reaches(robot_id):
+            return
+        if (robot_id, cmd.term) not in self._given:
+            # What is handed over needs no way back to the voters: it begins at a moment told to the issuer before.
+            self._given.add((robot_id, cmd.term))
+            if cmd.term.issuer != robot_id:
+                self._reached[robot_id] = at
+        longest_s = (self.timing.act_s + self.timing.deadman_s) / (1.0 - CLOCK_RATE_ERROR)
+        since_s = at - self._reached.get(robot_id, LONG_AGO)
+        if since_s > longest_s + EARLY_S:
+            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)}, {since_s * 1000.0:.1f} ms without a quorum")
+
+    def _note(self, at: float) -> None:
+        for robot_id in self._config:
+            self._note_one(at, robot_id)
+
+    def _note_one(self, at: float, robot_id: int) -> None:
+        if self._reaches(robot_id):
+            self._reached[robot_id] = at
+
+    def _reaches(self, robot_id: int) -> bool:
+        config = self._config.get(robot_id)
+        if config is None:
+            return False
+        cuts = self._cuts
+        there = [
+            m
+            for m in electors(config)
+            if m in self._alive and (robot_id, m.id) not in cuts and (m.id, robot_id) not in cuts
+        ]
+        return is_quorum(config, there)
+
+
+def _version(config: Config) -> Version:
+    return config.version
+
+
+AFTER_FAULTS: tuple[type[Checker], ...] = (OneActs, AllInChain, OneVersion, Obeyed)
+"""L1-L4."""

@@ -1,0 +1,254 @@
+"""The processes of the arena: each runs one lease by its own clock, and commands its robot while it leads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from deploy.run.motors import Motors
+from deploy.run.network import Clock
+from deploy.run.traced import told
+from protocol.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from protocol.geometry import Twist
+from protocol.lease import Lease
+from protocol.messages import (
+    NO_TERM,
+    CmdVel,
+    GatewayStamp,
+    Grant,
+    Header,
+    LeaseBody,
+    Member,
+    Promise,
+    Propose,
+    Release,
+    Role,
+    Term,
+)
+from protocol.mission import robot_name
+from protocol.timing import CONTROL_PERIOD_S
+
+FORWARD = Twist(0.5, 0.0)
+FOLLOW_PERIOD_S = 0.1
+"""Followers command more rarely here than on the road: enough to carry terms to their gateways."""
+ROUNDING_S = 1e-9
+"""Of converting a time from one clock to another and back."""
+INBOX_SIZE_MAX = 500
+"""Messages kept for a process that is paused."""
+NEVER = float("inf")
+
+
+class Process:
+    """One life of one robot's (or the witness's) lease, with its own clock."""
+
+    def __init__(self, member: Member, lease: Lease, clock: Clock) -> None:
+        self.member = member
+        self.id = member.id
+        self.lease = lease
+        self.clock = clock
+        self.alive = True
+        self.paused = False
+        self.leaving = False
+        """Was told to exit, and says its last words."""
+        self.commanding = False
+        self.inbox: list[tuple[str, Any]] = []
+        """What came during a pause."""
+        self.wakes_at = NEVER
+        """True time of the earliest wake-up on the heap."""
+        self.drawn: CmdVel | None = None
+        """The last command computed as leader: what a pause may hold back."""
+
+
+class Hosts(Motors):
+    """Gateways and processes; `processes` holds the newest life of each id, alive or not."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.processes: dict[int, Process] = {}
+        self.log: list[tuple[float, int, Effect]] = []
+        """Every effect but messages and renewals."""
+        self._addresses = {name: to for i in self.ids for name, to in ((robot_name(i), i), (f"gateway{i}", -i))}
+        self._others = {i: tuple(other for other in self.ids if other != i) for i in self.ids}
+
+    # --- what comes --------------------------------------------------------------------------------------------
+
+    def deliver(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
+        """Call the lease, or keep the call for the end of a pause."""
+        if not process.paused:
+            self.take(process, method, arguments)
+        elif len(process.inbox) < INBOX_SIZE_MAX:
+            process.inbox.append((method, arguments))
+
+    def take(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
+        if method == "receive" and type(arguments[1]) is Promise:
+            for tell in self._tell["promises"]:
+                tell(self.now, arguments[0], arguments[1])
+        self.carry_out(process, getattr(process.lease, method)(*arguments, process.clock.local(self.now)))
+
+    def wake_at(self, process: Process, true: float) -> None:
+        if true < process.wakes_at:
+            process.wakes_at = true
+            self.at(true, self._wake, process)
+
+    def _wake(self, process: Process) -> None:
+        if process.wakes_at > self.now:
+            return  # set before the deadline moved
+        process.wakes_at = NEVER
+        if not process.alive or process.paused:
+            return
+        local, deadline = process.clock.local(self.now), process.lease.next_deadline()
+        if local < deadline - ROUNDING_S:
+            self.wake_at(process, process.clock.true(deadline))  # the deadline has moved since
+        else:
+            self.carry_out(process, process.lease.tick(max(local, deadline)))
+
+    def _arrive(self, src: Member, to: int, body: LeaseBody) -> None:
+        process = self.processes.get(to)
+        if process is not None and process.alive:
+            self.deliver(process, "receive", (src, body))
+
+    def _at_gateway(self, src: Member, robot_id: int, body: LeaseBody) -> None:
+        answered = self.fence(robot_id, body)
+        if answered is not None:
+            self._post(answered[0], self.host_of_gateway(robot_id), src.id, answered[1])
+
+    # --- what goes ---------------------------------------------------------------------------------------------
+
+    def carry_out(self, process: Process, effects: list[Effect]) -> None:
+        for effect in effects:
+            if self.trace is not None:
+                self.trace(self.now, process.id, told(effect))
+            if isinstance(effect, Send):
+                self._send(process, effect)
+            else:
+                self._note(process, effect)
+        lease = process.lease
+        if lease.released:
+            process.alive = False
+            if self.trace is not None:
+                self.trace(self.now, process.id, "exits")
+            self.tell_end(process)
+            self.tell_token(process.member, up=False)
+            return
+        deadline = process.clock.true(lease.next_deadline())
+        if deadline < process.wakes_at:
+            self.wake_at(process, max(self.now, deadline))
+
+    def _note(self, process: Process, effect: Effect) -> None:
+        """Tell the checkers of an effect that is no message; a new leader commands at once."""
+        match effect:
+            case AdoptChain(config=config):
+                for tell in self._tell["adopts"]:
+                    tell(self.now, process.member, config)
+            case StepDown():
+                self.log.append((self.now, process.id, effect))
+                for tell in self._tell["leads_no_more"]:
+                    tell(self.now, process.member)
+            case BecomeLeader(term=term, expiry=expiry):
+                self._tell_leads(process, term, expiry)
+                self.log.append((self.now, process.id, effect))
+                if not process.commanding:
+                    process.commanding = True
+                    self.lead(process)
+            case LeaseExtended(term=term, expiry=expiry):
+                self._tell_leads(process, term, expiry)
+
+    def _tell_leads(self, process: Process, term: Term, expiry: float) -> None:
+        for tell in self._tell["leads"]:
+            tell(self.now, process.member, term, process.clock.true(expiry))
+
+    def tell_end(self, process: Process) -> None:
+        for tell in self._tell["leads_no_more"]:
+            tell(self.now, process.member)
+        for tell in self._tell["ends"]:
+            tell(self.now, process.member)
+
+    def tell_token(self, member: Member, up: bool) -> None:
+        for other in list(self.processes.values()):
+            connected = (member.id, other.id) not in self.cuts
+            if other.alive and other.id != member.id and connected:
+                delay = self.random.uniform(0.001, self.weather.hint_delay_max)
+                self.at(self.now + delay, self._hinted, other, (member.id, member.incarnation, up))
+
+    def _hinted(self, process: Process, hint: tuple[int, int, bool]) -> None:
+        if process.alive:
+            self.deliver(process, "hint", hint)
+
+    def _send(self, process: Process, send: Send) -> None:
+        body = send.body
+        self._witness(process, body)
+        if send.to == "all":
+            for to in self._others[process.id]:
+                self._post(process.member, process.id, to, body)
+        else:
+            self._post(process.member, process.id, self._addresses[send.to], body)
+
+    def _post(self, src: Member, here: int, to: int, body: LeaseBody) -> None:
+        """`here` is where it leaves: the id of a host. A negative `to` is a gateway."""
+        start = self.now
+        if self.filter is not None:
+            extra = self.filter(src.id, to, body)
+            if extra is None:
+                return
+            start += extra
+        for delay in self.delays(here, to):
+            if to < 0:
+                self.at(start + delay, self._at_gateway, src, -to, body)
+            else:
+                self.at(start + delay, self._arrive, src, to, body)
+
+    def _witness(self, process: Process, body: LeaseBody) -> None:
+        """Tell the checkers what leaves a process. A PROPOSE by its holder is its own voter's grant as well."""
+        if isinstance(body, Grant):
+            self._tell_grant(process, body)
+        elif isinstance(body, Propose):
+            for tell in self._tell["proposes"]:
+                tell(self.now, process.member, body)
+            if body.holder == process.member:
+                self._tell_grant(process, Grant(body.term, body.round, body.config.version, 0.0))
+        elif isinstance(body, Release):
+            for tell in self._tell["releases"]:
+                tell(self.now, body.term)
+
+    def _tell_grant(self, process: Process, grant: Grant) -> None:
+        until = self.now + self._grant_s / process.clock.rate
+        for tell in self._tell["grants"]:
+            tell(self.now, process.member, grant, until)
+
+    # --- commands ----------------------------------------------------------------------------------------------
+
+    def lead(self, process: Process) -> None:
+        """The leader's control period: read the stamp, then the clock, then the lease, then send."""
+        lease = process.lease
+        if not process.alive or lease.role is not Role.LEADER:
+            process.commanding = False
+            return
+        self.at(self.now + CONTROL_PERIOD_S, self.lead, process)
+        if process.paused:
+            return
+        stamp = self.stamp(process.id)
+        local = process.clock.local(self.now)
+        if stamp is None or not lease.may_command(local):
+            return
+        gateway = self.gateways[process.id].gateway
+        self.carry_out(process, lease.gateway_term(gateway.term_max, local, gateway.latched))
+        if not lease.may_command(local):
+            return
+        process.drawn = self._drawn(process, lease.term, process.id, True, stamp)
+        self.command(process.id, process.drawn)
+        lease.commanded(local)
+
+    def follow(self, process: Process) -> None:
+        if not process.alive:
+            return
+        self.at(self.now + FOLLOW_PERIOD_S, self.follow, process)
+        lease = process.lease
+        if process.paused or lease.role is not Role.FOLLOWER or lease.config.version.term == NO_TERM:
+            return
+        stamp = self.stamp(process.id)
+        if stamp is not None:
+            term, holder = lease.config.version.term, lease.chain[0]
+            self.command(process.id, self._drawn(process, term, holder, False, stamp))
+
+    def _drawn(self, process: Process, term: Term, holder: int, as_leader: bool, stamp: GatewayStamp) -> CmdVel:
+        header = Header(robot_name(process.id), process.member.incarnation, 0, process.clock.local(self.now))
+        return CmdVel(header, FORWARD, term, holder, as_leader, stamp)

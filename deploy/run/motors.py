@@ -1,0 +1,102 @@
+"""The gateways of the arena: one for each robot, with a clock of its own, and the commands that reach it."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from deploy.run.network import Clock, Network, Weather
+from protocol.gateway import Gateway
+from protocol.messages import CmdVel, Fence, Fenced, GatewayStamp, LeaseBody, Member
+from protocol.timing import Timing
+
+
+class GatewayHost(Struct):
+    """One life of one robot's gateway, and its clock."""
+
+    gateway: Gateway
+    clock: Clock
+    born_at: float
+    alive: bool = True
+
+
+class Motors(Network):
+    """A network with gateways on it. Lives of processes and gateways are counted together."""
+
+    def __init__(
+        self,
+        seed: int,
+        ids: tuple[int, ...],
+        weather: Weather,
+        gateways_at: int | None,
+        timing: Timing,
+        rates: dict[int, float],
+        gateway_type: type[Gateway],
+    ) -> None:
+        """`rates`: of clocks other than 1, by id; minus an id is its gateway's."""
+        super().__init__(seed, ids, weather, gateways_at)
+        self.timing = timing
+        self.rates = rates
+        self.gateways: dict[int, GatewayHost] = {}
+        self.accepted: list[tuple[float, CmdVel]] = []
+        """Leader commands that a gateway obeyed."""
+        self._gateway_type = gateway_type
+        self._lives = 0
+        self._grant_s = timing.grant_s
+
+    def start_gateway(self, robot_id: int, at: float | None = None) -> None:
+        """A new life of a robot's gateway; `at` may lie in the past: it has then been up since."""
+        born_at = self.now if at is None else at
+        self._lives += 1
+        clock = Clock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
+        gateway = self._gateway_type(robot_id, self._lives, self.timing, clock.local(born_at))
+        self.gateways[robot_id] = GatewayHost(gateway, clock, born_at)
+        for tell in self._tell["gateway_starts"]:
+            tell(self.now, robot_id, born_at + self._grant_s / clock.rate)
+
+    def kill_gateway(self, robot_id: int) -> None:
+        self.gateways[robot_id].alive = False
+
+    def latch(self, robot_id: int, incarnation: int) -> None:
+        """The robot's gateway sees its agent's token vanish, whatever is true."""
+        host = self.gateways.get(robot_id)
+        if host is not None and host.alive:
+            host.gateway.agent_down(incarnation, host.clock.local(self.now))
+
+    def stamp(self, robot_id: int) -> GatewayStamp | None:
+        """The newest gateway stamp that reached the robot: one hop old. None when it hears no gateway."""
+        host = self.gateways.get(robot_id)
+        delay = self.random.uniform(0.0005, 0.002)
+        if host is None or not host.alive or self.now - delay < host.born_at:
+            return None
+        if (self.host_of_gateway(robot_id), robot_id) in self.cuts:
+            return None
+        return host.gateway.stamp(host.clock.local(self.now - delay))
+
+    def command(self, robot_id: int, cmd: CmdVel) -> None:
+        """`cmd` leaves the robot's process for its gateway."""
+        for delay in self.delays(robot_id, -robot_id):
+            self.at(self.now + delay, self._commanded, robot_id, cmd)
+
+    def _commanded(self, robot_id: int, cmd: CmdVel) -> None:
+        host = self.gateways.get(robot_id)
+        if host is None or not host.alive:
+            return
+        local = host.clock.local(self.now)
+        if host.gateway.command(cmd, local) is not None:
+            return
+        if cmd.as_leader:
+            self.accepted.append((self.now, cmd))
+        for tell in self._tell["obeys"]:
+            tell(self.now, robot_id, cmd, local - cmd.gateway.time)
+        for tell in self._tell["bars"]:
+            tell(self.now, robot_id, cmd.term)
+
+    def fence(self, robot_id: int, body: LeaseBody) -> tuple[Member, Fenced] | None:
+        """The gateway's answer, and who speaks."""
+        host = self.gateways.get(robot_id)
+        if host is None or not host.alive or not isinstance(body, Fence):
+            return None
+        for tell in self._tell["bars"]:
+            tell(self.now, robot_id, body.term)
+        answer = host.gateway.fence(body, host.clock.local(self.now))
+        return Member(robot_id, host.gateway.incarnation), answer
