@@ -7,10 +7,11 @@ import subprocess
 import sys
 
 import pytest
+from msgspec.structs import replace
 
 from deploy.run.chaos import play_whole
 from deploy.run.fuzz import shrink
-from deploy.run.schedules import KINDS, draw, without
+from deploy.run.schedules import KINDS, LEADER, Fault, draw
 from protocol.acceptor import Acceptor
 from protocol.gateway import Gateway
 
@@ -46,7 +47,9 @@ def test_a_voter_that_forgets_its_bond_is_found_and_few_faults_are_enough(monkey
 
     monkeypatch.setattr(Acceptor, "propose", careless)
     monkeypatch.setattr(Acceptor, "bound", lambda self, now: None)
-    bad = without(draw(15), *range(4, len(draw(15).faults)))
+    loss, duplicate = Fault(1.2, "loss", (), 0.2, 0.1), Fault(2.5, "duplicate", (), 0.2, 0.2)
+    deaf = Fault(1.5, "cut_pair", (LEADER, 2), 1.0)  # robot 2 hears the leader no more, everybody else does
+    bad = replace(draw(3), faults=(loss, deaf, duplicate))
     name = play_whole(bad).violations[0].name
     small = shrink(bad, name, play_whole)
     assert len(small.faults) < len(bad.faults)
