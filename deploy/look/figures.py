@@ -1,8 +1,7 @@
 """The figures of a run: those of the paper (7, 8, 9, 11) and what the paper has none of. One table
 for PNGs and reports.
 
-Colours can be told apart with any colour vision; up to seven robots differ in line style as well, more are shades
-along the chain. Lines are thinned to what a page can show, with every spike kept.
+Lines are thinned to what a page can show, with every spike kept.
 """
 
 from __future__ import annotations
@@ -14,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.patches import Circle, Polygon
 
-from deploy.look import chronicle, errors
+from deploy.look import chronicle, errors, timeline
 from deploy.look.errors import Errors
+from deploy.look.marks import COLOURS, LEGEND_MAX, label, look
 from deploy.look.readings import Run
 from deploy.look.trace import Array
 from world.terrain import patches_of
@@ -27,31 +26,12 @@ from world.terrain import patches_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's palette.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
-LEGEND_MAX = 12
 POINTS_MAX = 8000  # on all lines of one panel together
 STANCES = 6  # how often a path flow shows the whole team
 TERM_SHARE_MIN = 0.15  # of the run: a shorter bar has no room for its term
 FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": True, "grid.alpha": 0.3,
         "legend.fontsize": 8.0, "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
         "svg.hashsalt": "lfa"}  # fmt: skip
-
-
-def look(run: Run, robot: int) -> dict[str, Any]:
-    """Colour and style of a robot's lines, the same in every figure."""
-    n = run.robots.index(robot) if robot in run.robots else 0
-    if len(run.robots) <= len(COLOURS):
-        return {"color": COLOURS[n], "linestyle": STYLES[n]}
-    return {"color": colormaps["viridis"](0.95 * n / (len(run.robots) - 1)), "linestyle": "-"}
-
-
-def label(run: Run, robot: int) -> str | None:
-    """A name for the legend; with many robots only the first, the last and some between have one."""
-    n, many = run.robots.index(robot), len(run.robots)
-    step = max(1, -(-many // LEGEND_MAX))
-    return f"robot {robot}" if n % step == 0 or n == many - 1 else None
 
 
 Draw = Callable[[FigureBase, Run], None]
@@ -157,28 +137,6 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
     axes.set(xlim=(0.0, end_s), ylim=(max(run.robots) + 0.8, min(run.robots) - 0.8))
 
 
-def _lease(figure: FigureBase, run: Run) -> None:
-    """Who held the lease when, in which term, why it changed; below it the place of each robot in the chain."""
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 3))
-    end_s = max(run.seen.end_s, 1.0)
-    first_n = min((reign.term[0] for reign in run.reigns), default=0)
-    for n, reign in enumerate(run.reigns):
-        until_s = end_s if reign.until_s is None else reign.until_s
-        colour = look(run, reign.robot_id)["color"]
-        above.barh(0, until_s - reign.from_s, left=reign.from_s, height=0.5, color=colour, edgecolor="white")
-        text = f"{reign.cause}: robot {reign.robot_id}, term +{reign.term[0] - first_n}"
-        above.annotate(
-            text, (reign.from_s, 0.3 + 0.35 * (n % 4)), xytext=(3, 0), textcoords="offset points", fontsize=7
-        )
-        above.axvline(reign.from_s, color=colour, linewidth=0.6)
-    above.set(ylim=(-0.3, 1.8), yticks=[], title="Who held the lease, in which term, and what ended the one before")
-    for robot, steps in chronicle.places(run.events, run.robots, end_s).items():
-        below.step(*zip(*steps, strict=True), where="post", label=label(run, robot), **look(run, robot))
-    last = len(run.robots) - 1
-    below.set(ylim=(last + 0.5, -0.5), yticks=range(last + 1), xlim=(0.0, end_s))
-    _finish(below, run, "The chain after it, as its leader told it", "place in the chain")
-
-
 def _string_stability(figure: FigureBase, run: Run) -> None:
     """Along the last chain: how large an error each follower keeps, how lively each turns against the one ahead."""
     left, right = figure.subplots(1, 2)
@@ -208,7 +166,7 @@ FIGURES: tuple[tuple[str, tuple[float, float], str, Draw], ...] = (
     ("fig07_distance_error",    (10.0, 4.0), "Distance error (figure 7)",                           _distance_error),
     ("fig08_orientation_error", (10.0, 6.5), "Orientation error (figure 8)",                        _orientation_error),
     ("fig11_tracking",          (10.0, 6.0), "Tracking controller's output (figure 11)",            _tracking),
-    ("lease_timeline",          (10.0, 5.0), "Lease, terms and chain",                              _lease),
+    ("lease_timeline",          (10.0, 5.0), "Lease, terms and chain",                              timeline.draw),
     ("string_stability",        (10.0, 3.5), "String stability, hop by hop",                        _string_stability),
     ("leader_timeline",         (10.0, 3.0), "Who led, and what it took to replace a lost leader",  _leader_timeline),
 )  # fmt: skip

@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import pytest
 
 from deploy.look import page, report
-from deploy.look.figures import FIGURES, label
+from deploy.look.figures import FIGURES
+from deploy.look.marks import label
 from deploy.look.readings import Run
 from deploy.run.faults import parse_all
 from deploy.run.simulate import run

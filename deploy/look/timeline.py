@@ -1,0 +1,100 @@
+"""The timeline of a run's lease: who held it when, in which term, why it changed, and the chain after it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isnan
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import FigureBase
+
+from deploy.look import chronicle
+from deploy.look.marks import LEGEND_MAX, levels, look
+from deploy.look.readings import Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LETTERS_WIDE = 150
+"""Letters of a label that the width of a figure has room for."""
+LINES = 3
+"""Of labels above a row."""
+LINE = 0.36
+"""Height of one, where a bar's is about 1."""
+
+
+def draw(figure: FigureBase, run: Run) -> None:
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 3))
+    end_s = max(run.seen.end_s, 1.0)
+    _holders(above, run, end_s)
+    _chain(below, run, end_s)
+    below.set(xlim=(0.0, end_s), xlabel="time [s]")
+    for axes in (above, below):
+        axes.grid(visible=False)
+        for fault in chronicle.faults(run.events):
+            axes.axvline(fault.at_s, color="black", linewidth=0.8, linestyle=":", zorder=3)
+
+
+def _holders(axes: Axes, run: Run, end_s: float) -> None:
+    """A bar a term; above it why it began, and what was done to the team."""
+    first = min((reign.term[0] for reign in run.reigns), default=0)
+    for reign in run.reigns:
+        until_s = end_s if reign.until_s is None else reign.until_s
+        _cell(axes, 0.0, reign.from_s, until_s, run, reign.robot_id, end_s)
+    began = [(reign.from_s, f"{_said(reign.cause)}, term +{reign.term[0] - first}") for reign in run.reigns]
+    _labels(axes, began, 0.55, end_s)
+    done = [(fault.at_s, f"{fault.kind} {fault.target}") for fault in chronicle.faults(run.events)]
+    top = 0.65 + LINE * LINES
+    _labels(axes, done, top, end_s, weight="bold")
+    axes.set(ylim=(-0.5, top + LINE * LINES), yticks=[0.0, 0.65 + LINE * LINES / 2.5, top + LINE * LINES / 2.5])
+    axes.set_yticklabels(["lease", "began by", "faults"])
+    axes.set_title(f"Who held the lease, and what ended the one before (terms count from {first})")
+    axes.tick_params(left=False)
+
+
+def _chain(axes: Axes, run: Run, end_s: float) -> None:
+    """A row a place; in it who had that place when."""
+    for robot, steps in chronicle.places(run.events, run.robots, end_s).items():
+        for from_s, until_s, place in _stretches(steps):
+            _cell(axes, place, from_s, until_s, run, robot, end_s)
+    last = len(run.robots) - 1
+    axes.set(
+        ylim=(last + 0.5, -0.5), ylabel="place in the chain", title="The chain after it, by the numbers of the robots"
+    )
+    axes.set_yticks(range(0, last + 1, max(1, -(-last // LEGEND_MAX))))
+    axes.tick_params(left=False)
+
+
+def _cell(axes: Axes, row: float, from_s: float, until_s: float, run: Run, robot: int, end_s: float) -> None:
+    """A robot's stretch of a row, with its number in it where there is room."""
+    axes.barh(row, until_s - from_s, left=from_s, height=0.84, color=look(run, robot)["color"], edgecolor="white")
+    text = f"{robot}"
+    if until_s - from_s > end_s * (len(text) + 1) / LETTERS_WIDE and len(run.robots) <= LEGEND_MAX:
+        middle = (from_s + until_s) / 2.0
+        axes.annotate(text, (middle, row), ha="center", va="center", color="white", fontsize=9, weight="bold")
+
+
+def _labels(
+    axes: Axes, texts: Sequence[tuple[float, str]], lowest: float, end_s: float, weight: str = "normal"
+) -> None:
+    for (at_s, text), level in zip(texts, levels(texts, end_s / LETTERS_WIDE, LINES), strict=True):
+        axes.annotate(text, (at_s, lowest + LINE * level), xytext=(2, 0), textcoords="offset points", fontsize=7.5,
+                      weight=weight, zorder=4,
+                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})  # fmt: skip
+
+
+def _stretches(steps: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float, float]]:
+    """From, until and place of each stretch that a robot kept one place in the chain."""
+    began, kept = 0.0, float("nan")
+    for at_s, place in steps:
+        if place == kept or (isnan(place) and isnan(kept)):
+            continue
+        if not isnan(kept):
+            yield began, at_s, kept
+        began, kept = at_s, place
+    if steps and not isnan(kept):
+        yield began, steps[-1][0], kept
+
+
+def _said(cause: str) -> str:
+    return {"start": "start", "handed_over": "handed over", "handover": "handed over"}.get(cause, cause)
