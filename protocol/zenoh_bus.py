@@ -18,6 +18,7 @@ import zenoh
 from protocol import clock
 from protocol.bus import Arrival, Inbox
 from protocol.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
+from protocol.endpoints import check_endpoints
 from protocol.mission import Profile, Refused
 from protocol.node import PeerDown, PeerUp, RouterLost
 from protocol.topics import TOPIC, Topic, address, alive_key
@@ -72,11 +73,12 @@ class ZenohBus:
         `credentials` are shown to routers that ask for some, and tell whose routers are trusted. Raises RouterAbsent
         when no router answers or none lets us in, Refused for an endpoint that is none.
         """
+        check_endpoints(endpoint, "connect")
         self._inbox = inbox
         try:
             self._session = _client(endpoint, lease_ms, credentials)
         except zenoh.ZError as error:
-            raise _open_error(endpoint, error) from None
+            raise RouterAbsent(_reason(error)) from None
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._followed: dict[str, Any] = {}
         self._token: zenoh.LivelinessToken | None = None
@@ -156,7 +158,10 @@ def open_router(
     """
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {ROUTER_RX_THREADS}))")
     for endpoint in listen:
+        check_endpoints(endpoint, "listen")
         _check_listen(endpoint, credentials, secure)
+    for endpoint in connect:
+        check_endpoints(endpoint, "connect")
     config = _config("router", listen, connect, lease_ms, credentials)
     if secure:
         assert credentials is not None
@@ -274,13 +279,6 @@ def _guard(credentials: Credentials) -> dict[str, Any]:
         raise Refused(f"{access}: {error}, must be the rules that `lfa keys` wrote") from None
     users_file = {"transport/auth/usrpwd/dictionary_file": str(users)}
     return _login(credentials) | users_file | {"transport/link/protocols": SECURE_PROTOCOLS} | rules
-
-
-def _open_error(endpoint: str, error: zenoh.ZError) -> Exception:
-    known = ("unixsock-stream/", "tcp/", "udp/", "tls/", "quic/", "ws/")
-    if not all(one.startswith(known) for one in endpoint.split(",")):
-        return Refused(f"connect {endpoint}: must be like tcp/127.0.0.1:7447 or unixsock-stream//run/lfa.sock")
-    return RouterAbsent(_reason(error))
 
 
 def _reason(error: zenoh.ZError) -> str:
