@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from protocol.geometry import TAU, Pose2D, compose
 from protocol.mission import Mission, Refused
+from world.reach import parted
 from world.spec import Obstacle, Point, Scenario
 from world.terrain import Ditch, Feature, features, patch_of, patches_of
 from world.ways import way_of
@@ -61,6 +62,15 @@ def check_course(scenario: Scenario) -> Scenario:
                 raise Refused(f"world.starts = {value}: must be {right}")
     goal = mission.goal_m
     _check_place(scenario, goal, f"the goal at ({goal[0]:.2f}, {goal[1]:.2f})")
+    first, route = (poses[0].x, poses[0].y), mission.leading.route_m
+    if parted((first, *route), world.walls_m):
+        value = f"... [{goal[0]:g}, {goal[1]:g}]"
+        right = f"walls part it from the start of robot {mission.robots[0]} at ({first[0]:.2f}, {first[1]:.2f})"
+        raise Refused(f"mission.leading.route_m = {value}: must be a goal that can be reached, {right}")
+    for box in mission.leading.keepout_m:
+        if box[0] <= goal[0] <= box[2] and box[1] <= goal[1] <= box[3]:
+            value = f"... [{goal[0]:g}, {goal[1]:g}]"
+            raise Refused(f"mission.leading.route_m = {value}: must be a goal outside of the keep-out box {list(box)}")
     return scenario
 
 

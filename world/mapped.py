@@ -38,6 +38,7 @@ def on_map(scenario: Scenario, folder: Path) -> Scenario:
         drawn = _read("world.map", folder / world.map)
         world, room = replace(world, walls_m=(*world.walls_m, *maps.walls(drawn))), Room(drawn)
         _check_goal(scenario, drawn, room)
+        _check_start(scenario, drawn)
     if world.starts is None or world.start is not None:
         starts = _starts(scenario, room)
         world = replace(world, starts=tuple((pose.x, pose.y, pose.theta) for pose in starts) if starts else None)
@@ -71,6 +72,12 @@ def _check_goal(scenario: Scenario, drawn: Map, room: Room) -> None:
     if room.clearance_m(x, y) < radius_m:
         right = f"must be {radius_m:g} m (the robots' radius) clear of them"
         raise Refused(f"{where} is {room.clearance_m(x, y):.2f} m from the walls of {scenario.world.map}: {right}")
+
+
+def _check_start(scenario: Scenario, drawn: Map) -> None:
+    x, y, *_ = scenario.world.start or (0.0, 0.0)
+    if scenario.world.starts is None and drawn.cell_of(x, y) is None:
+        raise Refused(f"world.start = {[x, y]}: outside of the map {scenario.world.map}: must be within it")
 
 
 def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:

@@ -16,15 +16,14 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from protocol.mission import Refused
+from world.images import Shades, shades_of
 
 UNKNOWN = -1
 OCCUPIED = 100
-CELLS_MAX = 64_000_000
 YAML_BYTES_MAX = 64 * 1024
 MODES = ("trinary", "scale", "raw")
 
 Cells = npt.NDArray[np.int16]
-Shades = npt.NDArray[np.uint8]
 Segment = tuple[float, float, float, float]
 Point = tuple[float, float]
 
@@ -77,7 +76,7 @@ def read(path: Path) -> Map:
     negate = fields.get("negate", "0").lower()
     if negate not in ("0", "1", "true", "false"):
         raise Refused(f"{path}: negate = {negate}: must be 0 or 1")
-    shades, opaque = _image(path, path.parent / image)
+    shades, opaque = shades_of(path, path.parent / image)
     cells = _occupancy(shades, mode, negate in ("1", "true"), free_thresh, occupied_thresh)
     if opaque is not None:
         cells[~opaque] = UNKNOWN
@@ -169,7 +168,7 @@ def _fields(path: Path) -> dict[str, str]:
     """The flat `key: value` lines of a map.yaml: what ROS writes, and nothing of YAML beyond it."""
     try:
         with path.open("rb") as file:
-            text = file.read(YAML_BYTES_MAX + 1).decode()
+            text = file.read(YAML_BYTES_MAX + 1).decode("utf-8-sig")
     except OSError as error:
         raise Refused(f"{path}: cannot be read ({error.strerror or error}): must be a map.yaml") from None
     except UnicodeDecodeError:
@@ -190,8 +189,10 @@ def _number(path: Path, fields: dict[str, str], key: str, default: float | None)
     text = fields.get(key)
     if text is None and default is not None:
         return default
+    if text is None:
+        raise Refused(f"{path}: {key} is missing: must be given")
     try:
-        value = float(text or "nothing")
+        value = float(text)
     except ValueError:
         value = float("nan")
     if not isfinite(value):
@@ -223,70 +224,3 @@ def _occupancy(shades: Shades, mode: str, negate: bool, free: float, occupied: f
         between = np.clip(np.rint(100.0 * (p - free) / (occupied - free)), 0, 99).astype(np.int16)
         between = np.minimum(between, np.int16(100.0 * occupied - 0.5))
     return np.where(p > occupied, OCCUPIED, np.where(p < free, 0, between)).astype(np.int16)
-
-
-# --- images --------------------------------------------------------------------------------------------------
-
-
-def _image(yaml: Path, path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
-    """Shades from 0 to 255, row 0 the top, and which cells an image with transparency shows."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise Refused(f"{yaml}: image = {path.name}: cannot be read ({error.strerror or error})") from None
-    if data[:2] in (b"P2", b"P5"):
-        return _pgm(path, data), None
-    if data[:8] == b"\x89PNG\r\n\x1a\n":
-        return _png(path)
-    raise Refused(f"{path}: neither pgm (P2, P5) nor png: must be one of them")
-
-
-def _pgm(path: Path, data: bytes) -> Shades:
-    """P5 (bytes) or P2 (numbers), with comments; at most 255 shades."""
-    match = re.match(rb"(P[25])" + 3 * rb"(?:\s+|#[^\n]*\n)+(\d{1,9})" + rb"(?:[ \t]*#[^\n]*)?\s", data)
-    if match is None:
-        raise Refused(f"{path}: no pgm header: must be P5 or P2, width, height and 255")
-    columns, rows, top = int(match[2]), int(match[3]), int(match[4])
-    _check_size(path, columns, rows)
-    if not 1 <= top <= 255:
-        bits = " (16-bit)" if top <= 65535 else ""
-        raise Refused(f"{path}: largest shade {top}{bits}: must be an 8-bit pgm, at most 255")
-    body = data[match.end() :]
-    if match[1] == b"P5":
-        shades = np.frombuffer(body[: rows * columns], dtype=np.uint8)
-    else:
-        words = re.sub(rb"#[^\n]*", b"", body).split()[: rows * columns]
-        if not all(word.isdigit() and len(word) < 4 and int(word) <= top for word in words):
-            raise Refused(f"{path}: a shade that is no number from 0 to {top}: the file is corrupt")
-        shades = np.array([int(word) for word in words], dtype=np.uint8)
-    if shades.size != rows * columns:
-        right = f"{columns} x {rows} = {columns * rows} by its header"
-        raise Refused(f"{path}: {shades.size} cells: must be {right}; the file is cut off")
-    if shades.size and int(shades.max()) > top:
-        raise Refused(f"{path}: a shade of {int(shades.max())} above its largest {top}: the file is corrupt")
-    scaled = shades if top == 255 else np.rint(shades * (255.0 / top)).astype(np.uint8)
-    return scaled.reshape(rows, columns)
-
-
-def _png(path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
-    """Shade is the mean of the colours; what is transparent is unknown."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(path) as image:
-            _check_size(path, *image.size)
-            if image.mode.startswith(("I", "F")):
-                raise Refused(f"{path}: png of mode {image.mode} (16-bit): must be 8-bit")
-            pixels = np.asarray(image.convert("RGBA"))
-    except (OSError, UnidentifiedImageError, SyntaxError, ValueError) as error:
-        if isinstance(error, Refused):
-            raise
-        raise Refused(f"{path}: no png that can be read ({error})") from None
-    opaque = pixels[:, :, 3] == 255
-    shades = np.rint(pixels[:, :, :3].mean(axis=2)).astype(np.uint8)
-    return shades, None if opaque.all() else opaque
-
-
-def _check_size(path: Path, columns: int, rows: int) -> None:
-    if columns < 1 or rows < 1 or columns * rows > CELLS_MAX:
-        raise Refused(f"{path}: {columns} x {rows} cells: must be from 1 to {CELLS_MAX} in all")

@@ -14,6 +14,11 @@ from world.scenario import load
 
 TEAM = ("mission.robots=[1,2]", "mission.formation.separation_m=0.6", "time_limit_s=90")
 
+BOXES = """world.obstacles=[
+{center_m=[4.5, 2.55], corners_m=[[-1.5, -0.05], [1.48, -0.05], [1.48, 0.05], [-1.5, 0.05]]},
+{center_m=[3.05, 3.7], corners_m=[[-0.05, -1.2], [0.05, -1.2], [0.05, 1.2], [-0.05, 1.2]]}]""".replace("\n", " ")
+"""Round the goal, in no map: what walls bar is refused before it starts."""
+
 
 def room(folder: Path, *walls: tuple[int, int, int, int]) -> maps.Map:
     """6 m x 5 m with walls all round and others (row, row, column, column) of 0.1 m cells."""
@@ -55,8 +60,8 @@ def test_the_leaders_map_overlays_the_true_one(explored: tuple[Path, maps.Map, s
 
 
 def test_a_goal_that_turns_out_to_be_walled_in_ends_the_mission_with_that_reason(tmp_path: Path) -> None:
-    room(tmp_path, (25, 26, 30, 60), (25, 50, 30, 31))
-    sets = [f"map={tmp_path / 'room.yaml'}", "start=1.5,1.5", "goal=4.5,4.0", *TEAM]
+    room(tmp_path)
+    sets = [f"map={tmp_path / 'room.yaml'}", "start=1.5,1.5", "goal=4.5,4.0", *TEAM, BOXES]
     summary = run(load("explore", sets), 1, tmp_path / "run").summary
     assert summary.outcome == "failed", f"look at {tmp_path}"
     assert summary.reason is not None and "walled in" in summary.reason

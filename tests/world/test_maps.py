@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from itertools import pairwise
 from math import pi
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from protocol.mission import Refused
 from world import maps
+from world.reach import parted
 from world.scenario import load, starts_of
 
 ROWS = ((0, 0, 0, 0), (0, 254, 205, 0), (0, 254, 254, 0))
@@ -31,13 +33,14 @@ def pgm(rows: tuple[tuple[int, ...], ...] = ROWS, header: bytes = b"P5\n# made b
     return header + bytes(shade for row in rows for shade in row)
 
 
-def png(rows: tuple[tuple[int, ...], ...] = ROWS) -> bytes:
+def png(rows: tuple[tuple[int, ...], ...] = ROWS, size: tuple[int, int] | None = None, depth: int = 8) -> bytes:
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     lines = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows))
-    size = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", size) + chunk(b"IDAT", lines) + chunk(b"IEND", b"")
+    columns_rows = size or (len(rows[0]), len(rows))
+    head = struct.pack(">IIBBBBB", *columns_rows, depth, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", lines) + chunk(b"IEND", b"")
 
 
 AS_READ = [[100, 0, 0, 100], [100, 0, -1, 100], [100, 100, 100, 100]]
@@ -99,7 +102,11 @@ BAD = [
     (pgm(), {"image": "none.pgm"}, "none.pgm: cannot be read"),
     (pgm(), {"resolution": 0}, "resolution = 0"),
     (pgm(), {"resolution": "nan"}, "resolution = nan"),
-    (pgm(), {"resolution": None}, "resolution = None"),
+    (pgm(), {"resolution": None}, "resolution is missing"),
+    (pgm(), {"resolution": -0.05}, "resolution = -0.05"),
+    (pgm(), {"origin": "[nan, 0, 0]"}, "origin = [nan, 0, 0]"),
+    (pgm(header=b"P5 -4 3 255\n"), {}, "no pgm header"),
+    (pgm(header=b"P5 4 3 0\n"), {}, "largest shade 0:"),
     (pgm(), {"origin": "[1, 2, x]"}, "origin = [1, 2, x]"),
     (pgm(), {"mode": "other"}, "mode = other"),
     (pgm(), {"negate": 2}, "negate = 2"),
@@ -112,6 +119,8 @@ BAD = [
     (b"P2 2 1 255 7 x", {}, "no number"),
     (b"GIF89a", {}, "neither pgm"),
     (png()[:40], {}, "no png"),
+    (png(size=(60000, 60000)), {}, "far too many cells"),
+    (png(depth=16), {}, "16-bit"),
 ]
 
 
@@ -169,6 +178,8 @@ def test_a_chain_without_room_behind_it_is_laid_out_round_the_corner(tmp_path: P
         (["start=5.0,3.0"], "inside a wall"),
         (["start=1"], "world.start"),
         (["map=none.yaml"], "world.map = none.yaml"),
+        (["start=-1,3"], r"world.start = \[-1.0, 3.0\]: outside of the map"),
+        (["world.walls_m=[[7.0, 0.0, 7.0, 6.0]]"], r"\[8.5, 4.5\]: must be a goal that can be reached, walls part it"),
     ],
 )
 def test_a_start_or_goal_without_room_is_one_line(tmp_path: Path, sets: list[str], said: str) -> None:
@@ -183,3 +194,23 @@ def test_a_keepout_mask_becomes_boxes_that_the_mission_tells(tmp_path: Path) -> 
     maps.write(tmp_path / "keepout.yaml", maps.Map(cells, 0.1))
     sets = [f"map={room(tmp_path)}", f"keepout={tmp_path / 'keepout.yaml'}", "start=4,1", "goal=8.5,4.5"]
     assert load("explore", sets).mission.leading.keepout_m == ((6.0, 1.0, 8.0, 2.0),)
+
+
+def test_a_goal_in_a_keepout_zone_is_refused(tmp_path: Path) -> None:
+    cells = np.zeros((60, 100), dtype=np.int16)
+    cells[40:50, 80:90] = 100
+    maps.write(tmp_path / "keepout.yaml", maps.Map(cells, 0.1))
+    sets = [f"map={room(tmp_path)}", f"keepout={tmp_path / 'keepout.yaml'}", "start=4,1", "goal=8.5,4.5"]
+    with pytest.raises(Refused, match="outside of the keep-out box"):
+        load("explore", sets)
+
+
+@pytest.mark.parametrize(("gap_m", "barred"), [(0.0, True), (0.3, False)])
+def test_walls_with_a_gap_that_a_robot_fits_through_part_nothing(gap_m: float, barred: bool) -> None:
+    """Along, across and aslant of the cells of the flood fill."""
+    for angle in (0.0, 0.3, pi / 4, 1.1):
+        c, s = np.cos(angle), np.sin(angle)
+        box = [(2.0, -2.0), (2.0, 2.0), (-2.0, 2.0), (-2.0, -2.0), (2.0 - gap_m, -2.0)]
+        turned = [(c * x - s * y, s * x + c * y) for x, y in box]
+        walls = [(*a, *b) for a, b in pairwise(turned)]
+        assert parted([(0.0, 0.0), (9.0, 1.0)], walls) == barred, angle

@@ -1,0 +1,90 @@
+"""Whether walls part the goal from the start: then no robot can reach it, and a scenario is refused.
+
+Only walls count, and generously: what a gap lets through is for the robots to find out. A flood fill over cells of
+`CELL_M`, and only where a wall crosses the straight way along the route: most scenarios cost nothing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+from math import ceil, floor, hypot
+
+Point = tuple[float, float]
+Segment = tuple[float, float, float, float]
+
+CELL_M = 0.1
+BAND_M = 0.08
+"""Cells whose centre is nearer to a wall are barred: more than 0.71 cells, so that no flood gets through a wall."""
+CELLS_MAX = 4_000_000
+RIM_M = 0.5
+
+
+def parted(route: Sequence[Point], walls: Sequence[Segment]) -> bool:
+    """Whether `walls` leave no way from the first point of `route` to its last; False for ground that is too large."""
+    if not any(_cross(a, b, wall) for a, b in pairwise(route) for wall in walls):
+        return False
+    xs = [x for x, _ in route] + [x for wall in walls for x in wall[::2]]
+    ys = [y for _, y in route] + [y for wall in walls for y in wall[1::2]]
+    ground = _Ground(min(xs) - RIM_M, min(ys) - RIM_M, max(xs) + RIM_M, max(ys) + RIM_M)
+    if ground.columns * ground.rows > CELLS_MAX:
+        return False
+    ground.bar(walls)
+    return not ground.flood(route[0], route[-1])
+
+
+class _Ground:
+    def __init__(self, low_x: float, low_y: float, high_x: float, high_y: float) -> None:
+        self._x, self._y = low_x, low_y
+        self.columns, self.rows = ceil((high_x - low_x) / CELL_M) + 1, ceil((high_y - low_y) / CELL_M) + 1
+
+    def bar(self, walls: Sequence[Segment]) -> None:
+        """Take the cells beside `walls`, and the rim, out of what can be flooded."""
+        self._taken = bytearray(self.columns * self.rows)
+        for column in range(self.columns):
+            self._taken[column] = self._taken[(self.rows - 1) * self.columns + column] = 1
+        for row in range(self.rows):
+            self._taken[row * self.columns] = self._taken[(row + 1) * self.columns - 1] = 1
+        for wall in walls:
+            self._bar_beside(wall)
+
+    def flood(self, start: Point, goal: Point) -> bool:
+        """Whether `goal` is reached from `start`."""
+        taken, columns, wanted = self._taken, self.columns, self._cell(goal)
+        first = self._cell(start)
+        waiting = deque([first])
+        taken[first] = 1
+        while waiting:
+            cell = waiting.popleft()
+            if cell == wanted:
+                return True
+            for beside in (cell - 1, cell + 1, cell - columns, cell + columns):
+                if not taken[beside] or beside == wanted:
+                    taken[beside] = 1
+                    waiting.append(beside)
+        return False
+
+    def _cell(self, point: Point) -> int:
+        return floor((point[1] - self._y) / CELL_M) * self.columns + floor((point[0] - self._x) / CELL_M)
+
+    def _bar_beside(self, wall: Segment) -> None:
+        x1, y1, x2, y2 = wall
+        length_m = hypot(x2 - x1, y2 - y1)
+        steps = max(1, ceil(length_m / (0.5 * CELL_M)))
+        for n in range(steps + 1):
+            x, y = x1 + (x2 - x1) * n / steps - self._x, y1 + (y2 - y1) * n / steps - self._y
+            column, row = floor(x / CELL_M), floor(y / CELL_M)
+            for r in range(row - 1, row + 2):
+                for c in range(column - 1, column + 2):
+                    if hypot((c + 0.5) * CELL_M - x, (r + 0.5) * CELL_M - y) < BAND_M:
+                        self._taken[r * self.columns + c] = 1
+
+
+def _cross(a: Point, b: Point, wall: Segment) -> bool:
+    c, d = wall[:2], wall[2:]
+    return _left(a, b, c) * _left(a, b, d) <= 0.0 and _left(c, d, a) * _left(c, d, b) <= 0.0
+
+
+def _left(a: Point, b: Point, p: Point) -> float:
+    return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
