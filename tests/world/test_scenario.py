@@ -88,7 +88,7 @@ def test_bad_input_is_refused_in_one_line(overrides: list[str], says: list[str])
     ("name", "says"),
     [
         ("paper_pth1", ["no scenario 'paper_pth1'", "did you mean 'paper_path1'"]),
-        ("zzz", ["no scenario 'zzz'", "paper_path1, paper_path2, straight"]),
+        ("zzz", ["no scenario 'zzz'", "paper_path1, paper_path2, "]),
         ("no/such.toml", ["no/such.toml", "No such file"]),
         (".", ["no scenario '.'"]),
     ],
