@@ -11,8 +11,6 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from protocol.mission import Refused
-
 if TYPE_CHECKING:
     import typer
 
@@ -115,6 +113,8 @@ def build(called: Sequence[str]) -> typer.Typer:
 def run_cli(name: str, app: typer.Typer) -> int:
     """Run `app` on the command line; the exit code. Used by all scripts of `deploy`."""
     import typer
+
+    from protocol.mission import Refused
 
     try:
         code = app(standalone_mode=False, prog_name=name)

@@ -17,6 +17,7 @@ from typing import Any
 
 from msgspec import structs
 
+from deploy.look.onlooker import Fleet
 from deploy.run.crew import ROUTER_NAME, Crew, Row, rows
 from deploy.run.folder import About, make
 from deploy.run.operator import Operator
@@ -121,6 +122,11 @@ class Team:
             self._bus.close()
         self._crew.kill_all()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    @property
+    def fleet(self) -> Fleet:
+        """For those who look on."""
+        return Fleet(self._about.fleet, self._endpoint, ())
 
     # --- what can be done to it ------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from msgspec import Struct
 
+from protocol.geometry import wrap
 from protocol.messages import Event, Message, PoseStamped, Role, Status, Tracking
 from protocol.mission import robot_id_of
 
@@ -28,6 +29,8 @@ class Row(Struct, frozen=True):
     predecessor: int | None
     error_m: float | None
     """How far from its slot, by its own knowledge."""
+    heading_error_rad: float | None
+    """Between the heading that would keep it there and its own, by its own knowledge."""
     speed_mps: float | None
     pose_age_s: float | None
     state: str
@@ -106,6 +109,7 @@ class Board:
             term=None if pose is None else pose.term.n,
             predecessor=None if tracking is None else tracking.predecessor,
             error_m=None if tracking is None else float(tracking.error_m),
+            heading_error_rad=None if tracking is None or pose is None else wrap(tracking.heading - pose.theta),
             speed_mps=None if pose is None else pose.twist.linear_x,
             pose_age_s=age_s,
             state=_state(role, tracking, status),

@@ -7,19 +7,15 @@ from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
 
-import numpy as np
-
-from deploy.look import chronicle, figures, summary
+from deploy.look import chronicle, figures, health, summary
 from deploy.look.figures import FIGURES
 from deploy.look.readings import Run
 from deploy.look.summary import RobotSummary, Summary
-from deploy.look.trace import messages
+from deploy.look.words import NONE, Cells, in_deg, in_mm, in_ms, in_s, short, table
 from deploy.run.folder import SCENARIO
 
 CSS = Path(__file__).with_name("report.css")
 ROWS_MAX = 150
-Cells = Sequence[object]
-NONE = "–"
 
 
 def of(runs: Sequence[Run]) -> str:
@@ -58,7 +54,7 @@ def _head(run: Run, s: Summary) -> str:
     tiles = (
         ("duration", f"{s.sim_duration_s:.1f} s"),
         ("times real time", f"{s.real_time_factor:g}"),
-        ("largest rms distance error", _mm(worst)),
+        ("largest rms distance error", in_mm(worst)),
         ("leaders", len(s.leaders)),
         ("slowest failover", f"{max(took):.0f} ms" if took else NONE),
         ("contacts", sum(r.contacts for r in s.robots)),
@@ -74,13 +70,13 @@ def _head(run: Run, s: Summary) -> str:
 def _assertions(s: Summary) -> str:
     rows = [("✓" if a.ok else "✗", a.name, getattr(a, "text", "")) for a in s.assertions]
     rows += [("✗", v.invariant, f"at {v.at_s:.3f} s: {v.text}") for v in s.violations]
-    return _table(("", "what must hold", ""), rows, text=(1, 2))
+    return table(("", "what must hold", ""), rows, text=(1, 2))
 
 
 def _robots(_run: Run, s: Summary) -> str:
     heads = ("robot", "at the end", "distance error rms", "largest", "orientation rms", "to body (paper)",
              "heading rms", "settled after", "contacts", "obstacles met")  # fmt: skip
-    return _table(heads, [_robot(r) for r in s.robots], text=(1, 9)) + (
+    return table(heads, [_robot(r) for r in s.robots], text=(1, 9)) + (
         "<p class='soft'>Rms values from when a follower had settled, with avoidance and formation changes left out; "
         "the largest with nothing left out.</p>"
     )
@@ -89,8 +85,8 @@ def _robots(_run: Run, s: Summary) -> str:
 def _robot(r: RobotSummary) -> Cells:
     met = ", ".join(f"{count} {kind}" for kind, count in r.obstacles_met.items() if count)
     angles = (r.bearing_error_rms_rad, r.bearing_error_body_rms_rad, r.heading_error_rms_rad)
-    return (r.id, r.role_at_end if r.alive else "gone", _mm(r.distance_error_rms_m), _mm(r.distance_error_max_m),
-            *(_deg(angle) for angle in angles), _s(r.settled_after_s), r.contacts, met or NONE)  # fmt: skip
+    return (r.id, r.role_at_end if r.alive else "gone", in_mm(r.distance_error_rms_m), in_mm(r.distance_error_max_m),
+            *(in_deg(angle) for angle in angles), in_s(r.settled_after_s), r.contacts, met or NONE)  # fmt: skip
 
 
 def _figure(name: str) -> Callable[[Run, Summary], str]:
@@ -103,15 +99,23 @@ def _figure(name: str) -> Callable[[Run, Summary], str]:
 
 
 def _leaders(run: Run, s: Summary) -> str:
-    reigns = _table(
+    reigns = table(
         ("robot", "term", "from", "until", "because of"),
-        [(r.robot_id, r.term[0], _s(r.from_s), _s(r.until_s), r.cause) for r in s.leaders],
+        [(r.robot_id, r.term[0], in_s(r.from_s), in_s(r.until_s), r.cause) for r in s.leaders],
         text=(4,),
     )
-    failovers = _table(
+    failovers = table(
         ("lost", "by", "at", "next", "lease held after", "first command after", "chain closed after"),
         [
-            (f.victim, f.cause, _s(f.at_s), f.leader or NONE, _ms(f.lease_ms), _ms(f.first_command_ms), _ms(f.chain_ms))
+            (
+                f.victim,
+                f.cause,
+                in_s(f.at_s),
+                f.leader or NONE,
+                in_ms(f.lease_ms),
+                in_ms(f.first_command_ms),
+                in_ms(f.chain_ms),
+            )
             for f in s.failovers
         ],
     )
@@ -122,8 +126,8 @@ def _leaders(run: Run, s: Summary) -> str:
 def _faults(run: Run, s: Summary) -> str:
     if not s.faults:
         return "<p>None.</p>"
-    rows = [(_s(f.at_s), f.kind, f.target, *_recovery(run, f)) for f in s.faults]
-    return _table(("at", "what", "robot", "chain without it after", "back in the chain after"), rows, text=(1,))
+    rows = [(in_s(f.at_s), f.kind, f.target, *_recovery(run, f)) for f in s.faults]
+    return table(("at", "what", "robot", "chain without it after", "back in the chain after"), rows, text=(1,))
 
 
 def _recovery(run: Run, fault: chronicle.FaultDone) -> tuple[str, str]:
@@ -134,8 +138,8 @@ def _recovery(run: Run, fault: chronicle.FaultDone) -> tuple[str, str]:
         if without is None and not member:
             without = line["t"] - fault.at_s
         elif without is not None and member:
-            return _ms(1000.0 * without), _s(line["t"] - fault.at_s)
-    return (NONE if without is None else _ms(1000.0 * without)), NONE
+            return in_ms(1000.0 * without), in_s(line["t"] - fault.at_s)
+    return (NONE if without is None else in_ms(1000.0 * without)), NONE
 
 
 def _decisions(run: Run, _s: Summary) -> str:
@@ -144,52 +148,12 @@ def _decisions(run: Run, _s: Summary) -> str:
     rows = [(f"{line['t']:.2f} s", line["robot"] or NONE, line["kind"], _details(line)) for line in lines[:ROWS_MAX]]
     rest = f"<p class='soft'>{len(lines) - ROWS_MAX} more in events.jsonl.</p>" if len(lines) > ROWS_MAX else ""
     opened = f"<details><summary>{len(lines)} lines</summary>"
-    return f"{opened}{_table(('at', 'robot', 'kind', 'what'), rows, text=(2, 3))}{rest}</details>"
+    return f"{opened}{table(('at', 'robot', 'kind', 'what'), rows, text=(2, 3))}{rest}</details>"
 
 
 def _details(line: chronicle.Line) -> str:
     left_out = ("t", "robot", "term", "kind", "from")
-    return ", ".join(f"{name} {_short(value)}" for name, value in line.items() if name not in left_out)
-
-
-def _processes(run: Run, _s: Summary) -> str:
-    """What each process said about itself, and how regularly its commands came."""
-    said: dict[str, list[dict[str, float]]] = {}
-    for owner, _, _, status in messages(run.folder, frozenset({"status"})):
-        said.setdefault(owner, []).append({name: float(value) for name, value in status.counters.items()})
-    rows = []
-    for owner in sorted(said):
-        own = said[owner]
-        commands = run.seen.cmd_vel.get(int(owner.removeprefix("robot"))) if owner.startswith("robot") else None
-        gaps = np.diff(commands[:, 0]) if commands is not None and commands.shape[0] > 1 else np.array([])
-        rows.append((
-            owner, _largest(own, "loop_lag_ms", "ms"), _largest(own, "cpu_percent", "%"),
-            _largest(own, "rss_mib", "MiB"),            _largest(own, "dropped", ""), _largest(own, "undecodable", ""),
-            f"{1.0 / gaps.mean():.1f} Hz" if gaps.size else NONE, _ms(1000.0 * gaps.max()) if gaps.size else NONE,
-        ))  # fmt: skip
-    heads = (
-        "process",
-        "largest loop lag",
-        "largest CPU share",
-        "memory",
-        "dropped",
-        "undecodable",
-        "commands",
-        "longest gap",
-    )
-    return _table(heads, rows, text=(0,))
-
-
-def _radio(run: Run, _s: Summary) -> str:
-    radio = run.scenario.radio
-    rows = [
-        ("delay", _ms(1000.0 * radio.delay_s)),
-        ("jitter", _ms(1000.0 * radio.jitter_s)),
-        ("loss", f"{100.0 * radio.loss:g} %"),
-        ("mean losses in a row", f"{radio.loss_burst:g}"),
-        ("duplication", f"{100.0 * radio.duplication:g} %"),
-    ]
-    return _table(("between robots", "as configured"), rows, text=(0,))
+    return ", ".join(f"{name} {short(value)}" for name, value in line.items() if name not in left_out)
 
 
 def _configuration(run: Run, _s: Summary) -> str:
@@ -207,8 +171,8 @@ SECTIONS: tuple[tuple[str, Callable[[Run, Summary], str]], ...] = (
     ("Leaders", _leaders),
     ("Faults and recoveries", _faults),
     ("Decisions", _decisions),
-    ("Processes", _processes),
-    ("Radio", _radio),
+    ("Processes", health.processes),
+    ("Radio", health.radio),
     ("Configuration", _configuration),
 )
 
@@ -238,7 +202,7 @@ def _compared(a: Summary, b: Summary) -> str:
                 ("settled after [s]", "settled_after_s", 1.0),
             )
         ]
-    return _table(("", "first", "second", "second − first"), rows, text=(0,))
+    return table(("", "first", "second", "second − first"), rows, text=(0,))
 
 
 def _scaled(r: RobotSummary, field: str, scale: float) -> float | None:
@@ -252,46 +216,5 @@ def _row(name: str, a: float | None, b: float | None, digits: int) -> Cells:
     return (name, *texts, f"{b - a:+.{digits}f}" if both else NONE)  # type: ignore[operator]
 
 
-# --- words and numbers ----------------------------------------------------------------------------------------------
-
-
-def _table(heads: Cells, rows: Sequence[Cells], text: Sequence[int] = ()) -> str:
-    """`text`: columns of words, which stand to the left."""
-    if not rows:
-        return "<p>None.</p>"
-
-    def line(cells: Cells, tag: str) -> str:
-        marks = (' class="text"' if n in text else "" for n in range(len(cells)))
-        return "".join(f"<{tag}{m}>{escape(str(c))}</{tag}>" for c, m in zip(cells, marks, strict=True))
-
-    body = "".join(f"<tr>{line(row, 'td')}</tr>" for row in rows)
-    return f'<div class="scroll"><table><thead><tr>{line(heads, "th")}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
 def _id(name: str) -> str:
     return name.lower().replace(" ", "-")
-
-
-def _short(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _largest(own: Sequence[dict[str, float]], name: str, unit: str) -> str:
-    values = [counters[name] for counters in own if name in counters]
-    return f"{max(values):g} {unit}".rstrip() if values else NONE
-
-
-def _mm(value_m: float | None) -> str:
-    return NONE if value_m is None else f"{1000.0 * value_m:.1f} mm"
-
-
-def _deg(value_rad: float | None) -> str:
-    return NONE if value_rad is None else f"{57.2958 * value_rad:.2f}°"
-
-
-def _s(value_s: float | None) -> str:
-    return NONE if value_s is None else f"{value_s:.2f} s"
-
-
-def _ms(value_ms: float | None) -> str:
-    return NONE if value_ms is None else f"{value_ms:.1f} ms"

@@ -11,6 +11,7 @@ import sys
 import termios
 import tty
 from collections.abc import Iterator
+from math import pi
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
@@ -29,6 +30,7 @@ REFRESH_S = 0.5
 FIRST_S = 1.3  # each process has told its status by then
 WIDTH_MIN, HEIGHT_MIN = 60, 12
 TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"})
+HEADS = ("robot", "role", "term", "ahead", "off mm", "turned °", "m/s", "age ms", "lag ms", "CPU %", "MiB", "state")
 SIDES = ("left", "right", "column", "zigzag")
 #        key   deed
 DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
@@ -160,8 +162,7 @@ def _table(rows: list[Row], chosen: int | None) -> RenderableType:
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    heads = ("robot", "role", "term", "ahead", "off slot", "speed", "pose", "lag", "CPU", "mem", "state")
-    for head in heads:
+    for head in HEADS:
         left = head in ("role", "state")
         table.add_column(head, justify="left" if left else "right", no_wrap=True, overflow="ellipsis")
     for row in rows:
@@ -170,20 +171,25 @@ def _table(rows: list[Row], chosen: int | None) -> RenderableType:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    """Units in the cells. Of a term number the last four digits: neighbours differ there."""
+    """Units in the heads. Of a term number the last four digits: neighbours differ there."""
     return (
         str(row.robot),
         row.role,
         "" if row.term is None else f"{row.term % 10000}",
         "" if row.predecessor is None else str(row.predecessor),
-        "" if row.error_m is None else f"{1000.0 * row.error_m:.0f} mm",
-        "" if row.speed_mps is None else f"{row.speed_mps:.2f} m/s",
-        "" if row.pose_age_s is None else _age(row.pose_age_s),
-        "" if row.loop_lag_ms is None else f"{row.loop_lag_ms:.0f} ms",
-        "" if row.cpu_percent is None else f"{row.cpu_percent:.0f} %",
-        "" if row.rss_mib is None else f"{row.rss_mib:.0f} M",
+        _number(row.error_m, 1000.0),
+        _number(row.heading_error_rad, 180.0 / pi),
+        "" if row.speed_mps is None else f"{row.speed_mps:.2f}",
+        _number(row.pose_age_s, 1000.0),
+        _number(row.loop_lag_ms, 1.0),
+        _number(row.cpu_percent, 1.0),
+        _number(row.rss_mib, 1.0),
         row.state,
     )
+
+
+def _number(value: float | None, scale: float) -> str:
+    return "" if value is None else f"{scale * value:.0f}"
 
 
 def _timeline(board: Board, width: int) -> RenderableType:
@@ -194,10 +200,6 @@ def _timeline(board: Board, width: int) -> RenderableType:
     samples = list(board.leaders)[-room:]
     line = "".join("." if leader is None else str(leader % 10) for leader in samples)
     return Text(f"lease -{len(samples):>3} s {line}", style="green", no_wrap=True)
-
-
-def _age(age_s: float) -> str:
-    return f"{1000.0 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.0f} s"
 
 
 def _ago(at: float) -> str:

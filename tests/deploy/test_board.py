@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from deploy.look.board import Board, Row
 from deploy.look.topic import expressions
@@ -37,6 +38,11 @@ def _row(board: Board, robot: int, now: float) -> Row:
 def test_a_follower_shows_whom_it_follows_and_how_well() -> None:
     row = _row(_board((10.0, _pose(2, FOLLOWING, 3)), (10.0, _tracking(2))), 2, 10.1)
     assert (row.role, row.predecessor, row.error_m, row.state) == ("follower", 1, 0.25, "follow, avoids")
+
+
+def test_a_follower_turned_away_from_its_heading_shows_by_how_much() -> None:
+    row = _row(_board((10.0, _pose(2, FOLLOWING, 3)), (10.0, replace(_tracking(2), heading=-0.2))), 2, 10.1)
+    assert row.heading_error_rad == pytest.approx(-0.2)
 
 
 def test_a_robot_that_fell_silent_is_called_so_and_its_errors_go() -> None:

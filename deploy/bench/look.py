@@ -1,0 +1,194 @@
+"""What looking costs: shares of a core beside a running team of four at full rates, what it does to the agents' loop
+lag, how large and how slow files of a two-minute run are, and how soon `lfa --help` answers.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import termios
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from socket import socket
+
+import msgspec
+from msgspec.structs import replace
+
+from deploy.bench.rows import Quantity, Row, row, show
+from deploy.bench.team import Team, endless
+from deploy.look import report
+from deploy.look.onlooker import Ear, Fleet, listen
+from deploy.look.view import converted
+from deploy.run import simulate
+from deploy.run.folder import About, make
+from deploy.run.processes import cpu_s, identify
+from deploy.run.recorder import LastWord, Task
+from deploy.run.referee import Verdict
+from protocol import clock
+from protocol.messages import Status
+
+ROBOTS = 4
+SETTLE_S = 5.0
+WATCHED_S = 20.0
+RUN_S = 120.0
+STARTS = 9
+MB = 1e6
+LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+
+
+def run(as_json: bool) -> int:
+    """Print the rows; 0 when all hold."""
+    return show(_rows(), as_json)
+
+
+def _rows() -> Iterator[list[Row]]:
+    yield _help()
+    with Team(endless(ROBOTS)) as team, tempfile.TemporaryDirectory() as place:
+        team.await_chain(ROBOTS)
+        _pause(team, SETTLE_S)
+        with listen(team.fleet, frozenset({"*/status"}), every=True) as ear:
+            alone = _lags(team, ear, WATCHED_S)
+            yield _recorder(team, Path(place))
+            yield _watch(team)
+            with _started([*LFA, *_view(team.fleet)]) as viewer:
+                _pause(team, SETTLE_S)
+                ear.take()
+                before, since = _cpu_s(viewer), clock.now()
+                watched = _lags(team, ear, WATCHED_S)
+                share = 100.0 * (_cpu_s(viewer) - before) / (clock.now() - since)
+    yield [row("viewer bridge", Quantity("share of a core", "%", 10.0), share)]
+    yield [
+        row("loop lag", Quantity("median without a viewer", "ms"), alone),
+        row("loop lag", Quantity("median with a viewer", "ms", max(1.25 * alone, alone + 0.5)), watched),
+    ]
+    yield from _files()
+
+
+def _help() -> list[Row]:
+    """Beside a bare start of the interpreter, so that a slow machine is no slow command."""
+    bare = statistics.median(_took([sys.executable, "-c", "pass"]) for _ in range(STARTS))
+    told = statistics.median(_took([*LFA, "--help"]) for _ in range(STARTS))
+    return [
+        row("help", Quantity("a bare start", "s"), bare),
+        row("help", Quantity("lfa --help", "s", 0.3), told),
+        row("help", Quantity("times a bare start", "1", 10.0), told / bare),
+    ]
+
+
+def _recorder(team: Team, place: Path) -> list[Row]:
+    """The process of `lfa run`, on this team."""
+    folder = make(place / "run", team.scenario)
+    task = Task(str(folder), About("endless", "bench", 0, team.fleet.name), team.fleet.endpoint, str(place / "none"))
+    words = [sys.executable, "-m", "deploy.run.recorder", msgspec.json.encode(task).decode()]
+    with _started(words, stdin=subprocess.PIPE) as process:
+        _pause(team, SETTLE_S)
+        before, since = _cpu_s(process), clock.now()
+        _pause(team, WATCHED_S)
+        share = 100.0 * (_cpu_s(process) - before) / (clock.now() - since)
+        process.communicate(msgspec.json.encode(LastWord(Verdict("time_limit"), WATCHED_S, ())) + b"\n")
+    kept = msgspec.json.decode((folder / "summary.json").read_bytes())["recording"]
+    return [
+        row("recorder", Quantity("share of a core", "%", 10.0), share),
+        row("recorder", Quantity("messages a second", "1/s"), kept["messages"] / (WATCHED_S + SETTLE_S)),
+        row("recorder", Quantity("lost", "messages", 0.0), float(kept["missing"] + kept["dropped"])),
+    ]
+
+
+def _watch(team: Team) -> list[Row]:
+    """On a terminal of 80 columns that nobody looks at."""
+    terminal, inside = os.openpty()
+    termios.tcsetwinsize(inside, (24, 80))
+    threading.Thread(target=_drain, args=(terminal,), daemon=True).start()
+    words = [*LFA, "watch", "--fleet", team.fleet.name, "--connect", team.fleet.endpoint]
+    with _started(words, inside, inside) as process:
+        _pause(team, SETTLE_S)
+        before, since = _cpu_s(process), clock.now()
+        _pause(team, WATCHED_S)
+        share = 100.0 * (_cpu_s(process) - before) / (clock.now() - since)
+    os.close(inside)
+    return [row("watch", Quantity("share of a core", "%", 5.0), share)]
+
+
+def _drain(terminal: int) -> None:
+    with contextlib.suppress(OSError):  # the other side was closed
+        while os.read(terminal, 65536):
+            pass
+
+
+def _files() -> Iterator[list[Row]]:
+    """Of a run of two minutes."""
+    place = Path(tempfile.mkdtemp(prefix="lfa-"))
+    try:
+        folder = simulate.run(replace(endless(ROBOTS), time_limit_s=RUN_S), 1, place / "run").folder
+        yield [row("two minutes", Quantity("mcap", "MB", 30.0), (folder / "recording.mcap").stat().st_size / MB)]
+        since = clock.now()
+        page = report.html([folder])
+        yield [
+            row("two minutes", Quantity("report", "MB", 3.0), len(page.encode()) / MB),
+            row("two minutes", Quantity("report made in", "s", 10.0), clock.now() - since),
+        ]
+        since = clock.now()
+        rrd = converted(folder)
+        yield [
+            row("two minutes", Quantity("rrd", "MB", 30.0), rrd.stat().st_size / MB),
+            row("two minutes", Quantity("rrd made in", "s"), clock.now() - since),
+        ]
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def _view(fleet: Fleet) -> list[str]:
+    ports = []
+    for _ in range(2):
+        with socket() as free:
+            free.bind(("127.0.0.1", 0))
+            ports.append(str(free.getsockname()[1]))
+    where = ["--port", ports[0], "--web-port", ports[1]]
+    return ["view", "--fleet", fleet.name, "--connect", fleet.endpoint, "--serve-web", *where]
+
+
+@contextlib.contextmanager
+def _started(
+    words: Sequence[str], stdin: int = subprocess.DEVNULL, stdout: int = subprocess.DEVNULL
+) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(words, stdin=stdin, stdout=stdout, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait()
+
+
+def _took(words: Sequence[str]) -> float:
+    since = clock.now()
+    subprocess.run(words, stdout=subprocess.DEVNULL, check=True)
+    return clock.now() - since
+
+
+def _pause(team: Team, duration_s: float) -> None:
+    """The team's own news are heard meanwhile, so that they do not pile up."""
+    until = clock.now() + duration_s
+    while clock.now() < until:
+        team.listen()
+        clock.sleep(0.1)
+
+
+def _lags(team: Team, ear: Ear, duration_s: float) -> float:
+    """Median over the agents' largest lags of each second [ms]."""
+    ear.take()
+    _pause(team, duration_s)
+    told = [message for _, message in ear.take() if isinstance(message, Status)]
+    return statistics.median(status.counters["loop_lag_ms"] for status in told if "loop_lag_ms" in status.counters)
+
+
+def _cpu_s(process: subprocess.Popen[bytes]) -> float:
+    identity = identify(process.pid)
+    assert identity is not None, "it has ended"
+    return cpu_s(identity)

@@ -1,0 +1,76 @@
+"""How processes and radio fared in a run: sections of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from deploy.look.readings import Run
+from deploy.look.summary import Summary
+from deploy.look.trace import messages
+from deploy.look.words import NONE, in_ms, table
+
+
+def processes(run: Run, s: Summary) -> str:
+    """What each process said about itself, and how regularly its commands came."""
+    said: dict[str, list[dict[str, float]]] = {}
+    for owner, _, _, status in messages(run.folder, frozenset({"status"})):
+        said.setdefault(owner, []).append({name: float(value) for name, value in status.counters.items()})
+    rows = []
+    for owner in sorted(said):
+        own = said[owner]
+        commands = run.seen.cmd_vel.get(int(owner.removeprefix("robot"))) if owner.startswith("robot") else None
+        gaps = np.diff(commands[:, 0]) if commands is not None and commands.shape[0] > 1 else np.array([])
+        rows.append((
+            owner, _largest(own, "loop_lag_ms", "ms"), _largest(own, "cpu_percent", "%"),
+            _largest(own, "rss_mib", "MiB"),            _largest(own, "dropped", ""), _largest(own, "undecodable", ""),
+            f"{1.0 / gaps.mean():.1f} Hz" if gaps.size else NONE, in_ms(1000.0 * gaps.max()) if gaps.size else NONE,
+        ))  # fmt: skip
+    heads = (
+        "process",
+        "largest loop lag",
+        "largest CPU share",
+        "memory",
+        "dropped",
+        "undecodable",
+        "commands",
+        "longest gap",
+    )
+    kept = s.recording
+    lost = "" if kept is None else (
+        f"<p class='soft'>Recorded: {kept.messages} messages in {kept.bytes / 1e6:.1f} MB; {kept.missing} missing, "
+        f"{kept.dropped} dropped, {kept.undecodable} undecodable.</p>"
+    )  # fmt: skip
+    return table(heads, rows, text=(0,)) + lost
+
+
+def radio(run: Run, _s: Summary) -> str:
+    """As configured; and as it was for each robot, by the gaps in the rows of the table that all tell all."""
+    radio = run.scenario.radio
+    rows = [
+        ("delay", in_ms(1000.0 * radio.delay_s)),
+        ("jitter", in_ms(1000.0 * radio.jitter_s)),
+        ("loss", f"{100.0 * radio.loss:g} %"),
+        ("mean losses in a row", f"{radio.loss_burst:g}"),
+        ("duplication", f"{100.0 * radio.duplication:g} %"),
+    ]
+    heard: dict[str, list[float]] = {}
+    for owner, _, _, status in messages(run.folder, frozenset({"status"})):
+        if "rows_heard" in status.counters:
+            came, missed = float(status.counters["rows_heard"]), float(status.counters["rows_lost"])
+            before = heard.setdefault(owner, [0.0, 0.0, 0.0, 0.0])
+            ended = before[:2] if came >= before[2] else [before[0] + before[2], before[1] + before[3]]
+            heard[owner] = [*ended, came, missed]  # of lives that have ended, and of this one
+    shares = [(owner, a + c, b + d) for owner, (a, b, c, d) in sorted(heard.items())]
+    lost = [
+        (owner, f"{came:.0f}", f"{missed:.0f}", f"{100.0 * missed / max(came + missed, 1.0):.1f} %")
+        for owner, came, missed in shares
+    ]
+    heads = ("table rows of the others", "heard", "lost", "share lost")
+    return table(("between robots", "as configured"), rows, text=(0,)) + table(heads, lost, text=(0,))
+
+
+def _largest(own: Sequence[dict[str, float]], name: str, unit: str) -> str:
+    values = [counters[name] for counters in own if name in counters]
+    return f"{max(values):g} {unit}".rstrip() if values else NONE
