@@ -32,6 +32,8 @@ from protocol.zenoh_bus import LINK_LEASE_MS, RouterAbsent, ZenohBus
 CONNECT_RETRY_S = 0.2
 STOP_GRACE_S = 0.7  # last words: a fence round trip or the residual motion, whatever the profile
 VITALS_S = 1.0
+NAMESAKE_LEASES = 1.75  # of the two that are waited: one that waits for its mission speaks once a second only
+TWIN_LEASES = 1.5
 WAIT_S_MAX = 0.5
 
 
@@ -128,11 +130,12 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             bus = connect(options, inbox, stop)
             if bus is None:
                 return 0
-            _refuse_double(bus, inbox, options, node)
+            dead = _refuse_double(bus, inbox, options, node)
             started_with = {"fleet": options.fleet, **node.started_with}
             heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
             seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading), weather_key))
             bus.announce(options.fleet, node.name, node.incarnation)
+            _refuse_twin(bus, options, node, dead)
         gc.collect()
         gc.freeze()
         return _loop(seats, wake, stop)
@@ -205,25 +208,55 @@ def _on_signals(wake: Wake) -> _Stopping:
     return stop
 
 
-def _refuse_double(bus: ZenohBus, inbox: Inbox, options: Options, node: Node) -> None:
-    """A restarted name waits two link leases for its predecessor's token; only if that one still speaks, refuse."""
+def _refuse_double(bus: ZenohBus, inbox: Inbox, options: Options, node: Node) -> list[int]:
+    """A restarted name waits two link leases for its predecessor's token; only if that one still speaks, refuse.
+
+    Returns the lives whose tokens stand, but who are silent: dead, as far as anybody can tell.
+    """
     fleet, lease_s = options.fleet, options.lease_ms / 1000.0
-    if not bus.living(fleet, node.name):
-        return
+    dead = bus.living(fleet, node.name)
+    if not dead:
+        return []
     bus.follow(frozenset({f"lfa/{fleet}/{node.name}/**"}))
     heard: dict[int, float] = {}
     patience_until = clock.now() + 2.0 * lease_s
     while clock.now() < patience_until:
         clock.sleep(0.05)
         heard.update(_speakers(inbox))
-        if not bus.living(fleet, node.name):
+        dead = bus.living(fleet, node.name)
+        if not dead:
             break
     else:
-        speaking = [life for life, at in heard.items() if at > clock.now() - lease_s]
-        if speaking:
-            raise Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another --id")
+        if any(at > clock.now() - NAMESAKE_LEASES * lease_s for at in heard.values()):
+            raise _double(fleet, node)
     bus.follow(frozenset())
     inbox.take()
+    return dead
+
+
+def _refuse_twin(bus: ZenohBus, options: Options, node: Node, dead: list[int]) -> None:
+    """Two that start at one moment see nobody before they announce themselves: the younger gives way then.
+
+    Nothing is said meanwhile, so tokens alone count. The older waits long enough for the younger to go first.
+    """
+
+    def twins() -> list[int]:
+        return [life for life in bus.living(options.fleet, node.name) if life not in (node.incarnation, *dead)]
+
+    found = twins()
+    if not found:
+        return
+    leases = TWIN_LEASES if min(found) < node.incarnation else 2.0 * TWIN_LEASES
+    patience_until = clock.now() + leases * options.lease_ms / 1000.0
+    while clock.now() < patience_until:
+        clock.sleep(0.05)
+        if not twins():
+            return
+    raise _double(options.fleet, node)
+
+
+def _double(fleet: str, node: Node) -> Refused:
+    return Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another --id")
 
 
 def _speakers(inbox: Inbox) -> dict[int, float]:

@@ -19,6 +19,8 @@ class Health:
         self._ahead: dict[int, tuple[float, int]] = {}
         self._texts: dict[int, str] = {}
         self._status: dict[str, tuple[float, HostStatus]] = {}
+        self._namesakes: dict[int, float] = {}
+        """When a process that is not the fleet's own last spoke as that robot."""
 
     def see(self, at: float, message: Message) -> None:
         robot = robot_id_of(message.header.sender)
@@ -26,7 +28,10 @@ class Health:
             case HostStatus():
                 self._status[message.host] = (at, message)
             case PoseStamped() if robot is not None:
-                self._poses[robot] = (at, message)
+                if self._own(robot, message.header.incarnation):
+                    self._poses[robot] = (at, message)
+                else:
+                    self._namesakes[robot] = at
             case Tracking() if robot is not None:
                 self._ahead[robot] = (at, message.predecessor)
             case Status() if robot is not None:
@@ -81,11 +86,12 @@ class Health:
         return host in self._status and now - self._status[host][0] < 3.0 * FRESH_S
 
     def _moves(self, robot: int, now: float) -> bool:
-        """Its poses flow, and are those of the process that its supervisor started: not a namesake's elsewhere."""
-        if robot not in self._poses or now - self._poses[robot][0] >= FRESH_S:
-            return False
+        spoken_for = now - self._namesakes.get(robot, -FRESH_S) < FRESH_S
+        return not spoken_for and robot in self._poses and now - self._poses[robot][0] < FRESH_S
+
+    def _own(self, robot: int, incarnation: int) -> bool:
+        """Of the process that its supervisor has started, as far as that is known; not of a namesake's elsewhere."""
         reports = [r for _, status in self._status.values() for r in status.processes if r.name == robot_name(robot)]
-        incarnation = self._poses[robot][1].header.incarnation
         return all(report.state == "running" and incarnation >= report.began_ms for report in reports)
 
     def _follows(self, robot: int) -> bool:
@@ -96,5 +102,7 @@ class Health:
         return pose.role is Role.LEADER
 
     def _text(self, robot: int) -> str:
+        if robot in self._namesakes:
+            return " of its own: another process speaks in its name, end that one"
         text = self._texts.get(robot, "")
         return f" ({text})" if text else ""

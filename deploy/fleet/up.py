@@ -76,7 +76,7 @@ async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wai
         found = await fleet.check(may_install=may_install)
         _all_well(fleet)
         _join_those_that_run(plan, fleet, found, digest)
-        fresh = [name for name, one in found.items() if not one.run]
+        fresh = [name for name in plan.hosts if not found[name].run]
         _say(f"starting {len(fresh)} of {len(found)} hosts")
         await fleet.do("start")
         if fleet.wrong:

@@ -109,6 +109,22 @@ def test_machines_that_would_not_do_are_named_a_line_each(clean: Machines) -> No
     assert wrongs == {("b", "lfa"), ("c", "clock"), ("d", "place"), ("e", "place"), ("f", "port")}
 
 
+def test_a_robot_that_runs_elsewhere_already_is_named_and_the_fleet_is_taken_down_again(clean: Machines) -> None:
+    fleet = clean
+    file = fleet.write(TOP, tail='[robots]\non = { 1 = "a" }')
+    connect = ("--connect", f"tcp/{fleet.address('a')}:{PORT}")
+    agent = ("agents.cli", "--role", "leader", "--id", "1", "--fleet", "convoy", *connect)
+    stranger = subprocess.Popen([*fleet.net.enter(fleet.host("b")), sys.executable, "-m", *agent])
+    try:
+        done = fleet.lfa("up", str(file), "--wait", "30")
+    finally:
+        stranger.kill()
+        stranger.wait()
+    assert done.returncode == 1
+    assert "robot1 already runs in fleet 'convoy'" in done.stderr or "speaks in its name" in done.stderr
+    assert "taken down again: a, b, c, d, e, f" in done.stderr
+
+
 @pytest.mark.long
 def test_doctor_names_a_router_that_is_missing(six: Machines) -> None:
     fleet = six

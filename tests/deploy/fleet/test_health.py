@@ -52,7 +52,8 @@ def test_a_robot_outside_the_chain_is_missing() -> None:
 def test_poses_of_a_namesake_elsewhere_are_not_those_of_the_fleets_robot() -> None:
     health = _whole()
     health.see(0.1, _host(began_ms=2))
-    assert health.missing(0.5)[0].startswith("robot1: no pose")
+    health.see(0.2, _pose(1, Role.LEADER))
+    assert health.missing(0.5)[0] == "robot1: no pose of its own: another process speaks in its name, end that one"
 
 
 def test_two_terms_are_no_agreement() -> None:
