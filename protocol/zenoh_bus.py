@@ -196,7 +196,15 @@ def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
 
 def _client(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {CLIENT_RX_THREADS}))")
-    return zenoh.open(_config("client", [], endpoint.split(","), lease_ms, credentials))
+    config = _config("client", [], endpoint.split(","), lease_ms, credentials)
+    login = {} if credentials is None else _login(credentials)
+    if not login:
+        return zenoh.open(config)
+    _insert(config, login)
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError:  # a router that asks for no password does not take one either
+        return zenoh.open(_config("client", [], endpoint.split(","), lease_ms, credentials))
 
 
 def _check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:
@@ -235,8 +243,6 @@ def _config(
     }
     if credentials is not None:
         settings |= _certified(credentials, serves=mode == "router")
-        if mode == "client":
-            settings |= _login(credentials)
     config = zenoh.Config()
     _insert(config, settings)
     return config

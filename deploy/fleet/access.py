@@ -36,7 +36,7 @@ class Plan(Struct, frozen=True):
     hosts: dict[str, tuple[str, ...]]
     """Name of a machine: its addresses and names in the network."""
     places: dict[str, tuple[str, ...]]
-    """`robot3`, `world`, `operator`, ..: the machines whose routers it may join, its home first."""
+    """`robot3`, `world`, `operator`, `host-a`, ..: the machines whose routers it may join, its home first."""
 
     def at(self, host: str) -> list[str]:
         """Who may join there."""
@@ -123,8 +123,8 @@ def hearable(name: str, plan: Plan) -> list[str]:
 
 def rules(plan: Plan, host: str, common_names: dict[str, str]) -> dict[str, Any]:
     """The part of Zenoh's configuration that guards the router of `host`; `common_names`: those not revoked."""
-    members = [*plan.at(host), host_name(host)]
     neighbours = [host_name(other) for other in plan.hosts if other != host]
+    members = [name for name in plan.at(host) if name not in neighbours]
     everything = f"lfa/{plan.fleet}/**"
     allowed = [_rule("learn", "egress", LEARN, [everything]), _rule("ask", "ingress", ASK, [everything])]
     subjects: list[dict[str, Any]] = []
@@ -149,9 +149,12 @@ def rules(plan: Plan, host: str, common_names: dict[str, str]) -> dict[str, Any]
 
 
 def _through(neighbour: str, plan: Plan, common_names: dict[str, str]) -> list[str]:
-    """What a neighbour router may pass on: what those may say who may join there, and its own supervisor."""
+    """What a neighbour router may pass on: what those may say who may join there.
+
+    Its own supervisor shows the same certificate: should that one come here, it gets no more.
+    """
     there = [name for name in plan.at(neighbour.removeprefix(HOST_PREFIX)) if name in common_names]
-    return list(dict.fromkeys(key for name in (*there, neighbour) for key in sayable(name, plan)))
+    return list(dict.fromkeys(key for name in there for key in sayable(name, plan)))
 
 
 def _subjects(name: str, common_name: str, *, joins: bool) -> list[dict[str, Any]]:

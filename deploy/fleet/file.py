@@ -60,7 +60,8 @@ class Robots(Struct, frozen=True, forbid_unknown_fields=True):
 class Links(Struct, frozen=True, forbid_unknown_fields=True):
     """How the machines' routers are joined."""
 
-    transport: Literal["tcp"] = "tcp"
+    transport: Literal["quic", "tcp"] = "quic"
+    """`quic`: encrypted, both ends show a certificate of this fleet. `tcp`: neither, for wires that you trust."""
     pairs: tuple[tuple[str, str], ...] = ()
     """Which routers are joined. Default: each with each."""
     failover: bool = True
@@ -101,6 +102,10 @@ class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
     robots: Robots = Robots()
     links: Links = Links()
     restart: Restart = Restart()
+    secure: bool = False
+    """Everybody shows who it is, and what the rules do not allow is denied (also `lfa up --secure`)."""
+    keys: str = ""
+    """Folder of the fleet's authority, on the operator's machine. Default: `~/.local/state/lfa/<fleet>.keys`."""
 
 
 class Plan(Struct, frozen=True):
@@ -119,6 +124,15 @@ class Plan(Struct, frozen=True):
     @property
     def hosts(self) -> dict[str, Machine]:
         return self.file.hosts
+
+    def seconds(self, home: str) -> tuple[str, ...]:
+        """Whose routers a process goes to that has lost its own, in turn; secured, one is enough, and is trusted."""
+        if not self.file.links.failover:
+            return ()
+        names = list(self.hosts)
+        at = names.index(home)
+        following = names[at + 1 :] + names[:at]
+        return tuple(following[:1] if self.file.secure else following)
 
     def robots_on(self, host: str) -> tuple[int, ...]:
         return tuple(robot for robot, place in self.places.items() if place == host)

@@ -19,12 +19,14 @@ import msgspec
 from msgspec import Struct
 
 from deploy.fleet import part as parts
+from deploy.fleet.bundle import unpack
 from deploy.fleet.part import Part
 from deploy.fleet.supervise import end_orphans, living, sweep
 from deploy.run import processes
 from deploy.run.folder import SCENARIO
 from protocol import clock
 from protocol.mission import Refused
+from protocol.topics import HOST_PREFIX
 from protocol.zenoh_bus import UNIX_PATH_BYTES_MAX, answers, socket_path
 
 READY_S = 15.0
@@ -65,7 +67,7 @@ def check(part: Part) -> Found:
         raise Refused(f"{path}: a router that this fleet did not start answers there: end it, or give another state")
     _check_place(part)
     if part.port:
-        _check_port(part.port)
+        _check_port(part)
     if part.world:
         _check_world()
     return found
@@ -81,7 +83,9 @@ def start(part: Part) -> Found:
         part.run_folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         (part.run_folder / SCENARIO).write_text(part.scenario)
         path = part.folder / parts.PART
-        path.write_bytes(msgspec.json.encode(part))
+        if part.keyed:
+            unpack(part)
+        path.write_bytes(msgspec.json.encode(msgspec.structs.replace(part, bundle={})))
     except OSError as error:
         raise Refused(f"{part.folder}: {error.strerror}: must be a folder to write to") from None
     log = part.run_folder / LOG
@@ -130,8 +134,9 @@ def _check_place(part: Part) -> None:
         raise Refused(f"state = {part.state}: {free_mib} MiB are free there: must be at least {FREE_MIB_MIN}")
 
 
-def _check_port(port: int) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+def _check_port(part: Part) -> None:
+    port, quic = part.port, any(where.startswith("quic/") for where in part.listen)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if quic else socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("", port))
@@ -168,8 +173,9 @@ def _runners(part: Part) -> list[list[str]]:
 
 def _await_ready(part: Part, child: subprocess.Popen[bytes], log: Path) -> None:
     """Until its router answers."""
+    known = part.known_as(f"{HOST_PREFIX}{part.host}")
     until = clock.now() + READY_S
-    while not (living(part.folder) is not None and answers(part.socket)):
+    while not (living(part.folder) is not None and answers(part.socket, known)):
         code = child.poll()
         if code not in (None, 0) or clock.now() > until:
             child.kill()

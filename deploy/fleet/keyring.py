@@ -67,7 +67,7 @@ def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: lis
 def _init(folder: Path, plan: Plan, days: float, as_json: bool) -> int:
     made = keys.make(folder, plan, days)
     machines = {host: str(keys.folder_of(folder, host)) for host in plan.hosts}
-    lines = [f"{len(made)} certificates made, {len(plan.places) + len(plan.hosts)} in all: {folder}"]
+    lines = [f"{len(made)} certificates made, {len(plan.places)} in all: {folder}"]
     for host, path in machines.items():
         lines.append(f"machine {host}: {path}  (lfa-router --keys DIR --secure; {', '.join(plan.kept_at(host))})")
     return _say({"made": made, "hosts": machines}, "\n".join(lines), as_json)

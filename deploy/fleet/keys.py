@@ -2,7 +2,7 @@
 
     DIR/ca.pem, ca.key       the fleet's own authority; the key never leaves the operator's machine
     DIR/fleet.json           who joins where, under which common name (no secrets)
-    DIR/issued/              certificate, key and password of everybody
+    DIR/issued/              certificate, key and password of everybody: the operator's own `--keys`
     DIR/hosts/a/             all that machine `a` needs, and no more: `scp -r DIR/hosts/a a:/etc/lfa/keys`
         ca.pem, host-a.*     of its router and supervisor (the only certificates that serve)
         robot1.pem .key .password   of those who run there, of operator and recorder
@@ -51,7 +51,7 @@ class Registry(Struct, frozen=True):
     """How often each was."""
 
     def members(self) -> list[str]:
-        return [*map(host_name, self.plan.hosts), *self.plan.places]
+        return list(self.plan.places)
 
 
 class Shown(Struct, frozen=True):
@@ -84,7 +84,8 @@ def spread(
     names = list(hosts)
     if not names:
         raise Refused("hosts: must be at least one machine")
-    drawn = {robot_name(robot): _turn(names, n) for n, robot in enumerate(robots)}
+    drawn = {host_name(host): _turn(names, n) for n, host in enumerate(names)}
+    drawn |= {robot_name(robot): _turn(names, n) for n, robot in enumerate(robots)}
     drawn[WORLD_NAME] = _turn(names, 0)
     drawn |= {driver_of(robot_name(robot)): drawn.get(robot_name(robot), ()) for robot in drivers}
     drawn |= {OPERATOR_NAME: tuple(names), RECORDER_NAME: tuple(names)}
@@ -107,7 +108,7 @@ def _turn(names: list[str], n: int) -> tuple[str, ...]:
 def make(folder: Path, plan: Plan, days: float = DAYS) -> list[str]:
     """Everything that `plan` needs, in `folder`; whose certificates were made or renewed. Raises Refused."""
     try:
-        _private_folder(folder)
+        private_folder(folder)
         known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
         if known.plan.fleet != plan.fleet:
             raise Refused(f"{folder}: holds the keys of fleet {known.plan.fleet!r}, give another folder")
@@ -155,7 +156,7 @@ def show(folder: Path, now_ms: int) -> list[Shown]:
         common = registry.common_names.get(name)
         until = validity(folder / ISSUED / f"{name}.pem")[1] if common else None
         state = "revoked" if until is None else "expired" if until.timestamp() * 1000.0 < now_ms else "valid"
-        at = registry.plan.places.get(name, (name.removeprefix("host-"),))
+        at = registry.plan.places[name]
         text = "" if until is None else f"{until:%Y-%m-%d %H:%M}"
         shown.append(Shown(name, state, common or "", text, at, tuple(sayable(name, registry.plan)) if common else ()))
     return shown
@@ -187,7 +188,8 @@ def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]
     """Issue what is missing, then write every machine's folder anew; who got a new certificate."""
     issued = folder / ISSUED
     for inner in (issued, folder / HOSTS):
-        _private_folder(inner)
+        private_folder(inner)
+    write_private(issued / CA_FILE, (folder / CA_FILE).read_bytes())
     ca = authority.load(folder / CA_FILE, folder / CA_KEY)
     fresh = {name: name for name in registry.members() if name not in registry.revoked}
     registry = structs.replace(registry, common_names=fresh | registry.common_names)
@@ -205,24 +207,26 @@ def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]
         _password(stem.with_name(f"{name}.password"), common)
     for host in registry.plan.hosts:
         _lay_out_host(folder, registry, host)
-    _write(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
+    write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
     return made
 
 
 def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
     plan, here = registry.plan, folder_of(folder, host)
-    _private_folder(here)
-    kept = [name for name in (*plan.kept_at(host), host_name(host)) if name in registry.common_names]
+    private_folder(here)
+    kept = [name for name in plan.kept_at(host) if name in registry.common_names]
     wanted = {CA_FILE, ACCESS_FILE, USERS_FILE} | {f"{name}.{kind}" for name in kept for kind in KINDS}
     for path in here.iterdir():
         if path.name not in wanted:
             path.unlink()
-    _write(here / CA_FILE, (folder / CA_FILE).read_bytes())
+    write_private(here / CA_FILE, (folder / CA_FILE).read_bytes())
     for file in (f"{name}.{kind}" for name in kept for kind in KINDS):
-        _write(here / file, (folder / ISSUED / file).read_bytes())
+        write_private(here / file, (folder / ISSUED / file).read_bytes())
     joining = [name for name in (*plan.at(host), *map(host_name, plan.hosts)) if name in registry.common_names]
-    _write(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
-    _write(here / ACCESS_FILE, msgspec.json.format(msgspec.json.encode(rules(plan, host, registry.common_names))))
+    write_private(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
+    write_private(
+        here / ACCESS_FILE, msgspec.json.format(msgspec.json.encode(rules(plan, host, registry.common_names)))
+    )
 
 
 def _addresses(name: str, plan: Plan) -> tuple[str, ...]:
@@ -235,7 +239,7 @@ def _addresses(name: str, plan: Plan) -> tuple[str, ...]:
 
 def _password(path: Path, common_name: str) -> None:
     if not path.exists() or not path.read_text().startswith(f"{common_name}:"):
-        _write(path, f"{common_name}:{secrets.token_urlsafe(24)}\n".encode())
+        write_private(path, f"{common_name}:{secrets.token_urlsafe(24)}\n".encode())
 
 
 def _remove(stem: Path) -> None:
@@ -243,12 +247,13 @@ def _remove(stem: Path) -> None:
         stem.with_name(f"{stem.name}.{kind}").unlink(missing_ok=True)
 
 
-def _private_folder(path: Path) -> None:
+def private_folder(path: Path) -> None:
+    """Made, and for its owner only."""
     path.mkdir(parents=True, exist_ok=True)
     path.chmod(0o700)
 
 
-def _write(path: Path, data: bytes) -> None:
+def write_private(path: Path, data: bytes) -> None:
     """0600 from the first byte on, and whole or not at all."""
     beside = path.with_name(f".{path.name}.new")
     beside.unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
@@ -11,12 +12,15 @@ from msgspec import Struct
 from deploy.fleet.file import Machine, Plan, Restart
 from deploy.run.crew import ROUTER_NAME, Row
 from deploy.run.folder import JOURNALS, SCENARIO, toml
+from protocol import clock
+from protocol.credentials import Credentials, credentials
 from protocol.mission import WITNESS_NAME, Refused, robot_name
 from protocol.topics import WORLD_NAME
 from world.spec import STATE
 
 PART = "part.json"
 SOCKET = "router.sock"
+KEYS = "keys"
 USUAL_STATE = "~/.local/state/lfa"
 
 
@@ -50,6 +54,11 @@ class Part(Struct, frozen=True):
     restart: Restart
     hosts: tuple[str, ...]
     """All machines of the fleet."""
+    secure: bool = False
+    keyed: bool = False
+    """Its processes show certificates: the router does so to others, or to everybody."""
+    bundle: dict[str, str] = {}
+    """Keys on their way, file by file; not kept in the part."""
 
     @property
     def folder(self) -> Path:
@@ -59,6 +68,10 @@ class Part(Struct, frozen=True):
     @property
     def run_folder(self) -> Path:
         return self.folder / self.run
+
+    def known_as(self, name: str) -> Credentials | None:
+        """What `name` shows here. Raises Refused."""
+        return credentials(self.folder / KEYS, name, clock.wall_ms()) if self.keyed else None
 
     @property
     def socket(self) -> str:
@@ -70,14 +83,13 @@ class Part(Struct, frozen=True):
         return ",".join((self.socket, *self.others))
 
 
-def parts(plan: Plan, run: str, digest: str) -> dict[str, Part]:
-    """Each machine's share of `plan`."""
+def parts(plan: Plan, run: str, digest: str, bundles: Mapping[str, dict[str, str]] | None = None) -> dict[str, Part]:
+    """Each machine's share of `plan`, with its keys."""
     file, names = plan.file, list(plan.hosts)
     scenario = toml(plan.scenario)
     mission = plan.scenario.mission
     made = {}
     for n, (name, machine) in enumerate(plan.hosts.items()):
-        following = [names[(n + step) % len(names)] for step in range(1, len(names))]
         made[name] = Part(
             fleet=plan.name,
             host=name,
@@ -91,24 +103,28 @@ def parts(plan: Plan, run: str, digest: str) -> dict[str, Part]:
             world=name == file.world,
             witness=mission.witness and name == file.witness and file.witness != file.world,
             world_witness=mission.witness and file.witness == file.world,
-            listen=() if len(names) == 1 else (_listen(machine),),
-            connect=tuple(endpoint(plan.hosts[far]) for far in names[:n] if _joined(plan, name, far)),
-            others=tuple(endpoint(plan.hosts[far]) for far in following) if file.links.failover else (),
+            listen=() if len(names) == 1 else (_listen(plan, machine),),
+            connect=tuple(endpoint(plan, far) for far in names[:n] if _joined(plan, name, far)),
+            others=tuple(endpoint(plan, far) for far in plan.seconds(name)),
             port=0 if len(names) == 1 else machine.router_port,
             restart=file.restart,
             hosts=tuple(names),
+            secure=file.secure,
+            keyed=file.secure or (len(names) > 1 and file.links.transport == "quic"),
+            bundle=(bundles or {}).get(name, {}),
         )
     return made
 
 
-def endpoint(machine: Machine) -> str:
-    """Where other machines find its router."""
+def endpoint(plan: Plan, name: str) -> str:
+    """Where other machines find the router of machine `name`."""
+    machine = plan.hosts[name]
     host = f"[{machine.address}]" if ":" in machine.address else machine.address
-    return f"tcp/{host}:{machine.router_port}"
+    return f"{plan.file.links.transport}/{host}:{machine.router_port}"
 
 
-def _listen(machine: Machine) -> str:
-    return f"tcp/{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
+def _listen(plan: Plan, machine: Machine) -> str:
+    return f"{plan.file.links.transport}/{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
 
 
 def _joined(plan: Plan, a: str, b: str) -> bool:
@@ -119,10 +135,12 @@ def _joined(plan: Plan, a: str, b: str) -> bool:
 def rows(part: Part) -> list[Row]:
     """The processes of this machine, its router first."""
     folder = part.run_folder
-    team = ("--fleet", part.fleet, "--connect", part.endpoint, "--journal", str(folder / JOURNALS))
+    keys = ("--keys", str(part.folder / KEYS)) if part.keyed else ()
+    team = ("--fleet", part.fleet, "--connect", part.endpoint, "--journal", str(folder / JOURNALS), *keys)
+    guarded = (*keys, "--secure") if part.secure else keys
     listen = (word for where in (part.socket, *part.listen) for word in ("--listen", where))
     connect = (word for where in part.connect for word in ("--connect", where))
-    made = [Row(ROUTER_NAME, ("deploy.fleet.router", *listen, *connect))]
+    made = [Row(ROUTER_NAME, ("deploy.fleet.router", *listen, *connect, *guarded))]
     if part.world:
         witness = () if part.world_witness else ("--no-witness",)
         world = ("world.cli", str(folder / SCENARIO), "--seed", str(part.seed), "--state", str(folder), *team, *witness)

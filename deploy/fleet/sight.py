@@ -9,7 +9,9 @@ from pathlib import Path
 from msgspec import Struct
 
 from deploy.fleet import part as parts
+from deploy.fleet.bundle import store
 from deploy.fleet.file import Plan, load
+from deploy.fleet.keys import ISSUED
 from deploy.fleet.part import Part
 from deploy.look.onlooker import Ear, Fleet, listen
 from deploy.run.processes import own_processes
@@ -34,6 +36,8 @@ class Seen(Struct, frozen=True):
     part: Part | None = None
     """This machine's own, when it is one of them."""
     plan: Plan | None = None
+    keys: Path | None = None
+    """Where the operator's certificate lies, for a fleet that wants to see one."""
 
 
 def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
@@ -41,9 +45,10 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
     if file is not None:
         plan = load(file)
         own = next((part for part in here() if part.fleet == plan.name), None)
-        far = ",".join(parts.endpoint(machine) for machine in plan.hosts.values())
+        far = ",".join(parts.endpoint(plan, name) for name in plan.hosts)
         endpoint = connect or (own.endpoint if own is not None else far)
-        return Seen(plan.name, endpoint, tuple(plan.hosts), own, plan)
+        own_keys = _keys(own) or (store(plan) / ISSUED if (store(plan) / ISSUED).is_dir() else None)
+        return Seen(plan.name, endpoint, tuple(plan.hosts), own, plan, own_keys)
     own_all = [part for part in here() if fleet in (None, part.fleet)]
     if connect is not None:
         if fleet is None:
@@ -55,7 +60,11 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
         raise Refused(f"{which} has a supervisor here: give its fleet file, or --fleet NAME --connect ENDPOINT")
     if len(names) > 1:
         raise Refused(f"several fleets run here: say --fleet {' or --fleet '.join(names)}")
-    return Seen(names[0], own_all[0].endpoint, own_all[0].hosts, own_all[0])
+    return Seen(names[0], own_all[0].endpoint, own_all[0].hosts, own_all[0], None, _keys(own_all[0]))
+
+
+def _keys(part: Part | None) -> Path | None:
+    return part.folder / parts.KEYS if part is not None and part.keyed else None
 
 
 def here() -> list[Part]:
@@ -149,7 +158,7 @@ class Sight:
 @contextmanager
 def sight(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[Sight]:
     """Raises Refused when no router answers."""
-    with listen(Fleet(seen.name, seen.endpoint, ()), topics) as ear:
+    with listen(Fleet(seen.name, seen.endpoint, (), seen.keys), topics) as ear:
         yield Sight(ear, seen)
 
 

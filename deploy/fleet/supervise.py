@@ -256,8 +256,8 @@ class Supervisor:
             return
         self._join_at = now + JOIN_S
         try:
-            bus = ZenohBus(self._part.endpoint, self._inbox)
-        except RouterAbsent:
+            bus = ZenohBus(self._part.endpoint, self._inbox, credentials=self._part.known_as(self._me))
+        except (RouterAbsent, Refused):
             return
         bus.follow(frozenset({key(self._part.fleet, OPERATOR_NAME, "order")}))
         bus.announce(self._part.fleet, self._me, self._life)

@@ -14,12 +14,15 @@ from typing import Annotated, Any
 
 import msgspec
 import typer
+from msgspec.structs import replace
 
 from deploy.fleet import sight as sights
+from deploy.fleet.bundle import Bundle, bundles, store
 from deploy.fleet.file import Plan, load
 from deploy.fleet.health import Health
 from deploy.fleet.host import Found
 from deploy.fleet.hosts import Fleet
+from deploy.fleet.keys import ISSUED
 from deploy.fleet.part import Part, parts
 from deploy.fleet.sight import Seen
 from deploy.run.interrupts import Interrupts
@@ -43,10 +46,13 @@ class NotUp(Exception):
 def command(
     file: Annotated[Path, typer.Argument(help="A fleet file (deploy/fleet.example.toml is one).")],
     install: Annotated[bool, typer.Option("--install", help="Put this lfa onto the machines first.")] = False,
+    secure: Annotated[
+        bool, typer.Option("--secure", help="Everybody shows a certificate, and what the rules do not allow is denied.")
+    ] = False,
     wait: Annotated[float, typer.Option(help="Give up when it is not healthy after so many seconds.")] = 60.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
 ) -> int:
-    plan = load(file)
+    plan = _secured(load(file)) if secure else load(file)
     began = clock.now()
     try:
         with Interrupts() as interrupts:
@@ -67,15 +73,19 @@ def command(
     return 0
 
 
+def _secured(plan: Plan) -> Plan:
+    return replace(plan, file=replace(plan.file, secure=True))
+
+
 async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
     """Raises NotUp, with all that was started here ended again."""
-    digest = _digest(plan)
-    fleet = Fleet(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest))
+    digest, keys = _digest(plan), bundles(plan)
+    fleet = Fleet(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest, keys))
     try:
         await fleet.reach()
         found = await fleet.check(may_install=may_install)
         _all_well(fleet)
-        _join_those_that_run(plan, fleet, found, digest)
+        _join_those_that_run(plan, fleet, found, digest, keys)
         fresh = [name for name in plan.hosts if not found[name].run]
         _say(f"starting {len(fresh)} of {len(found)} hosts")
         await fleet.do("start")
@@ -105,7 +115,9 @@ def _all_well(fleet: Fleet) -> None:
         raise NotUp(fleet.lines(), 1 if fleet.unreached == set(fleet.wrong) else 2)
 
 
-def _join_those_that_run(plan: Plan, fleet: Fleet, found: dict[str, Found], digest: str) -> None:
+def _join_those_that_run(
+    plan: Plan, fleet: Fleet, found: dict[str, Found], digest: str, keys: dict[str, Bundle]
+) -> None:
     """Machines that run already set the run that the others join; they must have been told the same file."""
     for name, one in found.items():
         if one.run and one.digest != digest:
@@ -114,7 +126,7 @@ def _join_those_that_run(plan: Plan, fleet: Fleet, found: dict[str, Found], dige
         raise NotUp(fleet.lines(), 2)
     run = max((one.run for one in found.values()), default="")
     if run:
-        fleet.parts = parts(plan, run, digest)
+        fleet.parts = parts(plan, run, digest, keys)
 
 
 def _await_health(plan: Plan, shares: dict[str, Part], interrupts: Interrupts, wait_s: float) -> dict[str, Any]:
@@ -122,7 +134,7 @@ def _await_health(plan: Plan, shares: dict[str, Part], interrupts: Interrupts, w
     own = next((part for part in sights.here() if part.fleet == plan.name), None)
     endpoints = [own.socket] if own is not None else []
     endpoints += [end for part in shares.values() for end in part.others[:1]]
-    seen = Seen(plan.name, ",".join(dict.fromkeys(endpoints)), tuple(plan.hosts), own, plan)
+    seen = Seen(plan.name, ",".join(dict.fromkeys(endpoints)), tuple(plan.hosts), own, plan, store(plan) / ISSUED)
     health = Health(plan.scenario.mission.robots, tuple(plan.hosts))
     until, well_since, shown = clock.now() + wait_s, None, ""
     try:

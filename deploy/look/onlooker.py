@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from msgspec import Struct
 
 from deploy.run.inject import Running, agents, one_fleet, option
 from deploy.run.processes import own_processes
+from protocol import clock
 from protocol.bus import Arrival, Inbox, Wake
+from protocol.credentials import credentials
 from protocol.messages import BadMessage, Message, decode
 from protocol.mission import Refused
-from protocol.topics import TOPIC, address
+from protocol.topics import OPERATOR_NAME, TOPIC, address
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 from world.scenario import Scenario, draw, load
 
@@ -25,17 +28,19 @@ class Fleet(Struct, frozen=True):
     name: str
     endpoint: str
     team: tuple[Running, ...]
+    keys: Path | None = None
+    """Folder with the operator's certificate, for a fleet that wants to see one."""
 
 
-def find(fleet: str | None, connect: str | None) -> Fleet:
-    """The fleet that is meant: one that runs here, or any by its name and its router. Raises Refused."""
+def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> Fleet:
+    """The fleet that is meant: one that runs here, or any by its name, its router and its keys. Raises Refused."""
     running = agents()
     if connect is None and running and (fleet is None or any(agent.fleet == fleet for agent in running)):
         team = one_fleet(running, fleet)
-        return Fleet(team[0].fleet, team[0].endpoint, tuple(team))
+        return Fleet(team[0].fleet, team[0].endpoint, tuple(team), keys or team[0].keys)
     if fleet is None:
         raise Refused("no agent of yours runs on this machine: say --fleet NAME, and --connect for another router")
-    return Fleet(fleet, connect or default_endpoint(), ())
+    return Fleet(fleet, connect or default_endpoint(), (), keys)
 
 
 class Ear:
@@ -65,8 +70,9 @@ def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iter
     """An ear for the key expressions `topics` (`*/pose`) of `fleet`; `every`: all values of states, not the newest."""
     wake = Wake()
     inbox = Inbox(wake, INBOX_SIZE_MAX, every=every)
+    known = None if fleet.keys is None else credentials(fleet.keys, OPERATOR_NAME, clock.wall_ms())
     try:
-        bus = ZenohBus(fleet.endpoint, inbox)
+        bus = ZenohBus(fleet.endpoint, inbox, credentials=known)
     except RouterAbsent:
         raise Refused(f"no router answers at {fleet.endpoint}: must be the router of fleet {fleet.name}") from None
     try:

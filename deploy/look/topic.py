@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
 import typer
 from msgspec import Struct
 
-from deploy.look.onlooker import find, listen
+from deploy.look.onlooker import Fleet, find, listen
 from deploy.run import channels
 from protocol import clock
 from protocol.mission import Refused
@@ -33,14 +34,16 @@ def command(
     topic: Annotated[str, typer.Argument(help="robot2/pose, robot2, pose, or nothing for all.")] = "",
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
     count: Annotated[int, typer.Option(help="Echo: end after so many messages; 0 goes on.")] = 0,
     seconds: Annotated[float, typer.Option(help="List and hz: how long to listen.")] = 2.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON; echo always does.")] = False,
 ) -> int:
     wanted = expressions(topic)
+    found = find(fleet, connect, keys)
     if action == "echo":
-        return _echo(find(fleet, connect).name, connect, wanted, count)
-    rates = _rates(find(fleet, connect).name, connect, wanted, seconds)
+        return _echo(found, wanted, count)
+    rates = _rates(found, wanted, seconds)
     if as_json:
         print(msgspec.json.encode(rates).decode())
     else:
@@ -58,10 +61,10 @@ def expressions(text: str) -> frozenset[str]:
     return frozenset({f"{owner or '*'}/{name or '*'}", f"{owner or '*'}/{name or '*'}/*"})
 
 
-def _echo(fleet: str, connect: str | None, wanted: frozenset[str], count: int) -> int:
+def _echo(fleet: Fleet, wanted: frozenset[str], count: int) -> int:
     """Every message as one line of JSON, with its channel."""
     left = count
-    with listen(find(fleet, connect), wanted, every=True) as ear:
+    with listen(fleet, wanted, every=True) as ear:
         while True:
             ear.wait(POLL_S)
             for arrival, message in ear.take():
@@ -72,9 +75,9 @@ def _echo(fleet: str, connect: str | None, wanted: frozenset[str], count: int) -
                     return 0
 
 
-def _rates(fleet: str, connect: str | None, wanted: frozenset[str], seconds: float) -> list[Rate]:
+def _rates(fleet: Fleet, wanted: frozenset[str], seconds: float) -> list[Rate]:
     heard: dict[str, tuple[int, int]] = {}
-    with listen(find(fleet, connect), wanted, every=True) as ear:
+    with listen(fleet, wanted, every=True) as ear:
         begun = clock.now()
         while clock.now() < begun + seconds:
             ear.wait(min(POLL_S, seconds))

@@ -36,6 +36,7 @@ def command(
     folder: Annotated[Path | None, typer.Argument(metavar="[RUN]", help="A run folder; none: a running fleet.")] = None,
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
     serve_web: Annotated[bool, typer.Option("--serve-web", help="Serve the viewer to a browser.")] = False,
     screenshot: Annotated[Path | None, typer.Option(help="Write a PNG and end; needs no display.")] = None,
     port: Annotated[int, typer.Option(help="Where viewers get their data.")] = PORT,
@@ -46,7 +47,7 @@ def command(
         _free(port, "--port")
         _free(web_port, "--web-port")
     if folder is None:
-        return _live(find(fleet, connect), serve_web, screenshot, port, web_port)
+        return _live(find(fleet, connect, keys), serve_web, screenshot, port, web_port)
     rrd = converted(folder)
     if screenshot is not None:
         from deploy.look.shot import take

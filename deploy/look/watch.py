@@ -12,6 +12,7 @@ import termios
 import tty
 from collections.abc import Iterator
 from math import pi
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
@@ -41,12 +42,13 @@ ROLE_STYLES = {"leader": "bold green", "follower": "", "waiting": "yellow", "sil
 def command(
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
     once: Annotated[bool, typer.Option("--once", help="Print the table once and end.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows once, as JSON.")] = False,
 ) -> int:
     if not (once or as_json):
         _check_terminal()
-    found = find(fleet, connect)
+    found = find(fleet, connect, keys)
     board = Board(tuple(agent.robot for agent in found.team))
     with listen(found, TOPICS) as ear:
         if not (once or as_json):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -23,12 +24,13 @@ def command(
     robots: Annotated[list[int], typer.Argument(help="Ids whose processes are dead, and stay off until it is done.")],
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what came of it as JSON.")] = False,
 ) -> int:
     for robot in robots:
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
-    with listen(find(fleet, connect), frozenset({"*/event", "*/pose", "*/status"})) as ear:
+    with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status"})) as ear:
         for robot in robots:
             if ear.bus.living(ear.fleet.name, robot_name(robot)):
                 raise Refused(f"robot {robot} lives: end its process first, or let it join")

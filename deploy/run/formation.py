@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -22,10 +23,11 @@ def command(
     side: Annotated[str, typer.Argument(help="left, right, column or zigzag.")],
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the leader's answer as JSON.")] = False,
 ) -> int:
     named(side, FormationSpec())
-    with listen(find(fleet, connect), frozenset({"*/event"})) as ear:
+    with listen(find(fleet, connect, keys), frozenset({"*/event"})) as ear:
         clock.sleep(JOINED_S)
         answer = ask(ear, side)
     if as_json:

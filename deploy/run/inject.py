@@ -8,6 +8,7 @@ to exactly the process that was found: same pid, start time, user and command li
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -21,9 +22,10 @@ from deploy.run.processes import Identity
 from deploy.run.weather import note
 from protocol import clock
 from protocol.bus import Arrival, Inbox
+from protocol.credentials import credentials
 from protocol.messages import BadMessage, Event, PoseStamped, Role, decode, encode
 from protocol.mission import Refused, robot_id_of
-from protocol.topics import key
+from protocol.topics import OPERATOR_NAME, key
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 
 LISTEN_S = 1.0  # 50 poses of a leader
@@ -41,6 +43,8 @@ class Running(Struct, frozen=True):
     fleet: str
     endpoint: str
     identity: Identity
+    keys: Path | None = None
+    """What it was told with --keys."""
 
 
 def command(
@@ -144,7 +148,8 @@ def _agent(identity: Identity) -> Running | None:
     if not robot.isdecimal():
         return None
     endpoint = option(words, "--connect", default_endpoint())
-    return Running(int(robot), option(words, "--fleet", "fleet"), endpoint, identity)
+    keys = option(words, "--keys", "")
+    return Running(int(robot), option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)
 
 
 def option(words: Sequence[str], name: str, default: str) -> str:
@@ -218,7 +223,8 @@ def _leader(fleet: str, bus: ZenohBus, inbox: Inbox) -> int | None:
 
 
 def _bus(agent: Running, inbox: Inbox) -> ZenohBus:
+    known = None if agent.keys is None else credentials(agent.keys, OPERATOR_NAME, clock.wall_ms())
     try:
-        return ZenohBus(agent.endpoint, inbox)
+        return ZenohBus(agent.endpoint, inbox, credentials=known)
     except RouterAbsent:
         raise Refused(f"no router answers at {agent.endpoint}, where robot {agent.robot} looks for it") from None

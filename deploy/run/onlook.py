@@ -27,6 +27,7 @@ SPLIT_MB = 256.0
 def command(
     fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
     connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; default runs/<fleet>-<time>.")] = None,
     seconds: Annotated[float, typer.Option(help="End after so long; 0 goes on.")] = 0.0,
     split_mb: Annotated[float, typer.Option(help="Go on in a new file once one has so many MB; 0: never.")] = SPLIT_MB,
@@ -36,7 +37,7 @@ def command(
     if not split_mb >= 0.0 or keep < 0:
         raise Refused(f"--split-mb {split_mb:g} --keep {keep}: must be 0 or more")
     plan = None if hosts is None else load(hosts)
-    found = find(fleet, connect)
+    found = find(fleet, connect, keys)
     with listen(found, frozenset({"**"}), every=True) as ear, Interrupts() as interrupts:
         folder = _folder(found, out)
         about = About(found.name, "onlooker", 0, found.name).metadata()
