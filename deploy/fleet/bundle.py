@@ -5,23 +5,20 @@ They lie in `~/.local/state/lfa/<fleet>.keys`, or where the file's `keys` says; 
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from deploy.fleet import keys
 from deploy.fleet.access import Plan as KeyPlan
 from deploy.fleet.access import host_name
 from deploy.fleet.file import Plan
-from deploy.fleet.part import KEYS, USUAL_STATE, Part
+from deploy.fleet.hosts import Fleet
+from deploy.fleet.part import parts, store
+from deploy.fleet.private import ISSUED
+from protocol import clock
+from protocol.credentials import Credentials, credentials
 from protocol.mission import WITNESS_NAME, robot_name
-from protocol.topics import WORLD_NAME
+from protocol.topics import OPERATOR_NAME, WORLD_NAME
 
 Bundle = dict[str, str]
 """File name to text: all small, all text."""
-
-
-def store(plan: Plan) -> Path:
-    """Where the fleet's authority lives."""
-    return Path(plan.file.keys or f"{USUAL_STATE}/{plan.name}.keys").expanduser()
 
 
 def key_plan(plan: Plan) -> KeyPlan:
@@ -36,23 +33,33 @@ def key_plan(plan: Plan) -> KeyPlan:
     return keys.spread(plan.name, addresses, plan.places, places)
 
 
+def operator(plan: Plan) -> Credentials | None:
+    """What the operator shows, None where no keys were made yet. Raises Refused."""
+    issued = store(plan) / ISSUED
+    return credentials(issued, OPERATOR_NAME, clock.wall_ms()) if issued.is_dir() else None
+
+
 def bundles(plan: Plan) -> dict[str, Bundle]:
     """The keys of each machine, made where they are missing. Raises Refused."""
-    folder = store(plan)
-    keys.make(folder, key_plan(plan))
-    return {name: _read(keys.folder_of(folder, name)) for name in plan.hosts}
+    keys.make(store(plan), key_plan(plan))
+    return _bundles(plan)
 
 
-def _read(folder: Path) -> Bundle:
-    return {path.name: path.read_text() for path in sorted(folder.iterdir())}
+def _bundles(plan: Plan) -> dict[str, Bundle]:
+    folders = {name: keys.folder_of(store(plan), name) for name in plan.hosts}
+    return {name: {path.name: path.read_text() for path in sorted(at.iterdir())} for name, at in folders.items()}
 
 
-def unpack(part: Part) -> None:
-    """Write this machine's keys, those that are no more taken away. Raises OSError."""
-    folder = part.folder / KEYS
-    keys.private_folder(folder)
-    for path in folder.iterdir():
-        if path.name not in part.bundle:
-            path.unlink()
-    for name, text in part.bundle.items():
-        keys.write_private(folder / name, text.encode())
+async def push(plan: Plan) -> list[str]:
+    """Give the machines of a running fleet their keys anew, and open their routers one by one; a line for each fault.
+
+    Rules are read when a router opens. While one is away its processes go to the next machine's, as when it dies.
+    """
+    fleet = Fleet(plan, parts(plan, "", "", _bundles(plan)))
+    try:
+        await fleet.reach()
+        for name in plan.hosts:
+            await fleet.do("rekey", [name])
+    finally:
+        await fleet.close()
+    return fleet.lines()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ from msgspec import Struct
 
 from deploy.fleet import part as parts
 from deploy.fleet import sight
+from deploy.fleet.bundle import operator
 from deploy.fleet.file import Machine, Plan, load
 from deploy.fleet.host import Found
 from deploy.fleet.hosts import CLOCK_S_MAX, ask
@@ -22,6 +24,7 @@ from deploy.fleet.part import Part
 from deploy.fleet.remote import PYTHON_MIN, Probed, Shell, Unreachable, probe, python_of, reach
 from protocol import clock
 from protocol.mission import Refused
+from protocol.topics import HOST_PREFIX
 from protocol.zenoh_bus import answers, default_endpoint
 
 EXTRAS = {"world": ("numpy", "pymunk"), "view": ("mcap", "matplotlib", "rerun"), "deploy": ("asyncssh", "rich")}
@@ -78,8 +81,12 @@ def this_machine() -> list[Finding]:
 
 def _own_part(part: Part) -> list[Finding]:
     """The router here, and those of the other machines as they are seen from here."""
-    found = [_router(part.host, answers(part.socket))]
-    far = [end for end in part.others if not answers(end)]
+    try:
+        known = part.known_as(f"{HOST_PREFIX}{part.host}")
+    except Refused as refused:
+        return [Finding(part.host, "certificate", False, str(refused))]
+    found = [_router(part.host, answers(part.socket, known))]
+    far = [end for end in part.others if not answers(end, known)]
     says = "all answer" if not far else f"{', '.join(far)} do not answer: must be up, and their ports open"
     return [*found, Finding(part.host, "other hosts", not far, says)] if part.others else found
 
@@ -90,11 +97,12 @@ def _own_part(part: Part) -> list[Finding]:
 async def examine(plan: Plan) -> list[Finding]:
     """Every machine of `plan`, all at once. Starts nothing, but for a moment's listening where a router would."""
     shares = parts.parts(plan, "", "")
-    each = await asyncio.gather(*(_examine(name, machine, shares[name]) for name, machine in plan.hosts.items()))
+    each = await asyncio.gather(*(_examine(name, plan, shares[name]) for name in plan.hosts))
     return [finding for found in each for finding in found]
 
 
-async def _examine(name: str, machine: Machine, part: Part) -> list[Finding]:
+async def _examine(name: str, plan: Plan, part: Part) -> list[Finding]:
+    machine = plan.hosts[name]
     try:
         shell = await reach(machine)
     except Unreachable as error:
@@ -106,7 +114,7 @@ async def _examine(name: str, machine: Machine, part: Part) -> list[Finding]:
         probed = await probe(shell, python_of(machine))
         found += _probed(name, probed, part, (asked + clock.wall_ms()) / 2.0)
         if probed.lfa == part.version:
-            found += await _place(name, shell, machine, part)
+            found += await _place(name, shell, plan, part)
     except (Unreachable, Refused) as error:
         found.append(Finding(name, "python", False, str(error)))
     finally:
@@ -125,8 +133,9 @@ def _probed(name: str, probed: Probed, part: Part, here_ms: float) -> list[Findi
     ]
 
 
-async def _place(name: str, shell: Shell, machine: Machine, part: Part) -> list[Finding]:
-    """Folder, router and port; whether the port is open is tried from here."""
+async def _place(name: str, shell: Shell, plan: Plan, part: Part) -> list[Finding]:
+    """Folder, router, certificates and port; whether the port is open is tried from here."""
+    machine = plan.hosts[name]
     try:
         state: Found = await ask(shell, machine, "check", part)
     except Refused as refused:
@@ -134,11 +143,14 @@ async def _place(name: str, shell: Shell, machine: Machine, part: Part) -> list[
     found = [Finding(name, "place", True, part.state)]
     if state.run:
         found.append(_router(name, state.router))
+    if state.certificate:
+        found.append(Finding(name, "certificate", False, state.certificate))
     if part.port == 0 or machine.local:
         return found
-    open_ = await (asyncio.to_thread(answers, parts.endpoint(machine)) if state.run else _knock(shell, machine, part))
+    where, known = parts.endpoint(plan, name), operator(plan)
+    open_ = await (asyncio.to_thread(answers, where, known) if state.run else _knock(shell, machine, part))
     right = "reachable from here: a firewall, or a router that is not up?"
-    return [*found, _finding(name, "port", open_, f"{parts.endpoint(machine)}", right)]
+    return [*found, _finding(name, "port", open_, where, right)]
 
 
 async def _knock(shell: Shell, machine: Machine, part: Part) -> bool:
@@ -148,14 +160,27 @@ async def _knock(shell: Shell, machine: Machine, part: Part) -> bool:
     through = False
     while not through and not listening.done() and clock.now() < until:
         try:
-            opening = asyncio.open_connection(machine.address, machine.router_port)
-            _, writer = await asyncio.wait_for(opening, 0.5)
-            writer.close()
+            if part.over_udp:
+                await asyncio.to_thread(_knock_udp, machine)
+            else:
+                opening = asyncio.open_connection(machine.address, machine.router_port)
+                _, writer = await asyncio.wait_for(opening, 0.5)
+                writer.close()
             through = True
         except (OSError, TimeoutError):
             await asyncio.sleep(0.1)
     await listening
     return through
+
+
+def _knock_udp(machine: Machine) -> None:
+    """Raises OSError when nothing comes back."""
+    where = socket.getaddrinfo(machine.address, machine.router_port, type=socket.SOCK_DGRAM)[0]
+    with socket.socket(where[0], socket.SOCK_DGRAM) as knocking:
+        knocking.settimeout(0.5)
+        knocking.connect(where[4])
+        knocking.send(b"lfa")
+        knocking.recv(64)
 
 
 def _router(host: str, there: bool) -> Finding:

@@ -1,4 +1,4 @@
-"""`python -m deploy.fleet.host check|start|stop|listen`: what the operator's commands run on each machine.
+"""`python -m deploy.fleet.host check|start|stop|listen|rekey`: what the operator's commands run on each machine.
 
 A part comes on standard input, one JSON object goes out; what is wrong is one line on standard error and exit code 2.
 """
@@ -19,12 +19,15 @@ import msgspec
 from msgspec import Struct
 
 from deploy.fleet import part as parts
-from deploy.fleet.bundle import unpack
 from deploy.fleet.part import Part
-from deploy.fleet.supervise import end_orphans, living, sweep
+from deploy.fleet.private import unpack
+from deploy.fleet.router import LISTENS
+from deploy.fleet.supervise import Ledger, end_orphans, living, sweep
 from deploy.run import processes
-from deploy.run.folder import SCENARIO
+from deploy.run.crew import ROUTER_NAME
+from deploy.run.folder import LOGS, SCENARIO
 from protocol import clock
+from protocol.credentials import check_valid
 from protocol.mission import Refused
 from protocol.topics import HOST_PREFIX
 from protocol.zenoh_bus import UNIX_PATH_BYTES_MAX, answers, socket_path
@@ -49,6 +52,8 @@ class Found(Struct, frozen=True):
     orphans: tuple[str, ...] = ()
     router: bool = False
     """It answers."""
+    certificate: str = ""
+    """What is wrong with one; empty: nothing."""
 
 
 def check(part: Part) -> Found:
@@ -58,8 +63,7 @@ def check(part: Part) -> Found:
     running = living(part.folder)
     found = Found(version("lfa"), clock.wall_ms())
     if running is not None:
-        there = answers(part.socket)
-        return msgspec.structs.replace(found, run=running.run, digest=running.digest, router=there)
+        return _running(found, running, parts.read(part.folder / parts.PART))
     path = socket_path(part.socket)
     if path is None or len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
         raise Refused(f"state = {part.state}: too long for a socket in it: at most {UNIX_PATH_BYTES_MAX} bytes")
@@ -73,6 +77,20 @@ def check(part: Part) -> Found:
     return found
 
 
+def _running(found: Found, running: Ledger, own: Part) -> Found:
+    """How the router stands that runs here, and the certificates that it and its clients show."""
+    expired, known = "", None
+    with contextlib.suppress(Refused):
+        known = own.known_as(f"{HOST_PREFIX}{own.host}")
+    try:
+        for path in sorted((own.folder / parts.KEYS).glob("*.pem")) if own.keyed else ():
+            check_valid(path, found.wall_ms)
+    except Refused as refused:
+        expired = str(refused)
+    there = answers(own.socket, known)
+    return msgspec.structs.replace(found, run=running.run, digest=running.digest, router=there, certificate=expired)
+
+
 def start(part: Part) -> Found:
     """Bring this machine's part up, so that it outlives the session that asked for it. Raises Refused."""
     found = check(part)
@@ -84,7 +102,7 @@ def start(part: Part) -> Found:
         (part.run_folder / SCENARIO).write_text(part.scenario)
         path = part.folder / parts.PART
         if part.keyed:
-            unpack(part)
+            unpack(part.folder / parts.KEYS, part.bundle)
         path.write_bytes(msgspec.json.encode(msgspec.structs.replace(part, bundle={})))
     except OSError as error:
         raise Refused(f"{part.folder}: {error.strerror}: must be a folder to write to") from None
@@ -135,8 +153,8 @@ def _check_place(part: Part) -> None:
 
 
 def _check_port(part: Part) -> None:
-    port, quic = part.port, any(where.startswith("quic/") for where in part.listen)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if quic else socket.SOCK_STREAM) as probe:
+    port = part.port
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if part.over_udp else socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("", port))
@@ -188,6 +206,9 @@ def _await_ready(part: Part, child: subprocess.Popen[bytes], log: Path) -> None:
 
 def listen(part: Part) -> Found:
     """Listen where the router would, until somebody comes or a few seconds are over: is the port open?"""
+    if part.over_udp:
+        _echo(part.port)
+        return Found(version("lfa"), clock.wall_ms())
     with socket.create_server(("", part.port)) as server:
         server.settimeout(LISTEN_S)
         with contextlib.suppress(TimeoutError):
@@ -195,7 +216,34 @@ def listen(part: Part) -> Found:
     return Found(version("lfa"), clock.wall_ms())
 
 
-DEEDS = {"check": check, "start": start, "stop": stop, "listen": listen}
+def _echo(port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
+        server.bind(("", port))
+        server.settimeout(LISTEN_S)
+        with contextlib.suppress(TimeoutError):
+            knock, who = server.recvfrom(64)
+            server.sendto(knock, who)
+
+
+def rekey(part: Part) -> Found:
+    """New keys and rules for what runs here already: its router opens anew with them. Raises Refused."""
+    running = living(part.folder)
+    if running is None or not (own := parts.read(part.folder / parts.PART)).keyed:
+        return Found(version("lfa"), clock.wall_ms())
+    unpack(part.folder / parts.KEYS, part.bundle)
+    log = own.run_folder / LOGS / f"{ROUTER_NAME}.log"
+    before = log.read_text(errors="replace").count(LISTENS)
+    for router in (child for child in running.children if "deploy.fleet.router" in child.arguments):
+        processes.send(router, signal.SIGHUP)
+    until = clock.now() + READY_S
+    while log.read_text(errors="replace").count(LISTENS) == before:
+        if clock.now() > until:
+            raise Refused(f"its router does not open anew: see {log}")
+        clock.sleep(POLL_S)
+    return Found(version("lfa"), clock.wall_ms(), running.run, running.digest)
+
+
+DEEDS = {"check": check, "start": start, "stop": stop, "listen": listen, "rekey": rekey}
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
 
@@ -55,14 +55,15 @@ class Fleet:
         await self._each(self._shells, one)
         return answers
 
-    async def do(self, deed: str) -> dict[str, Found]:
-        """`start` or `stop` on each machine that is reached; what they say."""
+    async def do(self, deed: str, names: Iterable[str] | None = None) -> dict[str, Found]:
+        """`start`, `stop` or `rekey` on each machine that is reached, or on those `names`; what they say."""
         answers: dict[str, Found] = {}
 
         async def one(name: str) -> None:
             answers[name] = await ask(self._shells[name], self._plan.hosts[name], deed, self.parts[name])
 
-        await self._each(self._shells, one)
+        chosen = set(self._shells if names is None else names)
+        await self._each({name: shell for name, shell in self._shells.items() if name in chosen}, one)
         return answers
 
     async def close(self) -> None:

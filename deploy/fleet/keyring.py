@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,13 +12,17 @@ import typer
 
 from deploy.fleet import keys
 from deploy.fleet.access import Plan, host_name
+from deploy.fleet.bundle import push
+from deploy.fleet.file import Plan as FleetPlan
+from deploy.fleet.file import is_fleet_file, load
+from deploy.fleet.part import store
 from protocol import clock
 from protocol.mission import Refused
 
 
 def command(
     action: Annotated[Literal["init", "rotate", "revoke", "show"], typer.Argument(help="What to do.")],
-    folder: Annotated[Path, typer.Argument(help="Where the keys are; machine a's own are in hosts/a.")],
+    folder: Annotated[Path, typer.Argument(help="Where the keys are (machine a's in hosts/a), or a fleet file.")],
     names: Annotated[list[str] | None, typer.Argument(help="Of rotate, revoke, show: robot3, world, host-a.")] = None,
     robots: Annotated[int, typer.Option(help="init: ids 1 to N.")] = 4,
     hosts: Annotated[str, typer.Option(help="init: machines, with addresses: a=10.0.0.1+a.lan,b=10.0.0.2.")] = "local",
@@ -31,23 +37,44 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
     chosen = names or []
+    plan = load(folder) if is_fleet_file(folder) else None
+    if plan is not None:
+        if action == "init":
+            raise Refused(f"{folder}: lfa up makes the keys of a fleet file by itself")
+        folder = store(plan)
     if days <= 0.0:
         raise Refused(f"--days {days:g}: must be above 0")
     if action == "revoke" and not chosen:
         raise Refused("revoke: say whom, as in lfa keys revoke DIR robot3")
     if action == "init":
         return _init(folder, planned(fleet, hosts, robots, place or [], driver or []), days, as_json)
-    if action == "rotate":
-        made = keys.rotate(folder, chosen, days)
-        return _say(
-            {"renewed": made}, f"renewed {', '.join(made)}; copy hosts/ again, they count at the next start", as_json
-        )
-    if action == "revoke":
-        machines = keys.revoke(folder, chosen)
-        facts: dict[str, object] = {"revoked": chosen, "restart": machines}
-        text = f"revoked {', '.join(chosen)}; copy hosts/ again and restart the routers, one by one:"
-        return _say(facts, f"{text} {', '.join(machines)}", as_json)
+    if action != "show":
+        return _change(action, folder, chosen, days, plan, as_json)
     return _show(folder, chosen, as_json)
+
+
+def _change(
+    action: Literal["rotate", "revoke"],
+    folder: Path,
+    chosen: list[str],
+    days: float,
+    plan: FleetPlan | None,
+    as_json: bool,
+) -> int:
+    """Then the machines get to know: over ssh where there is a fleet file, else it is said what is to be done."""
+    if action == "rotate":
+        changed, text = keys.rotate(folder, chosen, days), "renewed (whoever runs shows it from its next start on)"
+    else:
+        keys.revoke(folder, chosen)
+        changed, text = chosen, "revoked"
+    machines = list(keys.load(folder).plan.hosts)
+    wrong = [] if plan is None else asyncio.run(push(plan))
+    then = "routers opened anew" if plan is not None else "copy hosts/ again, then SIGHUP to the routers, one by one"
+    facts: dict[str, object] = {"changed": changed, "hosts": machines, "pushed": plan is not None, "wrong": wrong}
+    for line in wrong:
+        print(f"lfa: {line}", file=sys.stderr)
+    _say(facts, f"{', '.join(changed)} {text}; {then}: {', '.join(machines)}", as_json)
+    return 1 if wrong else 0
 
 
 def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: list[int]) -> Plan:

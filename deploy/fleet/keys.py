@@ -21,9 +21,7 @@ DIR` serves `tls/` and `quic/`, with `--secure` under the rules. Files are 0600,
 
 from __future__ import annotations
 
-import os
 import secrets
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -32,11 +30,12 @@ from msgspec import Struct, structs
 
 from deploy.fleet import authority
 from deploy.fleet.access import Plan, driver_of, host_name, rules, sayable
+from deploy.fleet.private import ISSUED, private_folder, write_private
 from protocol.credentials import ACCESS_FILE, CA_FILE, USERS_FILE, validity
 from protocol.mission import WITNESS_NAME, Refused, robot_name
 from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
 
-REGISTRY, ISSUED, HOSTS, CA_KEY = "fleet.json", "issued", "hosts", "ca.key"
+REGISTRY, HOSTS, CA_KEY = "fleet.json", "hosts", "ca.key"
 DAYS = 365.0
 KINDS = ("pem", "key", "password")
 
@@ -245,21 +244,6 @@ def _password(path: Path, common_name: str) -> None:
 def _remove(stem: Path) -> None:
     for kind in KINDS:
         stem.with_name(f"{stem.name}.{kind}").unlink(missing_ok=True)
-
-
-def private_folder(path: Path) -> None:
-    """Made, and for its owner only."""
-    path.mkdir(parents=True, exist_ok=True)
-    path.chmod(0o700)
-
-
-def write_private(path: Path, data: bytes) -> None:
-    """0600 from the first byte on, and whole or not at all."""
-    beside = path.with_name(f".{path.name}.new")
-    beside.unlink(missing_ok=True)
-    with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        file.write(data)
-    shutil.move(beside, path)
 
 
 def _unwritable(folder: Path, error: OSError) -> Refused:

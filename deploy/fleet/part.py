@@ -69,6 +69,11 @@ class Part(Struct, frozen=True):
     def run_folder(self) -> Path:
         return self.folder / self.run
 
+    @property
+    def over_udp(self) -> bool:
+        """Its router listens for other machines at a port of UDP."""
+        return any(where.startswith("quic/") for where in self.listen)
+
     def known_as(self, name: str) -> Credentials | None:
         """What `name` shows here. Raises Refused."""
         return credentials(self.folder / KEYS, name, clock.wall_ms()) if self.keyed else None
@@ -114,6 +119,11 @@ def parts(plan: Plan, run: str, digest: str, bundles: Mapping[str, dict[str, str
             bundle=(bundles or {}).get(name, {}),
         )
     return made
+
+
+def store(plan: Plan) -> Path:
+    """Where the fleet's authority lives, on the operator's machine."""
+    return Path(plan.file.keys or f"{USUAL_STATE}/{plan.name}.keys").expanduser()
 
 
 def endpoint(plan: Plan, name: str) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -18,6 +18,7 @@ from protocol.topics import HOST_PREFIX
 from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint, open_router
 
 DEFAULT_TCP, DEFAULT_TLS = "tcp/127.0.0.1:7447", "tls/127.0.0.1:7447"
+LISTENS = "router listens at"
 ENDING = {signal.SIGTERM, signal.SIGINT}
 
 
@@ -42,28 +43,28 @@ def command(
         Literal["fast", "std", "wifi"], typer.Option(help="How soon a silent link counts as dead: 0.5, 1 or 2 s.")
     ] = "std",
 ) -> int:
-    """Run until SIGTERM or Ctrl-C; SIGHUP opens it anew, with the keys and rules of that moment."""
+    """Run until SIGTERM or Ctrl-C; SIGHUP starts it anew, with the keys and rules of that moment."""
     if secure and keys is None:
         raise Refused("--secure: needs --keys, a folder that lfa keys init made (DIR/hosts/NAME)")
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | {signal.SIGHUP})  # before Zenoh's threads: they inherit it
     endpoints = listen or [default_endpoint(), DEFAULT_TLS if secure else DEFAULT_TCP]
 
-    def opened(known: Credentials | None) -> Callable[[], None]:
-        return open_router(endpoints, connect or (), LINK_LEASES_MS[link], known, secure)
-
-    close = opened(None if keys is None else host_credentials(keys))
-    print(f"router listens at {' '.join(endpoints)}{', secure' if secure else ''}", flush=True)
+    close = open_router(endpoints, connect or (), LINK_LEASES_MS[link], _known(keys), secure)
+    print(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}", flush=True)
     while signal.sigwait(ENDING | {signal.SIGHUP}) not in ENDING:
         try:
-            known = None if keys is None else host_credentials(keys)
+            _known(keys)
         except Refused as refused:
             print(f"goes on as it was: {refused}", file=sys.stderr, flush=True)
             continue
         close()
-        close = opened(known)
-        print("router opened anew", flush=True)
+        os.execv(sys.executable, sys.orig_argv)  # a closed session keeps its QUIC port for a while; a process does not
     close()
     return 0
+
+
+def _known(keys: Path | None) -> Credentials | None:
+    return None if keys is None else host_credentials(keys)
 
 
 def host_credentials(folder: Path) -> Credentials:

@@ -9,10 +9,9 @@ from pathlib import Path
 from msgspec import Struct
 
 from deploy.fleet import part as parts
-from deploy.fleet.bundle import store
 from deploy.fleet.file import Plan, load
-from deploy.fleet.keys import ISSUED
 from deploy.fleet.part import Part
+from deploy.fleet.private import ISSUED
 from deploy.look.onlooker import Ear, Fleet, listen
 from deploy.run.processes import own_processes
 from protocol import clock
@@ -47,7 +46,7 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
         own = next((part for part in here() if part.fleet == plan.name), None)
         far = ",".join(parts.endpoint(plan, name) for name in plan.hosts)
         endpoint = connect or (own.endpoint if own is not None else far)
-        own_keys = _keys(own) or (store(plan) / ISSUED if (store(plan) / ISSUED).is_dir() else None)
+        own_keys = _keys(own) or (parts.store(plan) / ISSUED if (parts.store(plan) / ISSUED).is_dir() else None)
         return Seen(plan.name, endpoint, tuple(plan.hosts), own, plan, own_keys)
     own_all = [part for part in here() if fleet in (None, part.fleet)]
     if connect is not None:

@@ -17,13 +17,13 @@ import typer
 from msgspec.structs import replace
 
 from deploy.fleet import sight as sights
-from deploy.fleet.bundle import Bundle, bundles, store
+from deploy.fleet.bundle import Bundle, bundles
 from deploy.fleet.file import Plan, load
 from deploy.fleet.health import Health
 from deploy.fleet.host import Found
 from deploy.fleet.hosts import Fleet
-from deploy.fleet.keys import ISSUED
-from deploy.fleet.part import Part, parts
+from deploy.fleet.part import Part, parts, store
+from deploy.fleet.private import ISSUED
 from deploy.fleet.sight import Seen
 from deploy.run.interrupts import Interrupts
 from protocol import clock

@@ -246,10 +246,8 @@ def test_a_secure_router_listens_at_nothing_plain(tmp_path: Path) -> None:
 def test_init_show_revoke_as_one_types_them(tmp_path: Path) -> None:
     folder = str(tmp_path / "k")
     assert lfa("keys", "init", folder, "--robots", "2", "--hosts", "a=10.0.0.1+a.lan,b").returncode == 0
-    assert json.loads(lfa("keys", "revoke", folder, "robot2", "--json").stdout) == {
-        "revoked": ["robot2"],
-        "restart": ["a", "b"],
-    }
+    facts = json.loads(lfa("keys", "revoke", folder, "robot2", "--json").stdout)
+    assert facts == {"changed": ["robot2"], "hosts": ["a", "b"], "pushed": False, "wrong": []}
     shown = {line["name"]: line for line in json.loads(lfa("keys", "show", folder, "--json").stdout)}
     assert shown["robot2"]["state"] == "revoked" and shown["robot1"]["state"] == "valid"
     assert shown["robot1"]["joins_at"] == ["a", "b"]

@@ -116,7 +116,7 @@ class Net:
 
     def close_port(self, host: int, port: int) -> None:
         """As a firewall does it: whoever knocks hears nothing."""
-        self._rules(host, f"tcp dport {port} drop")
+        self._rules(host, f"meta l4proto {{ tcp, udp }} th dport {port} drop")
 
     def heal(self) -> None:
         for host in self.hosts:

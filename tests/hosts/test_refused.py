@@ -80,7 +80,8 @@ def test_machines_that_would_not_do_are_named_a_line_each(clean: Machines) -> No
     fleet = clean
     fleet.state("e").mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(fleet.state("e"))], check=True)
-    listen = f"import socket, time; s = socket.create_server(('', {PORT})); print(flush=True); time.sleep(120)"
+    bind = f"s = socket.socket(type=socket.SOCK_DGRAM); s.bind(('', {PORT}))"
+    listen = f"import socket, time; {bind}; print(flush=True); time.sleep(120)"
     taken = [*fleet.net.enter(fleet.host("d")), sys.executable, "-c", listen]
     with subprocess.Popen(taken, stdout=subprocess.PIPE) as holder:
         try:

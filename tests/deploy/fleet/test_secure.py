@@ -1,0 +1,114 @@
+"""`lfa up --secure` for two machines that are this one: everybody has a certificate, and a stolen one is revoked."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from deploy.fleet import authority
+from deploy.run import processes
+from deploy.run.processes import own_processes
+from protocol import clock
+from protocol.credentials import credentials
+from protocol.zenoh_bus import answers
+from tests.processes.fleet import LFA, eventually
+from tests.processes.secured import free_port
+
+pytestmark = pytest.mark.processes
+
+FLEET = f"secure-{os.getpid()}"
+
+
+class Home:
+    """An operator's home, with the fleet's file and keys."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.file = folder / "fleet.toml"
+        ports = {free_port() for _ in range(8)}
+        hosts = [f'hosts.{name} = {{ address = "127.0.0.1", router_port = {ports.pop()} }}' for name in "ab"]
+        self.file.write_text("\n".join([f'fleet = "{FLEET}"', 'scenario = "straight"', "team = 2", *hosts]))
+        self.keys = folder / ".local/state/lfa" / f"{FLEET}.keys"
+
+    def lfa(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        environment = {**os.environ, "HOME": str(self.folder)}
+        return subprocess.run(
+            [*LFA, *arguments], capture_output=True, text=True, timeout=90, env=environment, check=False
+        )
+
+    def state(self, host: str) -> Path:
+        return self.folder / ".local/state/lfa" / FLEET / host
+
+    def lets_in(self, name: str, host: str, folder: Path) -> bool:
+        socket = f"unixsock-stream/{self.state(host) / 'router.sock'}"
+        return answers(socket, credentials(folder, name, clock.wall_ms()))
+
+    def wrong(self) -> dict[str, str]:
+        found: list[dict[str, Any]] = json.loads(self.lfa("doctor", str(self.file), "--json").stdout)["findings"]
+        return {f"{one['host']} {one['check']}": one["says"] for one in found if not one["ok"]}
+
+
+@pytest.fixture(scope="module")
+def home() -> Iterator[Home]:
+    made = Home(Path(tempfile.mkdtemp(prefix="lfa-", dir="/tmp")))
+    try:
+        done = made.lfa("up", str(made.file), "--secure", "--json")
+        assert done.returncode == 0, done.stderr
+        assert sorted(json.loads(done.stdout)["chain"]) == [1, 2]
+        yield made
+    finally:
+        made.lfa("down", str(made.file))
+        for one in own_processes():
+            if any(str(made.folder) in word for word in one.arguments):
+                processes.send(one, signal.SIGKILL)
+        shutil.rmtree(made.folder, ignore_errors=True)
+
+
+def test_who_shows_nothing_is_let_in_by_no_router(home: Home) -> None:
+    socket = f"unixsock-stream/{home.state('a') / 'router.sock'}"
+    assert not answers(socket)
+    assert home.lets_in("operator", "a", home.state("a") / "keys")
+
+
+def test_a_machine_holds_the_keys_of_its_own(home: Home) -> None:
+    held = {host: {path.stem for path in (home.state(host) / "keys").glob("robot*.key")} for host in "ab"}
+    assert held == {"a": {"robot1"}, "b": {"robot2"}}
+    assert not [path for host in "ab" for path in home.state(host).rglob("*") if path.name == "ca.key"]
+
+
+def test_the_operators_commands_show_the_operators_certificate(home: Home) -> None:
+    told = json.loads(home.lfa("ps", str(home.file), "--json").stdout)
+    assert {row["process"] for row in told["processes"]} == {"router", "world", "robot1", "robot2"}
+    heard = json.loads(home.lfa("topic", "list", "pose", "--fleet", FLEET, "--seconds", "1", "--json").stdout)
+    assert {rate["channel"] for rate in heard} == {"robot1/pose", "robot2/pose"}
+
+
+def test_a_revoked_robot_is_let_in_by_no_router_and_the_rest_goes_on(home: Home) -> None:
+    stolen = home.folder / "stolen"
+    shutil.copytree(home.keys / "issued", stolen)
+    assert home.lets_in("robot2", "b", stolen)
+    done = home.lfa("keys", "revoke", str(home.file), "robot2", "--json")
+    assert done.returncode == 0 and json.loads(done.stdout)["pushed"], done.stderr
+    assert not home.lets_in("robot2", "b", stolen) and not home.lets_in("robot2", "a", stolen)
+
+    def rest() -> bool:
+        heard = json.loads(home.lfa("topic", "list", "pose", "--fleet", FLEET, "--seconds", "1", "--json").stdout)
+        return {rate["channel"] for rate in heard} == {"robot1/pose"}
+
+    eventually(rest, "robot 1 alone should be heard")
+
+
+def test_doctor_names_an_expired_certificate(home: Home) -> None:
+    assert "a certificate" not in home.wrong()
+    ca = authority.load(home.keys / "ca.pem", home.keys / "ca.key")
+    authority.issue(home.state("a") / "keys" / "robot1", ca, "robot1", (), -0.01)
+    assert "robot1.pem: expired on" in home.wrong()["a certificate"]
