@@ -82,6 +82,13 @@ COMMANDS = (
 )  # fmt: skip
 
 
+EXTRAS = {
+    "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
+    "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
+}  # fmt: skip
+"""What is not in the base install, by the extra that brings it."""
+
+
 def main() -> None:
     """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
     if sys.argv[1:] in ([], ["--help"]):  # answered before the parser is imported, which takes longer than all else
@@ -91,6 +98,11 @@ def main() -> None:
         sys.exit(run_cli("lfa", build(sys.argv[1:2])))
     except KeyboardInterrupt:
         sys.exit(130)
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        sys.exit(_say("lfa", f"{sys.argv[1]} needs {error.name}: install with: pip install 'lfa[{extra}]'"))
 
 
 def overview() -> str:

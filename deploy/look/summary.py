@@ -17,6 +17,7 @@ from deploy.look.trace import Array, Trace
 from deploy.run.folder import About, scenario_of
 from deploy.run.record import Recording
 from deploy.run.referee import Verdict
+from protocol.mission import Refused
 from world.scenario import Outcome
 
 SUMMARY = "summary.json"
@@ -121,8 +122,11 @@ def write(folder: Path, summary: Summary) -> None:
 
 
 def read(folder: Path) -> Summary:
-    """Raises FileNotFoundError when the run in `folder` has no summary."""
-    return msgspec.json.decode((folder / SUMMARY).read_bytes(), type=Summary)
+    """Raises FileNotFoundError when the run in `folder` has no summary, Refused when it is none of this version's."""
+    try:
+        return msgspec.json.decode((folder / SUMMARY).read_bytes(), type=Summary)
+    except msgspec.DecodeError as error:
+        raise Refused(f"{folder / SUMMARY}: of another version ({error}): read it with the lfa of its time") from None
 
 
 def _robot(robot: int, seen: Trace, events: Sequence[Line]) -> RobotSummary:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -32,10 +35,16 @@ def text(summary: Summary, folder: Path) -> str:
             *([f"  left behind: robot {', '.join(map(str, summary.left_behind))}"] if summary.left_behind else []),
             *(f"  not ok: {a.name} {a.text}".rstrip() for a in summary.assertions if not a.ok),
             *(f"  violation of {v.invariant} at {v.at_s:.3f} s: {v.text}" for v in summary.violations),
-            f"see it: lfa report {folder} (a page for a browser), lfa view {folder}",
+            f"see it: {lfa()} view {folder}",
+            f"more: {lfa()} report {folder} (a page for a browser)",
             f"run folder: {folder}",
         ]
     )
+
+
+def lfa() -> str:
+    """The command as it can be typed here: by its name, or as it was called when the shell would not find it."""
+    return "lfa" if shutil.which("lfa") or not sys.argv[0].endswith("lfa") else os.path.relpath(sys.argv[0])
 
 
 def _row(robot: RobotSummary) -> tuple[str, ...]:

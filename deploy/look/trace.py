@@ -19,6 +19,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk
 from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.writer import MCAP0_MAGIC
 from msgspec import Struct
 from numpy.typing import NDArray
 from zstandard import ZstdError
@@ -87,8 +88,9 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
         _, owner, topic, *_ = channel.split("/")
         try:
             yield owner, topic, t, decoders[topic].decode(body)
-        except msgspec.ValidationError as error:
-            raise Refused(f"{folder / RECORDING}: recorded by another version, {channel}: {error}") from None
+        except msgspec.DecodeError as error:
+            by = "version of lfa" if isinstance(error, msgspec.ValidationError) else "program"
+            raise Refused(f"{folder / RECORDING}: recorded by another {by}, {channel}: {error}") from None
 
 
 def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
@@ -100,6 +102,10 @@ def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float,
 def _recorded(path: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
     wanted: dict[int, str] = {}
     with path.open("rb") as stream:
+        begins = stream.read(len(MCAP0_MAGIC))
+        if not MCAP0_MAGIC.startswith(begins):
+            raise Refused(f"{path}: no recording: must be an MCAP file that lfa wrote")
+        stream.seek(0)
         for chunk in _chunks(stream):
             for opcode, body in _records(chunk):
                 if opcode == Opcode.CHANNEL:

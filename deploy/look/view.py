@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from world.spec import Scenario
 
 RRD = "recording.rrd"
+PICTURE = "view.png"
 FLUSH_S = 0.25  # what a batch costs depends little on its size: at 0.1 s it would be twice as dear
 PORT, WEB_PORT = 9876, 9090
 SHOT_S = 5.0  # of a running fleet, before its picture is taken
@@ -49,17 +50,17 @@ def command(
     if folder is None:
         return _live(find(fleet, connect, keys), serve_web, screenshot, port, web_port)
     rrd = converted(folder)
+    if screenshot is None and not serve_web and not _display():
+        print("no display here: a picture instead (--serve-web shows it in a browser)", file=sys.stderr, flush=True)
+        screenshot = folder / PICTURE
     if screenshot is not None:
         from deploy.look.shot import take
 
         print(take(rrd, screenshot, folder))
         return 0
-    print(rrd)
+    print(rrd, flush=True)
     if serve_web:
         return _viewer(str(rrd), "--web-viewer", "--port", str(port), "--web-viewer-port", str(web_port))
-    if not _display():
-        print("no display here: look at it with --serve-web, or --screenshot FILE", file=sys.stderr)
-        return 0
     return _viewer(str(rrd))
 
 
