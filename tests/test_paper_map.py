@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -18,7 +19,7 @@ QUOTED = sorted(set(re.findall(r"`([^`\n]+)`", PAGE)))
 SECTIONS = ("1", "2", "2.1", "3", "3.1", "3.2", "4", "5")
 
 
-def _names(path: Path) -> set[str]:
+def names_of(path: Path) -> set[str]:
     """What a module defines at its top."""
     found: set[str] = set()
     for node in ast.parse(path.read_text()).body:
@@ -34,7 +35,7 @@ def _names(path: Path) -> set[str]:
 def test_a_file_and_a_name_on_the_page_exist(quoted: str) -> None:
     path, _, name = quoted.partition("::") if "::" in quoted else quoted.partition(":")
     assert (ROOT / path).is_file(), quoted
-    assert not name or name in _names(ROOT / path), quoted
+    assert not name or name in names_of(ROOT / path), quoted
 
 
 @pytest.mark.parametrize("quoted", [text for text in QUOTED if text.startswith("lfa ")])
@@ -58,3 +59,13 @@ def test_all_of_the_paper_is_on_the_page() -> None:
     _, _, figures = PAGE.partition("## Figures")
     assert {int(number) for number in re.findall(r"^\| (\d+) \|", figures, re.MULTILINE)} == set(range(1, 12))
     assert [section for section in SECTIONS if f"\n| {section} " not in PAGE] == []
+
+
+def test_figures_3_to_6_are_drawn_with_names_that_exist() -> None:
+    shown = dict(re.findall(r"!\[Figure (\d)[^]]*\]\((paper/fig\d\.svg)\)", PAGE))
+    assert shown == {number: f"paper/fig{number}.svg" for number in "3456"}
+    for path in shown.values():
+        drawing = (ROOT / "agents" / path).read_text()
+        assert ElementTree.fromstring(drawing).tag.endswith("svg")
+        modules = set(re.findall(r"\b(\w+\.py)\b", drawing))
+        assert modules <= {found.name for package in ("agents", "protocol") for found in (ROOT / package).iterdir()}
