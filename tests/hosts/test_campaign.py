@@ -51,7 +51,7 @@ class Faults:
         return lambda: [self._team.signal(victim, signal.SIGCONT) for victim in victims]
 
     def cut(self, chain: Sequence[int]) -> Undo:
-        side = self._some([*chain, WORLD_HOST])
+        side = self._some([*chain, WORLD_HOST])[: len(chain)]
         self._net.cut(side, [host for host in (*chain, WORLD_HOST) if host not in side])
         return self._net.heal
 
