@@ -14,7 +14,7 @@ from protocol.timing import timing_of
 from protocol.topics import address
 
 ROBOTS = 4
-WHOLE_S = 15.0
+WHOLE_S = 30.0
 """Patience for a team to be whole again, on a machine that may be busy."""
 
 
