@@ -99,7 +99,7 @@ class Whole:
         self.weather: Weather = schedule.weather
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
-        self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max
+        self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max if schedule.faults else float("inf")
         """What leaves before the faults end and would arrive later never does."""
         self.wall_ms: dict[int, int] = {}
         self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots

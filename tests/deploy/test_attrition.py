@@ -7,7 +7,7 @@ from itertools import permutations
 import pytest
 from msgspec import structs
 
-from deploy.run.arena import Weather
+from deploy.run.network import Weather
 from deploy.run.schedules import draw
 from deploy.run.whole import Whole
 from protocol.messages import Event, Message

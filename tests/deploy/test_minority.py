@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from msgspec import structs
 
-from deploy.run.arena import Weather
+from deploy.run.network import Weather
 from deploy.run.schedules import draw
 from deploy.run.whole import Whole
 from protocol.messages import Message, Truth
