@@ -45,7 +45,7 @@ class Leadership:
         self._mission = mission
         self._formation = formation
         self._beliefs = beliefs
-        self.lead = Lead(mission.leading, mission.limits)
+        self.lead = Lead(mission.leading, mission.limits, mission.radius_m)
         self.explore: Explore | None = None
         self._timetable: Timetable | None = None
         if mission.leading.motion == "explore":

@@ -74,8 +74,10 @@ class Route:
 class Lead:
     """One robot's progress along the route, and its twist when it leads."""
 
-    def __init__(self, leading: Leading, limits: Limits) -> None:
+    def __init__(self, leading: Leading, limits: Limits, radius_m: float = 0.15) -> None:
+        """`radius_m` is how much room a robot needs beside what is known (`Leading.known_m`)."""
         self._leading = leading
+        self._radius_m = radius_m
         self._limits = limits
         self._route: Route | None = None
         self._planned = leading.motion == "explore"
@@ -204,6 +206,12 @@ class Lead:
             points = [(pose.x, pose.y), points[-1]]
         if hypot(points[0][0] - points[-1][0], points[0][1] - points[-1][1]) < 1e-6 and len(points) == 2:
             points[0] = (points[0][0] - 0.01, points[0][1])
+        if self._leading.known_m:
+            from agents.known import past_known  # only in an iteration 2
+
+            if hypot(points[0][0] - pose.x, points[0][1] - pose.y) > CORNER_RADIUS_M:
+                points = [(pose.x, pose.y), *points]
+            points = past_known(points, self._leading.known_m, self._radius_m)
         return Route(points)
 
 

@@ -46,7 +46,7 @@ class Orders:
             self._given += 1
         if now >= self._check_at:
             self._check_at = now + BEND_CHECK_S
-            self._column_before_bend(lead, followers, term, now)
+            self._column_where_narrow(lead, followers, term, now)
         if now >= self._repeat_at:
             self._say(tuple(self._formation.slot_of(robot) for robot in followers), term, now)
 
@@ -60,9 +60,13 @@ class Orders:
         self._say(slots_of(spec, followers), term, now)
         self._voice.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
 
-    def _column_before_bend(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
+    def _column_where_narrow(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
+        """Before a bend that the formation cannot follow, and where obstacles are known: the route is past them."""
         slots = [self._formation.slot_of(robot) for robot in followers]
         if self._formation.trace or all(abs(abs(slot.phi) - pi) < 1e-6 for slot in slots):
+            return
+        if self._mission.leading.known_m:
+            self.order("column", "known obstacles", followers, term, now)
             return
         ahead_m = lead.narrow_bend_m(slots, BEND_AHEAD_M)
         if ahead_m is not None:

@@ -14,6 +14,8 @@ from msgspec import Struct
 
 WITNESS_ID = 0
 WITNESS_NAME = "witness"
+KNOWN_MAX = 64
+"""Known obstacles that a leader plans past: each costs planning time."""
 
 Side = Literal["left", "right", "column", "zigzag"]
 Motion = Literal["path_following", "point_to_point", "trajectory", "reactive", "explore"]
@@ -96,6 +98,8 @@ class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     """In the order of the route."""
     keepout_m: tuple[tuple[float, float, float, float], ...] = ()
     """Boxes x1, y1, x2, y2 in `map` that `explore` plans no route through."""
+    known_m: tuple[tuple[float, float, float], ...] = ()
+    """Circles x, y, radius in `map`: what an earlier run met, and a route along way-points is led past."""
 
 
 class Mission(Struct, frozen=True, forbid_unknown_fields=True):
@@ -173,12 +177,24 @@ def check_mission(mission: Mission) -> Mission:
         )
     _require(len(mission.leading.route_m) >= 1, "mission.leading.route_m", "[]", "at least one way-point [x, y]")
     _check_times(mission.leading)
+    _check_known(mission.leading)
     for orientation in mission.leading.orientations:
         fine = isfinite(orientation.at_m) and orientation.at_m >= 0.0
         _require(fine, "mission.leading.orientations.at_m", orientation.at_m, ">= 0, metres along the route")
     for point in mission.leading.route_m:
         _require(all(isfinite(c) for c in point), "mission.leading.route_m", point, "finite coordinates [m]")
     return mission
+
+
+def _check_known(leading: Leading) -> None:
+    """Known obstacles are circles, and only a route along way-points is led past them."""
+    where, followed = "mission.leading.known_m", leading.motion == "path_following"
+    value = [list(circle) for circle in leading.known_m]
+    _require(followed or not value, where, value, 'left out without motion = "path_following"')
+    _require(len(value) <= KNOWN_MAX, where, f"{len(value)} circles", f"at most {KNOWN_MAX}")
+    for circle in leading.known_m:
+        fine = all(map(isfinite, circle)) and 0.0 < circle[2] <= 100.0
+        _require(fine, where, list(circle), "x, y, radius [m], the radius above 0 and at most 100")
 
 
 def _check_times(leading: Leading) -> None:

@@ -1,7 +1,7 @@
 """The shapes of the paper's figures (control.md 7.1) over many seeds of both paths: each property with its worst value.
 
 Every run is a simulated one in a process of its own; what compares runs (path 1 with path 2, rank correlations over the
-pooled spikes) is judged over all of them.
+pooled spikes, iteration 2 with 1) is judged over all of them.
 """
 
 from __future__ import annotations
@@ -48,17 +48,20 @@ def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1) -> int:
     return 0 if all(row.ok for row in rows) else 1
 
 
-def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], Kept]:
-    """The findings on one run, which leaves nothing behind."""
+def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
+    """The findings on one run, what is kept of it and of its iteration 2; nothing is left behind on disk."""
     from deploy.look.readings import Run
+    from deploy.run.chosen import choose_again
     from deploy.run.simulate import run as simulate
     from deploy.shapes.table import of_run
-    from world.scenario import load
 
     folder = Path(tempfile.mkdtemp(prefix="lfa-paper-"))
     try:
-        done = Run(simulate(load(scenario), seed, folder / "run").folder)
-        return scenario, seed, of_run(done), across.keep(done)
+        chosen, _ = choose_again(scenario, (), None, seed, None)
+        first = Run(simulate(chosen, seed, folder / "first").folder)
+        known, _ = choose_again(scenario, (), None, seed, first.folder)
+        second = Run(simulate(known, seed, folder / "second").folder)
+        return scenario, seed, of_run(first), [across.keep(first), across.keep(second)]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -70,7 +73,7 @@ def _rows(seeds: int, jobs: int) -> list[Row]:
         waiting = [pool.submit(one, path, seed) for seed in range(1, seeds + 1) for path in PATHS]
         for number, future in enumerate(waiting, start=1):
             scenario, seed, findings, of_it = future.result()
-            kept.append(of_it)
+            kept += of_it
             for finding in findings:
                 found[scenario].setdefault(f"{finding.figure} {finding.name}", []).append(finding)
             failed = [f"{f.name} = {f.value:g} ({f.note})" for f in findings if f.status == "fails"]

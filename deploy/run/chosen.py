@@ -3,10 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+
+from msgspec.structs import replace
 
 from agents.following import follower_of
-from protocol.mission import Refused
+from protocol.mission import Refused, check_mission
 from world.scenario import Scenario, load
+
+
+def choose_again(
+    scenario: str, overrides: Sequence[str], robots: int | None, seed: int | None, map_from: Path | None
+) -> tuple[Scenario, int]:
+    """The scenario and the seed (0 when not given); with `map_from` the paper's iteration 2.
+
+    That is the world of the earlier run in that folder (its seed, unless another is given), with what its robots met
+    told to the team as known. Raises Refused with one line.
+    """
+    chosen = choose(scenario, overrides, robots)
+    if map_from is None:
+        return chosen, seed or 0
+    from deploy.look.met import known_obstacles  # reads recordings: numpy
+
+    leading = replace(chosen.mission.leading, known_m=known_obstacles(map_from))
+    try:
+        mission = check_mission(replace(chosen.mission, leading=leading))
+    except Refused as refused:
+        raise Refused(f"{scenario} with --map-from {map_from}: {refused}") from None
+    return replace(chosen, mission=mission), _seed_of(map_from) if seed is None else seed
+
+
+def _seed_of(folder: Path) -> int:
+    from deploy.look import summary
+
+    return summary.read(folder).seed if (folder / summary.SUMMARY).is_file() else 0
 
 
 def choose(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:

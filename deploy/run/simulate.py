@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from agents.agent import Agent
-from deploy.run.chosen import choose
+from deploy.run.chosen import choose_again
 from deploy.run.ending import Ended, finish, report
 from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
@@ -38,18 +38,21 @@ LEADER_WAIT_S = 0.01  # a fault on the leader waits for one, looking this often
 
 def command(
     scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")],
-    seed: Annotated[int, typer.Option(help="Draws noise, places, starts, delays and losses.")] = 0,
+    seed: Annotated[int | None, typer.Option(help="Draws noise, places, starts, delays and losses. Default 0.")] = None,
     overrides: Annotated[list[str] | None, typer.Option("--set", help="Any field: world.lidar.beams=90.")] = None,
     robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
     fault: Annotated[list[str] | None, typer.Option(help="Such as 'kill leader at 20 s'; again for more.")] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")] = None,
+    map_from: Annotated[
+        Path | None, typer.Option(help="An earlier run's folder: the same world, its obstacles known (iteration 2).")
+    ] = None,
     figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
     junit: Annotated[Path | None, typer.Option(help="Write the assertions' results as JUnit XML.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> int:
-    chosen = choose(scenario, overrides or (), robots)
+    chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
-    ended = run(chosen, seed, out, faults)
+    ended = run(chosen, number, out, faults)
     return report(ended, figures=figures, as_json=as_json, junit=junit)
 
 

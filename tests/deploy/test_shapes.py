@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from math import isnan
+from math import hypot, isnan
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,9 @@ import pytest
 
 from agents.crossing import Crossing
 from agents.strategy import Detour
+from deploy.look.met import known_obstacles
 from deploy.look.readings import Run
+from deploy.run.chosen import choose_again
 from deploy.run.simulate import run
 from deploy.shapes import across, spikes
 from deploy.shapes.across import Kept
@@ -63,9 +65,9 @@ def test_a_bar_tells_what_holds_what_fails_what_there_is_none_of_and_what_takes_
         "ok", "fails", "does not apply", "needs more runs"]  # fmt: skip
 
 
-def kept(scenario: str, seed: int, duration_s: float, requests: int = 0, switches: int = 0) -> Kept:
+def kept(scenario: str, seed: int, duration_s: float, requests: int = 0, switches: int = 0, iteration: int = 1) -> Kept:
     wide = tuple((float(n), 0.1 * n, float(n)) for n in range(1, 12))
-    return Kept(scenario, seed, duration_s, requests, switches, wide)
+    return Kept(scenario, seed, iteration, duration_s, 2.0 * duration_s, requests, switches, wide)
 
 
 def statuses(runs: list[Kept]) -> dict[str, str]:
@@ -79,17 +81,48 @@ def test_one_run_is_too_few_for_every_comparison() -> None:
 def test_path_1_has_to_take_longer_in_every_pair_of_equal_seeds() -> None:
     twos = [kept("paper_path2", seed, 50.0) for seed in (1, 2)]
     slow, quick = kept("paper_path1", 1, 60.0, 2, 1), kept("paper_path1", 2, 49.0, 2, 1)
-    assert set(statuses([slow, *twos]).values()) == {"ok"}
+    again = kept("paper_path1", 1, 59.0, iteration=2)
+    assert set(statuses([slow, again, *twos]).values()) == {"ok"}
+    longer = kept("paper_path1", 1, 61.0, iteration=2)
+    assert statuses([slow, longer])["time of iteration 2 in that of iteration 1"] == "fails"
     assert statuses([slow, quick, *twos])["time of path 1 beyond path 2"] == "fails"
 
 
 # --- runs ---------------------------------------------------------------------------------------------------------
 
 
-def test_the_papers_second_path_shows_what_its_figures_must(tmp_path: Path) -> None:
-    folder = run(load("paper_path2"), 1, tmp_path / "run").folder
-    failed = [one for one in of_run(Run(folder)) if one.status == "fails"]
+@pytest.fixture(scope="module")
+def second_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run(load("paper_path2"), 1, tmp_path_factory.mktemp("shapes") / "run").folder
+
+
+def test_the_papers_second_path_shows_what_its_figures_must(second_path: Path) -> None:
+    failed = [one for one in of_run(Run(second_path)) if one.status == "fails"]
     assert failed == [], "reproduce: lfa sim paper_path2 --seed 1, then lfa verify RUN"
+
+
+def test_what_the_robots_met_is_where_it_stands(second_path: Path) -> None:
+    known = known_obstacles(second_path)
+    true = [obstacle.center_m for obstacle in Run(second_path).scenario.world.obstacles]
+    assert len(known) == len(true) == 3
+    assert all(min(hypot(x - a, y - b) for a, b in true) < 0.1 and 0.15 < radius < 0.35 for x, y, radius in known)
+
+
+def test_iteration_2_with_known_obstacles_is_shorter_and_takes_less_time(second_path: Path, tmp_path: Path) -> None:
+    chosen, seed = choose_again("paper_path2", (), None, None, second_path)
+    assert seed == 1
+    again = run(chosen, seed, tmp_path / "again").folder
+    first, second = across.keep(Run(second_path)), across.keep(Run(again))
+    assert second.iteration == 2
+    assert second.way_m <= first.way_m, "reproduce: lfa sim paper_path2 --seed 1, then again with --map-from RUN"
+    assert second.duration_s <= first.duration_s
+
+
+def test_a_map_from_what_is_no_run_or_for_another_motion_is_refused(second_path: Path, tmp_path: Path) -> None:
+    with pytest.raises(Refused, match="no run folder"):
+        choose_again("paper_path2", (), None, None, tmp_path)
+    with pytest.raises(Refused, match=r"known_m .* left out without motion"):
+        choose_again("explore", (), None, None, second_path)
 
 
 def test_with_obstacle_avoidance_switched_off_the_verdict_is_1(

@@ -1,0 +1,56 @@
+"""What the robots of a run told each other that they met and that stood still: the known obstacles of iteration 2."""
+
+from __future__ import annotations
+
+from math import hypot
+from pathlib import Path
+
+from deploy.look import trace
+from protocol.mission import KNOWN_MAX, Refused
+from protocol.topics import TOPIC
+
+STANDING = ("stationary", "pothole", "trap")
+STILL_MPS = 0.05
+SAME_M = 0.4
+"""Told of by different robots, or again, nearer than this it is the same thing."""
+MATE_M = 0.5
+"""Nearer than this to where a robot said it was, it was that robot."""
+TOLD_MIN = 2
+"""What was told of only once may have been noise."""
+
+Circle = tuple[float, float, float]
+
+
+def known_obstacles(folder: Path) -> tuple[Circle, ...]:
+    """x, y, radius [m] in `map` of each. Raises Refused when `folder` is no run."""
+    if not (folder / "recording.mcap").is_file():
+        raise Refused(f"--map-from {folder}: no run folder, it has no recording.mcap")
+    places: dict[str, tuple[float, float]] = {}
+    found: list[list[Circle]] = []
+    for owner, topic, _, message in trace.messages(folder, frozenset({"pose", "obstacles"})):
+        if topic == TOPIC["pose"].name:
+            places[owner] = message.x, message.y
+            continue
+        moves = hypot(*message.twist_map) > STILL_MPS
+        mate = any(hypot(message.x - x, message.y - y) < MATE_M for robot, (x, y) in places.items() if robot != owner)
+        if message.kind in STANDING and not moves and (not mate or message.kind == "trap"):
+            _take(found, (message.x, message.y, message.radius_m), alone=message.kind == "trap")
+    known = [_middle(seen) for seen in found if len(seen) >= TOLD_MIN]
+    return tuple(sorted(known)[:KNOWN_MAX])
+
+
+def _take(found: list[list[Circle]], one: Circle, *, alone: bool) -> None:
+    """Add `one` to the sightings of the same thing; `alone` it counts as told of often enough."""
+    for seen in found:
+        x, y, _ = _middle(seen)
+        if hypot(one[0] - x, one[1] - y) < SAME_M:
+            seen.append(one)
+            return
+    found.append([one] * (TOLD_MIN if alone else 1))
+
+
+def _middle(seen: list[Circle]) -> Circle:
+    """The middle of all sightings, with the largest radius."""
+    many = len(seen)
+    x, y = sum(one[0] for one in seen) / many, sum(one[1] for one in seen) / many
+    return round(x, 3), round(y, 3), round(max(one[2] for one in seen), 3)
