@@ -31,6 +31,7 @@ SEEDS: dict[Player, str] = {play: "1000", play_whole: "60"}
 KINDS_CLAIM_SEEDS = 60
 """From this many seeds on every kind of fault must have taken effect."""
 FAILURES_SHOWN_MAX = 5
+TELL_EVERY_S = 10.0
 COLUMN = 30
 SKIPPED = ("extends", "hello", "grant", "nack")
 """What happens all the time and explains little; `propose` is told for a term's first rounds only."""
@@ -96,8 +97,12 @@ def _hunt(seeds: range, jobs: int, out: Path, as_json: bool, player: Player) -> 
     if jobs < 1:
         raise Refused(f"--jobs {jobs}: must be 1 or more")
     began, tally = time.perf_counter(), Tally()
+    told_at = began
     for part in _played(seeds, jobs, player):
         tally.add(part)
+        if time.perf_counter() > told_at + TELL_EVERY_S:
+            told_at = time.perf_counter()
+            typer.echo(so_far(tally, len(seeds), told_at - began), err=True)
     minutes = (time.perf_counter() - began) / 60.0
     missing = [kind for kind in KINDS if kind not in tally.faults] if len(seeds) >= KINDS_CLAIM_SEEDS else []
     for seed in sorted(tally.failed)[:FAILURES_SHOWN_MAX]:
@@ -115,6 +120,14 @@ def _hunt(seeds: range, jobs: int, out: Path, as_json: bool, player: Player) -> 
         rate_text = f"{tally.seeds / minutes:.0f} a minute with {jobs} jobs"
         typer.echo(f"{tally.seeds} schedules ({rate_text}), {tally.elections} elections, {len(tally.failed)} failed")
     return 1 if tally.failed or missing else 0
+
+
+def so_far(tally: Tally, of: int, seconds: float) -> str:
+    """How a long hunt stands: also what is known of one that was ended early."""
+    rate = f"{60.0 * tally.seeds / seconds:.0f} a minute"
+    faults = sum(tally.faults.values())
+    failed = f"{len(tally.failed)} failed {sorted(tally.failed)[:FAILURES_SHOWN_MAX] or ''}".rstrip()
+    return f"{tally.seeds} of {of} schedules ({rate}), {tally.elections} elections, {faults} faults, {failed}"
 
 
 def _played(seeds: range, jobs: int, player: Player) -> Iterator[Tally]:

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from deploy.run.chaos import play
-from deploy.run.fuzz import parse_seeds, shrink
+from deploy.run.fuzz import Tally, parse_seeds, shrink, so_far
 from deploy.run.schedules import Fault, draw, without
 from protocol.acceptor import Acceptor
 from protocol.mission import Refused
@@ -50,6 +50,13 @@ def test_a_planted_bug_is_found_shrunk_and_still_fails(monkeypatch: pytest.Monke
     small = shrink(draw(bad), name)
     assert len(small.faults) < len(draw(bad).faults)
     assert any(v.name == name for v in play(small).violations)
+
+
+def test_a_long_hunt_says_how_it_stands() -> None:
+    tally = Tally(1500, 8000, {"kill": 20_000, "cut": 15_000}, {77: ["I1 at 3.2 s: two"], 9: ["L1 at 8.0 s: none"]})
+    assert so_far(tally, 100_000, 90.0) == (
+        "1500 of 100000 schedules (1000 a minute), 8000 elections, 35000 faults, 2 failed [9, 77]"
+    )
 
 
 def test_faults_can_be_left_out_one_by_one() -> None:
