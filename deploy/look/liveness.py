@@ -13,7 +13,7 @@ from deploy.look.checker import member_text as _m
 from deploy.look.checker import term_text as _t
 from protocol.messages import CmdVel, Config, Member, Term, Version
 from protocol.mission import WITNESS_ID
-from protocol.quorum import electors, is_quorum
+from protocol.quorum import electors, is_quorum, quorum_time
 from protocol.timing import CLOCK_RATE_ERROR, Timing
 
 NEVER = float("inf")
@@ -227,57 +227,48 @@ class StopsWithoutQuorum(Checker):
         self._alive: set[Member] = set()
         self._cuts: Set[tuple[int, int]] = frozenset()
         self._config: dict[int, Config] = {}
-        self._reached: dict[int, float] = {}
-        """When each id was last connected, both ways, with a living quorum of its config."""
-        self._given: set[tuple[int, Term]] = set()
+        self._open: dict[tuple[int, int], float] = {}
+        """When each link that is cut was last open."""
+        self._ended: dict[Member, float] = {}
+        self._given: dict[tuple[int, Term], float] = {}
+        """When each robot first acted under a term that was handed over to it."""
 
     def lives(self, at: float, who: Member) -> None:
         self._alive.add(who)
 
     def ends(self, at: float, who: Member) -> None:
-        self._note(at)
         self._alive.discard(who)
+        self._ended.setdefault(who, at)
 
     def parts(self, at: float, cuts: Set[tuple[int, int]]) -> None:
-        self._note(at)
+        for link in cuts - self._cuts:
+            self._open[link] = at
         self._cuts = frozenset(cuts)
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
-        self._note_one(at, who.id)
         self._config[who.id] = config
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
-        if not cmd.as_leader or self._reaches(robot_id):
-            return
-        if (robot_id, cmd.term) not in self._given:
-            # What is handed over needs no way back to the voters: it begins at a moment told to the issuer before.
-            self._given.add((robot_id, cmd.term))
-            if cmd.term.issuer != robot_id:
-                self._reached[robot_id] = at
-        longest_s = (self.timing.act_s + self.timing.deadman_s) / (1.0 - CLOCK_RATE_ERROR)
-        since_s = at - self._reached.get(robot_id, LONG_AGO)
-        if since_s > longest_s + EARLY_S:
-            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)}, {since_s * 1000.0:.1f} ms without a quorum")
-
-    def _note(self, at: float) -> None:
-        for robot_id in self._config:
-            self._note_one(at, robot_id)
-
-    def _note_one(self, at: float, robot_id: int) -> None:
-        if self._reaches(robot_id):
-            self._reached[robot_id] = at
-
-    def _reaches(self, robot_id: int) -> bool:
         config = self._config.get(robot_id)
-        if config is None:
-            return False
-        cuts = self._cuts
-        there = [
-            m
-            for m in electors(config)
-            if m in self._alive and (robot_id, m.id) not in cuts and (m.id, robot_id) not in cuts
-        ]
-        return is_quorum(config, there)
+        if not cmd.as_leader or config is None:
+            return
+        longest_s = (self.timing.act_s + self.timing.deadman_s) / (1.0 - CLOCK_RATE_ERROR) + EARLY_S
+        times = {m: self._reached(at, robot_id, m) for m in electors(config)}
+        reached = quorum_time(config, times)
+        if cmd.term.issuer != robot_id:
+            # What is handed over needs no way back to the voters: it begins at a moment told to the issuer before.
+            reached = max(reached or LONG_AGO, self._given.setdefault((robot_id, cmd.term), at))
+        if reached is None or at - reached > longest_s:
+            since_ms = (at - (reached or 0.0)) * 1000.0
+            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)}, {since_ms:.1f} ms without a quorum")
+
+    def _reached(self, at: float, robot_id: int, voter: Member) -> float:
+        """When `voter` could last be asked, and could last answer."""
+        there, back = (robot_id, voter.id), (voter.id, robot_id)
+        asked = self._open.get(there, LONG_AGO) if there in self._cuts else at
+        answered = self._open.get(back, LONG_AGO) if back in self._cuts else at
+        lived = at if voter in self._alive else self._ended.get(voter, LONG_AGO)
+        return min(asked, answered, lived)
 
 
 def _version(config: Config) -> Version:
