@@ -232,6 +232,8 @@ class StopsWithoutQuorum(Checker):
         self._ended: dict[Member, float] = {}
         self._given: dict[tuple[int, Term], float] = {}
         """When each robot first acted under a term that was handed over to it."""
+        self._before: dict[int, float] = {}
+        """When each robot last reached a quorum of the config that it had before."""
 
     def lives(self, at: float, who: Member) -> None:
         self._alive.add(who)
@@ -246,21 +248,30 @@ class StopsWithoutQuorum(Checker):
         self._cuts = frozenset(cuts)
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._before[who.id] = self._since(at, who.id)
         self._config[who.id] = config
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
-        config = self._config.get(robot_id)
-        if not cmd.as_leader or config is None:
+        if not cmd.as_leader or robot_id not in self._config:
             return
         longest_s = (self.timing.act_s + self.timing.deadman_s) / (1.0 - CLOCK_RATE_ERROR) + EARLY_S
-        times = {m: self._reached(at, robot_id, m) for m in electors(config)}
-        reached = quorum_time(config, times)
+        since = self._since(at, robot_id)
         if cmd.term.issuer != robot_id:
             # What is handed over needs no way back to the voters: it begins at a moment told to the issuer before.
-            reached = max(reached or LONG_AGO, self._given.setdefault((robot_id, cmd.term), at))
-        if reached is None or at - reached > longest_s:
-            since_ms = (at - (reached or 0.0)) * 1000.0
-            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)}, {since_ms:.1f} ms without a quorum")
+            since = max(since, self._given.setdefault((robot_id, cmd.term), at))
+        if at - since > longest_s:
+            late = f"{(at - since) * 1000.0:.1f} ms without a quorum"
+            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)}, {late}")
+
+    def _since(self, at: float, robot_id: int) -> float:
+        """When a robot last reached a quorum of its config, or of the one before while it had that: a lease outlives
+        the config that it was granted under."""
+        config = self._config.get(robot_id)
+        before = self._before.get(robot_id, LONG_AGO)
+        if config is None:
+            return before
+        now = quorum_time(config, {m: self._reached(at, robot_id, m) for m in electors(config)})
+        return before if now is None else max(before, now)
 
     def _reached(self, at: float, robot_id: int, voter: Member) -> float:
         """When `voter` could last be asked, and could last answer."""
