@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-hosts test-hosts-short test-campaign lint bench model clean setup
+.PHONY: demo test test-hosts test-hosts-short test-campaign lint bench model planted clean setup
 
 setup: $(STAMP)
 
@@ -46,6 +46,10 @@ fuzz: $(STAMP)
 
 model: $(STAMP)
 	$(BIN)/python -m tests.model
+
+# Planted bugs: which invariant falls after how many schedules of faults; minutes.
+planted: $(STAMP)
+	$(BIN)/python -m tests.protocol.hunt
 
 clean:
 	rm -rf $(VENV) runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,4 +1,4 @@
-"""After how many schedules of `lfa fuzz` each planted bug is noticed: `python -m tests.protocol.hunt [--seeds 300]`.
+"""After how many schedules of `lfa fuzz` each planted bug is noticed: `python -m tests.protocol.hunt [--seeds 100]`.
 
 Prints a row a bug, as Markdown, as they come. Random schedules alone miss what a directed test sees at once: that is
 what the table is for.
@@ -18,7 +18,7 @@ from deploy.run.chaos import play
 from deploy.run.schedules import draw
 from tests.protocol.planted import PLANTED, Bug
 
-SEEDS = 300
+SEEDS = 100
 SCHEDULE_S_MAX = 60
 """A bug may keep a lease busy for ever at one moment of virtual time."""
 

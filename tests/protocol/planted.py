@@ -47,6 +47,10 @@ def _bond_as_short_as_the_lease(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Timing, "grant_s", property(lambda self: self.act_s))
 
 
+def _bond_of_half_the_lease(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Timing, "grant_s", property(lambda self: self.act_s / 2.0))
+
+
 def _bond_ignored(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Acceptor, "bound", lambda self, now: None)
 
@@ -396,6 +400,8 @@ PLANTED: tuple[Bug, ...] = (
         "lease::test_bug_14_a_late_propose_does_not_bring_a_released_lease_back"),
     Bug("bug 15", "out of the chain after four silent heartbeats", _silence_of_four_heartbeats,
         "lease::test_l5_bug_15_loss_changes_neither_holder_nor_chain", (0.2,)),
+    Bug("mutant", "a bond of half the lease", _bond_of_half_the_lease,
+        "gateway::test_e2_a_bond_outlives_lease_and_residual_motion_on_the_worst_clocks", ("std",)),
     Bug("mutant", "PREPARE and PROPOSE ignore a live grant", _bond_ignored,
         "lease::test_e3_a_bound_voter_refuses_another_holder_and_tells_when_it_is_free"),
     Bug("mutant", "a restarted process votes at once", _restart_votes_at_once,

@@ -8,6 +8,7 @@ import pytest
 
 from deploy.look.checker import Checker
 from deploy.look.checkers import SAFETY
+from deploy.look.liveness import Steady
 from deploy.run.arena import Arena
 from protocol.acceptor import Acceptor
 from protocol.effects import BecomeLeader, Effect, LeaseExtended, Send, StepDown
@@ -35,13 +36,13 @@ TEAM = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))
 
 
 class Team(Arena):
-    """An arena whose safety checkers are on, with everybody started and led by robot 1 at 1 s."""
+    """An arena whose safety checkers are on, with everybody started and led by robot 1 at 1 s, or at `led_by`."""
 
-    def __init__(self, robots: int = 4, **options: object) -> None:
+    def __init__(self, robots: int = 4, led_by: float = 1.0, **options: object) -> None:
         super().__init__(robots, **options)  # type: ignore[arg-type]
         self.checkers: list[Checker] = [checker(self.timing) for checker in SAFETY]
         self.listen(self.checkers)
-        self.start_all().run(1.0)
+        self.start_all().run(led_by)
         assert self.leaders() == [1]
 
     def safe(self) -> bool:
@@ -445,6 +446,17 @@ def test_l5_bug_15_loss_changes_neither_holder_nor_chain(loss: float) -> None:
     assert team.lease_of(1).config.version == version
 
 
+def test_l5_in_ten_minutes_at_20_percent_loss_the_holder_never_changes() -> None:
+    team = Arena(4, seed=5)
+    steady = Steady(team.timing)
+    team.start_all().run(1.0)
+    team.listen([steady])
+    team.weather.loss = 0.2
+    team.run(601.0)
+    assert steady.violations == []
+    assert team.leaders() == [1]
+
+
 def test_after_a_release_the_next_leads_within_two_round_trips() -> None:
     team = Team()
     team.exit(1)
@@ -477,6 +489,25 @@ def test_more_than_seven_robots_lead_with_seven_voters_and_all_follow() -> None:
     team.run(5.0)
     assert team.leaders() == [2]
     assert team.lease_of(20).chain == tuple(i for i in range(2, 21) if i != 15)
+    assert team.safe()
+
+
+@pytest.mark.parametrize("robots", [16, 64, 128])
+def test_large_teams_have_seven_voters_and_a_new_leader_as_fast_as_small_ones(robots: int) -> None:
+    """From the cold start to the chain of all, then the leader and a learner die together."""
+    team = Team(robots, led_by=1.5)
+    version = team.lease_of(1).config.version
+    team.run(2.0)
+    assert team.lease_of(robots).chain == tuple(range(1, robots + 1))
+    assert team.lease_of(1).config.version == version, "the chain does not flap"
+    assert len(team.lease_of(1).config.voters) == 7
+    team.kill(robots - 2)
+    team.kill(1)
+    team.run(2.5)
+    assert team.leaders() == [2]
+    assert team.led_at(2.0) - 2.0 < 0.04
+    left = tuple(i for i in range(2, robots + 1) if i != robots - 2)
+    assert {team.lease_of(i).chain for i in left} == {left}
     assert team.safe()
 
 
