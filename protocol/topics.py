@@ -18,6 +18,8 @@ TO_ALL = "all"
 WORLD_NAME = "world"
 OPERATOR_NAME = "operator"
 RECORDER_NAME = "recorder"
+DRIVER_PREFIX = "driver"
+"""The driver of the real robot `robot3` is `driver3`: it speaks on the robot's own keys what hardware says."""
 HOST_PREFIX = "host-"
 """The supervisor of machine `a` speaks as `host-a`."""
 
@@ -45,7 +47,7 @@ ANYONE = (*TEAM, "operator", "world")
 #         name            type             publishers             rate  state  wakes  priority      timeout
 TOPICS: tuple[Topic, ...] = (
     Topic("mission",      m.MissionNote,   ("operator", "world"), None, False, True,  "prompt",     None),
-    Topic("ask",          m.Ask,           ("agent", "witness"),  None, False, True,  "prompt",     None),
+    Topic("ask",          m.Ask,           TEAM,                  None, False, True,  "prompt",     None),
     Topic("pose",         m.PoseStamped,   ("agent",),            50.0, True,  False, "real_time",  0.5),
     Topic("table",        m.TableRow,      ("agent",),            2.0,  True,  False, "data",       3.0),
     Topic("tracking",     m.Tracking,      ("agent",),            25.0, True,  False, "background", 1.0),
@@ -112,7 +114,7 @@ def may_sign(where: Address, topic: Topic, sender: str) -> bool:
     its own could say it in another's name. Only hardware and ground truth are said by who plays them.
     """
     plays = "driver" in topic.publishers or "world" in topic.publishers
-    return sender == where.owner or (plays and sender in (WORLD_NAME, where.owner.replace("robot", "driver", 1)))
+    return sender == where.owner or (plays and sender in (WORLD_NAME, where.owner.replace("robot", DRIVER_PREFIX, 1)))
 
 
 def matches(expression: str, key: str) -> bool:

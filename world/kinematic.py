@@ -79,6 +79,10 @@ class Kinematic:
             self.wheels[n] = self.twists[n] = twist
         return []
 
+    def place(self, n: int, pose: Pose2D) -> None:
+        """Put robot `n` there: it is a real one, and says so."""
+        self.poses[n] = pose
+
     def moved(self) -> dict[int, Pose2D]:
         """The pose in `map` of each obstacle that is not nailed down, by its place in the scenario's list."""
         time_s = self._steps * self._dt_s

@@ -105,6 +105,13 @@ class Physics:
         touches.sort(key=lambda touch: (touch.robot, touch.other))
         return touches
 
+    def place(self, n: int, pose: Pose2D) -> None:
+        """Put robot `n` there: it is a real one, and says so."""
+        body = self._robots[n]
+        self.poses[n] = pose
+        body.position, body.angle = (pose.x, pose.y), pose.theta
+        self._space.reindex_shapes_for_body(body)
+
     def moved(self) -> dict[int, Pose2D]:
         """The pose in `map` of each obstacle that is not nailed down, by its place in the scenario's list."""
         poses = {n: Pose2D(*body.position, 0.0) for n, body, _ in self._moving}

@@ -111,6 +111,8 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     """Starts may lie in each other, as the paper's do: such robots meet and see each other once they were apart."""
     start: tuple[float, ...] | None = None
     """x, y [m] and perhaps theta [rad] of the first robot; the others stand behind it, where walls leave room."""
+    real_robots: tuple[int, ...] = ()
+    """Ids whose hardware is not simulated here but speaks for itself (`lfa-driver`): they are moved as they say."""
     map: str | None = None
     """A ROS `map.yaml`, relative to the scenario's file: its occupied cells become walls when the scenario is read."""
     keepout: str | None = None
@@ -185,6 +187,11 @@ def check_scenario(scenario: Scenario) -> Scenario:
     for key, feature in features(scenario.world):
         check_feature(f"world.{key}", feature)
     processes = ("router", "world", "robots", *(robot_name(robot) for robot in robots))
+    strange = [robot for robot in scenario.world.real_robots if robot not in robots]
+    _require(not strange, "world.real_robots", strange, f"ids among {list(robots)}")
+    # E19: a real robot's gateway does not stand or fall with the witness.
+    waits = not scenario.world.real_robots or scenario.mission.cold_start == "full_house"
+    _require(waits, "mission.cold_start", scenario.mission.cold_start, "full_house with world.real_robots")
     stranger = next((name for name in scenario.restart if name not in processes), None)
     _require(stranger is None, "restart", stranger, f"of {', '.join(processes)}")
     for index, wall in enumerate(scenario.world.walls_m):

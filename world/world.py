@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Struct
 
 from protocol.gateway import Gateway
-from protocol.geometry import Pose2D
+from protocol.geometry import STILL, Pose2D, Twist
 from protocol.messages import (
     Ask,
     Clock,
@@ -22,7 +22,9 @@ from protocol.messages import (
     Fence,
     Header,
     LeaseNote,
+    Localization,
     MissionNote,
+    Sensors,
     Term,
     TrueObstacle,
     TrueRobot,
@@ -103,6 +105,13 @@ class World:
         self._robots: list[Robot] = []
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
+        self._real = {robot_name(robot): self._place[robot_name(robot)] for robot in scenario.world.real_robots}
+        """Robots whose hardware speaks for itself, with their places."""
+        simulated = [robot for robot in scenario.mission.robots if robot_name(robot) not in self._real]
+        self._simulated: list[tuple[int, Robot]] = []
+        """All the others, with their places."""
+        self._driven: dict[int, tuple[Twist, float]] = {}
+        """How such a robot said that it moves, and when, by its place."""
         self._cut_off = False
         self._dt_s = 1.0 / scenario.world.physics_hz
         self._step = 0 if memory is None else memory.step
@@ -117,9 +126,10 @@ class World:
         """Whose leader command was obeyed last, over all gateways: a change back to an older term shows (I2)."""
         self.interests = frozenset(
             {key(fleet, "*", "ask")}
-            | {key(fleet, name, "cmd_vel") for name in self._names}
-            | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in scenario.mission.robots}
-            | {alive_key(fleet, name, "*") for name in self._names}
+            | {key(fleet, robot_name(robot_id), "cmd_vel") for robot_id in simulated}
+            | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in simulated}
+            | {alive_key(fleet, robot_name(robot_id), "*") for robot_id in simulated}
+            | {key(fleet, name, topic) for name in self._real for topic in ("sensors", "localization")}
         )
 
     @property
@@ -143,6 +153,10 @@ class World:
                 return self._command(received.key, message, now)
             case LeaseNote(body=Fence() as fence):
                 return self._fence(received.key, fence, now)
+            case Sensors(twist=twist):
+                self._hear_real(received.key, None, twist, now)
+            case Localization(pose_map=pose):
+                self._hear_real(received.key, pose, None, now)
             case Ask(what="mission"):
                 return [self._mission(now)]
             case PeerUp(name=name, incarnation=incarnation) if name in self._place:
@@ -196,6 +210,7 @@ class World:
                 Robot(self._fleet, robot_id, self._scenario, self._seed, self.incarnation, now)
                 for robot_id in mission.robots
             ]
+            self._simulated = [(n, robot) for n, robot in enumerate(self._robots) if robot.name not in self._real]
             for robot in self._robots:
                 if robot.id in self._remembered:
                     known = self._remembered[robot.id]
@@ -221,8 +236,21 @@ class World:
         to = where.to if where is not None else None
         return [robot.fence(fence, now) for robot in self._robots if to == _gateway_name(robot.id)]
 
+    def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None, now: float) -> None:
+        where = address(at_key)
+        place = self._real.get(where.owner) if where is not None else None
+        if place is None:
+            return
+        if twist is not None:
+            self._driven[place] = twist, now
+        if pose is not None:
+            self._bodies.place(place, pose)
+
     def _move(self, now: float) -> list[Touch]:
-        touches = self._bodies.step([robot.gateway.twist(now) for robot in self._robots])
+        wanted = [robot.gateway.twist(now) for robot in self._robots]
+        for place, (twist, at) in self._driven.items():  # a real one goes on as it last said, for a while
+            wanted[place] = twist if now - at <= (TOPIC["sensors"].timeout_s or 0.0) else STILL
+        touches = self._bodies.step(wanted)
         for robot, wheels in zip(self._robots, self._bodies.wheels, strict=True):
             robot.odometry.turn(wheels, self._dt_s)
         return touches
@@ -231,22 +259,25 @@ class World:
         """What is due at this point of the grid."""
         sent: list[Envelope] = []
         poses = self._bodies.poses
+        simulated = self._simulated
         for touch in touches:
             robot = self._robots[touch.robot]
+            if robot.name in self._real:
+                continue
             sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
             sent.append(self._event("contact", None, data | {"t": self._step * self._dt_s}, stamp))
         if self._is_due(TOPIC["sensors"].rate_hz):
-            sent += [robot.sensors(stamp, now) for robot in self._robots]
+            sent += [robot.sensors(stamp, now) for _, robot in simulated]
         if self._is_due(TOPIC["localization"].rate_hz):
-            fixes = (robot.localization(stamp, pose) for robot, pose in zip(self._robots, poses, strict=True))
+            fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated)
             sent += [fix for fix in fixes if fix is not None]
         if self._is_due(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, self._bodies.moved())
-            sent += [robot.scan(stamp, ranges[n]) for n, robot in enumerate(self._robots)]
+            sent += [robot.scan(stamp, ranges[n]) for n, robot in simulated]
         if not self._profiler.flat and self._is_due(TOPIC["ground"].rate_hz):
             heights = self._profiler.profile(poses, self._bodies.standing_m())
-            sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in enumerate(self._robots)]
+            sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in simulated]
         if self._is_due(TOPIC["truth"].rate_hz):
             sent.append(self._truth(stamp))
         if self._is_due(TOPIC["clock"].rate_hz):

@@ -14,9 +14,18 @@ from msgspec import Struct
 
 from protocol.messages import MESSAGE_BYTES_MAX
 from protocol.mission import WITNESS_NAME, robot_id_of
-from protocol.topics import HOST_PREFIX, OPERATOR_NAME, RECORDER_NAME, TO_ALL, TOPICS, TRUTH_OWNER, WORLD_NAME, Topic
+from protocol.topics import (
+    DRIVER_PREFIX,
+    HOST_PREFIX,
+    OPERATOR_NAME,
+    RECORDER_NAME,
+    TO_ALL,
+    TOPICS,
+    TRUTH_OWNER,
+    WORLD_NAME,
+    Topic,
+)
 
-DRIVER_PREFIX = "driver"
 FLOOD_RATIO, FLOOD_HZ_MIN = 10.0, 50.0
 """A topic may come so many times as often as the table says; what is more is dropped where it comes in."""
 FLOOD_HZ = {"lease": 2000.0, "obstacles": 500.0, "ask": 50.0}
@@ -96,7 +105,7 @@ def _speaks(kind: str, owner: str, topic: Topic) -> bool:
     if owner == TRUTH_OWNER or topic.name in ("truth", "clock"):
         return owner == TRUTH_OWNER and topic.name in ("truth", "clock")
     if kind == "driver":  # hardware and FENCED under the robot's name, what it says of itself under its own
-        own = topic.name in ("status", "event")
+        own = topic.name in ("status", "event", "ask")
         return kind in topic.publishers and own == owner.startswith(DRIVER_PREFIX)
     return kind in topic.publishers
 

@@ -34,19 +34,19 @@ class Terminals:
         self._inbox = Inbox()
 
     def router(self) -> subprocess.Popen[str]:
-        child = self._start("deploy.fleet.router", "--listen", self.endpoint)
+        child = self.start("deploy.fleet.router", "--listen", self.endpoint)
         eventually(lambda: answers(self.endpoint), "the router does not answer")
         return child
 
     def world(self, robots: int = 2) -> subprocess.Popen[str]:
-        return self._start("world.cli", "straight", "--robots", str(robots), *self._team())
+        return self.start("world.cli", "straight", "--robots", str(robots), *self.team())
 
     def lfa(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", "from deploy.cli import main; main()", *arguments, *self._team()]
+        command = [sys.executable, "-c", "from deploy.cli import main; main()", *arguments, *self.team()]
         return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
     def agent(self, robot_id: int, role: str = "follower") -> subprocess.Popen[str]:
-        return self._start("agents.cli", "--role", role, "--id", str(robot_id), *self._team())
+        return self.start("agents.cli", "--role", role, "--id", str(robot_id), *self.team())
 
     def look_on(self) -> None:
         self._bus = ZenohBus(self.endpoint, self._inbox)
@@ -65,10 +65,10 @@ class Terminals:
             child.kill()
             child.communicate()
 
-    def _team(self) -> tuple[str, ...]:
+    def team(self) -> tuple[str, ...]:
         return ("--fleet", FLEET, "--connect", self.endpoint)
 
-    def _start(self, *arguments: str) -> subprocess.Popen[str]:
+    def start(self, *arguments: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", *arguments]
         child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self._children.append(child)

@@ -1,0 +1,98 @@
+"""What a driver needs of a robot's own hardware, and a simulated motor that has it. Yours goes beside this one.
+
+A TurtleBot's `drive` writes its wheels' speeds, its `read` asks wheels, localisation, scanner and bumper. Neither may
+block: both are called 50 times a second from one thread. SI units and radians, frames as in REP-105.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Protocol
+
+from msgspec import Struct
+
+from protocol.geometry import STILL, Pose2D, Twist, along_arc, compose
+from protocol.mission import Limits
+
+
+class Scan(Struct, frozen=True):
+    """One turn of the scanner, as `protocol.messages.LaserScan`: beyond the range +inf, bad nan (REP-117)."""
+
+    angle_min: float
+    angle_increment: float
+    range_min_m: float
+    range_max_m: float
+    ranges_m: tuple[float, ...]
+
+
+class Reading(Struct, frozen=True):
+    """All that the hardware knows at one moment; None: nothing new since the last reading."""
+
+    pose_odom: Pose2D
+    """From the wheels alone: smooth, and adrift."""
+    twist: Twist
+    odometer_m: float
+    """The way that it has come, whichever direction: never decreases."""
+    pose_map: Pose2D | None = None
+    """From localisation: right, and rare. Ten times a second is enough."""
+    scan: Scan | None = None
+    contact: float | None = None
+    """Where the bumper was touched: bearing in `base_link` [rad]."""
+
+
+class Base(Protocol):
+    """A robot on two wheels."""
+
+    def drive(self, twist: Twist, now: float) -> None:
+        """Do this from `now` on [s, monotonic]. `STILL` means brake, and comes whenever nobody may command."""
+
+    def read(self, now: float) -> Reading:
+        """What is known at `now`."""
+
+
+class SimulatedBase:
+    """A motor with the mission's limits on an empty plane, from `start` in `map` on; its scanner sees nothing."""
+
+    FIX_S = 0.1
+    BEAMS, RANGE_MIN_M, RANGE_MAX_M = 36, 0.1, 10.0
+    TURN = 6.283185307179586
+
+    def __init__(self, start: Pose2D, limits: Limits, now: float) -> None:
+        self._start = start
+        self._limits = limits
+        self._pose_odom = Pose2D()
+        self._twist, self._wanted = STILL, STILL
+        self._odometer_m = 0.0
+        self._at = now
+        self._fix_at = now
+
+    def drive(self, twist: Twist, now: float) -> None:
+        self._move(now)
+        self._wanted = twist
+
+    def read(self, now: float) -> Reading:
+        self._move(now)
+        if now < self._fix_at:
+            return Reading(self._pose_odom, self._twist, self._odometer_m)
+        self._fix_at = max(self._fix_at + self.FIX_S, now)
+        pose_map = compose(self._start, self._pose_odom)
+        nothing = (inf,) * self.BEAMS
+        scan = Scan(-self.TURN / 2.0, self.TURN / self.BEAMS, self.RANGE_MIN_M, self.RANGE_MAX_M, nothing)
+        return Reading(self._pose_odom, self._twist, self._odometer_m, pose_map, scan)
+
+    def _move(self, now: float) -> None:
+        """Wheels reach what is wanted as fast as they can, and are then there for the rest of the time."""
+        dt_s, self._at = now - self._at, now
+        limits = self._limits
+        linear = min(limits.v_max_mps, max(-limits.v_reverse_max_mps, self._wanted.linear_x))
+        angular = min(limits.omega_max_radps, max(-limits.omega_max_radps, self._wanted.angular_z))
+        self._twist = Twist(
+            _towards(self._twist.linear_x, linear, limits.a_max_mps2 * dt_s),
+            _towards(self._twist.angular_z, angular, limits.alpha_max_radps2 * dt_s),
+        )
+        self._pose_odom = along_arc(self._pose_odom, self._twist, dt_s)
+        self._odometer_m += abs(self._twist.linear_x) * dt_s
+
+
+def _towards(now: float, wanted: float, step: float) -> float:
+    return min(now + step, max(now - step, wanted))

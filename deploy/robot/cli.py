@@ -1,0 +1,79 @@
+"""`lfa-driver`: the driver of one robot as one process, with a simulated motor; the example for your own.
+
+Like an agent it needs the base install only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+from deploy.robot.base import SimulatedBase
+from deploy.robot.driver import Driver
+from protocol import clock
+from protocol.credentials import credentials
+from protocol.geometry import Pose2D
+from protocol.mission import Limits, Refused
+from protocol.runtime import Options, run
+from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
+
+EXAMPLE = "example: lfa-driver --id 3 --at 0,-2.4,0 (beside lfa-world SCENARIO --set world.real_robots=[3])"
+
+
+def main() -> None:
+    """Entry point of `lfa-driver`: 0 ended well, 2 refused."""
+    try:
+        sys.exit(start(_parser().parse_args()))
+    except Refused as refused:
+        print(f"lfa-driver: {refused}", file=sys.stderr)
+        sys.exit(2)
+
+
+def start(arguments: argparse.Namespace) -> int:
+    """Drive one robot until stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
+    if not 1 <= arguments.id <= 2**31:
+        raise Refused(f"--id {arguments.id}: must be a robot's number, 1 or higher")
+    start_map, wall_ms = _pose(arguments.at), clock.wall_ms()
+
+    def make_base(limits: Limits, now: float) -> SimulatedBase:
+        return SimulatedBase(start_map, limits, now)
+
+    driver = Driver(arguments.fleet, arguments.id, wall_ms, make_base)
+    known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
+    endpoint = arguments.connect or default_endpoint()
+    options = Options(arguments.fleet, endpoint, None, False, LINK_LEASES_MS[arguments.link], known)
+    return run([driver], options, wall_ms)
+
+
+def _pose(text: str) -> Pose2D:
+    try:
+        x, y, theta = (float(part) for part in text.split(","))
+    except ValueError:
+        raise Refused(f"--at {text}: must be x,y,theta in map [m, m, rad], like 0,-2.4,0") from None
+    return Pose2D(x, y, theta)
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line instead of usage and a line."""
+        raise Refused(f"{message} ({EXAMPLE})")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="lfa-driver", description="Drive one robot's (simulated) motor until stopped.", epilog=EXAMPLE
+    )
+    add = parser.add_argument
+    add("--id", required=True, type=int, help="the robot's id in the mission")
+    add("--at", default="0,0,0", metavar="X,Y,THETA", help="where it stands in map at the start [m, m, rad]")
+    add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
+    add("--connect", metavar="ENDPOINT", help="router, like tcp/127.0.0.1:7447; a,b: or the next")
+    add("--keys", type=Path, metavar="DIR", help="this machine's folder of `lfa keys`")
+    add("--link", choices=sorted(LINK_LEASES_MS), default="std", help="how soon a silent link counts as dead")
+    return parser
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+"""The Node between an agent and its robot's hardware: commands through the gateway, sensors out, fences answered.
+
+All that an agent needs of a robot, and all that a simulated world does for one (`world/robot.py`). It hears `cmd_vel`
+of its own robot, FENCE to its gateway, and its agent's liveliness; it says `sensors` (with the gateway's own moment,
+which commands must echo), `localization`, `scan` and `contact`. The gateway's deadman brakes when its agent, its
+router or the network is gone: that happens here, on this machine's clock, and needs nobody else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any
+
+from deploy.robot.base import Base, Reading
+from protocol.gateway import Gateway
+from protocol.geometry import STILL
+from protocol.messages import (
+    Ask,
+    CmdVel,
+    Contact,
+    Event,
+    Fence,
+    Header,
+    LaserScan,
+    LeaseNote,
+    Localization,
+    Message,
+    MissionNote,
+    Sensors,
+    Term,
+)
+from protocol.mission import Limits, robot_name
+from protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from protocol.timing import timing_of
+from protocol.topics import DRIVER_PREFIX, TO_ALL, TOPIC, alive_key, key
+
+PERIOD_S = 1.0 / (TOPIC["sensors"].rate_hz or 50.0)
+ASK_S = 1.0
+REFUSAL_EVERY_S = 0.2
+
+
+class Driver:
+    """Of robot `robot_id`; `make_base(limits, now)` takes its hardware into use, once the mission is known."""
+
+    def __init__(self, fleet: str, robot_id: int, incarnation: int, make_base: Callable[[Limits, float], Base]) -> None:
+        self.name = f"{DRIVER_PREFIX}{robot_id}"
+        self.incarnation = incarnation
+        self.finished = False
+        self.refusal: str | None = None
+        self.started_with: dict[str, Any] = {"kind": "driver", "robot_id": robot_id}
+        self.interests = frozenset(
+            {
+                key(fleet, "*", "mission"),
+                key(fleet, robot_name(robot_id), "cmd_vel"),
+                key(fleet, "*", "lease", f"gateway{robot_id}"),
+                alive_key(fleet, robot_name(robot_id), "*"),
+            }
+        )
+        self._fleet = fleet
+        self._robot_id = robot_id
+        self._robot = robot_name(robot_id)
+        self._make_base = make_base
+        self._base: Base | None = None
+        self._gateway: Gateway | None = None
+        self._cut_off = False
+        self._next = -inf
+        self._seq: dict[str, int] = {}
+        self._led: Term | None = None
+        self._told: dict[str, float] = {}
+
+    def next_deadline(self) -> float:
+        return inf if self.finished else self._next
+
+    def receive(self, received: Received) -> list[Envelope]:
+        """A command or a fence counts at once."""
+        now, gateway = received.at, self._gateway
+        match received.message:
+            case MissionNote(mission=mission) if gateway is None:
+                if self._robot_id not in mission.robots:
+                    self.refusal = f"id {self._robot_id}: not in the mission, which has robots {list(mission.robots)}"
+                    return []
+                self._gateway = Gateway(self._robot_id, self.incarnation, timing_of(mission.profile), now)
+                self._base = self._make_base(mission.limits, now)
+                self._next = now
+            case CmdVel() as cmd if gateway is not None:
+                return self._command(cmd, gateway, now)
+            case LeaseNote(body=Fence() as fence) if gateway is not None:
+                header = Header(self._robot, self.incarnation, self._number("lease"), now)
+                note = LeaseNote(header, gateway.fence(fence, now))
+                return [Envelope(key(self._fleet, self._robot, "lease", TO_ALL), note)]
+            case PeerUp(incarnation=incarnation) if gateway is not None:
+                self._cut_off = False
+                gateway.agent_up(incarnation, now)
+            case PeerDown(incarnation=incarnation) if gateway is not None and not self._cut_off:
+                gateway.agent_down(incarnation, now)
+            case RouterLost():
+                self._cut_off = True
+            case Stop():
+                self.finished = True
+                if self._base is not None:
+                    self._base.drive(STILL, now)
+        return []
+
+    def tick(self, now: float) -> list[Envelope]:
+        """Drive what the gateway lets through, and tell what the hardware says."""
+        if self.finished:
+            return []
+        if self._gateway is None or self._base is None:
+            self._next = now + ASK_S
+            return [Envelope(key(self._fleet, self.name, "ask"), Ask(self._header("ask", now), "mission"))]
+        self._next = max(self._next + PERIOD_S, now)
+        self._base.drive(self._gateway.twist(now), now)
+        return self._said(self._base.read(now), self._gateway, now)
+
+    def _said(self, reading: Reading, gateway: Gateway, now: float) -> list[Envelope]:
+        sent: list[Message] = [
+            Sensors(
+                self._header("sensors", now),
+                reading.pose_odom,
+                reading.twist,
+                reading.odometer_m,
+                gateway.stamp(now),
+                gateway.term_max,
+                gateway.latched,
+                sum(gateway.refused.values()),
+            )
+        ]
+        topics = ["sensors"]
+        if reading.pose_map is not None:
+            sent.append(Localization(self._header("localization", now), reading.pose_map))
+            topics.append("localization")
+        if (scan := reading.scan) is not None:
+            turn = (scan.angle_min, scan.angle_increment, scan.range_min_m, scan.range_max_m, scan.ranges_m)
+            sent.append(LaserScan(self._header("scan", now), *turn))
+            topics.append("scan")
+        if reading.contact is not None:
+            sent.append(Contact(self._header("contact", now), reading.contact))
+            topics.append("contact")
+        return [Envelope(key(self._fleet, self._robot, topic), m) for topic, m in zip(topics, sent, strict=True)]
+
+    def _command(self, cmd: CmdVel, gateway: Gateway, now: float) -> list[Envelope]:
+        """Events for whoever looks on: each term in which this robot leads, and refusals, now and then."""
+        reason = gateway.command(cmd, now)
+        if reason is None:
+            if not cmd.as_leader or cmd.term == self._led:
+                return []
+            self._led = cmd.term
+            return [self._event("leader_command", cmd.term, {}, now)]
+        if now - self._told.get(reason, -inf) < REFUSAL_EVERY_S:
+            return []
+        self._told[reason] = now
+        return [self._event("refused", cmd.term, {"reason": reason, "count": gateway.refused[reason]}, now)]
+
+    def _event(self, kind: str, term: Term, data: dict[str, Any], now: float) -> Envelope:
+        event = Event(self._header("event", now), kind, term, {"robot": self._robot_id, **data})
+        return Envelope(key(self._fleet, self.name, "event"), event)
+
+    def _header(self, topic: str, now: float) -> Header:
+        return Header(self.name, self.incarnation, self._number(topic), now)
+
+    def _number(self, topic: str) -> int:
+        seq = self._seq[topic] = self._seq.get(topic, 0) + 1
+        return seq
