@@ -12,10 +12,8 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
-from typing import Annotated
 
 import msgspec
-import typer
 
 from deploy.run.chosen import choose_again
 from deploy.run.crew import ROUTER_NAME, Crew, rows
@@ -24,6 +22,7 @@ from deploy.run.faults import ORDERS, RESTART, SIGNALS, Deed, Fault, Schedule, p
 from deploy.run.folder import About, make
 from deploy.run.interrupts import Interrupts
 from deploy.run.operator import Operator
+from deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from deploy.run.progress import Progress, progress
 from deploy.run.recorder import LastWord, Task
 from deploy.run.referee import Referee, Verdict
@@ -50,18 +49,16 @@ RECORDER_S_MAX = 30.0  # to read the recording back and sum it up
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")],
-    seed: Annotated[int | None, typer.Option(help="Draws noise, places and starts. Default 0.")] = None,
-    overrides: Annotated[list[str] | None, typer.Option("--set", help="Any field: world.lidar.beams=90.")] = None,
-    robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
-    fault: Annotated[list[str] | None, typer.Option(help="Such as 'kill leader at 20 s'; again for more.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")] = None,
-    map_from: Annotated[
-        Path | None, typer.Option(help="An earlier run's folder: the same world, its obstacles known (iteration 2).")
-    ] = None,
-    figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
-    junit: Annotated[Path | None, typer.Option(help="Write the assertions' results as JUnit XML.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    scenario: ScenarioName,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    robots: Robots = None,
+    fault: Faults = None,
+    out: Out = None,
+    map_from: MapFrom = None,
+    figures: Figures = True,
+    junit: JUnit = None,
+    as_json: AsJson = False,
 ) -> int:
     chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())

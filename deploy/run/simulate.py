@@ -5,9 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from agents.agent import Agent
 from deploy.run.chosen import choose_again
@@ -16,6 +13,7 @@ from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
 from deploy.run.folder import JOURNALS, About, make
 from deploy.run.interrupts import Interrupts
 from deploy.run.operator import Operator
+from deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from deploy.run.record import Recorder, Recording
 from deploy.run.referee import Referee, Verdict
 from deploy.run.weather import note
@@ -37,18 +35,16 @@ LEADER_WAIT_S = 0.01  # a fault on the leader waits for one, looking this often
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")],
-    seed: Annotated[int | None, typer.Option(help="Draws noise, places, starts, delays and losses. Default 0.")] = None,
-    overrides: Annotated[list[str] | None, typer.Option("--set", help="Any field: world.lidar.beams=90.")] = None,
-    robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
-    fault: Annotated[list[str] | None, typer.Option(help="Such as 'kill leader at 20 s'; again for more.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")] = None,
-    map_from: Annotated[
-        Path | None, typer.Option(help="An earlier run's folder: the same world, its obstacles known (iteration 2).")
-    ] = None,
-    figures: Annotated[bool, typer.Option(help="Draw figures/*.png.")] = True,
-    junit: Annotated[Path | None, typer.Option(help="Write the assertions' results as JUnit XML.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    scenario: ScenarioName,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    robots: Robots = None,
+    fault: Faults = None,
+    out: Out = None,
+    map_from: MapFrom = None,
+    figures: Figures = True,
+    junit: JUnit = None,
+    as_json: AsJson = False,
 ) -> int:
     chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
