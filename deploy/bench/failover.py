@@ -26,6 +26,8 @@ ROBOTS = 4
 ROUNDS = 30
 FULL_ROUNDS = 200
 NEARLY_ALL = 28.0 / 30.0
+PER_ROBOT_S = 5.0
+"""Patience for a team to be whole again."""
 PATIENCE_S = 5.0
 """A fault that is not got over by then counts as this long."""
 FROZEN_S_MIN = 0.6
@@ -82,6 +84,9 @@ KINDS = (
         (_chain, "chain", "28 of 30", 120.0),
     )),
 )  # fmt: skip
+LARGE_TEAM = "kill among 16"
+LARGE, LARGE_ROUNDS_MAX = 16, 10
+"""More robots than voters."""
 FOLLOWER_KILLED = "follower killed"
 FOLLOWS_MS_MAX = 150.0
 
@@ -92,7 +97,7 @@ def run(as_json: bool, rows: str = "*", kills: int = ROUNDS, full: bool = False)
 
 
 def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[Row]]:
-    with _Bench() as bench:
+    with _Bench(ROBOTS) as bench:
         for kind in KINDS:
             if not fnmatchcase(kind.name, glob.split("/")[0]):
                 continue
@@ -102,6 +107,10 @@ def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[Row]]:
             times = [bench.follower_round() for _ in range(rounds)]
             yield [_row(FOLLOWER_KILLED, "follows the new predecessor", "worst", times, FOLLOWS_MS_MAX)]
         yield [row("team", Quantity("had to be started anew", "times", 0.0), float(bench.broken))]
+    if fnmatchcase(LARGE_TEAM, glob.split("/")[0]):
+        with _Bench(LARGE) as bench:
+            took = [bench.round(KINDS[0]) for _ in range(min(rounds, LARGE_ROUNDS_MAX))]
+        yield [_row(LARGE_TEAM, what, "worst", [of(one) for one in took], bar) for of, what, _, bar in SILENT]
 
 
 def _against_bars(kind: Kind, took: Sequence[Took]) -> list[Row]:
@@ -125,7 +134,8 @@ def quantile(values: Sequence[float], share: float) -> float:
 class _Bench:
     """A team, started anew should it ever not come together again."""
 
-    def __init__(self) -> None:
+    def __init__(self, robots: int) -> None:
+        self._robots = robots
         self._team: Team | None = None
         self._random = Random("failover")
         self.broken = 0
@@ -153,7 +163,7 @@ class _Bench:
     def follower_round(self) -> float:
         """A follower with one behind it is killed; until that one tracks the robot before it [ms]."""
         team, chain = self._whole()
-        place = self._random.randrange(1, ROBOTS - 1)
+        place = self._random.randrange(1, self._robots - 1)
         at = team.signal(chain[place], signal.SIGKILL)
         follows_at = inf
 
@@ -175,7 +185,7 @@ class _Bench:
         while True:
             try:
                 team = self._team or self._start()
-                chain = team.await_chain(ROBOTS)
+                chain = team.await_chain(self._robots, PER_ROBOT_S * self._robots)
                 _rest(team, clock.now() + 0.1 * self._random.random())
                 return team, chain
             except Broken as broken:
@@ -186,7 +196,7 @@ class _Bench:
                     raise
 
     def _start(self) -> Team:
-        self._team = Team(endless(ROBOTS))
+        self._team = Team(endless(self._robots))
         return self._team.__enter__()
 
     def _end(self) -> None:
