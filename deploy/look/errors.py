@@ -59,7 +59,7 @@ def of_follower(trace: Trace, robot: int) -> Errors | None:
     own, said = trace.truth.get(robot), trace.tracking.get(robot)
     if own is None or said is None:
         return None
-    said = said[np.isin(said[:, 1], list(trace.truth))]
+    said = said[np.isin(said[:, 1], list(trace.truth)) & (said[:, 2] > 0.0)]  # before its first slot it keeps none
     if said.shape[0] == 0:
         return None
     at = np.searchsorted(said[:, 0], own[:, 0], side="right") - 1

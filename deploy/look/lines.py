@@ -1,0 +1,86 @@
+"""Panels over time: a line a robot, what was done to the team as marks, and a strip of what the robots did."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from deploy.look import chronicle
+from deploy.look.marks import LEGEND_MAX, label, look
+from deploy.look.readings import Run
+from deploy.look.trace import Array
+from deploy.shapes import spikes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+POINTS_MAX = 8000  # on all lines of one panel together
+STRIP = "#555555"
+
+
+def plot(axes: Axes, run: Run, of_robots: dict[int, tuple[Array, Array]]) -> None:
+    """A line for each robot's (t [s], y)."""
+    most = POINTS_MAX // max(1, len(of_robots))
+    for robot, (t, y) in of_robots.items():
+        axes.plot(*_unwrapped(*thin(t, y, most)), label=label(run, robot), linewidth=1.4, **look(run, robot))
+
+
+def finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True, legend: bool = True) -> None:
+    """Faults, role switches and orientation requests as marks, names, units; a legend where there is what to name."""
+    for at_s, text, style in _marks(run):
+        axes.axvline(at_s, color="black", linewidth=0.8, linestyle=style)
+        if legend:
+            axes.annotate(text, (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -9),
+                          textcoords="offset points", fontsize=7.5, rotation=90, va="top")  # fmt: skip
+    axes.set(title=title, ylabel=y_label, xlim=(0.0, max(run.seen.end_s, 1.0)))
+    if last:
+        axes.set_xlabel("time [s]")
+    if legend and axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper right", ncols=len(axes.lines) if len(axes.lines) < 5 else 2, framealpha=0.9)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.12 * (high - low))
+
+
+def strip(axes: Axes, run: Run) -> None:
+    """When each robot avoided something, by its own log: a bar an avoidance, in the robot's colour."""
+    shown = [robot for robot in run.robots if label(run, robot)][:LEGEND_MAX]
+    for place, robot in enumerate(shown):
+        spans = [(a, max(b - a, 0.1)) for a, b in spikes.avoidances(run, robot)]
+        axes.broken_barh(
+            spans, (place - 0.35, 0.7), facecolors=look(run, robot)["color"], edgecolor=STRIP, linewidth=0.4
+        )
+    axes.set(ylim=(len(shown) - 0.4, -0.6), xlim=(0.0, max(run.seen.end_s, 1.0)), xlabel="time [s]")
+    axes.set_yticks(range(len(shown)), [f"robot {robot}" for robot in shown], fontsize=7.5)
+    axes.set_title("avoiding", fontsize=8.0, loc="left", pad=2.0)
+    axes.grid(visible=False, axis="y")
+    for at_s, _, style in _marks(run):
+        axes.axvline(at_s, color="black", linewidth=0.8, linestyle=style)
+
+
+def thin(t: Array, y: Array, most: int) -> tuple[Array, Array]:
+    """At most about `most` points: of each stretch its least and its largest, in their order."""
+    width = -(-2 * t.size // max(most, 2))
+    if width <= 2:
+        return t, y
+    whole = t.size // width * width
+    stretches = np.where(np.isnan(y[:whole]), 0.0, y[:whole]).reshape(-1, width)
+    ends = np.stack([stretches.argmin(axis=1), stretches.argmax(axis=1)], axis=1)
+    ends.sort(axis=1)
+    kept = (ends + np.arange(0, whole, width)[:, None]).ravel()
+    kept = np.append(kept, np.arange(whole, t.size))
+    return t[kept], y[kept]
+
+
+def _unwrapped(t: Array, y: Array) -> tuple[Array, Array]:
+    """No line across the plot where an angle [deg] goes over from -180 to 180."""
+    over = np.flatnonzero(np.abs(np.diff(y)) > 270.0) + 1
+    return np.insert(t, over, t[over]), np.insert(y, over, np.nan)
+
+
+def _marks(run: Run) -> list[tuple[float, str, str]]:
+    """When [s], what, and with which line."""
+    found = [(fault.at_s, f"{fault.kind} {fault.target}", ":") for fault in chronicle.faults(run.events)]
+    found += [(reign.from_s, f"robot {reign.robot_id} leads", "-") for reign in run.reigns[1:]]
+    asked = (line for line in chronicle.of_kind(run.events, "formation") if chronicle.asked_by_leader(line))
+    return found + [(float(line["t"]), f"to {line.get('side', '')}", "--") for line in asked]
