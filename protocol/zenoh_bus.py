@@ -195,16 +195,29 @@ def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
 
 
 def _client(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
-    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {CLIENT_RX_THREADS}))")
     config = _config("client", [], endpoint.split(","), lease_ms, credentials)
     login = {} if credentials is None else _login(credentials)
     if not login:
-        return zenoh.open(config)
+        return _open(config, CLIENT_RX_THREADS)
     _insert(config, login)
     try:
-        return zenoh.open(config)
+        return _open(config, CLIENT_RX_THREADS)
     except zenoh.ZError:  # a router that asks for no password does not take one either
-        return zenoh.open(_config("client", [], endpoint.split(","), lease_ms, credentials))
+        return _open(_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_RX_THREADS)
+
+
+def _open(config: zenoh.Config, rx_threads: int) -> zenoh.Session:
+    """With so many receiver threads, unless the environment says otherwise or this process has some already.
+
+    Zenoh reads it from the environment, at the first use; a child must not inherit it: it may be a router.
+    """
+    if "ZENOH_RUNTIME" in os.environ:
+        return zenoh.open(config)
+    os.environ["ZENOH_RUNTIME"] = f"(rx: (worker_threads: {rx_threads}))"
+    try:
+        return zenoh.open(config)
+    finally:
+        del os.environ["ZENOH_RUNTIME"]
 
 
 def _check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:

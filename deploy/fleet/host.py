@@ -153,13 +153,17 @@ def _check_place(part: Part) -> None:
 
 
 def _check_port(part: Part) -> None:
-    port = part.port
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if part.over_udp else socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("", port))
-        except OSError as error:
-            raise Refused(f"router_port = {port}: {error.strerror}: must be a free port") from None
+    """For routers over udp it is also that of tcp, for processes."""
+    kinds = {"tcp": socket.SOCK_STREAM, **({"udp": socket.SOCK_DGRAM} if part.over_udp else {})}
+    for name, kind in kinds.items():
+        with socket.socket(socket.AF_INET, kind) as probe:
+            if kind is socket.SOCK_STREAM:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("", part.port))
+            except OSError as error:
+                right = f"must be a free port ({name})"
+                raise Refused(f"router_port = {part.port}: {error.strerror}: {right}") from None
 
 
 def _check_world() -> None:

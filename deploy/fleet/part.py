@@ -108,9 +108,9 @@ def parts(plan: Plan, run: str, digest: str, bundles: Mapping[str, dict[str, str
             world=name == file.world,
             witness=mission.witness and name == file.witness and file.witness != file.world,
             world_witness=mission.witness and file.witness == file.world,
-            listen=() if len(names) == 1 else (_listen(plan, machine),),
+            listen=() if len(names) == 1 else _listen(plan, machine),
             connect=tuple(endpoint(plan, far) for far in names[:n] if _joined(plan, name, far)),
-            others=tuple(endpoint(plan, far) for far in plan.seconds(name)),
+            others=tuple(door(plan, far) for far in plan.seconds(name)),
             port=0 if len(names) == 1 else machine.router_port,
             restart=file.restart,
             hosts=tuple(names),
@@ -127,14 +127,32 @@ def store(plan: Plan) -> Path:
 
 
 def endpoint(plan: Plan, name: str) -> str:
-    """Where other machines find the router of machine `name`."""
-    machine = plan.hosts[name]
+    """Where other machines' routers find the router of machine `name`."""
+    return f"{plan.file.links.transport}/{_at(plan.hosts[name])}"
+
+
+def door(plan: Plan, name: str) -> str:
+    """Where processes of other machines, and the operator, find that router.
+
+    By tls, where routers speak quic: the end of a router's process ends its tcp links at once, as the kernel tells the
+    other end. A quic link ends by silence alone, a link lease later, and meanwhile nobody fails over.
+    """
+    return f"{_DOORS[plan.file.links.transport]}/{_at(plan.hosts[name])}"
+
+
+_DOORS = {"quic": "tls", "tcp": "tcp"}
+
+
+def _at(machine: Machine) -> str:
     host = f"[{machine.address}]" if ":" in machine.address else machine.address
-    return f"{plan.file.links.transport}/{host}:{machine.router_port}"
+    return f"{host}:{machine.router_port}"
 
 
-def _listen(plan: Plan, machine: Machine) -> str:
-    return f"{plan.file.links.transport}/{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
+def _listen(plan: Plan, machine: Machine) -> tuple[str, ...]:
+    """The same port number, of udp for routers and of tcp for processes."""
+    where = f"{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
+    transport = plan.file.links.transport
+    return tuple(f"{kind}/{where}" for kind in dict.fromkeys((transport, _DOORS[transport])))
 
 
 def _joined(plan: Plan, a: str, b: str) -> bool:

@@ -44,7 +44,7 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
     if file is not None:
         plan = load(file)
         own = next((part for part in here() if part.fleet == plan.name), None)
-        far = ",".join(parts.endpoint(plan, name) for name in plan.hosts)
+        far = ",".join(parts.door(plan, name) for name in plan.hosts)
         endpoint = connect or (own.endpoint if own is not None else far)
         own_keys = _keys(own) or (parts.store(plan) / ISSUED if (parts.store(plan) / ISSUED).is_dir() else None)
         return Seen(plan.name, endpoint, tuple(plan.hosts), own, plan, own_keys)

@@ -21,7 +21,7 @@ from msgspec import Struct
 
 from deploy.fleet import part as parts
 from deploy.fleet.part import Part
-from deploy.fleet.policy import ROUTER, Lives
+from deploy.fleet.policy import REFUSED_CODE, ROUTER, Lives
 from deploy.fleet.tail import Tail
 from deploy.run import processes
 from deploy.run.crew import ROUTER_NAME, Crew, Row
@@ -51,6 +51,10 @@ STEP_S = 0.1
 JOIN_S = 0.1
 ROUTER_S = 3.0
 LAST_WORDS_S = 0.1
+END_S = 1.5
+"""Last words take 0.7 s at most; who then still takes leave of a router that has gone is not waited for."""
+LEAVE_S = 0.5
+"""Patience with a router, which says good-bye to others that may be gone already."""
 OPERATORS_MAX = 64
 
 
@@ -196,7 +200,9 @@ class Supervisor:
         verdict = ward.lives.ended(code, now)
         ward.start_at, ward.state = verdict.at, verdict.word
         if name == ROUTER_NAME and verdict.at is None:
-            raise Refused(ward.ended)
+            if ward.starts == 1:
+                raise Refused(ward.ended)
+            ward.start_at, ward.state = now + TELL_S, "waiting"  # it could listen before: what is in its way may go
         return True
 
     def _waits_for_router(self, now: float) -> bool:
@@ -237,16 +243,17 @@ class Supervisor:
 
     def _end(self) -> None:
         """Robots and world in order, then one last word, then the router."""
-        self._crew.end([name for name in self._wards if name != ROUTER_NAME])
+        self._crew.end([name for name in self._wards if name != ROUTER_NAME], END_S)
         for ward in self._wards.values():
             if ward.row.name != ROUTER_NAME:
                 ward.state, ward.ended = "ended", "lfa down"
         self._tell(clock.now())
         if self._bus is not None:
             clock.sleep(LAST_WORDS_S)
-        self._crew.end([ROUTER_NAME])
-        if self._bus is not None:
-            self._bus.close()  # not before: a router that hangs would hold it
+            leaving = threading.Thread(target=self._bus.close, daemon=True)
+            leaving.start()
+            leaving.join(LEAVE_S)  # a router that hangs would hold us longer
+        self._crew.end([ROUTER_NAME], LEAVE_S)
 
     # --- what is said and heard ------------------------------------------------------------------------------------
 
@@ -337,10 +344,12 @@ def main() -> None:
             raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
         for orphan in end_orphans(part.folder):
             print(f"ended what an earlier life has left: {orphan}", flush=True)
-        sys.exit(Supervisor(part).run())
+        code = Supervisor(part).run()
     except Refused as refused:
         print(f"lfa-supervise: {refused}", file=sys.stderr)
-        sys.exit(2)
+        code = REFUSED_CODE
+    sys.stdout.flush()
+    os._exit(code)  # a session that did not close holds the interpreter
 
 
 if __name__ == "__main__":

@@ -12,7 +12,10 @@ from deploy.look.onlooker import Ear, Fleet, listen
 from protocol import clock
 from protocol.messages import Event, PoseStamped
 from protocol.mission import robot_id_of
+from protocol.topics import HOST_PREFIX
+from protocol.zenoh_bus import answers
 from tests.hosts.machines import Machines
+from tests.processes.fleet import eventually
 
 POLL_S = 0.005
 TOPICS = frozenset({"*/pose", "*/tracking", "*/host", "*/event", "*/status"})
@@ -78,5 +81,6 @@ class Onlooker:
 def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[Onlooker]:
     """At machine `at`'s router, over its unix socket: no network lies between."""
     part = machines.part(at)
+    eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at}")), f"no router answers at {at}")
     with listen(Fleet(part.fleet, part.socket, ()), TOPICS, every=True) as ear:
         yield Onlooker(ear, robots)

@@ -45,6 +45,12 @@ def up(fleet: Machines) -> tuple[Machines, float]:
     return fleet, facts["took_s"]
 
 
+@pytest.fixture(scope="module")
+def joined(up: tuple[Machines, float]) -> dict[int, str]:
+    """At whose router each robot is."""
+    return {robot: name for name in up[0].names for robot in up[0].part(name).robots}
+
+
 def _robots_on(machines: Machines, name: str) -> set[int]:
     return set(machines.part(name).robots)
 
@@ -87,25 +93,6 @@ def test_when_the_operators_machine_is_cut_off_no_robot_notices(up: tuple[Machin
     figure("operator's machine cut off: the longest silence of any robot", max(gaps.values()), UNTOUCHED_S, alone)
 
 
-@pytest.mark.parametrize("name", ["b", *(pytest.param(other, marks=pytest.mark.long) for other in "acde")])
-def test_a_killed_router_costs_its_own_robots_little_and_the_others_nothing(
-    up: tuple[Machines, float], figure: Figure, name: str
-) -> None:
-    """They fail over to the next machine's router."""
-    fleet = up[0]
-    own = _robots_on(fleet, name)
-    with onlooker(fleet, "c" if name == "b" else "b", ROBOTS) as look:
-        alone = _quiet(look)
-        fleet.kill_router(name)
-        look.watch(WATCH_S)
-        gaps = look.gaps()
-        look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
-    if own:
-        figure(f"router {name} killed: longest silence of its robots", max(gaps[r] for r in own), FAILED_OVER_S, alone)
-    others = max(gaps[r] for r in ROBOTS if r not in own)
-    figure(f"router {name} killed: longest silence of the others", others, UNTOUCHED_S, alone)
-
-
 def test_a_machine_with_the_leader_dies_and_comes_back_at_the_tail(up: tuple[Machines, float], figure: Figure) -> None:
     fleet = up[0]
     with onlooker(fleet, WORLD, ROBOTS) as look:
@@ -125,6 +112,27 @@ def test_a_machine_with_the_leader_dies_and_comes_back_at_the_tail(up: tuple[Mac
         tail = set(look.chain()[-len(lost) :])
     figure("host of the leader dead: the chain without its robots", drives_on_s, DRIVES_ON_S)
     assert tail == lost
+
+
+@pytest.mark.parametrize("name", ["b", *(pytest.param(other, marks=pytest.mark.long) for other in "acde")])
+def test_a_killed_router_costs_its_own_robots_little_and_the_others_nothing(
+    up: tuple[Machines, float], joined: dict[int, str], figure: Figure, name: str
+) -> None:
+    """They go over to the next machine's router, and stay there."""
+    fleet = up[0]
+    own = {robot for robot, at in joined.items() if at == name}
+    following = fleet.names[(fleet.names.index(name) + 1) % len(fleet.names)]
+    with onlooker(fleet, "c" if name == "b" else "b", ROBOTS) as look:
+        alone = _quiet(look)
+        fleet.kill_router(name)
+        look.watch(WATCH_S)
+        gaps = look.gaps()
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
+    joined.update(dict.fromkeys(own, following))
+    if own:
+        figure(f"router {name} killed: longest silence of its robots", max(gaps[r] for r in own), FAILED_OVER_S, alone)
+    others = max((gaps[r] for r in ROBOTS if r not in own), default=0.0)
+    figure(f"router {name} killed: longest silence of the others", others, UNTOUCHED_S, alone)
 
 
 def test_down_leaves_no_process_and_no_socket(up: tuple[Machines, float], figure: Figure) -> None:

@@ -110,17 +110,25 @@ def test_machines_that_would_not_do_are_named_a_line_each(clean: Machines) -> No
     assert wrongs == {("b", "lfa"), ("c", "clock"), ("d", "place"), ("e", "place"), ("f", "port")}
 
 
-def test_a_robot_that_runs_elsewhere_already_is_named_and_the_fleet_is_taken_down_again(clean: Machines) -> None:
+def test_of_two_robots_of_one_name_on_two_machines_one_is_refused_and_named(clean: Machines) -> None:
+    """Whichever comes second. When it is the fleet's, all that has been started is taken down again."""
     fleet = clean
-    file = fleet.write(TOP, tail='[robots]\non = { 1 = "a" }')
+    file = fleet.write(TOP + 'links.transport = "tcp"\n', tail='[robots]\non = { 1 = "a" }')
     connect = ("--connect", f"tcp/{fleet.address('a')}:{PORT}")
     agent = ("agents.cli", "--role", "leader", "--id", "1", "--fleet", "convoy", *connect)
-    stranger = subprocess.Popen([*fleet.net.enter(fleet.host("b")), sys.executable, "-m", *agent])
-    try:
-        done = fleet.lfa("up", str(file), "--wait", "30")
-    finally:
-        stranger.kill()
-        stranger.wait()
+    command = [*fleet.net.enter(fleet.host("b")), sys.executable, "-m", *agent]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as stranger:
+        try:
+            done = fleet.lfa("up", str(file), "--wait", "30")
+            if done.returncode == 0:
+                assert stranger.wait(20.0) == 2
+        finally:
+            stranger.kill()
+            fleet.lfa("down", str(file))
+        told = stranger.stderr.read() if stranger.stderr is not None else ""
+    if done.returncode == 0:
+        assert "robot1 already runs in fleet 'convoy'" in told
+        return
     assert done.returncode == 1
     assert "robot1 already runs in fleet 'convoy'" in done.stderr or "speaks in its name" in done.stderr
     assert "taken down again: a, b, c, d, e, f" in done.stderr
