@@ -165,7 +165,7 @@ def connect(options: Options, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
 
 
 def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping) -> int:
-    now = clock.now()
+    began = now = clock.now()
     stop_by = None
     vitals = _VitalSigns(now)
     while True:
@@ -173,7 +173,7 @@ def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping) -> int:
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
         now = clock.now()
         for seat in seats:
-            vitals.lag(seat.step(now))
+            vitals.lag(min(seat.step(now), now - began))  # a first deadline lies anywhere in the past
         if vitals.due(now):
             for seat in seats:
                 seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable), now)

@@ -129,7 +129,9 @@ def told(who: str, kind: str, data: dict[str, Any]) -> str | None:
     if kind in DULL:
         return None
     facts = ", ".join(
-        _short(value) if name == kind else f"{name} {_short(value)}" for name, value in data.items() if name != "t"
+        _short(value) if name == kind else f"{name} {_short(value)}"
+        for name, value in data.items()
+        if name != "t" and value is not None
     )
     return f"{who} {kind} {facts}".strip()
 

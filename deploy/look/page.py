@@ -27,7 +27,7 @@ def of(runs: Sequence[Run]) -> str:
         parts.append(f'<h2 id="compared">Compared</h2>{_compared(*sums)}')
     for name, section in SECTIONS:
         parts.append(f'<h2 id="{_id(name)}">{escape(name)}</h2>{_side_by_side(runs, sums, section)}')
-    links = "".join(f'<a href="#{_id(name)}">{escape(name)}</a>' for name, _ in SECTIONS)
+    links = " ".join(f'<a href="#{_id(name)}">{escape(name)}</a>' for name, _ in SECTIONS)
     two = ' class="two"' if len(runs) == 2 else ""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>lfa: {escape(title)}</title>'

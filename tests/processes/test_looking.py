@@ -8,6 +8,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from socket import socket
+from urllib.request import urlopen
 
 from deploy.look import trace
 from deploy.run.record import parts
@@ -74,6 +76,34 @@ def test_a_recording_played_back_is_seen_like_a_fleet(tmp_path: Path) -> None:
             player.kill()
             player.wait()
     assert json.loads(heard.stdout)["message"]["type"] == "pose"
+
+
+def test_a_viewer_comes_and_goes_and_the_run_goes_on(tmp_path: Path) -> None:
+    with running(tmp_path / "run", "straight", "--robots", "2", "--set", "mission.leading.route_m=[[6.0, 0.0]]") as run:
+        run.wait_for("leader_command")
+        port, web_port = free_port(), free_port()
+        where = ("--fleet", f"straight-{run.launcher.pid}", "--port", str(port), "--web-port", str(web_port))
+        viewer = subprocess.Popen([*LFA, "view", "--serve-web", *where], stdout=subprocess.PIPE, text=True)
+        try:
+            assert viewer.stdout is not None
+            assert viewer.stdout.readline().startswith(f"http://127.0.0.1:{web_port}?url=")
+            with urlopen(f"http://127.0.0.1:{web_port}/") as page:
+                assert b"rerun" in page.read().lower()
+            seen = trace.read(run.folder).end_s
+            eventually(lambda: trace.read(run.folder).end_s > seen + 0.5, "the run stands")
+        finally:
+            viewer.kill()
+            viewer.wait()
+        assert run.launcher.wait(60.0) == 0
+        assert run.summary()["outcome"] == "goal_reached"
+        assert run.summary()["recording"]["dropped"] == 0
+
+
+def free_port() -> int:
+    with socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
 
 def test_what_is_not_there_is_said_in_one_line() -> None:
