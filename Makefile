@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-hosts test-hosts-short test-campaign lint bench model planted clean setup
+.PHONY: demo test test-hosts test-hosts-short test-campaign lint bench model planted pages clean setup
 
 setup: $(STAMP)
 
@@ -50,6 +50,11 @@ model: $(STAMP)
 # Planted bugs: which invariant falls after how many schedules of faults; minutes.
 planted: $(STAMP)
 	$(BIN)/python -m tests.protocol.hunt
+
+# The table of a scenario's keys, from the types, to the end of its page.
+pages: $(STAMP)
+	sed -i '/^| key | type /,$$d' world/SCENARIO.md
+	$(BIN)/lfa schema --markdown >> world/SCENARIO.md
 
 clean:
 	rm -rf $(VENV) runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

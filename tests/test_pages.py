@@ -97,5 +97,5 @@ def test_the_pages_sensor_is_its_own_source_of_chance() -> None:
 
 def test_the_table_of_keys_is_the_one_that_the_types_give() -> None:
     assert SCENARIO.partition("# Every key")[2].strip().endswith(schema.table().strip()), (
-        "lfa schema --markdown > the end of world/SCENARIO.md"
+        "keys have changed: make pages"
     )
