@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import nan
 
 import numpy as np
@@ -37,8 +38,10 @@ def bearings_explained(s: Subject) -> Measured:
 def after_switch(s: Subject) -> Measured:
     """The longest time from a role switch until a follower's bearing is back, or something else disturbs it."""
     worst, note = nan, "no role switch in this run"
-    for reign in s.run.reigns[1:]:
+    for before, reign in pairwise(s.run.reigns):
         for robot, e in s.run.errors.items():
+            if robot == before.robot_id:  # it comes back at the tail when it can: a rejoin
+                continue
             after = (e.t >= reign.from_s) & (e.t <= _undisturbed_until(s, robot, reign.from_s))
             off = after & (np.abs(e.bearing) >= spikes.BASE_RAD)
             if not after.any():
