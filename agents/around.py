@@ -14,10 +14,12 @@ from agents.ground import Ground
 from agents.perception import Point, Surroundings
 from agents.strategy import Thing
 from protocol.geometry import Pose2D, Twist, along_arc
-from protocol.messages import GroundProfile, LaserScan, ObstacleNote
+from protocol.messages import GroundProfile, LaserScan
 from protocol.mission import Limits
 
 LOOK_M = 2.0
+TRAP_M = 0.8
+"""Radius of the place in which a leader got stuck."""
 MATE_M = 0.6
 """A thing nearer than this to where a team-mate should be is that team-mate: the table's rows are half a second old."""
 OWN_M = 0.15
@@ -48,9 +50,9 @@ class Around:
         """Take a look at the floor ahead, made at `pose`."""
         self.ground.profile(profile, pose, now)
 
-    def avoid_trap(self, note: ObstacleNote, now: float) -> None:
-        """Keep out of a place in which another robot got stuck."""
-        self.ground.bar_circle(note.x, note.y, note.radius_m, "wall", now)
+    def avoid_trap(self, x: float, y: float, now: float) -> None:
+        """Keep out of a place in which a robot got stuck."""
+        self.ground.bar_circle(x, y, TRAP_M, "wall", now)
 
     def points(self, pose: Pose2D) -> list[Point]:
         """What bars the way near `pose`, in `base_link`."""

@@ -11,6 +11,9 @@ from protocol.messages import Delay, ObstacleNote, Sensors, TableRow
 from protocol.topics import TOPIC
 
 ROBOTS_MAX = 512
+ROW_S_MIN = 0.05
+GOES_ON_S = 0.6
+"""A robot is taken to go on as it went for so long after its last row."""
 TOLD_S = 1.0
 """What another robot saw moving is believed so long."""
 
@@ -24,6 +27,8 @@ class Beliefs:
         self.rows_heard = self.rows_lost = 0
         """Of the table, over all robots: a gap in a sender's numbers is rows that never came. How the radio is."""
         self._table: dict[int, tuple[TableRow, float]] = {}
+        self._velocity: dict[int, tuple[float, float]] = {}
+        """From one row to the next, in `map`."""
         self._clocks: dict[int, ClockOffset] = {}
         self._told: dict[int, tuple[ObstacleNote, float]] = {}
 
@@ -39,7 +44,10 @@ class Beliefs:
             return
         if known is None or known[0].header.incarnation != row.header.incarnation:
             self._clocks[robot] = ClockOffset()
+            self._velocity[robot] = (0.0, 0.0)
         else:
+            dt = max(row.header.stamp - known[0].header.stamp, ROW_S_MIN)
+            self._velocity[robot] = ((row.x - known[0].x) / dt, (row.y - known[0].y) / dt)
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
         self._table[robot] = (row, at)
@@ -49,12 +57,12 @@ class Beliefs:
         return self.sensors if now - self.sensors_at <= (TOPIC["sensors"].timeout_s or 0.0) else None
 
     def pose_of(self, robot: int, now: float) -> Pose2D | None:
-        """Last known place of `robot` in `map`, None when it is stale."""
+        """Where `robot` is in `map`: its last place, and on from there for a while; None when that is stale."""
         known = self._table.get(robot)
         if known is None or now - known[1] > (TOPIC["table"].timeout_s or 0.0):
             return None
-        row = known[0]
-        return Pose2D(row.x, row.y, row.theta)
+        row, (vx, vy), later = known[0], self._velocity[robot], min(now - known[1], GOES_ON_S)
+        return Pose2D(row.x + vx * later, row.y + vy * later, row.theta)
 
     def stuck(self, robot: int, now: float) -> bool:
         """Whether `robot` says that it is stuck; what it said long ago does not count."""
@@ -72,14 +80,15 @@ class Beliefs:
             self._told[robot] = (note, at)
 
     def moving(self, seen: list[Feature], here: Pose2D, now: float) -> list[Feature]:
-        """`seen`, and what others saw moving elsewhere, as of `now`; not what is where this robot itself is."""
+        """`seen`, and what others saw moving elsewhere, as of `now`; not what is where a robot is."""
         known = list(seen)
         for note, at in self._told.values():
             if now - at <= TOLD_S:
                 vx, vy = note.twist_map
                 x, y = note.x + vx * (now - at), note.y + vy * (now - at)
-                own = hypot(x - here.x, y - here.y) < SAME_M
-                if not own and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
+                robots = (here, *(self.pose_of(robot, now) for robot in self._table))
+                ours = any(p is not None and hypot(x - p.x, y - p.y) < SAME_M for p in robots)
+                if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
                     known.append(Feature("moving", x, y, note.radius_m, vx, vy))
         return known
 

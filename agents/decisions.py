@@ -27,6 +27,8 @@ class Situation(Struct, frozen=True):
     left_m: float = inf
     right_m: float = inf
     rear_m: float = inf
+    back_m: float = inf
+    """How far it could back off straight."""
     closest_m: float = inf
     """Closest approach predicted, of what moves."""
     crept: bool = False
@@ -74,7 +76,7 @@ TABLE: tuple[Row, ...] = (
     Row("moving", "it comes too near", lambda s: s.closest_m < 0.6, "give_way", MOTION),
     Row("wall", "a side is free", lambda s: _turns(s) and _beside(s), "aside", ANGLE),
     Row("wall", "both sides barred", lambda s: _turns(s) and _behind(s), "u_turn", ANGLE),
-    Row("wall", "too near to turn", lambda s: _behind(s), "back", ANGLE),
+    Row("wall", "too near to turn", lambda s: not _turns(s) and s.back_m >= s.swing_m, "back", ANGLE),
     Row("ditch", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
     Row("ditch", "a side is free", _beside, "aside", ANGLE),
     Row("ditch", "both sides barred", _behind, "u_turn", ANGLE),

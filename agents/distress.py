@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import floor, inf
 
+from agents.around import TRAP_M
 from agents.beliefs import Beliefs
 from agents.driver import Driver
 from agents.stuck import POSE_LOST
@@ -20,8 +21,8 @@ from protocol.mission import Mission
 
 HANDOVER_S = 2.0
 """At least between two hand-overs that a stuck leader asks for."""
-TRAP_M = 0.8
-"""Radius of the place that a stuck leader tells the others to keep out of."""
+NEWS_S = 1.0
+"""Within this a new leader has heard that the one before it is stuck."""
 PLACE_M = 1.0
 """Side of the cell within which being stuck twice is being stuck in the same place."""
 
@@ -38,6 +39,9 @@ class Distress:
         self._failed = False
         self._next_handover = 0.0
         self._given_up: list[tuple[int, int]] = []
+        self._led_before: int | None = None
+        """Who gave the lease away, until it is out of its plight."""
+        self._reign_from = 0.0
 
     def step(self, role: Role, pose: Pose2D, lease: Lease, driver: Driver, now: float) -> bool:
         """Say what has changed. True when the lease is to be handed over now."""
@@ -46,6 +50,10 @@ class Distress:
             self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
         if role is not Role.LEADER:
             lease.left_out = frozenset()
+            self._led_before = lease.chain[0] if lease.chain else None
+            self._reign_from = now
+            if self._id not in lease.chain:
+                driver.back_out(pose)
             return False
         lease.left_out = self._left_out(lease, driver, now)
         failure = None if driver.explore is None else driver.explore.failure
@@ -54,9 +62,13 @@ class Distress:
         return driver.stuck is not None and now >= self._next_handover and self._gives_up(pose, lease, driver, now)
 
     def _left_out(self, lease: Lease, driver: Driver, now: float) -> frozenset[int]:
-        """The stuck ones that are out stay out; those within go once the leader has waited for them."""
-        within = () if driver.leading.waited_out else lease.chain
-        stuck = {robot for robot in self._robots if robot not in within and self._beliefs.stuck(robot, now)}
+        """The stuck ones that are out stay out, and so does who gave the lease away; the others that are stuck go once
+        the leader has waited for them."""
+        before = self._led_before
+        if before is not None and now >= self._reign_from + NEWS_S and not self._beliefs.stuck(before, now):
+            self._led_before = None
+        waited_for = () if driver.leading.waited_out else [robot for robot in lease.chain if robot != self._led_before]
+        stuck = {robot for robot in self._robots if robot not in waited_for and self._beliefs.stuck(robot, now)}
         for robot in stuck & set(lease.chain) - lease.left_out:
             self._event("left_out", now, lease, {"robot_left": robot})
         return frozenset(stuck)
@@ -75,6 +87,7 @@ class Distress:
         self._given_up.append(place)
         header = self._voice.header("obstacles", now)
         self._voice.say("obstacles", ObstacleNote(header, "trap", pose.x, pose.y, TRAP_M))
+        driver.back_out(pose)
         return True
 
     def _fail(self, reason: str, lease: Lease, now: float) -> None:

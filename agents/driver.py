@@ -6,7 +6,7 @@ knows of terms or keys.
 
 from __future__ import annotations
 
-from math import hypot
+from math import hypot, inf, pi
 from typing import TYPE_CHECKING
 
 from agents.around import Around, resting
@@ -21,6 +21,7 @@ from agents.leading import LEADER_OMEGA_MAX_RADPS, Leadership
 from agents.motion import Lead, in_base
 from agents.perception import Point, without
 from agents.predecessor import Predecessor
+from agents.retreat import Retreat
 from agents.safety import safe
 from agents.strategy import Decision, Detour
 from agents.stuck import Plight
@@ -59,6 +60,7 @@ class Driver:
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing()
         self._plight = Plight(again=mission.leading.motion != "explore")
+        self._retreat = Retreat()
         self._role = Role.WAITING
         self._last = STILL
         self._driven_at: float | None = None
@@ -112,7 +114,13 @@ class Driver:
 
     def avoid_trap(self, note: ObstacleNote, now: float) -> None:
         """Keep out of a place in which another robot got stuck."""
-        self._around.avoid_trap(note, now)
+        self._around.avoid_trap(note.x, note.y, now)
+
+    def back_out(self, pose: Pose2D) -> None:
+        """Leave this place, in which the robot is stuck, the way that it came."""
+        if self.stuck is not None and not self._retreat.under_way:
+            self._retreat.begin(pose)
+            self._plight.backing_out = True
 
     def met(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
         """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
@@ -143,11 +151,14 @@ class Driver:
             if self._steps % TRACK_EVERY == 0:
                 self.lead.track(pose)
             wanted = self._follow(still, pose, twist, dt, now)
+            wanted = self._back_out(points, pose, wanted, now) if self._retreat.under_way else wanted
         else:
             wanted = STILL
         if role is not Role.WAITING:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
             wanted = self._around.ground.cross(wanted, self._mission.radius_m, now)
+        if not self._retreat.under_way:
+            self._retreat.keep(pose)
         self._watch(role, pose, wanted, now)
         limits = self._mission.limits
         self._last = safe(wanted, self._last, points, self._mission.radius_m, limits, dt)
@@ -200,6 +211,19 @@ class Driver:
         return self._detour.steer(
             points, target, wanted, speed, now, lambda free_m: self._around.thing(pose, wanted, free_m, now)
         )
+
+    def _back_out(self, points: list[Point], pose: Pose2D, wanted: Twist, now: float) -> Twist:
+        """Backwards out of a trap, which is kept out of from then on; `wanted` once that is done."""
+        twist = self._retreat.step(points, pose, self._mission.radius_m)
+        if twist is not None:
+            self._detour.decision = Decision("back" if twist.linear_x else "blocked", inf, pi, "wall", "out of a trap")
+            return twist
+        self._plight.out()
+        self._detour.decision = None
+        self.follower.rejoin(pose, self._last)
+        if self._retreat.trap is not None:
+            self._around.avoid_trap(*self._retreat.trap, now)
+        return wanted
 
     def _follow(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
         sighting = None if self.predecessor is None else self.predecessor.at(now)

@@ -19,6 +19,8 @@ WALL_M = 1.0
 FLAT_WALL_M = 0.45
 FLAT_SHARE = 0.1
 """So is what is wider than this and bulges by less than this share of its width."""
+SMALL_M = 0.08
+"""Of less than this radius only a piece is seen."""
 SAME_M = 0.5
 """A thing is taken for the one that was seen nearer than this to where it should be by now."""
 FORGET_S = 1.0
@@ -29,8 +31,8 @@ ANCHOR_S = 1.0
 EDGE_M = 0.1
 """What reaches to within this of the end of sight is seen in part only: its centre would seem to move."""
 TOUCH_M = 0.35
-HIDDEN_RAD = 0.06
-"""Two neighbouring beams of a scan of 180 are half of this apart."""
+HIDDEN_RAD = 0.09
+"""Neighbouring beams of a scan of 180 are less than half of this apart."""
 TRACKS_MAX = 64
 
 
@@ -93,8 +95,9 @@ class Tracker:
                 hypot(x - mx, y - my) < mate_m or _touches(cluster, mx, my) for mx, my in mates
             ):
                 continue
-            elif not whole:  # what comes out from behind another thing would seem to move
-                self._seen.append((cluster, Feature("stationary", x, y, radius_m, whole=False)))
+            elif not whole or radius_m < SMALL_M or _flat(cluster):
+                # What comes out from behind another thing, and a wall that is seen end on, would seem to move.
+                self._seen.append((cluster, Feature("stationary", x, y, radius_m, whole=whole)))
             else:
                 track = self._follow(x, y, radius_m, now)
                 if track is not None:

@@ -64,8 +64,8 @@ class Leadership:
 
     @property
     def waiting(self) -> bool:
-        """For its team, standing or slowly."""
-        return self._waiting_since is not None
+        """It stands, for its team to come up."""
+        return self._waiting_since is not None and not self.waited_out
 
     def begin(self, pose: Pose2D, now: float) -> None:
         """Leadership starts here."""

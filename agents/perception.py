@@ -94,11 +94,3 @@ def _bent(x: float, y: float, from_center: float, radius: float, half_width_m: f
     reach = (radius * radius + from_center * from_center - half_width_m * half_width_m) / (2.0 * radius * from_center)
     touching = acos(max(-1.0, min(1.0, reach)))
     return radius * ((atan2(x, radius - y) - touching) % (2.0 * pi))
-
-
-def sides(points: Sequence[Point]) -> tuple[float, float, float]:
-    """Clear range [m] to the left, to the right and behind: the nearest point within 45 degrees of each."""
-    left = min((y for x, y in points if y > abs(x)), default=inf)
-    right = min((-y for x, y in points if -y > abs(x)), default=inf)
-    rear = min((-x for x, y in points if -x > abs(y)), default=inf)
-    return left, right, rear

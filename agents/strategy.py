@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from agents.config import CONTROL_PERIOD_S
 from agents.decisions import Class, Row, Situation, decide
-from agents.perception import Point, free_along, sides
+from agents.perception import Point, free_along
 from protocol.geometry import STILL, Twist, wrap
 from protocol.mission import Limits
 
@@ -93,6 +93,7 @@ class Detour:
         self._clear_since: float | None = None
         self._since = -inf
         self._crept_s = 0.0
+        self._open_since: float | None = None
 
     def steer(
         self,
@@ -121,7 +122,7 @@ class Detour:
 
     def _blocked(self, points: Sequence[Point], wanted: Twist) -> float | None:
         """The free way along `wanted` when it is too short, None when it is long enough."""
-        v = wanted.linear_x
+        v = abs(wanted.linear_x)
         if v <= 0.01:
             return None
         free_m = free_along(points, wanted, self._radius_m + NARROW_M)
@@ -155,20 +156,23 @@ class Detour:
             case "u_turn" if (rear := openings.rear or self._rear(points, towards, reach)) is not None:
                 bearing = rear
                 twist = self._towards(points, bearing, speed_mps)
-            case "back" | "u_turn" if free_along(points, BACK, self._radius_m + SKIN_M) > SKIN_M:
-                action, bearing, twist = "back", pi, BACK
+            case "back":
+                bearing, twist = pi, BACK
             case "creep":
                 bearing = 0.0
                 twist = Twist(CREEP_MPS, 0.0) if free_m > CREEP_FREE_M else STILL
                 self._crept_s += CONTROL_PERIOD_S
             case _:
                 action = "blocked"
+        if action == "blocked":
+            self._open_since = None
+        elif self._barred_lately(now):
+            action, twist = "blocked", STILL
         self._say(action, free_m, bearing, row if action != "blocked" else None, now)
         return twist
 
     def _row(self, points: Sequence[Point], openings: _Openings, free_m: float) -> Row | None:
         """The table's row for what was met: an opening is as wide as the robot needs, whatever lies beside it."""
-        rear_m = sides(points)[2]
         ahead_m = self._radius_m + min(free_m, free_along(points, AHEAD, self._radius_m))
         kind = "stationary" if self._thing.kind == "moving" else self._thing.kind
         return decide(
@@ -178,7 +182,8 @@ class Detour:
                 self._thing.width_m,
                 left_m=inf if openings.left is not None else 0.0,
                 right_m=inf if openings.right is not None else 0.0,
-                rear_m=inf if openings.rear is not None else rear_m - self._radius_m,
+                rear_m=inf if openings.rear is not None else 0.0,
+                back_m=free_along(points, BACK, self._radius_m + SKIN_M),
                 crept=self._crept_s >= CREEP_S,
                 swing_m=self._radius_m + SWING_M,
             )
@@ -214,6 +219,15 @@ class Detour:
         if side != self._side and not (held and self._side != 0.0):
             self._side, self._side_at = side, now
         return self._side
+
+    def _barred_lately(self, now: float) -> bool:
+        """It was blocked, and a way out has not been open for long enough to be more than noise."""
+        if self.decision is None or self.decision.action != "blocked":
+            self._open_since = None
+            return False
+        if self._open_since is None:
+            self._open_since = now
+        return now - self._open_since < CLEAR_S
 
     def _say(self, action: str, free_m: float, bearing: float, row: Row | None, now: float) -> None:
         """What is logged keeps its name for a while, unless there is no way at all."""

@@ -11,6 +11,7 @@ STILL_S, STILL_M = 3.0, 0.10
 WANTED_MPS = 0.05
 BLOCKED_S = 1.5
 TURNS, TURNS_S = 3, 10.0
+BACK_S = 5.0
 CELL_M, CELL_ENTRIES, CELL_S = 0.5, 3, 30.0
 WAITING_S = 10.0
 POSE_LOST_S = 1.0
@@ -31,15 +32,19 @@ class Plight:
         self._at: Pose2D | None = None
         self._held_at = 0.0
         self.reason: str | None = None
+        self.backing_out = False
+        """It stays stuck until it is out of the place."""
 
     def begin(self, *, leading: bool) -> None:
         """A new role. Whoever leads starts anew; who was stuck as leader is so still as a follower."""
         self._stuck.reset()
         if leading:
-            self.reason = None
+            self.out()
 
     def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> None:
         """One control step on the way; arguments as of `Stuck.watch`."""
+        if self.backing_out:
+            return
         held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
         if held is None:
             self._ease(pose, now)
@@ -53,13 +58,17 @@ class Plight:
         self._stuck.reset()
         self._ease(pose, now)
 
+    def out(self) -> None:
+        """It has left the place."""
+        self.reason, self._at, self.backing_out = None, None, False
+        self._stuck.reset()
+
     def _ease(self, pose: Pose2D, now: float) -> None:
-        if self.reason is None or self._at is None:
+        if self.reason is None or self._at is None or self.backing_out:
             return
         freed = hypot(pose.x - self._at.x, pose.y - self._at.y) >= FREED_M
         if freed or now - self._held_at >= CALM_S or self.reason == POSE_LOST:
-            self.reason, self._at = None, None
-            self._stuck.reset()
+            self.out()
 
 
 class Stuck:
@@ -89,6 +98,8 @@ class Stuck:
             return "S4: waited too long for what moves"
         if action == "blocked" and now - self._since > BLOCKED_S:
             return "S2: blocked on all sides"
+        if action == "back" and now - self._since > BACK_S:
+            return "S3: backs off without end"
         if self._again and len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
             return "S3: turned round again and again"
         if self._again and self._entries_of_cell(now) >= CELL_ENTRIES:
@@ -120,4 +131,6 @@ class Stuck:
         while self._moved[0][0] < now - STILL_S:
             self._moved.popleft()
         first_at, x, y = self._moved[0]
-        return now - first_at >= STILL_S - 0.1 and hypot(pose.x - x, pose.y - y) < STILL_M
+        if now - first_at < STILL_S - 0.1 or hypot(pose.x - x, pose.y - y) >= STILL_M:
+            return False
+        return all(hypot(px - x, py - y) < STILL_M for _, px, py in self._moved)  # nor went there and back

@@ -1,5 +1,6 @@
 """What a robot has heard of others is fresh, stale, or not believed."""
 
+import pytest
 from msgspec.structs import replace
 
 from agents.beliefs import TOLD_S, Beliefs
@@ -25,6 +26,15 @@ def test_the_newest_row_of_the_newest_life_counts() -> None:
     pose = beliefs.pose_of(2, 1.0)
     assert pose is not None
     assert pose.x == 5.0
+
+
+def test_a_robot_is_where_it_went_on_to_since_its_last_row() -> None:
+    beliefs = Beliefs()
+    for seq in (1, 2):
+        beliefs.hear_row(2, row(seq, 0.05 * seq), 1.0 + 0.1 * seq)  # 0.5 m/s
+    pose = beliefs.pose_of(2, 1.6)
+    assert pose is not None
+    assert pose.x == pytest.approx(0.1 + 0.5 * 0.4)
 
 
 def test_a_stale_row_is_no_place() -> None:

@@ -12,7 +12,7 @@ CASES = [
     (S("moving", 2.0, closest_m=0.5), "give_way"),
     (S("wall", 1.0, left_m=0.6, right_m=0.1), "aside"),
     (S("wall", 1.0, left_m=0.1, right_m=0.1, rear_m=1.0), "u_turn"),
-    (S("wall", 0.1, left_m=1.0, rear_m=1.0), "back"),
+    (S("wall", 0.1, left_m=1.0, back_m=1.0), "back"),
     (S("ditch", 1.0, 0.04, crossable=True), "overcome"),
     (S("ditch", 1.0, 0.4, left_m=1.0), "aside"),
     (S("ditch", 1.0, 0.4, left_m=0.1, right_m=0.1), "u_turn"),
@@ -48,4 +48,4 @@ def test_obstacles_update_speed_and_position_and_the_environment_the_angle() -> 
 
 
 def test_who_is_barred_on_all_sides_has_no_row() -> None:
-    assert decide(S("wall", 0.1, left_m=0.1, right_m=0.1, rear_m=0.1)) is None
+    assert decide(S("wall", 0.1, left_m=0.1, right_m=0.1, rear_m=0.1, back_m=0.1)) is None
