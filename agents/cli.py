@@ -6,6 +6,7 @@ The command line is read by argparse: the library that reads `lfa`'s own would b
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import NoReturn
@@ -42,7 +43,8 @@ def start(arguments: argparse.Namespace) -> int:
     node = _node(arguments.role, arguments.id, fleet, wall_ms, mission)
     known = None if arguments.keys is None else credentials(arguments.keys, node.name, wall_ms)
     lease_ms = LINK_LEASES_MS[arguments.link]
-    options = Options(fleet, endpoint, arguments.journal, arguments.faults, lease_ms, known)
+    notify = os.environ.get("NOTIFY_SOCKET", "")
+    options = Options(fleet, endpoint, arguments.journal, arguments.faults, lease_ms, known, notify)
     return run([node], options, wall_ms)
 
 

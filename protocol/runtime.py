@@ -25,6 +25,7 @@ from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, OperatorNote, decode
 from protocol.mission import Refused
 from protocol.node import Local, Node, Stop, Vitals
+from protocol.notify import Notify
 from protocol.radio import WEATHER, Reception
 from protocol.topics import OPERATOR_NAME, TOPIC, address, key, matches
 from protocol.zenoh_bus import LINK_LEASE_MS, RouterAbsent, ZenohBus
@@ -48,6 +49,8 @@ class Options(Struct, frozen=True):
     """Obey an operator's weather: bad radio, made at the receiver."""
     lease_ms: int = LINK_LEASE_MS
     credentials: Credentials | None = None
+    notify: str = ""
+    """Where systemd listens (NOTIFY_SOCKET); empty: nowhere."""
 
 
 class _Seat:
@@ -138,7 +141,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             _refuse_twin(bus, options, node, dead)
         gc.collect()
         gc.freeze()
-        return _loop(seats, wake, stop)
+        return _loop(seats, wake, stop, Notify(options.notify))
     finally:
         for seat in seats:
             seat.bus.close()
@@ -164,8 +167,9 @@ def connect(options: Options, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
     return None
 
 
-def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping) -> int:
+def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping, notify: Notify) -> int:
     began = now = clock.now()
+    notify.ready()
     stop_by = None
     vitals = _VitalSigns(now)
     while True:
@@ -175,6 +179,7 @@ def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping) -> int:
         for seat in seats:
             vitals.lag(min(seat.step(now), now - began))  # a first deadline lies anywhere in the past
         if vitals.due(now):
+            notify.alive()
             for seat in seats:
                 seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable), now)
         if stop.told and stop_by is None:

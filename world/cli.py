@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
@@ -47,7 +48,8 @@ def start(
     wall_ms = clock.wall_ms()
     known_as = None if keys is None else credentials(keys, WORLD_NAME, wall_ms)
     endpoint = connect or default_endpoint()
-    options = Options(_fleet(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as)
+    notify = os.environ.get("NOTIFY_SOCKET", "")
+    options = Options(_fleet(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as, notify)
     known = None if resume is None else memory.read(resume)
     placed = drawn if known is None else memory.resumed(drawn, known)
     world = World(fleet, placed, seed, wall_ms, start_at=clock.now(), memory=known)

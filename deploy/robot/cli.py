@@ -6,6 +6,7 @@ Like an agent it needs the base install only.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import NoReturn
@@ -43,7 +44,16 @@ def start(arguments: argparse.Namespace) -> int:
     driver = Driver(arguments.fleet, arguments.id, wall_ms, make_base)
     known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
     endpoint = arguments.connect or default_endpoint()
-    options = Options(arguments.fleet, endpoint, None, False, LINK_LEASES_MS[arguments.link], known)
+    notify = os.environ.get("NOTIFY_SOCKET", "")
+    options = Options(
+        arguments.fleet,
+        endpoint,
+        None,
+        False,
+        LINK_LEASES_MS[arguments.link],
+        known,
+        notify,
+    )
     return run([driver], options, wall_ms)
 
 

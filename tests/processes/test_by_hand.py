@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -45,8 +47,11 @@ class Terminals:
         command = [sys.executable, "-c", "from deploy.cli import main; main()", *arguments, *self.team()]
         return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
-    def agent(self, robot_id: int, role: str = "follower") -> subprocess.Popen[str]:
-        return self.start("agents.cli", "--role", role, "--id", str(robot_id), *self.team())
+    def agent(
+        self, robot_id: int, role: str = "follower", environment: Mapping[str, str] | None = None
+    ) -> subprocess.Popen[str]:
+        arguments = ("agents.cli", "--role", role, "--id", str(robot_id), *self.team())
+        return self.start(*arguments, environment=environment)
 
     def look_on(self) -> None:
         self._bus = ZenohBus(self.endpoint, self._inbox)
@@ -68,9 +73,9 @@ class Terminals:
     def team(self) -> tuple[str, ...]:
         return ("--fleet", FLEET, "--connect", self.endpoint)
 
-    def start(self, *arguments: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", *arguments]
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def start(self, *arguments: str, environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
+        command, told = [sys.executable, "-m", *arguments], {**os.environ, **(environment or {})}
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=told)
         self._children.append(child)
         return child
 
@@ -173,3 +178,16 @@ def test_a_fleet_goes_on_without_robots_that_the_operator_declares_lost(terminal
     assert (done.returncode, done.stdout) == (0, "forgotten: robot2, robot3, robot4; robot1 leads\n"), done.stderr
     again = terminals.lfa("forget", "3")
     assert again.stdout == "robot1 leads: who is silent leaves its voters without being forgotten\n"
+
+
+def test_systemd_hears_when_an_agent_is_ready_and_that_its_loop_turns(terminals: Terminals) -> None:
+    terminals.router()
+    with (
+        tempfile.TemporaryDirectory(prefix="lfa-") as folder,
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd,
+    ):
+        systemd.bind(f"{folder}/notify")
+        systemd.settimeout(20.0)
+        terminals.agent(1, environment={"NOTIFY_SOCKET": f"{folder}/notify"})
+        heard = [systemd.recv(64) for _ in range(3)]
+    assert heard == [b"READY=1", b"WATCHDOG=1", b"WATCHDOG=1"]
