@@ -73,9 +73,7 @@ class Faults:
                 arena.exit(target)
                 arena.at(min(lasts + EXIT_S, FAULTS_UNTIL_S), self._start, target)
             case "clock_step" if target is not None:
-                arena.step_wall(target, fault.value)
-                arena.kill(target)
-                arena.at(lasts, self._start, target)
+                self._step_wall(fault, target, lasts)
             case "pause" if target is not None:
                 arena.pause(target)
                 arena.at(lasts, arena.resume, target, fault.value > 0.0)
@@ -121,6 +119,12 @@ class Faults:
     def _start(self, target: int) -> None:
         if not self.arena.processes[target].alive:
             self.arena.start(target)
+
+    def _step_wall(self, fault: Fault, target: int, lasts: float) -> None:
+        self.arena.step_wall(target, fault.value)
+        if fault.duration_s > 0.0:
+            self.arena.kill(target)
+            self.arena.at(lasts, self._start, target)
 
     def _start_gateway(self, robot_id: int) -> None:
         if not self.arena.gateways[robot_id].alive:

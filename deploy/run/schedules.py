@@ -80,7 +80,7 @@ KINDS: tuple[str, ...] = (
     "witness",
 )
 """Kinds that a schedule may draw; `burst` is a short total loss, `gateway` and `witness` are a crash with a restart,
-`clock_step` is a restart at which the wall clock is wrong (no other clock can be stepped)."""
+`clock_step` sets a wall clock wrong (no other clock can be stepped), and two times in three the process restarts."""
 
 
 def draw(seed: int) -> Schedule:

@@ -224,9 +224,10 @@ def _deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
     honest = Lease.next_deadline
 
     def next_deadline(self: Lease) -> float:
-        if self._holder is None or self._candidate is not None:
+        if self._holder is None:
             return honest(self)
-        return min(self._hello_at, self._release_at, self._holder.next_round_at)
+        asking = self._holder.next_round_at if self._candidate is None else self._candidate.deadline
+        return min(self._hello_at, self._release_at, asking)
 
     patch.setattr(Lease, "next_deadline", next_deadline)
     patch.setattr(Lease, "_expire", lambda self, now, effects: None)
