@@ -41,16 +41,16 @@ from protocol.messages import (
     Term,
 )
 from protocol.mission import WITNESS_ID, Mission, robot_name
+from protocol.peers import Peers
 from protocol.quorum import electors
-from protocol.timing import CLOCK_RATE_ERROR, Timing
+from protocol.stopping import SLOWEST, Stopping
+from protocol.timing import Timing
 
 __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Send", "StepDown"]
 
 NEVER = float("inf")
 COLD_START_S = 3.0
 """How long a cold start waits for everybody where `cold_start = "majority"` (E19)."""
-SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
-"""How many seconds of the fastest clock one second of the slowest may last."""
 HELLO_HEARTBEATS = 3
 FORGET_GRANTS = 3
 """How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
@@ -95,23 +95,14 @@ class Lease:
         self._holder: Holder | None = None
         self._seen = Term(floor)
         """The highest term heard of."""
-        self._down: dict[int, tuple[int, float]] = {}
-        """Of each robot whose token vanished: the incarnation that it vanished of, and when."""
-        self._lives: dict[int, int] = {me.id: me.incarnation}
-        """Of each id the newest life that was heard."""
+        self._peers = Peers(me, timing.heartbeat_s)
+        self._stopping = Stopping(timing.deadman_s)
         self._pending: tuple[Member, Prepare] | None = None
         """The last PREPARE refused because of a bond."""
         self._leader_until = now
         self._hello_at = now
         self._elect_at = NEVER
         self._elect_base = now
-        self._closing = False
-        self._commanded_at = float("-inf")
-        self._unreleased: Term | None = None
-        """The term given up whose RELEASE waits for the own gateway, until `_release_at` at most."""
-        self._release_at = NEVER
-        self._gift: Propose | None = None
-        """What is handed over instead of a RELEASE, once we have stopped."""
         self._early: list[tuple[Member, Grant]] = []
         """Grants of a term that we do not know yet."""
         self._elect_after(self._acceptor.silent_until)
@@ -137,7 +128,7 @@ class Lease:
     @property
     def missing(self) -> tuple[int, ...]:
         """Ids that the first election of the fleet still waits for (E18); empty once somebody has led."""
-        return tuple(i for i in self._universe if i not in self._lives) if is_first(self.config) else ()
+        return tuple(i for i in self._universe if not self._peers.knows(i)) if is_first(self.config) else ()
 
     def may_command(self, now: float) -> bool:
         """Leading, and `now` is before the lease's expiry (I1, I2)."""
@@ -145,7 +136,7 @@ class Lease:
 
     def commanded(self, now: float) -> None:
         """A command as leader was just sent."""
-        self._commanded_at = now
+        self._stopping.commanded_at = now
 
     # --- what comes in -----------------------------------------------------------------------------------------
 
@@ -156,7 +147,7 @@ class Lease:
         if not isinstance(body, Fenced):  # a gateway's incarnations are not its robot's
             if src.id == self.me.id:
                 return effects  # an echo of our own
-            self._heard(src, now)
+            self._peers.heard(src, now)
         match body:
             case Propose():
                 self._on_propose(src, body, now, effects)
@@ -182,7 +173,7 @@ class Lease:
         """A deadline passed."""
         effects: list[Effect] = []
         self._expire(now, effects)
-        if now >= self._release_at:
+        if now >= self._stopping.release_at:
             self._stopped(now, effects)
         if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
             self._reshape(now, effects)
@@ -194,7 +185,7 @@ class Lease:
             self._stand(now, effects)
         if now >= self._hello_at:
             self._hello_at = now + HELLO_HEARTBEATS * self._timing.heartbeat_s
-            if self._is_out(now) and not self._closing:
+            if self._is_out(now) and not self._stopping.closing:
                 effects.append(Send("all", Hello(None if is_first(self.config) else self.config.version)))
         if self.leader is not None and self._holder is None and now >= self._leader_until:
             self.leader = None
@@ -202,7 +193,7 @@ class Lease:
 
     def next_deadline(self) -> float:
         """When to tick next."""
-        at = min(self._hello_at, self._release_at)
+        at = min(self._hello_at, self._stopping.release_at)
         if self._holder is not None:
             at = min(at, _expiry(self._holder))
             if self._candidate is None:
@@ -220,10 +211,9 @@ class Lease:
         effects: list[Effect] = []
         self._expire(now, effects)
         if up:
-            if incarnation >= self._down.get(id, (0, now))[0]:
-                self._down.pop(id, None)
+            self._peers.appeared(id, incarnation)
         elif id != self.me.id:
-            self._down[id] = (max(incarnation, self._down.get(id, (0, now))[0]), now)
+            self._peers.vanished(id, incarnation, now)
             if self._holder is not None and self._candidate is None:
                 self._reshape(now, effects)
             elif self._holder is None:
@@ -247,11 +237,11 @@ class Lease:
     def request_release(self, now: float) -> list[Effect]:
         """Clean exit: stop leading, tell the voters; `released` turns true, at once if there is nothing to give up."""
         effects: list[Effect] = []
-        self._closing = True
+        self._stopping.closing = True
         self._elect_at = NEVER
         self._step_down(now, "released", effects)
         self._drop_candidate(now, effects)
-        self.released = self._unreleased is None
+        self.released = self._stopping.unreleased is None
         return effects
 
     def request_handover(self, now: float) -> list[Effect]:
@@ -279,7 +269,7 @@ class Lease:
 
     def _lives_on(self, lost: tuple[Member, ...]) -> bool:
         """One of these is this very process, or was heard in a later life."""
-        return any(m.id == self.me.id or self._lives.get(m.id, -1) > m.incarnation for m in lost)
+        return any(m.id == self.me.id or self._peers.is_superseded(m) for m in lost)
 
     # --- voting ------------------------------------------------------------------------------------------------
 
@@ -303,7 +293,7 @@ class Lease:
     def _stands_before(self, src: Member, body: Prepare) -> bool:
         """E5: in the first election of a fleet nobody promises to a candidate further back than itself."""
         first = is_first(self.config) and body.version == self.config.version and self.me.id in self._may_lead
-        return first and not self._closing and self._rank(self.me.id) < self._rank(src.id)
+        return first and not self._stopping.closing and self._rank(self.me.id) < self._rank(src.id)
 
     def _on_propose(self, src: Member, body: Propose, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.term)
@@ -343,22 +333,12 @@ class Lease:
     def _holder_gone(self) -> bool:
         """The token of the holder that this voter is bound to vanished."""
         bond = self._acceptor.bond
-        return bond is not None and bond.holder.incarnation <= self._down.get(bond.holder.id, (-1, 0.0))[0]
+        return bond is not None and self._peers.is_gone(bond.holder)
 
     def _answer_pending(self, now: float, effects: list[Effect]) -> None:
         pending, self._pending = self._pending, None
         if pending is not None:
             self._on_prepare(*pending, now, effects)
-
-    def _heard(self, src: Member, now: float) -> None:
-        """A life that still speaks two heartbeats after its token vanished is not dead; until then, last words."""
-        if src.incarnation > self._lives.get(src.id, -1):
-            self._lives[src.id] = src.incarnation
-        if src.id in self._down:
-            incarnation, since = self._down[src.id]
-            late = now - since > 2.0 * self._timing.heartbeat_s
-            if src.incarnation > incarnation or (src.incarnation == incarnation and late):
-                del self._down[src.id]
 
     def _yield_to(self, term: Term, now: float, effects: list[Effect]) -> None:
         """Whoever promises or grants a higher term gives up its own lower candidacy."""
@@ -369,16 +349,12 @@ class Lease:
     # --- standing for election ---------------------------------------------------------------------------------
 
     def _rank(self, robot_id: int) -> int:
-        return rank(self.config, robot_id, lambda other: other.id not in self._may_lead or self._is_down(other))
-
-    def _is_down(self, member: Member) -> bool:
-        """The token of this life, or of a later one, vanished."""
-        return member.id in self._down and self._down[member.id][0] >= member.incarnation
+        return rank(self.config, robot_id, lambda other: other.id not in self._may_lead or self._peers.is_gone(other))
 
     def _elect_after(self, at: float) -> None:
         """E6: stand for election once `at` has passed, each robot its rank later than the one before it."""
         self._elect_base = at
-        if self.me.id not in self._may_lead or self._closing:
+        if self.me.id not in self._may_lead or self._stopping.closing:
             self._elect_at = NEVER
             return
         # Who has no vote stands last: it is needed only when nobody who has one can lead.
@@ -440,7 +416,7 @@ class Lease:
             if lives:
                 config = of_full_house(self.config, self.me, candidate.term, lives)
             else:
-                config = led_by(self.config, self.me, candidate.term, self._is_down)
+                config = led_by(self.config, self.me, candidate.term, self._peers.is_gone)
             self._adopt(config, now, effects)
             self._send_round(candidate.holder, now, effects)
 
@@ -455,7 +431,7 @@ class Lease:
         return lives
 
     def _on_fenced(self, src: Member, body: Fenced, now: float, effects: list[Effect]) -> None:
-        if src.id == self.me.id and body.old == self._unreleased:
+        if src.id == self.me.id and body.old == self._stopping.unreleased:
             self._stopped(now, effects)
         candidate = self._candidate
         if candidate is not None and candidate.holder is None and body.term == candidate.term:
@@ -467,7 +443,7 @@ class Lease:
         candidate, self._candidate = self._candidate, None
         if candidate is None or candidate.holder is None or self._holder is not None:
             return
-        if now >= self._at_rest_at():
+        if now >= self._stopping.at_rest_at:
             self._acceptor.release(candidate.term)
             effects.append(Send("all", Release(candidate.term)))
 
@@ -535,7 +511,9 @@ class Lease:
                 self._reshape(now, effects)  # the joint config may have been accepted
         elif now < expiry:
             if self._candidate is not None and self._candidate.given:
-                self._adopt(led_by(self.config, self.me, holder.term, self._is_down, keep_leader=True), now, effects)
+                self._adopt(
+                    led_by(self.config, self.me, holder.term, self._peers.is_gone, keep_leader=True), now, effects
+                )
             self._candidate, self._holder = None, holder
             self.leader = self.me.id
             effects.append(BecomeLeader(holder.term, expiry))
@@ -546,14 +524,13 @@ class Lease:
         assert holder is not None
 
         def stays(member: Member, silence_s: float) -> bool:
-            superseded = self._lives.get(member.id, -1) > member.incarnation
-            return member == self.me or not (superseded or holder.silent(member, now, silence_s))
+            return member == self.me or not (self._peers.is_superseded(member) or holder.silent(member, now, silence_s))
 
         def out(member: Member) -> bool:
-            return self._is_down(member) or (member.id in self.left_out and member != self.me)
+            return self._peers.is_gone(member) or (member.id in self.left_out and member != self.me)
 
         here = [m for m in config.chain if not out(m) and stays(m, timing.chain_silence_s)]
-        asking = [m for m in holder.said_hello if not self._is_down(m) and stays(m, timing.chain_silence_s)]
+        asking = [m for m in holder.said_hello if not self._peers.is_gone(m) and stays(m, timing.chain_silence_s)]
         holder.said_hello.clear()
         chain = (*here, *(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here)) and not out(m)))
         kept = tuple(m for m in config.voters if stays(m, timing.remove_silence_s))
@@ -571,7 +548,7 @@ class Lease:
         """E9: whoever is out asks the leader; while nobody leads, it is told the newest config."""
         if self.leader is None and (body.version is None or body.version < self.config.version):
             effects.append(Send(robot_name(src.id), self._acceptor.refusal(NO_TERM, self.config, now)))
-        if self._holder is None or src.id not in self._universe or src.incarnation < self._lives[src.id]:
+        if self._holder is None or src.id not in self._universe or self._peers.is_superseded(src):
             return
         self._holder.heard_at[src] = now
         if src not in self._holder.said_hello:
@@ -595,20 +572,14 @@ class Lease:
         if holder is None:
             return
         self.leader = None
-        self._unreleased = holder.term
-        self._release_at = max(now, self._at_rest_at())
+        self._stopping.begin(holder.term, now)
         effects.append(StepDown(holder.term, cause))
         effects.append(Send(gateway_of(self.me.id), Fence(holder.term, below or _just_above(holder.term))))
 
-    def _at_rest_at(self) -> float:
-        """From when on no gateway obeys the last command sent as leader, by its age alone."""
-        return self._commanded_at + self._timing.deadman_s * SLOWEST
-
     def _stopped(self, now: float, effects: list[Effect]) -> None:
         """The own gateway refuses the term, or its last command is too old: RELEASE, or what was to be handed over."""
-        term, self._unreleased, self._release_at = self._unreleased, None, NEVER
-        gift, self._gift = self._gift, None
-        self.released = self._closing
+        term, gift = self._stopping.end()
+        self.released = self._stopping.closing
         if term is None:
             return
         own = None if gift is None else self._acceptor.propose(self.me, gift, self.config, now)
@@ -633,16 +604,17 @@ class Lease:
             life, nonce = successor
             term = Term(max(self._seen.n, holder.term.n) + 1, self.me.id, self.me.incarnation)
             self._seen = term
-            self._gift = Propose(term, self.config, 0, life, nonce=nonce)
+            self._stopping.gift = Propose(term, self.config, 0, life, nonce=nonce)
         self._drop_candidate(now, effects)
-        self._step_down(now, "handed_over", effects, None if self._gift is None else self._gift.term)
+        gift = self._stopping.gift
+        self._step_down(now, "handed_over", effects, None if gift is None else gift.term)
         self._elect_after(now + self._grant_s)
 
     def _successor(self, holder: Holder, now: float) -> tuple[Member, float] | None:
         """The first behind us that may lead and granted within t_chain: its life, and its clock's moment then."""
         for member in self.config.chain[1:]:
             nonce = holder.nonces.get(member)
-            fit = member.id in self._may_lead and member in self.config.voters and not self._is_down(member)
+            fit = member.id in self._may_lead and member in self.config.voters and not self._peers.is_gone(member)
             if fit and nonce is not None and not holder.silent(member, now, self._timing.chain_silence_s):
                 return member, nonce
         return None

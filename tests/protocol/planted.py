@@ -27,6 +27,7 @@ from protocol.gateway import Gateway
 from protocol.holder import Holder
 from protocol.lease import Lease
 from protocol.messages import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
+from protocol.stopping import Stopping
 from protocol.timing import Timing
 from tests.protocol import test_gateway, test_lease, test_usual_bugs
 
@@ -67,7 +68,7 @@ def _hint_taken_as_proof(patch: pytest.MonkeyPatch) -> None:
 
 
 def _release_before_the_stop_is_confirmed(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Lease, "_at_rest_at", lambda self: float("-inf"))
+    patch.setattr(Stopping, "at_rest_at", float("-inf"))
 
 
 def _released_term_granted_again(patch: pytest.MonkeyPatch) -> None:
@@ -227,7 +228,7 @@ def _deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
         if self._holder is None:
             return honest(self)
         asking = self._holder.next_round_at if self._candidate is None else self._candidate.deadline
-        return min(self._hello_at, self._release_at, asking)
+        return min(self._hello_at, self._stopping.release_at, asking)
 
     patch.setattr(Lease, "next_deadline", next_deadline)
     patch.setattr(Lease, "_expire", lambda self, now, effects: None)
@@ -248,10 +249,10 @@ def _hand_over_writes_a_config(patch: pytest.MonkeyPatch) -> None:
 
     def hand_over(self: Lease, holder: Holder, now: float, effects: list[Any]) -> None:
         honest(self, holder, now, effects)
-        gift = self._gift
+        gift = self._stopping.gift
         if gift is not None:
             written = protocol.membership.led_by(self.config, gift.holder, gift.term, lambda m: False, keep_leader=True)
-            self._gift = Propose(gift.term, written, gift.round, gift.holder, nonce=gift.nonce)
+            self._stopping.gift = Propose(gift.term, written, gift.round, gift.holder, nonce=gift.nonce)
 
     patch.setattr(Lease, "_hand_over", hand_over)
 
