@@ -10,18 +10,15 @@ from __future__ import annotations
 from protocol.acceptor import Acceptor
 from protocol.candidate import Candidate
 from protocol.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
+from protocol.election import Election
 from protocol.holder import Holder
 from protocol.membership import (
     VOTERS_MAX,
-    chosen,
     first_config,
     ids,
     is_first,
     led_by,
     of_full_house,
-    rank,
-    rewritten,
-    universe,
 )
 from protocol.messages import (
     NO_TERM,
@@ -43,17 +40,14 @@ from protocol.messages import (
 from protocol.mission import WITNESS_ID, Mission, robot_name
 from protocol.peers import Peers
 from protocol.quorum import electors
+from protocol.reshape import Policy, reshaped
 from protocol.stopping import SLOWEST, Stopping
 from protocol.timing import Timing
 
 __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Send", "StepDown"]
 
 NEVER = float("inf")
-COLD_START_S = 3.0
-"""How long a cold start waits for everybody where `cold_start = "majority"` (E19)."""
 HELLO_HEARTBEATS = 3
-FORGET_GRANTS = 3
-"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
 
 
 def gateway_of(robot_id: int) -> str:
@@ -80,16 +74,8 @@ class Lease:
         """A requested release is complete: the last words are out and the process may end."""
         self._timing = timing
         self._grant_s = timing.grant_s
-        self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
-        self._universe = universe(mission)
-        self._tiebreak, self._shrink = mission.tiebreak, mission.shrink
-        majority = mission.cold_start == "majority" and mission.witness
-        self._majority_from = now + COLD_START_S if majority else NEVER
-        self._lonely_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
-        self._lonely_from = now + self._lonely_s
-        self._forget: tuple[Member, ...] = ()
-        """E20: whom the operator declared dead, until `_forget_until`."""
-        self._forget_until = now
+        self._election = Election(me, mission, timing, now)
+        self._policy = Policy(mission.tiebreak, mission.shrink, len(self._election.universe))
         self._acceptor = Acceptor(Term(floor), self._grant_s, now)
         self._candidate: Candidate | None = None
         self._holder: Holder | None = None
@@ -101,8 +87,6 @@ class Lease:
         """The last PREPARE refused because of a bond."""
         self._leader_until = now
         self._hello_at = now
-        self._elect_at = NEVER
-        self._elect_base = now
         self._early: list[tuple[Member, Grant]] = []
         """Grants of a term that we do not know yet."""
         self._elect_after(self._acceptor.silent_until)
@@ -128,7 +112,7 @@ class Lease:
     @property
     def missing(self) -> tuple[int, ...]:
         """Ids that the first election of the fleet still waits for (E18); empty once somebody has led."""
-        return tuple(i for i in self._universe if not self._peers.knows(i)) if is_first(self.config) else ()
+        return tuple(i for i in self._election.universe if not self._peers.knows(i)) if is_first(self.config) else ()
 
     def may_command(self, now: float) -> bool:
         """Leading, and `now` is before the lease's expiry (I1, I2)."""
@@ -181,7 +165,7 @@ class Lease:
             self._send_round(self._holder, now, effects)
         if self._candidate is not None:
             self._press(self._candidate, now, effects)
-        elif self._holder is None and now >= self._elect_at:
+        elif self._holder is None and now >= self._election.at:
             self._stand(now, effects)
         if now >= self._hello_at:
             self._hello_at = now + HELLO_HEARTBEATS * self._timing.heartbeat_s
@@ -203,7 +187,7 @@ class Lease:
         if self._candidate is not None:
             at = min(at, self._candidate.deadline)
         elif self._holder is None:
-            at = min(at, self._elect_at)
+            at = min(at, self._election.at)
         return at
 
     def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:
@@ -238,7 +222,7 @@ class Lease:
         """Clean exit: stop leading, tell the voters; `released` turns true, at once if there is nothing to give up."""
         effects: list[Effect] = []
         self._stopping.closing = True
-        self._elect_at = NEVER
+        self._election.at = NEVER
         self._step_down(now, "released", effects)
         self._drop_candidate(now, effects)
         self.released = self._stopping.unreleased is None
@@ -260,10 +244,10 @@ class Lease:
         """
         effects: list[Effect] = []
         self._expire(now, effects)
-        lost = tuple(m for m in lost if m.id in self._universe)
+        lost = tuple(m for m in lost if m.id in self._election.universe)
         if self._holder is None and self.leader is None and lost and not self._lives_on(lost):
             self._drop_candidate(now, effects)
-            self._forget, self._forget_until = lost, now + FORGET_GRANTS * self._grant_s
+            self._election.forget(lost, now)
             self._elect_after(now)
         return effects
 
@@ -286,13 +270,13 @@ class Lease:
         if isinstance(answer, Promise):
             self._yield_to(body.term, now, effects)
             if self._candidate is None:
-                self._elect_after(max(now + 2.0 * self._timing.heartbeat_s, self._elect_base))
+                self._elect_after(max(now + 2.0 * self._timing.heartbeat_s, self._election.base))
         elif answer is not None and answer.remaining_s > 0.0:
             self._pending = (src, body)  # answered again as soon as the bond ends: it may have overtaken the news
 
     def _stands_before(self, src: Member, body: Prepare) -> bool:
         """E5: in the first election of a fleet nobody promises to a candidate further back than itself."""
-        first = is_first(self.config) and body.version == self.config.version and self.me.id in self._may_lead
+        first = is_first(self.config) and body.version == self.config.version and self.me.id in self._election.may_lead
         return first and not self._stopping.closing and self._rank(self.me.id) < self._rank(src.id)
 
     def _on_propose(self, src: Member, body: Propose, now: float, effects: list[Effect]) -> None:
@@ -314,7 +298,7 @@ class Lease:
             self._take_over(body, answer, now, effects)
         self.leader = body.holder.id
         self._leader_until = now + self._grant_s
-        self._lonely_from = now + self._lonely_s
+        self._election.held(now)
         self._elect_after(self._leader_until)
 
     def _on_release(self, body: Release, now: float, effects: list[Effect]) -> None:
@@ -349,18 +333,12 @@ class Lease:
     # --- standing for election ---------------------------------------------------------------------------------
 
     def _rank(self, robot_id: int) -> int:
-        return rank(self.config, robot_id, lambda other: other.id not in self._may_lead or self._peers.is_gone(other))
+        return self._election.rank(self.config, robot_id, self._peers)
 
     def _elect_after(self, at: float) -> None:
-        """E6: stand for election once `at` has passed, each robot its rank later than the one before it."""
-        self._elect_base = at
-        if self.me.id not in self._may_lead or self._stopping.closing:
-            self._elect_at = NEVER
-            return
-        # Who has no vote stands last: it is needed only when nobody who has one can lead.
-        named = is_first(self.config) or self.me in self.config.voters
-        place = self._rank(self.me.id) + (0 if named else len(self.config.voters))
-        self._elect_at = at + place * self._timing.rank_step_s
+        """E6: stand for election when the line has come to us, counted from `at`."""
+        if not self._stopping.closing:
+            self._election.after(at, self.config, self._peers)
 
     def _stand(self, now: float, effects: list[Effect]) -> None:
         """A new candidacy under a term above all that was heard of. A leader may stand too: it raises its term."""
@@ -370,7 +348,7 @@ class Lease:
             self._elect_after(bond.expiry)
             return
         number = max(self._seen.n, self._acceptor.promised.n) + 1
-        forget = self._forget if now < self._forget_until else ()
+        forget = self._election.forgotten(now)
         self._candidate = Candidate(Term(number, self.me.id, self.me.incarnation), self._timing, now, forget)
         self._seen = self._candidate.term
         self._press(self._candidate, now, effects)
@@ -383,7 +361,7 @@ class Lease:
                 self._elect_after(now + self._timing.rank_step_s)
             elif now >= candidate.holder.next_round_at and not candidate.given:
                 self._send_round(candidate.holder, now, effects)
-        elif candidate.forget and now >= self._forget_until:
+        elif candidate.forget and now >= self._election.forget_until:
             self._drop_candidate(now, effects)
             self._elect_after(now)
         elif now >= candidate.ask_at:
@@ -406,7 +384,7 @@ class Lease:
         lives: tuple[Member, ...] = ()
         candidate.expects_nobody()
         if not candidate.has_quorum(self.config):
-            lives = self._without_quorum(candidate, now)
+            lives = self._election.without_quorum(candidate, self.config, now)
             if self.me not in lives:
                 return
         for grantee in candidate.fences_to_ask(self.me):
@@ -419,16 +397,6 @@ class Lease:
                 config = led_by(self.config, self.me, candidate.term, self._peers.is_gone)
             self._adopt(config, now, effects)
             self._send_round(candidate.holder, now, effects)
-
-    def _without_quorum(self, candidate: Candidate, now: float) -> tuple[Member, ...]:
-        """Who makes a fresh config where no quorum of the known one answers (E18-E21); nobody while too few do."""
-        lives = candidate.full_house(self.config, self._universe)
-        if not lives and is_first(self.config) and now >= self._majority_from:
-            lives = candidate.blank_majority(self._universe)
-        asked_all = now >= candidate.began_at + self._timing.heartbeat_s
-        if not lives and not is_first(self.config) and now >= self._lonely_from and asked_all:
-            lives = candidate.whoever_answers(self._universe)
-        return lives
 
     def _on_fenced(self, src: Member, body: Fenced, now: float, effects: list[Effect]) -> None:
         if src.id == self.me.id and body.old == self._stopping.unreleased:
@@ -450,7 +418,7 @@ class Lease:
     def _on_nack(self, src: Member, body: Nack, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.promised, body.config.version.term)
         if body.remaining_s > 0.0 and body.holder != self.me:
-            self._lonely_from = now + self._lonely_s  # somebody holds a lease
+            self._election.held(now)
         candidate, holder = self._candidate, self._holder
         newer = body.config.version > self.config.version
         # Whatever a voter refuses, it tells what it will refuse next: asking on under a lower term is in vain.
@@ -504,7 +472,7 @@ class Lease:
         if not holder.granted(src, grant, self.config, now):
             return
         expiry = _expiry(holder)
-        self._lonely_from = now + self._lonely_s
+        self._election.held(now)
         if holder is self._holder:
             effects.append(LeaseExtended(holder.term, expiry))
             if self.config.previous is not None and self._candidate is None:
@@ -520,27 +488,12 @@ class Lease:
 
     def _reshape(self, now: float, effects: list[Effect]) -> None:
         """E8, E9, E17: who is gone leaves the chain, who asks joins its tail, and the voters follow, jointly."""
-        holder, config, timing = self._holder, self.config, self._timing
+        holder = self._holder
         assert holder is not None
-
-        def stays(member: Member, silence_s: float) -> bool:
-            return member == self.me or not (self._peers.is_superseded(member) or holder.silent(member, now, silence_s))
-
-        def out(member: Member) -> bool:
-            return self._peers.is_gone(member) or (member.id in self.left_out and member != self.me)
-
-        here = [m for m in config.chain if not out(m) and stays(m, timing.chain_silence_s)]
-        asking = [m for m in holder.said_hello if not self._peers.is_gone(m) and stays(m, timing.chain_silence_s)]
+        known, policy, timing = self._peers, self._policy, self._timing
+        newer = reshaped(self.config, holder, self.me, known, self.left_out, policy, timing, now)
         holder.said_hello.clear()
-        chain = (*here, *(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here)) and not out(m)))
-        kept = tuple(m for m in config.voters if stays(m, timing.remove_silence_s))
-        witness = next((m for m in (*kept, *asking) if m.id == WITNESS_ID), None)
-        voters = chosen(kept, chain, witness)
-        if self._shrink == "static" and 2 * len(voters) <= len(self._universe):
-            voters = config.voters
-        tie = self.me if self._tiebreak == "head" else witness if self._tiebreak == "witness" else None
-        newer = rewritten(config, chain, voters, tie, holder.committed(config))
-        if newer is not config:
+        if newer is not self.config:
             self._adopt(newer, now, effects)
             self._send_round(holder, now, effects)
 
@@ -548,7 +501,7 @@ class Lease:
         """E9: whoever is out asks the leader; while nobody leads, it is told the newest config."""
         if self.leader is None and (body.version is None or body.version < self.config.version):
             effects.append(Send(robot_name(src.id), self._acceptor.refusal(NO_TERM, self.config, now)))
-        if self._holder is None or src.id not in self._universe or self._peers.is_superseded(src):
+        if self._holder is None or src.id not in self._election.universe or self._peers.is_superseded(src):
             return
         self._holder.heard_at[src] = now
         if src not in self._holder.said_hello:
@@ -614,7 +567,11 @@ class Lease:
         """The first behind us that may lead and granted within t_chain: its life, and its clock's moment then."""
         for member in self.config.chain[1:]:
             nonce = holder.nonces.get(member)
-            fit = member.id in self._may_lead and member in self.config.voters and not self._peers.is_gone(member)
+            fit = (
+                member.id in self._election.may_lead
+                and member in self.config.voters
+                and not self._peers.is_gone(member)
+            )
             if fit and nonce is not None and not holder.silent(member, now, self._timing.chain_silence_s):
                 return member, nonce
         return None

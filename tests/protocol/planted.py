@@ -17,12 +17,14 @@ import protocol.holder
 import protocol.lease
 import protocol.membership
 import protocol.quorum
+import protocol.reshape
 from deploy.run import schedules
 from deploy.run.arena import Arena
 from deploy.run.network import Clock
 from protocol.acceptor import Acceptor
 from protocol.candidate import Candidate
 from protocol.effects import StepDown
+from protocol.election import Election
 from protocol.gateway import Gateway
 from protocol.holder import Holder
 from protocol.lease import Lease
@@ -124,7 +126,7 @@ def _voters_change_without_a_joint_config(patch: pytest.MonkeyPatch) -> None:
         newer = honest(config, *arguments)
         return Config(newer.version, newer.voters, newer.tie, None, newer.chain)
 
-    patch.setattr(protocol.lease, "rewritten", rewritten)
+    patch.setattr(protocol.reshape, "rewritten", rewritten)
 
 
 def _full_house_of_a_majority(patch: pytest.MonkeyPatch) -> None:
@@ -235,7 +237,7 @@ def _deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
 
 
 def _equal_ranks(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Lease, "_rank", lambda self, robot_id: 0)
+    patch.setattr(Election, "rank", lambda self, config, robot_id, peers: 0)
     patch.setattr(Lease, "_stands_before", lambda self, src, body: False)
 
 
@@ -343,7 +345,7 @@ def _forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
 
     def request_forget(self: Lease, lost: tuple[Member, ...], now: float) -> Any:
         effects = honest(self, lost, now)
-        self._forget_until = float("inf")
+        self._election.forget_until = float("inf")
         return effects
 
     patch.setattr(Lease, "request_forget", request_forget)

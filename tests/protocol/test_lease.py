@@ -12,7 +12,8 @@ from deploy.look.liveness import Steady
 from deploy.run.arena import Arena
 from protocol.acceptor import Acceptor
 from protocol.effects import BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from protocol.lease import COLD_START_S, Lease
+from protocol.election import COLD_START_S
+from protocol.lease import Lease
 from protocol.membership import first_config
 from protocol.messages import (
     Config,

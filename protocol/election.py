@@ -1,0 +1,69 @@
+"""When one process stands for election (E6), and who makes a fresh config where no quorum answers (E18-E21)."""
+
+from __future__ import annotations
+
+from protocol.candidate import Candidate
+from protocol.membership import is_first, rank, universe
+from protocol.messages import Config, Member
+from protocol.mission import Mission
+from protocol.peers import Peers
+from protocol.timing import Timing
+
+NEVER = float("inf")
+COLD_START_S = 3.0
+"""How long a cold start waits for everybody where `cold_start = "majority"` (E19)."""
+FORGET_GRANTS = 3
+"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
+
+
+class Election:
+    def __init__(self, me: Member, mission: Mission, timing: Timing, now: float) -> None:
+        self.me = me
+        self.universe = universe(mission)
+        self.may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
+        self.at = NEVER
+        """When to stand."""
+        self.base = now
+        """The moment that the line counts from."""
+        self.forget_until = now
+        self._forget: tuple[Member, ...] = ()
+        """E20: whom the operator declared dead, until `forget_until`."""
+        self._timing = timing
+        majority = mission.cold_start == "majority" and mission.witness
+        self._majority_from = now + COLD_START_S if majority else NEVER
+        self._lonely_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
+        self._lonely_from = now + self._lonely_s
+
+    def rank(self, config: Config, robot_id: int, peers: Peers) -> int:
+        return rank(config, robot_id, lambda other: other.id not in self.may_lead or peers.is_gone(other))
+
+    def after(self, at: float, config: Config, peers: Peers) -> None:
+        """E6: stand once `at` has passed, each robot its rank later than the one before it."""
+        self.base = at
+        if self.me.id not in self.may_lead:
+            self.at = NEVER
+            return
+        # Who has no vote stands last: it is needed only when nobody who has one can lead.
+        named = is_first(config) or self.me in config.voters
+        place = self.rank(config, self.me.id, peers) + (0 if named else len(config.voters))
+        self.at = at + place * self._timing.rank_step_s
+
+    def held(self, now: float) -> None:
+        """Somebody holds a lease: whoever hears of it is not alone (E21)."""
+        self._lonely_from = now + self._lonely_s
+
+    def forget(self, lost: tuple[Member, ...], now: float) -> None:
+        self._forget, self.forget_until = lost, now + FORGET_GRANTS * self._timing.grant_s
+
+    def forgotten(self, now: float) -> tuple[Member, ...]:
+        return self._forget if now < self.forget_until else ()
+
+    def without_quorum(self, candidate: Candidate, config: Config, now: float) -> tuple[Member, ...]:
+        """Who makes a fresh config where no quorum of the known one answers; nobody while too few do."""
+        lives = candidate.full_house(config, self.universe)
+        if not lives and is_first(config) and now >= self._majority_from:
+            lives = candidate.blank_majority(self.universe)
+        asked_all = now >= candidate.began_at + self._timing.heartbeat_s
+        if not lives and not is_first(config) and now >= self._lonely_from and asked_all:
+            lives = candidate.whoever_answers(self.universe)
+        return lives

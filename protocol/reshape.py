@@ -1,0 +1,48 @@
+"""What a leader makes of its config when robots go and come (E8, E9, E17, E22): a pure function of what it knows."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from protocol.holder import Holder
+from protocol.membership import chosen, ids, rewritten
+from protocol.messages import Config, Member
+from protocol.mission import WITNESS_ID, Shrink, TieBreak
+from protocol.peers import Peers
+from protocol.timing import Timing
+
+
+class Policy(Struct, frozen=True):
+    """What the mission says of it."""
+
+    tiebreak: TieBreak
+    shrink: Shrink
+    everybody: int
+    """How many ids there are, the witness included."""
+
+
+def reshaped(
+    config: Config, holder: Holder, me: Member, peers: Peers, left_out: frozenset[int], policy: Policy, timing: Timing,
+    now: float,
+) -> Config:  # fmt: skip
+    """The next config, or `config` itself.
+
+    Who is gone leaves the chain, who asks joins its tail, and the voters follow, jointly.
+    """
+
+    def stays(member: Member, silence_s: float) -> bool:
+        return member == me or not (peers.is_superseded(member) or holder.silent(member, now, silence_s))
+
+    def out(member: Member) -> bool:
+        return peers.is_gone(member) or (member.id in left_out and member != me)
+
+    here = [m for m in config.chain if not out(m) and stays(m, timing.chain_silence_s)]
+    asking = [m for m in holder.said_hello if not peers.is_gone(m) and stays(m, timing.chain_silence_s)]
+    chain = (*here, *(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here)) and not out(m)))
+    kept = tuple(m for m in config.voters if stays(m, timing.remove_silence_s))
+    witness = next((m for m in (*kept, *asking) if m.id == WITNESS_ID), None)
+    voters = chosen(kept, chain, witness)
+    if policy.shrink == "static" and 2 * len(voters) <= policy.everybody:
+        voters = config.voters
+    tie = me if policy.tiebreak == "head" else witness if policy.tiebreak == "witness" else None
+    return rewritten(config, chain, voters, tie, holder.committed(config))
