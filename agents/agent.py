@@ -134,7 +134,8 @@ class Agent:
                 lease = self._lease
                 role, term = (Role.WAITING, NO_TERM) if lease is None else (self._role(lease), lease.term)
                 missing = () if lease is None else lease.missing
-                status(self._voice, message, self._beliefs, self._driver, missing, role, term, now)
+                version = None if lease is None else lease.config.version
+                status(self._voice, message, self._beliefs, self._driver, missing, role, term, version, now)
             case Stop():
                 self._stop(now)
             case _ if self._lease is not None and self._driver is not None:

@@ -9,7 +9,18 @@ from agents.driver import Driver
 from agents.strategy import Decision
 from agents.voice import Voice
 from protocol.geometry import Pose2D, Twist
-from protocol.messages import Level, ObstacleNote, PlanNote, PoseStamped, Role, Status, TableRow, Term, Tracking
+from protocol.messages import (
+    Level,
+    ObstacleNote,
+    PlanNote,
+    PoseStamped,
+    Role,
+    Status,
+    TableRow,
+    Term,
+    Tracking,
+    Version,
+)
 from protocol.mission import robot_name
 from protocol.node import Vitals
 
@@ -104,7 +115,7 @@ class Reports:
 
 def status(
     voice: Voice, vitals: Vitals, beliefs: Beliefs, driver: Driver | None, missing: tuple[int, ...],
-    role: Role, term: Term, now: float,
+    role: Role, term: Term, version: Version | None, now: float,
 ) -> None:  # fmt: skip
     """Diagnostics in the sense of ROS. `driver` is None before the mission is known; `missing` stay away (E18)."""
     counters: dict[str, float] = {
@@ -116,6 +127,8 @@ def status(
         "rows_heard": beliefs.rows_heard,
         "rows_lost": beliefs.rows_lost,
     }
+    if version is not None:  # of the config, and so of the chain: who missed the event knows it by this
+        counters |= {"config_n": version.term.n, "config_seq": version.seq}
     text, level = "waiting for the mission", Level.WARN
     if driver is not None:
         text, level = (role.value, Level.OK) if driver.estimator.ready else ("waiting for sensors", Level.WARN)

@@ -12,10 +12,12 @@ from typing import Protocol
 
 from msgspec import Struct, structs
 
-from protocol.node import PeerDown, PeerUp, RouterLost
+from protocol.node import Local, PeerDown, PeerUp, RouterLost
 from protocol.topics import TOPIC, Address, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
+ANEW_S = 1.5
+"""Routers have met again by then: links are tried every second."""
 TOKEN_HOLD_S = 0.001
 """How long a vanished token is held back: six times what was measured between it and the news of a router's death."""
 OWNER_RATE_MAX_HZ = 500.0
@@ -169,6 +171,34 @@ class Tokens:
 
     def next_due(self) -> float:
         return min((held.at for held in self._held), default=float("inf"))
+
+
+class Links:
+    """When to tell the router anew what is followed: a while after links between routers may have gone and come back.
+
+    Declarations that cross a link while it comes back are dropped for good by a router that is busy (zenoh#1886), and
+    with them all that they ask for. Tokens tell of links: one that vanishes, and one that comes back in the same life.
+    """
+
+    def __init__(self) -> None:
+        self.anew_at = float("inf")
+        self._gone: set[tuple[str, int]] = set()
+
+    def see(self, event: Local, now: float) -> None:
+        match event:
+            case PeerDown(name, incarnation):
+                self._gone.add((name, incarnation))
+                self.anew_at = now + ANEW_S
+            case PeerUp(name, incarnation) if (name, incarnation) in self._gone:
+                self._gone.discard((name, incarnation))
+                self.anew_at = now + ANEW_S
+
+    def due(self, now: float) -> bool:
+        """True once each time."""
+        if now < self.anew_at:
+            return False
+        self.anew_at = float("inf")
+        return True
 
 
 def _at(arrival: Arrival) -> float:

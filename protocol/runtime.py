@@ -18,7 +18,7 @@ from types import FrameType
 from msgspec import Struct
 
 from protocol import clock
-from protocol.bus import Arrival, Inbox, Tokens, Wake
+from protocol.bus import Arrival, Inbox, Links, Tokens, Wake
 from protocol.credentials import Credentials
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
@@ -64,10 +64,12 @@ class _Seat:
         self._followed: frozenset[str] | None = None
         self._weather_key = weather_key
         self._tokens = Tokens()
+        self._links = Links()
         self._reception = Reception(node.name, Random(f"air-{node.name}-{node.incarnation}"))
 
     def next_deadline(self) -> float:
-        return min(self.host.node.next_deadline(), self._reception.next_due(), self._tokens.next_due())
+        wire = min(self._reception.next_due(), self._tokens.next_due(), self._links.anew_at)
+        return min(self.host.node.next_deadline(), wire)
 
     def step(self, now: float) -> float:
         """Feed what came, tick if due; how late the tick was [s]."""
@@ -76,6 +78,7 @@ class _Seat:
             if isinstance(arrival.payload, bytes):
                 self._publish(host.message(arrival.at, arrival.key, arrival.payload))
             else:
+                self._links.see(arrival.payload, now)
                 self._publish(host.deliver(arrival.at, "", arrival.payload, b""))
         late = now - node.next_deadline()
         if late >= 0.0:
@@ -83,6 +86,8 @@ class _Seat:
         if node.interests is not self._followed:
             self._followed = node.interests
             self.bus.follow(node.interests | self._weather_interest(node.interests))
+        elif self._links.due(now):
+            self.bus.follow_anew()
         host.journal.flush()
         return late
 

@@ -108,6 +108,13 @@ class ZenohBus:
         for key in sorted(interests - self._followed.keys()):
             self._followed[key] = self._subscribe(key)
 
+    def follow_anew(self) -> None:
+        """Say once more to the router what is followed: declarations that cross a link while it comes back are
+        dropped for good by a router that is busy (zenoh#1886), and all that they ask for with them."""
+        for key in sorted(self._followed):
+            self._followed[key].undeclare()
+            self._followed[key] = self._subscribe(key)
+
     def close(self) -> None:
         """Undeclare all and leave: without it a callback subscriber would keep the interpreter alive."""
         self._session.close()  # type: ignore[no-untyped-call]

@@ -25,7 +25,7 @@ from deploy.run.processes import Identity
 from protocol import clock
 from protocol.bus import Inbox
 from protocol.credentials import Credentials
-from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Tracking, Truth, decode, encode
+from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Status, Tracking, Truth, decode, encode
 from protocol.mission import FormationSpec, Leading, Mission, Profile, robot_id_of, robot_name
 from protocol.radio import WEATHER
 from protocol.topics import RECORDER_NAME, TOPIC, WORLD_NAME, address, key
@@ -39,8 +39,10 @@ SPEAKING_S = 0.15
 SETTLED_S = 0.5
 REST_MPS = 1e-3
 """Who is no faster stands."""
+ANEW_S = 3.0
+"""Routers whose link has come back may not know any more what is listened to (`ZenohBus.follow_anew`)."""
 EVENTS_MAX = 4096
-TOPICS = ("event", "tracking", "pose", "truth")
+TOPICS = ("event", "tracking", "pose", "truth", "status")
 
 
 Table = Callable[[Sequence[Row], Path], Sequence[Row]]
@@ -208,6 +210,15 @@ class Team:
                     version = (structs.astuple(message.term), message.data.get("seq"))
                     self._chains[robot] = (version, tuple(message.data["chain"]))
 
+            case Status(counters=counters) if robot is not None and "config_seq" in counters:
+                self._catch_up(robot, counters["config_n"], counters["config_seq"])
+
+    def _catch_up(self, robot: int, n: float, seq: float) -> None:
+        """A robot says which config it holds: its chain is that of whoever said the same, had we missed its event."""
+        known = max(self._chains.values(), default=None)
+        if known is not None and (known[0][0][0], known[0][1]) == (n, seq):
+            self._chains[robot] = known
+
     def wait_until(self, holds: Callable[[], bool], complaint: str, within_s: float = START_S_MAX) -> None:
         until = clock.now() + within_s
         while True:
@@ -238,11 +249,15 @@ class Team:
     def await_chain(self, length: int, within_s: float = START_S_MAX) -> tuple[int, ...]:
         """The chain, once it has been one and the same of `length` robots for `SETTLED_S`."""
         since = clock.now()
+        anew_at = since + ANEW_S
         last: tuple[int, ...] = ()
 
         def settled() -> bool:
-            nonlocal since, last
+            nonlocal since, last, anew_at
             chain, now = self.chain(), clock.now()
+            if now > anew_at and self._bus is not None:
+                anew_at = now + ANEW_S
+                self._bus.follow_anew()
             if chain != last or len(chain) != length:
                 since, last = now, chain
             return now - since >= SETTLED_S

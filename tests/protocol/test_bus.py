@@ -4,13 +4,17 @@ import signal
 import threading
 from random import Random
 
+import pytest
+
 from protocol.bus import (
+    ANEW_S,
     OWNER_BURST_MAX,
     OWNER_RATE_MAX_HZ,
     OWNERS_MAX,
     TOKEN_HOLD_S,
     Arrival,
     Inbox,
+    Links,
     Tokens,
     Wake,
 )
@@ -136,3 +140,28 @@ def test_names_without_end_take_no_memory_without_end() -> None:
     for n in range(10 * OWNERS_MAX):
         inbox.put(Arrival(0.0, f"lfa/f/stranger{n}/lease/all", b""))
     assert len(inbox._allowances) <= OWNERS_MAX
+
+
+@pytest.mark.parametrize(
+    ("events", "anew_after_s"),
+    [
+        (["up 1"], None),
+        (["down 1"], ANEW_S),
+        (["down 1", "up 2"], ANEW_S),
+        (["down 1", "up 1"], 1.0 + ANEW_S),
+        (["down 1", "up 1", "up 1"], 1.0 + ANEW_S),
+    ],
+)
+def test_what_is_followed_is_told_anew_after_a_token_went_or_came_back(
+    events: list[str], anew_after_s: float | None
+) -> None:
+    links = Links()
+    for at, event in enumerate(events):
+        kind, life = event.split()
+        links.see(PeerUp("robot2", int(life)) if kind == "up" else PeerDown("robot2", int(life)), float(at))
+    if anew_after_s is None:
+        assert not links.due(1000.0)
+        return
+    assert not links.due(anew_after_s - 0.001)
+    assert links.due(anew_after_s)
+    assert not links.due(1000.0), "once is enough"
