@@ -130,7 +130,7 @@ def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web
 def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None, until: float | None) -> None:
     from deploy.look.scene import TOPICS, Scene
 
-    scene, time = Scene(stream), WorldTime()
+    scene, time, lost = Scene(stream), WorldTime(), 0
     if scenario is not None:
         scene.ground(scenario.world)
         scene.mission(scenario.mission)
@@ -146,6 +146,9 @@ def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None
                 if where is not None:
                     scene.see(time.of(arrival.at), where.owner, where.topic, message)
             scene.flush()
+            if ear.dropped > lost:
+                lost = ear.dropped
+                print(f"{lost} messages lost: this machine is too busy to draw them", file=sys.stderr, flush=True)
 
 
 def _viewer(*arguments: str) -> int:

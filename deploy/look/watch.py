@@ -31,7 +31,7 @@ REFRESH_S = 0.5
 FIRST_S = 1.3  # each process has told its status by then
 WIDTH_MIN, HEIGHT_MIN = 60, 12
 TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"})
-HEADS = ("robot", "role", "term", "ahead", "off mm", "turned °", "m/s", "age ms", "lag ms", "CPU %", "MiB", "state")
+HEADS = ("robot", "role", "term", "ahead", "off mm", "turn °", "m/s", "age ms", "lag ms", "CPU %", "MiB", "state")
 SIDES = ("left", "right", "column", "zigzag")
 #        key   deed
 DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
@@ -191,7 +191,7 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 
 def _number(value: float | None, scale: float) -> str:
-    return "" if value is None else f"{scale * value:.0f}"
+    return "" if value is None else f"{round(scale * value)}"
 
 
 def _timeline(board: Board, width: int) -> RenderableType:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from io import StringIO
+
 import pytest
 from msgspec.structs import replace
+from rich.console import Console
 
 from deploy.look.board import Board, Row
 from deploy.look.topic import expressions
+from deploy.look.watch import _table
 from protocol.geometry import Pose2D, Twist
 from protocol.messages import Event, Header, Level, Message, PoseStamped, Role, Status, Term, Tracking
 from protocol.mission import Refused
@@ -88,3 +92,12 @@ def test_a_topic_may_be_said_in_three_ways() -> None:
 def test_a_topic_that_is_none_is_refused() -> None:
     with pytest.raises(Refused, match="must be one of mission"):
         expressions("robot2/nonsense")
+
+
+def test_the_table_keeps_every_number_whole_on_80_columns() -> None:
+    row = Row(10, "follower", 1795717143586, 9, -1.7159, -3.1, -0.25, 12.345, "follow, avoids", 1200.0, 100.0, 135.0)
+    console = Console(width=80, file=StringIO(), record=True)
+    console.print(_table([row], None))
+    _, line = console.export_text().splitlines()
+    assert line.split()[:11] == ["10", "follower", "3586", "9", "-1716", "-178", "-0.25", "12345", "1200", "100", "135"]
+    assert len(line) <= 80

@@ -88,6 +88,11 @@ def test_a_browser_shows_it_without_a_complaint(folder: Path, tmp_path: Path) ->
         "--headless",
         "--no-sandbox",
         "--disable-gpu",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
         "--enable-logging=stderr",
         f"--user-data-dir={tmp_path}/chrome",
     )
