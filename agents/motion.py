@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, ceil, cos, hypot, inf, pi, sin, tan
 
+from agents.config import CONTROL_PERIOD_S
 from agents.formation import COLUMN_BELOW_MPS, PLANNED_MARGIN, leader_speed_cap
 from protocol.geometry import Pose2D, Twist, wrap
 from protocol.messages import Slot
@@ -168,7 +169,12 @@ class Lead:
         near_end = left_m < self._look_ahead_m
         target = in_base(pose, self.goal) if near_end else self.ahead(pose, self._look_ahead_m)
         braking = (2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5
-        v = min(self._cruise(slots), braking, speed_max_mps, abs(twist.linear_x) + 0.05)
+        v = min(
+            self._cruise(slots),
+            braking,
+            speed_max_mps,
+            abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S,
+        )
         bearing = atan2(target[1], target[0])
         if near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing)
