@@ -18,6 +18,7 @@ from msgspec.structs import replace
 
 from protocol.mission import Refused
 from protocol.radio import Radio
+from world.checks import check_scenario
 from world.course import check_course, draw, starts_of
 from world.spec import (
     Body,
@@ -29,7 +30,6 @@ from world.spec import (
     Scenario,
     Vary,
     WorldSpec,
-    check_scenario,
 )
 
 __all__ = [

@@ -4,7 +4,7 @@ import pytest
 
 from agents.agent import Agent
 from protocol.mission import Leading, Mission, robot_id_of, robot_name
-from protocol.topics import TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches
+from protocol.topics import HARDWARE, TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches
 
 
 def test_each_topic_is_named_once_and_has_its_own_type() -> None:
@@ -17,6 +17,18 @@ def test_no_agent_hears_ground_truth() -> None:
     agent.tick(0.0)
     for expression in before | agent.interests:
         assert not any(matches(expression, key("f", TRUTH_OWNER, topic)) for topic in ("truth", "clock")), expression
+
+
+def test_of_what_the_world_says_an_agent_hears_its_own_sensors_and_the_mission_alone() -> None:
+    """Every row of the table that hardware or the world may publish, under every owner that there is."""
+    agent = Agent(2, 1, "f", 1, Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0)))))
+    agent.tick(0.0)
+    of_world = [topic.name for topic in TOPICS if {"driver", "world"} & set(topic.publishers)]
+    owners = [TRUTH_OWNER, "world", *(robot_name(robot) for robot in (1, 2, 3, 4))]
+    heard = {(owner, topic) for owner in owners for topic in of_world
+             if any(matches(expression, key("f", owner, topic)) for expression in agent.interests)}  # fmt: skip
+    assert {topic for _, topic in heard} <= {"mission", "lease", *HARDWARE}
+    assert {owner for owner, topic in heard if topic in HARDWARE} == {"robot2"}
 
 
 def test_address_reads_what_key_writes() -> None:
