@@ -53,8 +53,13 @@ def on_course(s: Subject) -> list[Spike]:
 
 
 def duration_s(s: Subject, spike: Spike) -> float:
-    """How long the avoidances lasted that a spike belongs to, overlaps counted once; 0 with none."""
-    spans = [(one.from_s, one.until_s) for one in spikes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
+    """How long there was avoiding for a spike, overlaps counted once: from `FELT_S` before it to its end; 0 with none.
+
+    What lasted on after it, as of a robot that is stuck for long, or began long before, did not make it.
+    """
+    first_s = spike.from_s - spikes.FELT_S
+    avoided = [one for one in spikes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
+    spans = [(max(one.from_s, first_s), min(one.until_s, spike.until_s)) for one in avoided]
     return sum(until_s - from_s for from_s, until_s in spikes.merged(spans))
 
 
