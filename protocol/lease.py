@@ -302,7 +302,10 @@ class Lease:
         self._elect_after(self._leader_until)
 
     def _on_release(self, body: Release, now: float, effects: list[Effect]) -> None:
-        if not self._acceptor.release(body.term):
+        freed = self._acceptor.release(body.term)
+        # Whoever has no vote was bound to nobody, and yet waits for the lease that it knew of to run out.
+        known = self._holder is None and body.term == self.config.version.term and self._acceptor.bound(now) is None
+        if not (freed or known):
             return
         self.leader = None
         self._elect_after(now)

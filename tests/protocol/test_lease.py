@@ -25,6 +25,7 @@ from protocol.messages import (
     Prepare,
     Promise,
     Propose,
+    Release,
     Role,
     Term,
     Version,
@@ -466,6 +467,21 @@ def test_after_a_release_the_next_leads_within_two_round_trips() -> None:
     assert team.led_at(1.0) - 1.0 < 0.02
     assert team.lease_of(3).chain == (2, 3, 4)
     assert team.safe()
+
+
+def test_e6_a_robot_without_a_vote_does_not_wait_for_a_lease_that_was_released() -> None:
+    """It was bound to nobody, but knows the leader's term from the PROPOSEs."""
+    mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
+    term, leader, witness = Term(5, 1, 7), Member(1, 7), Member(0, 3)
+    config = Config(Version(term, 0), (leader, Member(2, 4), witness), witness, None, (leader,))
+    newcomer = Lease(Member(2, 9), mission, STD, 0.0, floor=0)
+    newcomer.receive(leader, Propose(term, config, 3, leader), 10.0)
+    newcomer.receive(leader, Release(term), 10.01)
+    now, asked = 10.01, []
+    while not asked and now < 11.0:
+        now = max(newcomer.next_deadline(), now + 1e-6)
+        asked = sent(newcomer.tick(now), Prepare)
+    assert now <= 10.01 + 4 * STD.rank_step_s * 2
 
 
 def test_a_release_does_not_revive_the_voters_old_promise() -> None:
