@@ -14,7 +14,7 @@ from deploy.run.crew import ROUTER_NAME, Row
 from deploy.run.folder import JOURNALS, SCENARIO, toml
 from protocol import clock
 from protocol.credentials import Credentials, credentials
-from protocol.mission import WITNESS_NAME, Refused, robot_name
+from protocol.mission import WITNESS_NAME, Profile, Refused, robot_name
 from protocol.topics import WORLD_NAME
 from world.spec import STATE
 
@@ -54,6 +54,8 @@ class Part(Struct, frozen=True):
     restart: Restart
     hosts: tuple[str, ...]
     """All machines of the fleet."""
+    link: Profile = "std"
+    """How soon a silent link counts as dead: as the mission's profile."""
     secure: bool = False
     keyed: bool = False
     """Its processes show certificates: the router does so to others, or to everybody."""
@@ -114,6 +116,7 @@ def parts(plan: Plan, run: str, digest: str, bundles: Mapping[str, dict[str, str
             port=0 if len(names) == 1 else machine.router_port,
             restart=file.restart,
             hosts=tuple(names),
+            link=mission.profile,
             secure=file.secure,
             keyed=file.secure or (len(names) > 1 and file.links.transport == "quic"),
             bundle=(bundles or {}).get(name, {}),
@@ -164,8 +167,9 @@ def rows(part: Part) -> list[Row]:
     """The processes of this machine, its router first."""
     folder = part.run_folder
     keys = ("--keys", str(part.folder / KEYS)) if part.keyed else ()
-    team = ("--fleet", part.fleet, "--connect", part.endpoint, "--journal", str(folder / JOURNALS), *keys)
-    guarded = (*keys, "--secure") if part.secure else keys
+    link = ("--link", part.link)
+    team = ("--fleet", part.fleet, "--connect", part.endpoint, "--journal", str(folder / JOURNALS), *link, *keys)
+    guarded = (*keys, *link, "--secure") if part.secure else (*keys, *link)
     listen = (word for where in (part.socket, *part.listen) for word in ("--listen", where))
     connect = (word for where in part.connect for word in ("--connect", where))
     made = [Row(ROUTER_NAME, ("deploy.fleet.router", *listen, *connect, *guarded))]

@@ -41,7 +41,7 @@ from protocol.messages import (
 )
 from protocol.mission import Refused
 from protocol.topics import HOST_PREFIX, OPERATOR_NAME, TOPIC, address, key
-from protocol.zenoh_bus import RouterAbsent, ZenohBus
+from protocol.zenoh_bus import LINK_LEASES_MS, RouterAbsent, ZenohBus
 from world.spec import STATE
 
 LEDGER = "processes.json"
@@ -263,7 +263,9 @@ class Supervisor:
             return
         self._join_at = now + JOIN_S
         try:
-            bus = ZenohBus(self._part.endpoint, self._inbox, credentials=self._part.known_as(self._me))
+            bus = ZenohBus(
+                self._part.endpoint, self._inbox, LINK_LEASES_MS[self._part.link], self._part.known_as(self._me)
+            )
         except (RouterAbsent, Refused):
             return
         bus.follow(frozenset({key(self._part.fleet, OPERATOR_NAME, "order")}))

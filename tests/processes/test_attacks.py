@@ -60,6 +60,13 @@ def test_an_expired_certificate(fleet: Attacked) -> None:
     assert not fleet.refused(fleet.tls, TRAITOR, forge(fleet.folder / "fresh", TRAITOR, fleet.keys))
 
 
+def test_a_certificate_that_expires_closes_its_link(fleet: Attacked) -> None:
+    brief = forge(fleet.folder / "brief", TRAITOR, fleet.keys, days=2.5 / 86400.0)
+    with fleet.open(fleet.tls, TRAITOR, brief) as session:
+        assert session.info.links(), "it was let in while the certificate was valid"
+        eventually(lambda: not session.info.links(), "the link outlives the certificate", 20.0)
+
+
 def test_a_revoked_robots_old_keys(fleet: Attacked) -> None:
     assert fleet.refused(fleet.tls, REVOKED)
     assert fleet.refused(fleet.unix, REVOKED)
