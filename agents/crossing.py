@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, inf
 
+from agents.decisions import Situation, decide
 from agents.features import Feature
 from agents.strategy import Decision
 from protocol.geometry import STILL, Pose2D, Twist, along_arc
@@ -31,6 +32,8 @@ class Crossing:
         self.decision: Decision | None = None
         self._waiting_since: float | None = None
         self._held_until = 0.0
+        self._near = inf
+        """Of the last conflict."""
         self._impatient = False
 
     @property
@@ -44,6 +47,7 @@ class Crossing:
         if near >= CLEARANCE_M and now >= self._held_until:
             self.decision, self._waiting_since, self._impatient = None, None, False
             return wanted
+        self._near = near if near < CLEARANCE_M else self._near
         if self._waiting_since is None:
             self._waiting_since = now
         self._impatient = now - self._waiting_since > WAIT_S_MAX
@@ -52,7 +56,9 @@ class Crossing:
             return wanted
         action = "slow" if near >= CLEARANCE_M else self._less(moving, pose, wanted)
         if self.decision is None or CARE[action] >= CARE[self.decision.action] or now >= self._held_until:
-            self.decision = Decision(action, near, 0.0, "moving")
+            row = decide(Situation("moving", near, closest_m=min(near, self._near)))
+            named = ("", "") if row is None else (row.name, row.updates)
+            self.decision = Decision(action, near, 0.0, "moving", *named)
             self._held_until = now + HOLD_S if near < CLEARANCE_M else self._held_until
         return _done(self.decision.action, wanted)
 

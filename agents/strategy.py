@@ -153,8 +153,8 @@ class Detour:
                 bearing = (openings.left if side > 0.0 else openings.right) or 0.0
                 action = "left" if side > 0.0 else "right"
                 twist = self._towards(points, bearing, speed_mps)
-            case "u_turn" if (rear := openings.rear or self._rear(points, towards, reach)) is not None:
-                bearing = rear
+            case "u_turn" if openings.rear is not None:
+                bearing = openings.rear
                 twist = self._towards(points, bearing, speed_mps)
             case "back":
                 bearing, twist = pi, BACK
@@ -196,7 +196,8 @@ class Detour:
             left = _first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             right = _first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             if left is not None or right is not None:
-                return _Openings(left, right, None)
+                unknown = self._thing.width_m == inf  # the table asks for the way back as well
+                return _Openings(left, right, self._rear(points, towards, reach_m) if unknown else None)
         return _Openings(None, None, self._rear(points, towards, reach_m))
 
     def _rear(self, points: Sequence[Point], towards: float, reach_m: float) -> float | None:

@@ -1,12 +1,12 @@
 """Round what the scan shows: one robot, a few points, and where it ends."""
 
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, inf, pi, sin
 
 import pytest
 
 from agents.perception import Surroundings
 from agents.safety import safe
-from agents.strategy import NARROW_M, Detour
+from agents.strategy import NARROW_M, Detour, Thing
 from protocol.geometry import STILL, Pose2D, Twist, along_arc
 from protocol.mission import Limits
 
@@ -83,3 +83,19 @@ def test_a_decision_is_held_at_least_a_second() -> None:
     assert detour.steer([(0.5, 0.0)], target, wanted, 0.4, 0.0) is not None
     assert detour.steer([], target, wanted, 0.4, 0.9) is not None
     assert detour.steer([], target, wanted, 0.4, 1.5) is None
+
+
+def test_what_has_no_visible_end_is_crept_towards_for_two_seconds_and_then_turned_from() -> None:
+    detour, wanted, actions = Detour(RADIUS_M, LIMITS), Twist(0.3, 0.0), []
+    for n in range(200):
+        twist = detour.steer(circle(0.8, 0.0, 0.2), (3.0, 0.0), wanted, 0.4, n * DT, lambda _: Thing("stationary", inf))
+        assert twist is not None
+        assert detour.decision is not None
+        if not actions or actions[-1][0] != detour.decision.action:
+            actions.append((detour.decision.action, detour.decision.condition, detour.decision.updates, n * DT))
+            assert n > 0 or 0.0 < twist.linear_x <= 0.1
+    assert [action[:3] for action in actions] == [
+        ("creep", "its end is not in sight", "speed and position"),
+        ("u_turn", "its end stays out of sight", "speed and position"),
+    ]
+    assert actions[1][3] == pytest.approx(2.0, abs=0.1)
