@@ -22,7 +22,7 @@ from agents.motion import Lead, in_base
 from agents.perception import Point, without
 from agents.predecessor import Predecessor
 from agents.retreat import Retreat
-from agents.safety import safe
+from agents.safety import safe, sharing
 from agents.strategy import Decision, Detour
 from agents.stuck import Plight
 from protocol.geometry import STILL, Pose2D, Twist
@@ -157,6 +157,7 @@ class Driver:
         if role is not Role.WAITING:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
             wanted = self._around.ground.cross(wanted, self._mission.radius_m, now)
+            wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
         if not self._retreat.under_way:
             self._retreat.keep(pose)
         self._watch(role, pose, wanted, now)
@@ -196,6 +197,13 @@ class Driver:
             sighting = self.predecessor.at(now)
             places.append(None if sighting is None else sighting.pose)
         return [place for place in places if place is not None]
+
+    def _strangers(self, pose: Pose2D, now: float) -> list[Point]:
+        """The team-mates that this robot does not follow, in `base_link`: nobody else keeps the two apart."""
+        ahead = None if self.predecessor is None else self.predecessor.robot
+        others = [robot for robot in self._mission.robots if robot not in (self._id, ahead)]
+        places = [self._beliefs.pose_of(robot, now) for robot in others]
+        return [in_base(pose, (place.x, place.y)) for place in places if place is not None]
 
     def _lead(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
         wanted, speed = self.leading.step(chain, pose, self._last, now)

@@ -4,7 +4,7 @@ slow enough to stop before what the scan shows."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import hypot, isfinite
 
 from agents.perception import Point, free_along
 from protocol.geometry import STILL, Twist
@@ -14,6 +14,9 @@ SKIN_M = 0.02
 """Kept between the body and the nearest point when braking."""
 BRAKING_SHARE = 0.8
 """Of the drive's deceleration, planned with: the rest is for what a 10 Hz scan has not seen yet."""
+
+SHARED_SHARE = 0.5
+"""Cosine of the angle off the motion within which a team-mate is ahead."""
 
 
 def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, limits: Limits, dt: float) -> Twist:
@@ -29,6 +32,21 @@ def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, l
     return Twist(
         _near(v, last.linear_x, limits.a_max_mps2 * dt), _near(omega, last.angular_z, limits.alpha_max_radps2 * dt)
     )
+
+
+def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits) -> Twist:
+    """`wanted`, slow enough towards each of `mates` (centres in `base_link`) to stop within half of the room between:
+    the other one may be coming, and the same holds for it."""
+    v = wanted.linear_x
+    sign = 1.0 if v >= 0.0 else -1.0
+    for x, y in mates:
+        if sign * x > SHARED_SHARE * hypot(x, y):
+            room_m = max(0.0, 0.5 * (hypot(x, y) - 2.0 * radius_m) - SKIN_M)
+            v_max = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * room_m) ** 0.5
+            if abs(v) > v_max:
+                wanted = Twist(sign * v_max, wanted.angular_z * v_max / abs(v))
+                v = wanted.linear_x
+    return wanted
 
 
 def within(twist: Twist, limits: Limits) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.safety import BRAKING_SHARE, SKIN_M, safe, within
+from agents.safety import BRAKING_SHARE, SKIN_M, safe, sharing, within
 from protocol.geometry import STILL, Twist
 from protocol.mission import Limits
 
@@ -55,3 +55,17 @@ def test_the_speed_before_an_obstacle_leaves_the_way_to_stop() -> None:
 def test_limits_keep_the_shape_of_the_path(v: float, w: float) -> None:
     out_v, out_w = within(Twist(v, w), LIMITS)
     assert out_v * w == pytest.approx(out_w * v, abs=1e-9)
+
+
+def test_two_robots_that_meet_each_stop_within_half_of_the_room() -> None:
+    for apart in (0.4, 0.8, 1.5, 3.0):
+        out = sharing(Twist(1.0, 0.2), [(apart, 0.0)], 0.15, LIMITS)
+        way = out.linear_x**2 / (2.0 * BRAKING_SHARE * LIMITS.a_max_mps2)
+        assert way <= max(0.0, 0.5 * (apart - 0.3) - SKIN_M) + 1e-9
+        assert out.angular_z * 1.0 == pytest.approx(0.2 * out.linear_x)
+
+
+def test_a_team_mate_beside_or_behind_slows_nobody() -> None:
+    for place in ((0.1, 0.5), (-0.5, 0.0)):
+        assert sharing(Twist(0.5, 0.0), [place], 0.15, LIMITS) == Twist(0.5, 0.0)
+    assert sharing(Twist(-0.3, 0.0), [(-0.4, 0.0)], 0.15, LIMITS).linear_x > -0.3
