@@ -32,7 +32,7 @@ def command(
     with sight(seen, frozenset({"*/host", "*/status"})) as view:
         began = clock.now()
         first_word(view, HEAR_S)
-        while clock.now() < began + STATUS_S:
+        while clock.now() < began + STATUS_S and not _all_have_spoken(view):
             clock.sleep(0.05)
             view.hear()
         now = clock.now()
@@ -47,6 +47,12 @@ def command(
         for name in silent:
             print(f"host {name} is silent")
     return 1 if silent or not facts or any(row["state"] != "running" for row in facts) else 0
+
+
+def _all_have_spoken(view: Sight) -> bool:
+    """Each running robot has told how it is."""
+    running = [report.name for status in view.hosts.values() for report in status.processes if report.pid]
+    return all(name in view.texts for name in running if robot_id_of(name))
 
 
 def rows(view: Sight) -> list[dict[str, Any]]:

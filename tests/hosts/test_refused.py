@@ -110,6 +110,7 @@ def test_machines_that_would_not_do_are_named_a_line_each(clean: Machines) -> No
     assert wrongs == {("b", "lfa"), ("c", "clock"), ("d", "place"), ("e", "place"), ("f", "port")}
 
 
+@pytest.mark.long
 def test_of_two_robots_of_one_name_on_two_machines_one_is_refused_and_named(clean: Machines) -> None:
     """Whichever comes second. When it is the fleet's, all that has been started is taken down again."""
     fleet = clean

@@ -43,10 +43,13 @@ class Home:
         self.file.write_text(TEXT)
         self.state = folder / ".local/state/lfa" / FLEET / "laptop"
 
+    @property
+    def environment(self) -> dict[str, str]:
+        return {**os.environ, "HOME": str(self.folder)}
+
     def lfa(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        environment = {**os.environ, "HOME": str(self.folder)}
         command = [*LFA, *arguments]
-        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, env=environment)
+        return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False, env=self.environment)
 
     def rows(self) -> dict[str, dict[str, Any]]:
         told = self.lfa("ps", "--json", "--fleet", FLEET)
@@ -58,6 +61,10 @@ class Home:
 
     def process(self, module: str, *words: str) -> Identity:
         return next(one for one in self.processes() if module in one.arguments and set(words) <= set(one.arguments))
+
+
+def _of(home: Home, robot: str) -> list[Identity]:
+    return [one for one in home.processes() if "--id" in one.arguments and robot in one.arguments]
 
 
 @pytest.fixture(scope="module")
@@ -89,11 +96,29 @@ def test_ps_and_logs_need_no_file_where_the_fleet_runs(up: Home) -> None:
     assert told.returncode == 0 and "router listens at" in told.stdout
 
 
+def test_logs_go_on_with_what_comes_until_ctrl_c(up: Home) -> None:
+    told = up.folder / "told"
+    log = max(up.state.glob("*/logs/router.log"))
+    command = [*LFA, "logs", "-f", "router", "--fleet", FLEET, "-n", "1"]
+    with told.open("w") as out, subprocess.Popen(command, stdout=out, text=True, env=up.environment) as following:
+        try:
+            eventually(lambda: "router listens at" in told.read_text(), "the last line does not come")
+            with log.open("a") as file:
+                file.write("and more\n")
+            eventually(lambda: told.read_text().endswith("and more\n"), "what is written does not come")
+            following.send_signal(signal.SIGINT)
+            assert following.wait(20.0) == 130
+        finally:
+            following.kill()
+
+
 def test_what_is_killed_is_started_again_and_ps_tells_why_it_ended(up: Home) -> None:
     robot = up.process("agents.cli", "2")
     assert processes.send(robot, signal.SIGKILL)
-    eventually(lambda: up.rows()["robot2"]["starts"] > 1, "robot2 is not started again")
-    assert up.rows()["robot2"]["ended"] == "robot2 ended (SIGKILL)"
+    eventually(lambda: any("agents.cli" in one.arguments and one != robot for one in _of(up, "2")), "not started again")
+    row = up.rows()["robot2"]
+    assert row["starts"] > 1
+    assert row["ended"] == "robot2 ended (SIGKILL)"
 
 
 def test_restart_ends_one_process_and_starts_it_again(up: Home) -> None:
