@@ -9,6 +9,7 @@ import tarfile
 from pathlib import Path
 
 from deploy.fleet import journals
+from deploy.fleet.file import load
 
 
 def _state(tmp_path: Path) -> Path:
@@ -27,6 +28,13 @@ def test_the_newest_runs_journals_come(tmp_path: Path) -> None:
     ).stdout
     assert journals.unpack(packed, tmp_path / "here") == 1
     assert (tmp_path / "here" / "journal" / "robot2-7.bin").read_bytes() == b"new"
+
+
+def test_the_journals_of_every_machine_of_a_fleet_file_come(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.toml"
+    file.write_text(f'scenario = "straight"\n[hosts.here]\nstate = "{_state(tmp_path)}"\n')
+    assert journals.fetch(load(file), tmp_path / "run") == (1, [])
+    assert (tmp_path / "run" / "journal" / "robot2-7.bin").read_bytes() == b"new"
 
 
 def test_a_machine_can_put_nothing_outside_of_the_folder(tmp_path: Path) -> None:
