@@ -36,7 +36,7 @@ from protocol.messages import (
 )
 from protocol.quorum import is_quorum
 from protocol.timing import timing_of
-from tests.model import register
+from tests.model import register_state
 from tests.model.voter_rules import may_grant, may_promise
 
 GRANT_S = 2.0
@@ -190,9 +190,15 @@ def quorums() -> int:
         for tie, previous_tie in product((0, 1, 8), repeat=2):
             old = Electorate(sets[previous], _member(members, previous_tie), rule) if previous else None
             config = Config(VERSIONS[0], sets[voters], _member(members, tie), old, ())
-            content = (voters, tie, previous, previous_tie, register.ALL if rule == "all" else register.HALF)
+            content = (
+                voters,
+                tie,
+                previous,
+                previous_tie,
+                register_state.ALL if rule == "all" else register_state.HALF,
+            )
             for present in range(16):
-                ours = register.is_quorum(content, present)
+                ours = register_state.is_quorum(content, present)
                 assert is_quorum(config, sets[present]) == ours, (config, sets[present])
                 compared += 1
     return compared

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.model import lease_core, register
+from tests.model import lease_state, register_state
 from tests.model.checker import Model
 from tests.model.lease_core import LeaseCore
 from tests.model.register import Register
@@ -94,13 +94,13 @@ RULES = (
 def lease_mutant(mutant: str, issuers: str, act: int, deadman: int = 0, *, gateways: bool, short: bool = True) -> Run:
     terms = tuple(int(digit) - 1 for digit in issuers)
     build: Callable[[], Model] = lambda: LeaseCore(terms, act, deadman, gateways, mutant=mutant)  # noqa: E731
-    return Run(lease_core.MUTANTS[mutant], build, short, mutant)
+    return Run(lease_state.MUTANTS[mutant], build, short, mutant)
 
 
 def config_mutant(mutant: str, robots: int, issuers: str, restarts: tuple[int, ...] = (), *, short: bool = True) -> Run:
     terms = tuple(int(digit) - 1 for digit in issuers)
     build: Callable[[], Model] = lambda: Register(robots, terms, 1, restarts, mutant=mutant)  # noqa: E731
-    return Run(register.MUTANTS[mutant], build, short, mutant)
+    return Run(register_state.MUTANTS[mutant], build, short, mutant)
 
 
 MUTANTS = (

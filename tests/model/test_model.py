@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.model import lease_core, refinement, register
+from tests.model import lease_state, refinement, register_state
 from tests.model.__main__ import report
 from tests.model.checker import explore, in_columns
 from tests.model.runs import MUTANTS, RULES, STATES_MAX, Run
@@ -28,7 +28,7 @@ def test_a_planted_fault_is_caught_with_a_trace(run: Run) -> None:
 
 
 def test_every_mutant_is_planted() -> None:
-    assert {run.mutant for run in MUTANTS} == {*lease_core.MUTANTS, *register.MUTANTS}
+    assert {run.mutant for run in MUTANTS} == {*lease_state.MUTANTS, *register_state.MUTANTS}
 
 
 def test_make_model_fails_with_a_trace_when_t_grant_is_one_unit_short(capsys: pytest.CaptureFixture[str]) -> None:
