@@ -37,7 +37,7 @@ def messages(draw: st.DrawFn) -> tuple[float, PoseStamped]:
     )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     heard=st.lists(st.one_of(st.none(), messages()), min_size=5, max_size=40),
     times=st.lists(st.floats(-0.05, 0.6), min_size=5, max_size=40),

@@ -37,7 +37,7 @@ def test_an_obstacle_on_the_way_is_passed_with_room_on_the_shorter_side() -> Non
     assert Route(points).length_m < 20.2
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(known=circles)
 def test_a_route_begins_and_ends_where_it_should_bends_gently_and_stays_near(
     known: list[tuple[float, float, float]],

@@ -50,7 +50,7 @@ class Pair:
         return hypot(x, y)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     phi=st.floats(pi / 2, 3 * pi / 2),
     start=st.tuples(st.floats(0.4, 1.0), st.floats(-pi, pi), st.floats(-1.0, 1.0)),

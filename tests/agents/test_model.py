@@ -22,7 +22,7 @@ def _ahead(own: Pose2D) -> tuple[float, float]:
     return own.x + B * cos(own.theta), own.y + B * sin(own.theta)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(poses, twists)
 def test_eq_1_arc_is_what_many_small_euler_steps_tend_to(pose: Pose2D, twist: Twist) -> None:
     x, y, theta, n = pose.x, pose.y, pose.theta, 20_000

@@ -93,7 +93,7 @@ segment = st.tuples(coordinate, coordinate, coordinate, coordinate).filter(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     circles=st.lists(circle, max_size=6),
     segments=st.lists(segment, max_size=6),
