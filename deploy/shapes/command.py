@@ -60,7 +60,7 @@ def command(
     if as_json:
         print(msgspec.json.encode(verdict).decode())
     elif compared:
-        print(f"across {len(kept)} runs of the paper's paths\n" + "\n".join(map(bars.line, compared)))
+        print(f"across {len(kept)} of the paper's paths\n" + "\n".join(map(bars.line, compared)))
     return 0 if verdict.ok else 1
 
 
