@@ -16,8 +16,8 @@ from protocol.node import Local, PeerDown, PeerUp, RouterLost
 from protocol.topics import TOPIC, Address, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
-ANEW_S = 1.5
-"""Routers have met again by then: links are tried every second."""
+ANEW_S = (1.5, 6.5)
+"""Routers have met again by then: links are tried every second, and a busy machine takes its time."""
 TOKEN_HOLD_S = 0.001
 """How long a vanished token is held back: six times what was measured between it and the news of a router's death."""
 OWNER_RATE_MAX_HZ = 500.0
@@ -181,23 +181,33 @@ class Links:
     """
 
     def __init__(self) -> None:
-        self.anew_at = float("inf")
+        self._due: list[float] = []
         self._gone: set[tuple[str, int]] = set()
+        self._cut_off = False
+
+    @property
+    def anew_at(self) -> float:
+        return self._due[0] if self._due else float("inf")
 
     def see(self, event: Local, now: float) -> None:
         match event:
             case PeerDown(name, incarnation):
                 self._gone.add((name, incarnation))
-                self.anew_at = now + ANEW_S
-            case PeerUp(name, incarnation) if (name, incarnation) in self._gone:
+            case PeerUp(name, incarnation) if self._cut_off or (name, incarnation) in self._gone:
                 self._gone.discard((name, incarnation))
-                self.anew_at = now + ANEW_S
+            case RouterLost():
+                self._cut_off = True
+                return
+            case _:
+                return
+        self._due = [now + after_s for after_s in ANEW_S]
 
     def due(self, now: float) -> bool:
         """True once each time."""
         if now < self.anew_at:
             return False
-        self.anew_at = float("inf")
+        self._due.pop(0)
+        self._cut_off = False
         return True
 
 

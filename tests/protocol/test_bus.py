@@ -143,25 +143,26 @@ def test_names_without_end_take_no_memory_without_end() -> None:
 
 
 @pytest.mark.parametrize(
-    ("events", "anew_after_s"),
+    ("events", "last_s"),
     [
         (["up 1"], None),
-        (["down 1"], ANEW_S),
-        (["down 1", "up 2"], ANEW_S),
-        (["down 1", "up 1"], 1.0 + ANEW_S),
-        (["down 1", "up 1", "up 1"], 1.0 + ANEW_S),
+        (["lost"], None),
+        (["down 1"], 0.0),
+        (["down 1", "up 2"], 0.0),
+        (["down 1", "up 1"], 1.0),
+        (["down 1", "up 1", "up 1"], 1.0),
+        (["lost", "up 1"], 1.0),
     ],
 )
-def test_what_is_followed_is_told_anew_after_a_token_went_or_came_back(
-    events: list[str], anew_after_s: float | None
+def test_what_is_followed_is_told_anew_twice_after_a_token_went_or_came_back(
+    events: list[str], last_s: float | None
 ) -> None:
     links = Links()
+    kinds = {"up": PeerUp, "down": PeerDown}
     for at, event in enumerate(events):
-        kind, life = event.split()
-        links.see(PeerUp("robot2", int(life)) if kind == "up" else PeerDown("robot2", int(life)), float(at))
-    if anew_after_s is None:
-        assert not links.due(1000.0)
-        return
-    assert not links.due(anew_after_s - 0.001)
-    assert links.due(anew_after_s)
-    assert not links.due(1000.0), "once is enough"
+        kind, _, life = event.partition(" ")
+        links.see(kinds[kind]("robot2", int(life)) if life else RouterLost(), float(at))
+    for after_s in () if last_s is None else ANEW_S:
+        assert not links.due(last_s + after_s - 0.001)  # type: ignore[operator]
+        assert links.due(last_s + after_s)  # type: ignore[operator]
+    assert not links.due(1000.0)
