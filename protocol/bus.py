@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from msgspec import Struct, structs
@@ -54,26 +53,25 @@ class Settable(Protocol):
 
 
 class Wake:
-    """The loop's one wake-up, set by any thread and by signal handlers.
+    """The loop's one wake-up, set by any thread and by signal handlers: a lock that is free when it is set.
 
     `threading.Event` will not do: its lock is not re-entrant, and a signal that comes while the loop itself holds it
     stops the process for good, in its own handler.
     """
 
     def __init__(self) -> None:
-        self._tokens: SimpleQueue[None] = SimpleQueue()
+        self._unset = threading.Lock()
+        self._unset.acquire()
 
     def set(self) -> None:
-        if self._tokens.empty():
-            self._tokens.put(None)
+        try:
+            self._unset.release()
+        except RuntimeError:
+            return  # it is set already
 
     def wait(self, timeout_s: float) -> bool:
         """Until it is set (True) or `timeout_s`, 0 or more, have passed (False); afterwards it is unset."""
-        try:
-            self._tokens.get(timeout=timeout_s)
-        except Empty:
-            return False
-        return True
+        return self._unset.acquire(timeout=timeout_s)
 
 
 class Inbox:
