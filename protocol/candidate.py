@@ -5,6 +5,8 @@ The term stays the same while the attempt only repeats itself, so a robot that n
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from protocol.holder import Holder
 from protocol.membership import ANY_LIFE
 from protocol.messages import NO_TERM, Config, Grantee, Member, Term
@@ -88,15 +90,19 @@ class Candidate:
     def fenced_terms(self) -> tuple[Term, ...]:
         return tuple(sorted(grantee.term for grantee in self._fenced if grantee.term != NO_TERM))
 
-    def refused(self, src: Member, config: Config) -> bool:
+    def refused(self, src: Member, config: Config, ended: Callable[[Member], bool]) -> bool:
         """`src` has promised a higher term; answers whether this one is beaten.
 
         While it only asks, at once: a higher term of its own costs nothing. Once grants are on their way, only
         when no quorum is left: a late refusal by one voter must not undo an election that the others have made.
+        A life that has `ended` leaves none: counted in, it would hold an attempt that nobody can grant for T_act.
         """
         self._refused.add(src)
-        left = [m for m in electors(config) if m not in self._refused]
-        return self.holder is None or not is_quorum(config, left)
+        if self.holder is None:
+            return True
+        granted = self.holder.nonces
+        left = [m for m in electors(config) if m not in self._refused and (m in granted or not ended(m))]
+        return not is_quorum(config, left)
 
     def has_quorum(self, config: Config) -> bool:
         """E18: only lives that `config` names, and that know of a config, count."""

@@ -429,7 +429,8 @@ class Lease:
         if candidate is not None and (body.term == candidate.term or in_vain):
             if newer:
                 self._adopt(body.config, now, effects)
-            beaten = candidate.refused(src, self.config) if body.promised > candidate.term else False
+            overtaken = body.promised > candidate.term
+            beaten = overtaken and candidate.refused(src, self.config, self._peers.has_ended)
             if beaten or (newer and candidate.holder is not None):
                 self._drop_candidate(now, effects)
                 self._elect_after(now + self._timing.rank_step_s)

@@ -45,3 +45,7 @@ class Peers:
     def is_superseded(self, member: Member) -> bool:
         """A later life of it was heard."""
         return self._newest.get(member.id, NEVER_HEARD) > member.incarnation
+
+    def has_ended(self, member: Member) -> bool:
+        """No answer is to be expected of this life: a later one was heard, or its token vanished."""
+        return self.is_superseded(member) or self.is_gone(member)

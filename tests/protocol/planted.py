@@ -29,6 +29,7 @@ from protocol.gateway import Gateway
 from protocol.holder import Holder
 from protocol.lease import Lease
 from protocol.messages import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
+from protocol.peers import Peers
 from protocol.stopping import Stopping
 from protocol.timing import Timing
 from tests.protocol import test_gateway, test_lease, test_usual_bugs
@@ -351,6 +352,10 @@ def _forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Lease, "request_forget", request_forget)
 
 
+def _ended_lives_may_still_grant(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Peers, "has_ended", lambda self, member: False)
+
+
 class Bug(NamedTuple):
     where: str
     """In the design: a usual bug by its number, a mutant, a wording; else a rule of ours."""
@@ -440,6 +445,8 @@ PLANTED: tuple[Bug, ...] = (
         "gateway::test_e13_a_gateway_that_starts_is_shut_for_the_longest_bond"),
     Bug("rule E11", "FENCED answered without fencing", _fence_without_effect,
         "gateway::test_e11_a_fenced_gateway_brakes_and_refuses_what_is_below"),
+    Bug("rule E6", "a candidate waits for grants of lives that have ended", _ended_lives_may_still_grant,
+        "usual_bugs::test_e6_an_attempt_that_only_ended_lives_could_still_grant_is_given_up_at_once"),
     Bug("rule E8", "the chain forgets its order", _chain_forgets_its_order,
         "lease::test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_within_its_bond", (0,)),
 )

@@ -6,13 +6,16 @@ from typing import TypeVar
 
 from protocol.acceptor import Acceptor
 from protocol.holder import Holder
-from protocol.messages import Grant, LeaseBody, Member, Nack, Prepare, Promise, Propose, Release, Term, Version
+from protocol.lease import Lease
+from protocol.messages import Grant, Hello, LeaseBody, Member, Nack, Prepare, Promise, Propose, Release, Term, Version
 from protocol.timing import CLOCK_RATE_ERROR
 from tests.protocol.test_lease import (
     HIGH,
     LOW,
+    OLD,
     OTHERS,
     STD,
+    TEAM,
     A,
     B,
     Team,
@@ -192,3 +195,49 @@ def test_bug_10_a_candidate_that_nobody_hears_keeps_its_term() -> None:
     team.run(11.0)
     assert len(said) > 100
     assert len({body.term for _, body in said}) == 1
+
+
+# --- a candidate whose grants are on their way, refused by one voter of five (E6) -------------------------------------
+
+REFUSED_AT = 1.0
+
+
+def refused_by_the_witness(
+    restarted: tuple[int, ...], vanished: tuple[int, ...], granted: tuple[int, ...] = ()
+) -> Lease:
+    """Robot 2 of four, after robot 1 fell silent and `granted` have granted to it; three votes of five are needed."""
+    lease = Lease(Member(2, 1), TEAM, STD, 0.0, floor=0)
+    lease.receive(Member(1, 1), Propose(Term(1, 1, 1), config_of(Term(1, 1, 1)), 0, Member(1, 1)), 0.4)
+    [prepare] = sent(lease.tick(REFUSED_AT), Prepare)
+    assert isinstance(prepare, Prepare)
+    promise = Promise(prepare.term, lease.config, None, False)
+    effects = [e for other in (0, 4) for e in lease.receive(Member(other, 1), promise, REFUSED_AT)]
+    [propose] = sent(effects, Propose)
+    assert isinstance(propose, Propose)
+    for other in granted:
+        lease.receive(Member(other, 1), Grant(propose.term, propose.round, propose.config.version, 0.0), REFUSED_AT)
+    for other in restarted:
+        lease.receive(Member(other, 2), Hello(None), REFUSED_AT)
+    for other in vanished:
+        lease.hint(other, 1, False, REFUSED_AT)
+    lease.receive(Member(0, 1), Nack(propose.term, Term(50, 4, 1), None, 0.0, OLD), REFUSED_AT)
+    return lease
+
+
+def asks_anew(lease: Lease) -> bool:
+    """With a term above the refusal, long before the attempt runs out."""
+    said = sent(lease.tick(REFUSED_AT + STD.heartbeat_s), Prepare)
+    return any(isinstance(body, Prepare) and body.term > Term(50, 4, 1) for body in said)
+
+
+def test_e6_an_attempt_that_only_ended_lives_could_still_grant_is_given_up_at_once() -> None:
+    """Else it binds its own voter for T_act against whoever the others have promised to (L1)."""
+    assert asks_anew(refused_by_the_witness(restarted=(1, 3), vanished=()))
+    assert asks_anew(refused_by_the_witness(restarted=(), vanished=(1, 3)))
+    assert asks_anew(refused_by_the_witness(restarted=(1,), vanished=(3,)))
+
+
+def test_e6_one_refusal_undoes_no_attempt_that_a_quorum_may_still_grant() -> None:
+    assert not asks_anew(refused_by_the_witness(restarted=(), vanished=()))
+    assert not asks_anew(refused_by_the_witness(restarted=(1,), vanished=()))
+    assert not asks_anew(refused_by_the_witness(restarted=(1, 3), vanished=(), granted=(3,))), "its grant still counts"
