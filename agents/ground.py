@@ -27,6 +27,9 @@ STRAIGHT_M = 0.08
 """A hole whose near edge is this straight over all three lines is a ditch."""
 CELL_M = 0.05
 CELLS_MAX = 4000
+MOVED_M = 0.3
+"""What is barred near the robot is looked up anew when it has moved so far, or something new bars the way."""
+NOWHERE = (inf, inf, 0.0)
 JUDGE_M = 0.6
 """Nearer than this, what has no visible end has none."""
 NEAR_M = 0.5
@@ -64,6 +67,9 @@ class Ground:
         self._seen_at: dict[tuple[int, int], float] = {}
         self._crossable: dict[tuple[int, int], float] = {}
         """Near edges of what can be crossed, and when they were seen last."""
+        self._near: list[Point] = []
+        self._looked_at = NOWHERE
+        """Where `_near` was looked up, and how far around."""
         self._kinds: dict[tuple[int, int], tuple[BarKind, float]] = {}
         """Class and width [m] of the floor that bars a cell."""
         self.ahead: GroundFeature | None = None
@@ -113,7 +119,7 @@ class Ground:
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
         """What bars the way nearer than `within_m`, in `base_link`."""
         c, s, near = cos(pose_map.theta), sin(pose_map.theta), []
-        for x, y in self._barred():
+        for x, y in self._barred_near(pose_map, within_m):
             dx, dy = x - pose_map.x, y - pose_map.y
             if dx * dx + dy * dy < within_m * within_m:
                 near.append((c * dx + s * dy, c * dy - s * dx))
@@ -128,8 +134,16 @@ class Ground:
                 best, found = apart, self._kinds[i, j]
         return found
 
-    def _barred(self) -> list[Point]:
-        return [((i + 0.5) * CELL_M, (j + 0.5) * CELL_M) for (i, j), n in self._cells.items() if n >= SEEN_MIN]
+    def _barred_near(self, pose_map: Pose2D, within_m: float) -> list[Point]:
+        """All barred points nearer than `within_m` and some farther ones, looked up anew where the robot moved on."""
+        x, y, reach_m = self._looked_at
+        if reach_m != within_m or abs(pose_map.x - x) > MOVED_M or abs(pose_map.y - y) > MOVED_M:
+            self._looked_at = x, y, _ = pose_map.x, pose_map.y, within_m
+            cells = ((i, j) for (i, j), n in self._cells.items() if n >= SEEN_MIN)
+            points = (((i + 0.5) * CELL_M, (j + 0.5) * CELL_M) for i, j in cells)
+            far_m = within_m + MOVED_M
+            self._near = [(px, py) for px, py in points if abs(px - x) < far_m and abs(py - y) < far_m]
+        return self._near
 
     def _confirmed(self, y: float, feature: GroundFeature, pose_map: Pose2D, now: float) -> bool:
         """Whether the near edge was seen hereabouts a moment ago too."""
@@ -161,6 +175,7 @@ class Ground:
         if before < SEEN_MIN and now - self._seen_at.get(cell, -inf) > AGAIN_S:
             before = 0
         self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, (kind, width_m)
+        self._looked_at = NOWHERE
 
 
 def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:

@@ -30,7 +30,7 @@ def is_first(config: Config) -> bool:
 
 
 def ids(chain: tuple[Member, ...]) -> tuple[int, ...]:
-    return tuple(member.id for member in chain)
+    return tuple([member.id for member in chain])  # asked for at every control step: a generator takes twice as long
 
 
 def universe(mission: Mission) -> tuple[int, ...]:
