@@ -169,19 +169,16 @@ class Lead:
         near_end = left_m < self._look_ahead_m
         target = in_base(pose, self.goal) if near_end else self.ahead(pose, self._look_ahead_m)
         braking = (2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5
-        v = min(
-            self._cruise(slots),
-            braking,
-            speed_max_mps,
-            abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S,
-        )
         bearing = atan2(target[1], target[0])
+        v = min(self._cruise(slots), braking, speed_max_mps)
+        if self._planned:
+            v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
+        # Last of all: a share of what the last step allows would be a share of a share in the next one.
+        v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S)
         if near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing)
         if abs(bearing) > IN_PLACE_RAD:
             return self._turn(bearing)
-        if self._planned:
-            v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
         reach = max(hypot(*target), 0.25)
         curvature = 2.0 * target[1] / (reach * reach)
         return Twist(v, v * curvature)
