@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -26,7 +27,8 @@ def test_what_a_client_asks_of_zenoh_is_not_inherited_by_its_children() -> None:
         )
         try:
             client = [sys.executable, "-c", SCRIPT, endpoint]
-            told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True)
+            fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
+            told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh)
         finally:
             router.kill()
             router.wait()

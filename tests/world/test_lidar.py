@@ -43,7 +43,8 @@ def test_a_round_obstacle_is_seen_where_it_stands_and_nowhere_else() -> None:
 
 
 def test_walls_all_round_leave_no_gap() -> None:
-    ranges = look(Pose2D(0.0, 0.0, 0.3), "world.walls_m=[[-2,-2,2,-2],[2,-2,2,2],[2,2,-2,2],[-2,2,-2,-2]]")
+    room = "world.walls_m=[[-2,-2,2,-2],[2,-2,2,2],[2,2,-2,2],[-2,2,-2,-2]]"
+    ranges = look(Pose2D(0.0, 0.0, 0.3), room, "mission.leading.route_m=[[1.0, 0.0]]")
     assert all(2.0 <= r <= hypot(2.0, 2.0) + 1e-9 for r in ranges)
 
 

@@ -194,6 +194,7 @@ from protocol.geometry import Twist
 from world.physics import Physics
 from world.scenario import load
 overrides = ["world.walls_m=[[-2,-2,4,-2],[4,-2,4,4],[4,4,-2,4],[-2,4,-2,-2]]", "mission.formation.separation_m=0.6",
+    "mission.leading.route_m=[[3.0, 3.0]]",
     "world.obstacles=[{center_m=[1,0.3],radius_m=0.2,mass_kg=4},{center_m=[2,1],corners_m=[[0,0],[0.3,0],[0,0.3]],mass_kg=2}]"]
 world, chance = Physics(load("straight", overrides, robots=6)), Random(3)
 litter = [bytearray(Random(n).randrange(1, 9999)) for n in range(SIZE)]
