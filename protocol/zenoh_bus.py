@@ -32,9 +32,6 @@ FOLLOWED_AT_ONCE = ("cmd_vel",)
 """Not sent by themselves: the pose that each control step says next takes them along, one write for the two."""
 ROUTER_RX_THREADS = 32  # more than the tcp links that can die at once: each blocks one for 10 s (zenoh.md section 2)
 CLIENT_RX_THREADS = 4  # a client has one link at a time, and those that it lost within the last 10 s
-LOCAL_RX_THREADS = 2
-"""A lost unix socket blocks nobody, and each thread more that looks for work takes processor time: 5.7 % of a core with
-4, 4.9 % with 2 for an agent among four."""
 UNIX_PATH_BYTES_MAX = 107
 SECURE_PROTOCOLS = ("unixsock-stream", "tls", "quic")
 
@@ -204,15 +201,13 @@ def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
 def _client(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
     config = _config("client", [], endpoint.split(","), lease_ms, credentials)
     login = {} if credentials is None else _login(credentials)
-    local = all(socket_path(one) is not None for one in endpoint.split(","))
-    threads = LOCAL_RX_THREADS if local else CLIENT_RX_THREADS
     if not login:
-        return _open(config, threads)
+        return _open(config, CLIENT_RX_THREADS)
     _insert(config, login)
     try:
-        return _open(config, threads)
+        return _open(config, CLIENT_RX_THREADS)
     except zenoh.ZError:  # a router that asks for no password does not take one either
-        return _open(_config("client", [], endpoint.split(","), lease_ms, credentials), threads)
+        return _open(_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_RX_THREADS)
 
 
 def _open(config: zenoh.Config, rx_threads: int) -> zenoh.Session:
