@@ -11,7 +11,6 @@ import pytest
 from deploy.run.chaos import play
 from deploy.run.fuzz import Tally, parse_seeds, shrink, so_far
 from deploy.run.schedules import Fault, draw, without
-from protocol.acceptor import Acceptor
 from protocol.mission import Refused
 
 
@@ -35,16 +34,9 @@ def test_one_seed_is_one_run_under_any_hash_seed() -> None:
     assert len(told[0].splitlines()) > 100
 
 
-def test_a_planted_bug_is_found_shrunk_and_still_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("forgetful_voter")
+def test_a_planted_bug_is_found_shrunk_and_still_fails() -> None:
     """A voter that forgets its bond: two leases within few seeds, and few faults are enough."""
-    honest = Acceptor.propose
-
-    def careless(self: Acceptor, *arguments: object) -> object:
-        self.bond = None
-        return honest(self, *arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(Acceptor, "propose", careless)
-    monkeypatch.setattr(Acceptor, "bound", lambda self, now: None)
     bad = next(seed for seed in range(50) if play(draw(seed)).violations)
     name = play(draw(bad)).violations[0].name
     small = shrink(draw(bad), name)

@@ -12,7 +12,6 @@ from msgspec.structs import replace
 from deploy.run.chaos import play_whole
 from deploy.run.fuzz import shrink
 from deploy.run.schedules import KINDS, LEADER, Fault, draw
-from protocol.acceptor import Acceptor
 from protocol.gateway import Gateway
 
 SEEDS = (2, 3, 4, 7, 8, 14, 15, 18, 19)
@@ -38,15 +37,8 @@ def test_one_seed_is_one_run_under_any_hash_seed() -> None:
     assert len(told[0].splitlines()) > 50
 
 
-def test_a_voter_that_forgets_its_bond_is_found_and_few_faults_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = Acceptor.propose
-
-    def careless(self: Acceptor, *arguments: object) -> object:
-        self.bond = None
-        return honest(self, *arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(Acceptor, "propose", careless)
-    monkeypatch.setattr(Acceptor, "bound", lambda self, now: None)
+@pytest.mark.usefixtures("forgetful_voter")
+def test_a_voter_that_forgets_its_bond_is_found_and_few_faults_are_enough() -> None:
     loss, duplicate = Fault(1.2, "loss", (), 0.2, 0.1), Fault(2.5, "duplicate", (), 0.2, 0.2)
     deaf = Fault(1.5, "cut_pair", (LEADER, 2), 1.0)  # robot 2 hears the leader no more, everybody else does
     bad = replace(draw(3), faults=(loss, deaf, duplicate))
