@@ -13,16 +13,19 @@ from protocol.geometry import STILL, Pose2D, Twist, along_arc
 CLEARANCE_M = 0.6
 """From the robot's centre to the surface of what moves; nearer within the horizon is a conflict."""
 HORIZON_S = 3.0
+LOOK_S = 6.0
+"""When nothing keeps the distance within the horizon, so far ahead is looked at which keeps most of it: what comes on
+slowly from behind is not at a waiting robot yet when the horizon ends."""
 STEP_S = 0.25
 SLOW_SHARE = 0.4
-BACK_MPS = 0.25
+BACK_MPS = AHEAD_MPS = 0.25
 WAIT_S_MAX = 5.0
 """After so long what moves is gone round as if it stood."""
 HOLD_S = 1.0
 """A robot takes less care only so long after the last conflict."""
-CARE = {"slow": 0, "wait": 1, "back": 2}
+CARE = {"slow": 0, "wait": 1, "ahead": 2, "back": 2}
 WORTH_M = 0.1
-"""Backing off must win this much clearance over waiting."""
+"""Going out of the way, ahead or back, must win this much clearance over what is being done, or over waiting."""
 
 
 class Crossing:
@@ -66,25 +69,31 @@ class Crossing:
         """The least that keeps the distance; what keeps most of it when nothing does."""
         if _closest(moving, pose, _done("slow", wanted)) >= CLEARANCE_M:
             return "slow"
-        standing, backing = _closest(moving, pose, STILL), _closest(moving, pose, _done("back", wanted))
-        return "wait" if standing >= CLEARANCE_M or standing + WORTH_M >= backing else "back"
+        if _closest(moving, pose, STILL) >= CLEARANCE_M:
+            return "wait"
+        kept = {action: _closest(moving, pose, _done(action, wanted), LOOK_S) for action in ("wait", "back", "ahead")}
+        doing = "wait" if self.decision is None or self.decision.action not in kept else self.decision.action
+        kept[doing] += WORTH_M
+        return max(kept, key=lambda action: kept[action])
 
 
 def _done(action: str, wanted: Twist) -> Twist:
     if action == "slow":
         return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
+    if action == "ahead":
+        return Twist(max(wanted.linear_x, AHEAD_MPS), 0.0)
     return STILL if action == "wait" else Twist(-BACK_MPS, 0.0)
 
 
-def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist) -> float:
-    """Least distance [m] between the robot's centre and a surface within the horizon, from now on.
+def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: float = HORIZON_S) -> float:
+    """Least distance [m] between the robot's centre and a surface within so long from now on.
 
     What is already that near and moves away is no conflict: only approaches count.
     """
     least = inf
     for feature in moving:
         first = hypot(feature.x - pose.x, feature.y - pose.y)
-        for n in range(1, round(HORIZON_S / STEP_S) + 1):
+        for n in range(1, round(within_s / STEP_S) + 1):
             later = n * STEP_S
             there, (x, y) = along_arc(pose, twist, later), feature.at(later)
             apart = hypot(x - there.x, y - there.y)

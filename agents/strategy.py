@@ -47,8 +47,8 @@ class Decision(Struct, frozen=True):
     """What a detour does now, with the values that it was decided by, for the log."""
 
     action: str
-    """`left`, `right`, `u_turn`, `back`, `creep`, `blocked`; of what moves: `slow`, `wait`, `back`; on the ground:
-    `overcome`, `climb`."""
+    """`left`, `right`, `u_turn`, `back`, `creep`, `blocked`; of what moves: `slow`, `wait`, `back`, `ahead`;
+    on the ground: `overcome`, `climb`."""
     free_m: float
     """Clear way along the motion that was wanted."""
     bearing: float

@@ -59,3 +59,14 @@ def test_no_slower_crosser_is_touched_whenever_it_comes() -> None:
             y += 0.3 * 0.02
             least = min(least, ((2.0 - pose.x) ** 2 + (y - pose.y) ** 2) ** 0.5 - 0.25 - 0.15)
         assert least > 0.0, f"touched at phase {phase}"
+
+
+def test_who_stands_before_what_comes_from_behind_goes_ahead_out_of_its_way() -> None:
+    """What turned round behind a robot and comes on at walking pace: to wait or to back off is to be touched."""
+    crossing, pose, y, least = Crossing(), Pose2D(0.0, 0.0, -1.27), 1.2, 9.0
+    for n in range(400):
+        twist = crossing.give_way(crosser(0.2, y, 0.0, -0.22), pose, Twist(0.1, 0.0), 0.02 * n)
+        pose = along_arc(pose, twist, 0.02)
+        y -= 0.22 * 0.02
+        least = min(least, ((0.2 - pose.x) ** 2 + (y - pose.y) ** 2) ** 0.5 - 0.25 - 0.15)
+    assert least > 0.2, least
