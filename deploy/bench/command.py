@@ -31,7 +31,7 @@ def command(
     kills: Annotated[int | None, typer.Option(help="Rounds of each fault.")] = None,
     full: Annotated[bool, typer.Option("--full", help="Many more rounds, with their tails.")] = False,
     minutes: Annotated[float | None, typer.Option(help="How long to look on.")] = None,
-    seeds: Annotated[int | None, typer.Option(help="Runs of each scenario, from seed 1 on.")] = None,
+    seeds: Annotated[int | None, typer.Option(help="Runs of each scenario, from seed 1 on; pairs on each map.")] = None,
 ) -> int:
     """Exit code 1 when a row does not reach its bar."""
     names = _names()

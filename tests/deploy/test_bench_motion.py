@@ -9,6 +9,8 @@ import pytest
 
 from deploy.bench import motion
 from deploy.run.simulate import run
+from protocol.mission import Refused
+from world import maps
 from world.scenario import load, shipped
 
 
@@ -17,12 +19,27 @@ def test_every_shipped_scenario_is_a_case() -> None:
     assert {f"scenario/{name}" for name in shipped()} <= names
 
 
-def test_a_pair_is_far_apart_and_has_room_for_the_team() -> None:
-    [sets] = motion.pairs(1)
-    scenario = load("explore", sets)
+@pytest.mark.parametrize("ground", motion.GROUNDS, ids=lambda ground: ground.name)
+def test_a_pair_is_far_apart_and_has_room_for_the_team(ground: motion.Ground) -> None:
+    path = motion.map_of(ground)
+    if path is None:
+        pytest.skip(f"no shared/data/maps/{ground.name}.yaml beside the checkout or above it")
+    [sets] = motion.pairs(ground, 1)
+    scenario, room = load("explore", sets, ground.robots), maps.Room(maps.read(path))
     assert scenario.world.starts is not None
     (x, y, _), goal = scenario.world.starts[0], scenario.mission.goal_m
-    assert hypot(x - goal[0], y - goal[1]) > motion.PAIR_M - 0.02
+    assert len(scenario.world.starts) == ground.robots
+    assert hypot(x - goal[0], y - goal[1]) > ground.apart_m - 0.02
+    assert min(room.clearance_m(x, y), room.clearance_m(*goal)) > ground.clear_m - 0.01
+
+
+def test_a_map_that_is_not_there_is_left_out_and_said_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(motion, "GROUNDS", (motion.Ground("nowhere"),))
+    with pytest.raises(Refused):
+        motion.run(as_json=False, rows="unknown/nowhere*")
+    assert "unknown/nowhere is left out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("goal", "limit", "good"), [(1.0, 30.0, True), (5.0, 1.0, False)])
