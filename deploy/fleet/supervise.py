@@ -27,7 +27,7 @@ from deploy.run import processes
 from deploy.run.crew import ROUTER_NAME, Crew, Row
 from deploy.run.processes import Identity
 from protocol import clock
-from protocol.bus import Inbox
+from protocol.bus import Inbox, Links
 from protocol.messages import (
     BadMessage,
     Header,
@@ -40,7 +40,7 @@ from protocol.messages import (
     encode,
 )
 from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX, OPERATOR_NAME, TOPIC, address, key
+from protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
 from protocol.zenoh_bus import LINK_LEASES_MS, RouterAbsent, ZenohBus
 from world.spec import STATE
 
@@ -136,6 +136,7 @@ class Supervisor:
         self._join_at = 0.0
         self._wake = threading.Event()
         self._inbox = Inbox(self._wake)
+        self._links = Links()
         self._bus: ZenohBus | None = None
         self._tails: dict[str, Tail] = {}
         self._ending = False
@@ -268,15 +269,18 @@ class Supervisor:
             )
         except (RouterAbsent, Refused):
             return
-        bus.follow(frozenset({key(self._part.fleet, OPERATOR_NAME, "order")}))
+        orders = key(self._part.fleet, OPERATOR_NAME, "order")
+        bus.follow(frozenset({orders, alive_key(self._part.fleet, "*", "*")}))
         bus.announce(self._part.fleet, self._me, self._life)
         self._bus = bus
 
     def _hear(self, now: float) -> bool:
         told = False
+        if self._bus is not None and self._links.due(now):
+            self._bus.follow_anew()
         for arrival in self._inbox.take():
-            where = address(arrival.key)
-            if where is None or where.topic not in TOPIC or not isinstance(arrival.payload, bytes):
+            if not isinstance(arrival.payload, bytes):
+                self._links.see(arrival.payload, now)
                 continue
             try:
                 order = decode(arrival.payload, HostOrder)

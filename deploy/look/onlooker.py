@@ -11,11 +11,11 @@ from msgspec import Struct
 from deploy.run.inject import Running, agents, one_fleet, option
 from deploy.run.processes import own_processes
 from protocol import clock
-from protocol.bus import Arrival, Inbox, Wake
+from protocol.bus import Arrival, Inbox, Links, Wake
 from protocol.credentials import credentials
 from protocol.messages import BadMessage, Message, decode
 from protocol.mission import Refused
-from protocol.topics import OPERATOR_NAME, TOPIC, address
+from protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 from world.scenario import Scenario, draw, load
 
@@ -44,13 +44,17 @@ def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> Fl
 
 
 class Ear:
-    """What comes from one fleet. `wait` sleeps until something wakes it or the time is over."""
+    """What comes from one fleet, also after links between its routers went and came back.
+
+    `wait` sleeps until something wakes it or the time is over.
+    """
 
     def __init__(self, fleet: Fleet, bus: ZenohBus, inbox: Inbox, wake: Wake) -> None:
         self.fleet = fleet
         self.bus = bus
         self._inbox = inbox
         self._wake = wake
+        self._links = Links()
 
     @property
     def dropped(self) -> int:
@@ -61,7 +65,13 @@ class Ear:
 
     def take(self) -> list[tuple[Arrival, Message]]:
         """What has come since the last call; what is no message of ours is left out."""
-        found = ((arrival, _message(arrival)) for arrival in self._inbox.take())
+        now, arrivals = clock.now(), self._inbox.take()
+        for arrival in arrivals:
+            if not isinstance(arrival.payload, bytes):
+                self._links.see(arrival.payload, now)
+        if self._links.due(now):
+            self.bus.follow_anew()
+        found = ((arrival, _message(arrival)) for arrival in arrivals)
         return [(arrival, message) for arrival, message in found if message is not None]
 
 
@@ -76,7 +86,7 @@ def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iter
     except RouterAbsent:
         raise Refused(f"no router answers at {fleet.endpoint}: must be the router of fleet {fleet.name}") from None
     try:
-        bus.follow(frozenset(f"lfa/{fleet.name}/{topic}" for topic in topics))
+        bus.follow(frozenset(f"lfa/{fleet.name}/{topic}" for topic in topics) | {alive_key(fleet.name, "*", "*")})
         yield Ear(fleet, bus, inbox, wake)
     finally:
         bus.close()
