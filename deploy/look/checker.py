@@ -98,10 +98,12 @@ class Fences:
 
     def __init__(self) -> None:
         self._least: dict[int, Term] = {}
+        self._least_ever: dict[int, Term] = {}
         self._shut_until: dict[int, float] = {}
 
     def bars(self, robot_id: int, below: Term) -> None:
         self._least[robot_id] = max(self._least.get(robot_id, below), below)
+        self._least_ever[robot_id] = max(self._least_ever.get(robot_id, below), below)
 
     def gateway_starts(self, robot_id: int, shut_until: float) -> None:
         self._least.pop(robot_id, None)
@@ -111,6 +113,15 @@ class Fences:
         """No command of `term` moves `robot_id`, now and until `until`."""
         least = self._least.get(robot_id)
         return (least is not None and term < least) or until <= self._shut_until.get(robot_id, LONG_AGO)
+
+    def fenced(self, robot_id: int, term: Term) -> bool:
+        """`term` was barred at `robot_id`, be it by an earlier life of its gateway.
+
+        That life's fence followed the promises of a quorum, so that no lease of `term` has begun since; and those
+        begun before have run out when the next life opens (E13).
+        """
+        least = self._least_ever.get(robot_id)
+        return least is not None and term < least
 
 
 class WithFences(Checker):

@@ -119,7 +119,8 @@ class OneBond(WithFences):
         # The receiver's own grant of a gift is seen by nobody: it shows in its next one only.
         handed_over = issued_by == (other.id, other.incarnation) or (other, voter) in self._gifts
         free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
-        if not free and not self.fences.refuses(other.id, term, its_until):
+        fenced = self.fences.fenced(other.id, term) or self.fences.refuses(other.id, term, its_until)
+        if not free and not fenced:
             self.broken(
                 at,
                 f"{_m(voter)} granted {_t(grant.term)} to {_m(holder)}, bound to {_t(term)} of {_m(other)}",

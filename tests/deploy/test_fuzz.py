@@ -8,10 +8,14 @@ import sys
 
 import pytest
 
+from deploy.look.checkers import OneBond
 from deploy.run.chaos import play
 from deploy.run.fuzz import Tally, parse_seeds, shrink, so_far
 from deploy.run.schedules import Fault, draw, without
-from protocol.mission import Refused
+from protocol.membership import first_config
+from protocol.messages import Grant, Member, Propose, Term, Version
+from protocol.mission import Mission, Refused
+from protocol.timing import timing_of
 
 
 @pytest.mark.parametrize("start", range(0, 60, 20))
@@ -42,6 +46,22 @@ def test_a_planted_bug_is_found_shrunk_and_still_fails() -> None:
     small = shrink(draw(bad), name)
     assert len(small.faults) < len(draw(bad).faults)
     assert any(v.name == name for v in play(small).violations)
+
+
+@pytest.mark.parametrize(("bars", "violations"), [(True, 0), (False, 1)])
+def test_i4_a_fence_holds_though_its_gateway_starts_anew(bars: bool, violations: int) -> None:
+    """A voter that slept adopts a term late, and the next at once: its first bond outlasts the shut start of the
+    gateway, the lease that it was for does not (seed 15427)."""
+    checker, old, new, voter = OneBond(timing_of("std")), Member(2, 9), Member(5, 12), Member(4, 11)
+    terms = Term(4, 2, 9), Term(5, 5, 12)
+    for term, holder in zip(terms, (old, new), strict=True):
+        checker.proposes(2.2, holder, Propose(term, first_config(Mission((1, 2, 4, 5))), 0, holder))
+    if bars:
+        checker.bars(2.5, old.id, terms[1])
+    checker.gateway_starts(2.7, old.id, 3.0)
+    for term in terms:
+        checker.grants(2.74, voter, Grant(term, 0, Version(term, 0), 2.2), 3.05)
+    assert len(checker.violations) == violations
 
 
 def test_a_long_hunt_says_how_it_stands() -> None:
