@@ -108,30 +108,37 @@ class Candidate:
         """E18: only lives that `config` names, and that know of a config, count."""
         return is_quorum(config, self._remembering)
 
-    def full_house(self, config: Config, universe: tuple[int, ...]) -> tuple[Member, ...]:
+    def _answering(self, superseded: Callable[[Member], bool]) -> dict[int, Member]:
+        """Of each id the newest life that promised. One that a later life has replaced cannot grant any more:
+        counted in, it would hold an attempt that needs all of them for T_act."""
+        return {m.id: m for m in sorted(self._promised) if not superseded(m)}
+
+    def full_house(
+        self, config: Config, universe: tuple[int, ...], superseded: Callable[[Member], bool]
+    ) -> tuple[Member, ...]:
         """E18: the newest life of every id, when all have promised and hold no quorum of `config`; else nobody.
 
         Of the ids that are forgotten in this attempt none is needed (E20).
         """
-        lives = {m.id: m for m in sorted(self._promised)}
+        lives = self._answering(superseded)
         forgotten = {m.id for m in self.forget}
         if not all(i in lives or i in forgotten for i in universe) or self.has_quorum(config):
             return ()
         return tuple(lives[i] for i in universe if i in lives)
 
-    def blank_majority(self, universe: tuple[int, ...]) -> tuple[Member, ...]:
+    def blank_majority(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
         """E19: the newest lives of more than half of all ids, the witness (last of `universe`) among them; else nobody.
 
         One promiser that remembers a config is enough to forbid it.
         """
-        lives = {m.id: m for m in sorted(self._promised)}
+        lives = self._answering(superseded)
         here = tuple(lives[i] for i in universe if i in lives)
         fine = 2 * len(here) > len(universe) and universe[-1] in lives and not self._remembering
         return here if fine else ()
 
-    def whoever_answers(self, universe: tuple[int, ...]) -> tuple[Member, ...]:
+    def whoever_answers(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
         """E21: the newest lives that promised. Every other robot's gateway is to refuse what is below, first."""
-        lives = {m.id: m for m in sorted(self._promised)}
+        lives = self._answering(superseded)
         absent = (i for i in universe if i not in lives and i != WITNESS_ID)
         self._absent = frozenset(Grantee(NO_TERM, Member(i, ANY_LIFE)) for i in absent)
         return tuple(lives[i] for i in universe if i in lives)

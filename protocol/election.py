@@ -58,12 +58,12 @@ class Election:
     def forgotten(self, now: float) -> tuple[Member, ...]:
         return self._forget if now < self.forget_until else ()
 
-    def without_quorum(self, candidate: Candidate, config: Config, now: float) -> tuple[Member, ...]:
+    def without_quorum(self, candidate: Candidate, config: Config, peers: Peers, now: float) -> tuple[Member, ...]:
         """Who makes a fresh config where no quorum of the known one answers; nobody while too few do."""
-        lives = candidate.full_house(config, self.universe)
+        lives = candidate.full_house(config, self.universe, peers.is_superseded)
         if not lives and is_first(config) and now >= self._majority_from:
-            lives = candidate.blank_majority(self.universe)
+            lives = candidate.blank_majority(self.universe, peers.is_superseded)
         asked_all = now >= candidate.began_at + self._timing.heartbeat_s
         if not lives and not is_first(config) and now >= self._lonely_from and asked_all:
-            lives = candidate.whoever_answers(self.universe)
+            lives = candidate.whoever_answers(self.universe, peers.is_superseded)
         return lives

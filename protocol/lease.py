@@ -387,7 +387,7 @@ class Lease:
         lives: tuple[Member, ...] = ()
         candidate.expects_nobody()
         if not candidate.has_quorum(self.config):
-            lives = self._election.without_quorum(candidate, self.config, now)
+            lives = self._election.without_quorum(candidate, self.config, self._peers, now)
             if self.me not in lives:
                 return
         for grantee in candidate.fences_to_ask(self.me):

@@ -131,7 +131,7 @@ def _voters_change_without_a_joint_config(patch: pytest.MonkeyPatch) -> None:
 
 
 def _full_house_of_a_majority(patch: pytest.MonkeyPatch) -> None:
-    def full_house(self: Candidate, config: Config, universe: tuple[int, ...]) -> Any:
+    def full_house(self: Candidate, config: Config, universe: tuple[int, ...], *_: object) -> Any:
         lives = tuple(sorted(self._promised))
         return lives if 2 * len(lives) > len(universe) else ()
 

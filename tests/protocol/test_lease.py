@@ -291,6 +291,23 @@ def test_e18_a_fleet_that_nobody_remembers_waits_for_everybody() -> None:
     assert team.lease_of(2).missing == ()
 
 
+def test_e18_a_life_that_promised_and_was_replaced_makes_no_full_house() -> None:
+    """It cannot accept the fresh config: counted in, it would hold everybody for T_act (seed 16062)."""
+    team = Arena(4, seed=3)
+    team.step_wall(1, 3600.0)  # terms of 1 are above all that a later life of 2 starts with, and refuses
+    for robot_id in team.mission.robots:
+        team.start_gateway(robot_id, -1.0)
+    for robot_id in (0, 1, 2, 3):
+        team.at(0.0, team.start, robot_id)
+    team.run(2.0)
+    team.kill(2, hinted=False)
+    team.start(4)
+    team.run(2.1)
+    team.start(2)
+    team.run(2.1 + STD.grant_s + 3.0 * STD.heartbeat_s)
+    assert team.leaders() == [1]
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_within_its_bond(seed: int) -> None:
     team = Team(seed=seed)
