@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import IO
 
 import msgspec
-from mcap.writer import CompressionType, Writer
 from msgspec import Struct
 
 from deploy.run import channels
+from deploy.run.chunks import ChunkWriter
 from protocol.messages import Event, Message
 from protocol.mission import robot_id_of
 from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
@@ -70,7 +70,7 @@ class Recorder:
 
     def record(self, t: float, key: str, message: Message) -> None:
         """`message` travelled on `key`, `t` [s] since the run's start; what came before that is given as 0."""
-        t = max(t, 0.0)
+        t = t if t > 0.0 else 0.0
         channel = self._channels.get(key)
         if channel is None:
             channel = self._channels[key] = self._open_channel(key, type(message))
@@ -79,7 +79,8 @@ class Recorder:
         self._messages += 1
         if isinstance(message, Event):
             self._events.write(event_line(t, message))
-        self.flush_when_due(t)
+        if t >= self._flushed_at + FLUSH_S:
+            self.flush_when_due(t)
 
     def flush_when_due(self, t: float) -> None:
         """Close the chunk every second, so that all before can be read even if this process dies."""
@@ -100,7 +101,7 @@ class Recorder:
         self._number += 1
         name = RECORDING if self._number == 1 else PART.format(f"{self._number:04}")
         self._stream: IO[bytes] = open(self._folder / name, "wb")  # noqa: SIM115 (closed by _close)
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES_MAX, compression=CompressionType.ZSTD)
+        self._writer = ChunkWriter(self._stream, CHUNK_BYTES_MAX)
         self._writer.start(profile="", library="lfa")
         self._writer.add_metadata("run", self._about)
         self._channels: dict[str, int] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from io import BytesIO
 from math import inf, isnan, nan
 from pathlib import Path
 
@@ -11,10 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from deploy.look import chronicle, trace
 from deploy.run import channels
+from deploy.run.chunks import ChunkWriter
 from deploy.run.record import EVENTS, RECORDING, Recorder, parts
+from protocol.membership import first_config
 from protocol.messages import (
     Event,
     Header,
@@ -68,7 +72,8 @@ def test_every_topic_has_a_schema_with_names(topic: object) -> None:
 
 
 def test_what_a_union_holds_keeps_its_tag() -> None:
-    note = LeaseNote(HEADER, Nack(Term(1, 2, 3), Term(2, 1, 1), Member(1, 5), inf, None))  # type: ignore[arg-type]
+    config = first_config(shipped()["straight"].mission)
+    note = LeaseNote(HEADER, Nack(Term(1, 2, 3), Term(2, 1, 1), Member(1, 5), inf, config))
     body = json.loads(channels.encode(note))["body"]
     assert body["type"] == "nack"
     assert body["remaining_s"] == "inf"
@@ -94,6 +99,22 @@ def test_a_recording_cut_off_anywhere_can_be_read(part: float, tmp_path_factory:
     seen = trace.read(folder)
     for rows in seen.truth.values():
         assert (rows[:, 1] == rows[:, 0]).all()
+
+
+@given(stamps=st.lists(st.integers(0, 2**40), max_size=30), flush_at=st.integers(0, 30))
+def test_the_quick_writer_writes_what_the_library_writes(stamps: list[int], flush_at: int) -> None:
+    written = []
+    for stream in (BytesIO(), BytesIO()):
+        writer = ChunkWriter(stream, 200) if written else Writer(stream, 200)
+        writer.start("", "lfa")
+        channels_of = [writer.register_channel(name, "json", 0) for name in ("/a", "/b")]
+        for n, stamp in enumerate(stamps):
+            writer.add_message(channels_of[n % 2], stamp, b"%d" % n, stamp + n, n)
+            if n == flush_at:
+                writer.flush()
+        writer.finish()
+        written.append(stream.getvalue())
+    assert written[0] == written[1]
 
 
 def test_a_killed_recorder_loses_no_more_than_a_second(tmp_path: Path) -> None:
