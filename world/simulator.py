@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Sequence
 from random import Random
+from typing import Any
 
 from msgspec import Struct
 
@@ -17,11 +18,12 @@ from protocol.journal import Journal
 from protocol.messages import Message, decode
 from protocol.mission import Refused
 from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
-from protocol.radio import Air, Radio, link_of
+from protocol.radio import Air, Link, Radio, link_of
 from protocol.topics import TOPIC, address, alive_key, matches
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
+LOCAL_DELAYS_S = (LOCAL_DELAY_S,)
 VITALS_S = 1.0
 FINISH_S_MAX = 1.0
 
@@ -46,16 +48,14 @@ class _Seat:
 
     def __init__(self, host: Host, clock: LocalClock) -> None:
         self.host = host
+        self.node: Node = host.node
         self.clock = clock
+        self.gone = False
         self.deadline: float | None = None
         self.interests: frozenset[str] = frozenset()
         self.paused = False
         self.waiting: list[tuple[str, Message | Local, bytes]] = []
         self.stop_by: float | None = None
-
-    @property
-    def node(self) -> Node:
-        return self.host.node
 
 
 class Simulator:
@@ -67,9 +67,10 @@ class Simulator:
         self._random = Random(f"air-{seed}")
         self.air = Air(radio, self._random)
         self._seats: dict[str, _Seat] = {}
-        self._heap: list[tuple[float, int, Callable[[], None]]] = []
+        self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = 0
-        self._routes: dict[str, list[_Seat]] = {}
+        self._routes: dict[str, list[tuple[_Seat, Link | None]]] = {}
+        """Who hears what comes on a key, and over which link through the air."""
         self._wanted: dict[tuple[frozenset[str], str], bool] = {}
 
     @property
@@ -83,7 +84,7 @@ class Simulator:
         self._refresh(seat)
         self._announce(PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)
         self._plan(seat)
-        self.at(self.now + VITALS_S, lambda: self._vitals(seat))
+        self.at(self.now + VITALS_S, self._vitals, seat)
 
     def lives(self, node: Node) -> bool:
         """Whether this very life goes on."""
@@ -92,9 +93,8 @@ class Simulator:
 
     def kill(self, name: str, *, hinted: bool = True) -> None:
         """SIGKILL: nothing more comes from it; the others' hints, if any, come within milliseconds."""
-        seat = self._seats.pop(name)
-        seat.host.journal.close()
-        self._routes.clear()
+        seat = self._seats[name]
+        self._remove(seat)
         low, high = HINT_DELAY_S
         if hinted:
             self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
@@ -121,7 +121,7 @@ class Simulator:
             if where is not None and TOPIC[where.topic].state and newest[key] != index:
                 continue
             self._give(seat, key, message, payload)
-        self._tick(seat)
+        self._tick(seat, seat.node.next_deadline())
 
     def terminate(self, name: str) -> None:
         """SIGTERM: the node says its last words and goes."""
@@ -129,26 +129,27 @@ class Simulator:
         seat.stop_by = self.now + FINISH_S_MAX
         self._give(seat, "", Stop(), b"")
 
-    def at(self, when: float, action: Callable[[], None]) -> None:
-        """Do `action` at true time `when`."""
+    def at(self, when: float, action: Callable[..., None], *arguments: Any) -> None:
+        """Call `action` with `arguments` at true time `when`."""
         self._order += 1
-        heapq.heappush(self._heap, (when, self._order, action))
+        heapq.heappush(self._heap, (when, self._order, action, arguments))
 
     def say(self, key: str, payload: bytes) -> None:
         """An outsider's message to all that follow `key`: an operator's, heard by the taps too."""
         message = decode(payload, TOPIC[key.split("/")[3]].type)
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        for seat in self._route(key):
-            self._deliver_later(seat, key, message, payload, LOCAL_DELAY_S)
+        for seat, _ in self._route(key):
+            self.at(self.now + LOCAL_DELAY_S, self._give, seat, key, message, payload)
 
     def run(self, until: float, over: Callable[[], bool] | None = None) -> None:
         """Advance to true time `until`, or until `over()` holds."""
         heap = self._heap
         while heap and heap[0][0] <= until:
-            when, _, action = heapq.heappop(heap)
-            self.now = max(self.now, when)
-            action()
+            when, _, action, arguments = heapq.heappop(heap)
+            if when > self.now:
+                self.now = when
+            action(*arguments)
             if over is not None and over():
                 return
         self.now = max(self.now, until)
@@ -156,19 +157,20 @@ class Simulator:
     # --- one call of one node ---------------------------------------------------------------------------------
 
     def _give(self, seat: _Seat, key: str, message: Message | Local, payload: bytes) -> None:
-        if self._seats.get(seat.node.name) is not seat:
+        if seat.gone:
             return
         if seat.paused:
             seat.waiting.append((key, message, payload))
             return
         self._after(seat, seat.host.deliver(seat.clock.local(self.now), key, message, payload))
 
-    def _tick(self, seat: _Seat) -> None:
-        if self._seats.get(seat.node.name) is not seat or seat.paused:
+    def _tick(self, seat: _Seat, deadline: float) -> None:
+        """`deadline` is the node's own, as it said after its last call."""
+        if seat.gone or seat.paused:
             return
         now = seat.clock.local(self.now)
-        if now >= seat.node.next_deadline() - 1e-9:
-            self._after(seat, seat.host.tick(max(now, seat.node.next_deadline())))
+        if now >= deadline - 1e-9:
+            self._after(seat, seat.host.tick(max(now, deadline)))
         else:
             self._plan(seat)
 
@@ -190,26 +192,29 @@ class Simulator:
         if deadline == seat.deadline:
             return
         seat.deadline = deadline
+        self.at(max(seat.clock.true(deadline), self.now), self._due, seat, deadline)
 
-        def due() -> None:
-            if seat.deadline == deadline:
-                seat.deadline = None
-                self._tick(seat)
-
-        self.at(max(seat.clock.true(deadline), self.now), due)
+    def _due(self, seat: _Seat, deadline: float) -> None:
+        if seat.deadline == deadline:
+            seat.deadline = None
+            self._tick(seat, deadline)
 
     def _leave(self, seat: _Seat) -> None:
-        if self._seats.pop(seat.node.name, None) is None:
-            return
+        if not seat.gone:
+            self._remove(seat)
+            self._announce(PeerDown(seat.node.name, seat.node.incarnation), LOCAL_DELAY_S)
+
+    def _remove(self, seat: _Seat) -> None:
+        del self._seats[seat.node.name]
+        seat.gone = True
         seat.host.journal.close()
         self._routes.clear()
-        self._announce(PeerDown(seat.node.name, seat.node.incarnation), LOCAL_DELAY_S)
 
     def _vitals(self, seat: _Seat) -> None:
-        if self._seats.get(seat.node.name) is seat:
+        if not seat.gone:
             if not seat.paused:
                 self._give(seat, "", Vitals(0.0, 0, seat.host.undecodable, 0.0, 0.0), b"")
-            self.at(self.now + VITALS_S, lambda: self._vitals(seat))
+            self.at(self.now + VITALS_S, self._vitals, seat)
 
     # --- between nodes ------------------------------------------------------------------------------------------
 
@@ -219,19 +224,15 @@ class Simulator:
             return
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        seats = self._routes.get(key)
-        for seat in self._route(key) if seats is None else seats:
-            link = link_of(key, seat.node.name)
-            for delay_s in [LOCAL_DELAY_S] if link is None else self.air.delays(*link):
-                self._deliver_later(seat, key, message, payload, delay_s)
+        routes = self._routes.get(key)
+        for seat, link in self._route(key) if routes is None else routes:
+            for delay_s in LOCAL_DELAYS_S if link is None else self.air.delays(*link):
+                self.at(self.now + delay_s, self._give, seat, key, message, payload)
 
-    def _deliver_later(self, seat: _Seat, key: str, message: Message, payload: bytes, delay_s: float) -> None:
-        self.at(self.now + delay_s, lambda: self._give(seat, key, message, payload))
-
-    def _route(self, key: str) -> list[_Seat]:
-        seats = [seat for seat in self._seats.values() if self._wants(seat.interests, key)]
-        self._routes[key] = seats
-        return seats
+    def _route(self, key: str) -> list[tuple[_Seat, Link | None]]:
+        hear = [seat for seat in self._seats.values() if self._wants(seat.interests, key)]
+        routes = self._routes[key] = [(seat, link_of(key, seat.node.name)) for seat in hear]
+        return routes
 
     def _wants(self, interests: frozenset[str], key: str) -> bool:
         """Kept, since every life that begins or ends opens all routes anew."""
@@ -258,7 +259,7 @@ class Simulator:
                 self._hint_later(seat, event, delay_s)
 
     def _hint_later(self, seat: _Seat, event: PeerUp | PeerDown, delay_s: float) -> None:
-        self.at(self.now + delay_s, lambda: self._give(seat, "", event, b""))
+        self.at(self.now + delay_s, self._give, seat, "", event, b"")
 
 
 def _token(node: Node) -> str:
