@@ -91,7 +91,12 @@ EXTRAS = {
 
 def main() -> None:
     """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
-    if sys.argv[1:] in ([], ["--help"]):  # answered before the parser is imported, which takes longer than all else
+    if sys.argv[1:] == ["--version"]:
+        from importlib.metadata import version
+
+        print("lfa", version("lfa"))
+        sys.exit(0)
+    if sys.argv[1:] in ([], ["-h"], ["--help"]):  # answered before the parser is imported, which takes the longest
         print(overview())
         sys.exit(0)
     try:
@@ -161,7 +166,12 @@ def _absent() -> None:
     """Stands for a command that was not called."""
 
 
-_PLAIN: dict[str, Any] = {"add_completion": False, "rich_markup_mode": None, "pretty_exceptions_enable": False}
+_PLAIN: dict[str, Any] = {
+    "add_completion": False,
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+    "rich_markup_mode": None,
+    "pretty_exceptions_enable": False,
+}
 _ABOUT = "A chain of robots, each its own process, that survives the loss of its leader."
 _MORE = """\
 Each has --help with an example: lfa run --help. For a first look: lfa run paper_path1 --fault 'kill leader at 20 s'"""

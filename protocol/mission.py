@@ -16,6 +16,8 @@ WITNESS_ID = 0
 WITNESS_NAME = "witness"
 KNOWN_MAX = 64
 """Known obstacles that a leader plans past: each costs planning time."""
+ROUTE_M_MAX = 10_000.0
+"""A leader keeps its route as a point each 0.1 m: a longer one takes the memory of the robot, then of the machine."""
 
 Side = Literal["left", "right", "column", "zigzag"]
 Motion = Literal["path_following", "point_to_point", "trajectory", "reactive", "explore"]
@@ -181,9 +183,18 @@ def check_mission(mission: Mission) -> Mission:
     for orientation in mission.leading.orientations:
         fine = isfinite(orientation.at_m) and orientation.at_m >= 0.0
         _require(fine, "mission.leading.orientations.at_m", orientation.at_m, ">= 0, metres along the route")
-    for point in mission.leading.route_m:
-        _require(all(isfinite(c) for c in point), "mission.leading.route_m", point, "finite coordinates [m]")
+    _check_route(mission.leading.route_m)
     return mission
+
+
+def _check_route(points: tuple[tuple[float, float], ...]) -> None:
+    """Way-points near enough that the way along them can be kept in memory."""
+    where = "mission.leading.route_m"
+    for point in points:
+        near = all(isfinite(c) and abs(c) <= ROUTE_M_MAX for c in point)
+        _require(near, where, list(point), f"coordinates [m] from {-ROUTE_M_MAX:g} to {ROUTE_M_MAX:g}")
+    length_m = sum(hypot(q[0] - p[0], q[1] - p[1]) for p, q in pairwise(points))
+    _require(length_m <= ROUTE_M_MAX, where, f"{length_m:.0f} m of way", f"at most {ROUTE_M_MAX:g} m")
 
 
 def _check_known(leading: Leading) -> None:

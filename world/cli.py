@@ -67,7 +67,12 @@ def _fleet(name: str) -> str:
 
 def main() -> None:
     """Entry point of `lfa-world`."""
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app = typer.Typer(
+        context_settings={"help_option_names": ["-h", "--help"]},
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
     app.command(epilog=EXAMPLE)(start)
     try:
         sys.exit(app(standalone_mode=False, prog_name="lfa-world"))

@@ -17,6 +17,7 @@ from world.ways import way_of
 
 DRAW_MARGIN_M = 0.5
 """What is drawn stays this far from the robots' starts and from the goal."""
+SEED_MAX = 2**63 - 1
 DRAWS_MAX = 50
 """An obstacle or a start for which so many draws find no room stays where the scenario puts it."""
 
@@ -92,8 +93,11 @@ def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
 def draw(scenario: Scenario, seed: int) -> Scenario:
     """What `seed` makes of `scenario`: a concrete one, with starts given and nothing left to vary.
 
-    Each start and each obstacle has its own generator, so an obstacle more does not move the others.
+    Each start and each obstacle has its own generator, so an obstacle more does not move the others. Raises Refused
+    for a seed that no journal could hold.
     """
+    if not -SEED_MAX <= seed <= SEED_MAX:
+        raise Refused(f"--seed {seed}: must be from -{SEED_MAX} to {SEED_MAX}")
     vary, world = scenario.world.vary, scenario.world
     goal = scenario.mission.goal_m
     anchors = [*((pose.x, pose.y) for pose in starts_of(scenario)), goal]

@@ -63,7 +63,7 @@ class Violation(Struct):
 def lines(folder: Path) -> list[Line]:
     """The events of a run in the order of their times; a last line cut off by a kill is left out."""
     path = folder / EVENTS
-    found = [_line(text) for text in path.read_bytes().splitlines()] if path.exists() else []
+    found = [_line(text) for text in path.read_bytes().splitlines()] if path.is_file() else []
     return sorted((line for line in found if line is not None), key=lambda line: float(line["t"]))
 
 

@@ -30,6 +30,7 @@ CHUNKS: dict[Player, int] = {play: 50, play_whole: 4}
 SEEDS: dict[Player, str] = {play: "1000", play_whole: "60"}
 KINDS_CLAIM_SEEDS = 60
 """From this many seeds on every kind of fault must have taken effect."""
+SEEDS_MAX = 100_000_000
 FAILURES_SHOWN_MAX = 5
 TELL_EVERY_S = 10.0
 COLUMN = 30
@@ -65,8 +66,12 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the tally as JSON.")] = False,
 ) -> int:
     player = play_whole if whole else play
+    if seed is not None and seeds is not None:
+        raise Refused(f"--seed {seed} with --seeds {seeds}: must be one of the two")
+    if verbose and (seed is None or as_json):
+        raise Refused("--verbose: must go with --seed, whose trace it tells, and without --json")
     if seed is not None:
-        return _one(seed, verbose, player)
+        return _one(seed, verbose, player, as_json)
     return _hunt(parse_seeds(seeds or SEEDS[player]), jobs, out, as_json, player)
 
 
@@ -76,14 +81,19 @@ def parse_seeds(text: str) -> range:
     if not all(part.isdecimal() for part in ((first, last) if dots else (first,))):
         raise Refused(f"--seeds {text}: must be a number (1000) or a range (5000..5999)")
     chosen = range(int(first), int(last) + 1) if dots else range(int(first))
-    if not chosen:
-        raise Refused(f"--seeds {text}: must name at least one seed")
+    if not 0 < chosen.stop - chosen.start <= SEEDS_MAX:
+        raise Refused(f"--seeds {text}: must name at least one seed, and at most {SEEDS_MAX}")
     return chosen
 
 
-def _one(seed: int, verbose: bool, player: Player = play) -> int:
+def _one(seed: int, verbose: bool, player: Player = play, as_json: bool = False) -> int:
     lines: list[str] = []
     played = player(draw(seed), columns(lines, draw(seed)) if verbose else None)
+    if as_json:
+        facts = {"seed": seed, "schedule": describe(played.schedule), "elections": played.elections}
+        violations = [said(violation) for violation in played.violations]
+        typer.echo(json.dumps({**facts, "faults": dict(played.counts), "violations": violations}))
+        return 1 if violations else 0
     typer.echo(describe(played.schedule))
     for line in lines:
         typer.echo(line)

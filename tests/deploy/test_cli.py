@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,11 @@ def test_help_names_every_command() -> None:
     told = subprocess.run([*LFA, "--help"], capture_output=True, text=True, check=True).stdout
     assert told == overview() + "\n"
     assert [entry.name for entry in COMMANDS if f"  {entry.name} " not in told] == []
+
+
+@pytest.mark.parametrize(("asked", "begins"), [("-h", "Usage: lfa COMMAND"), ("--version", f"lfa {version('lfa')}")])
+def test_the_habits_of_other_programs_are_answered(asked: str, begins: str) -> None:
+    assert subprocess.run([*LFA, asked], capture_output=True, text=True, check=True).stdout.startswith(begins)
 
 
 def test_help_does_not_wait_for_the_parser() -> None:

@@ -21,6 +21,8 @@ REFUSED = [
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=())), "mission.leading.route_m"),
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, float("inf")),))), "mission.leading.route_m"),
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, 0.0),), cruise_mps=3.0)), "mission.leading.cruise"),
+    (msgspec.structs.replace(GOOD, leading=Leading(route_m=((1e9, 0.0),))), "from -10000 to 10000"),
+    (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, 0.0), (9e3, 0.0)) * 9)), "at most 10000 m"),
 ]
 
 TIMED = Leading(motion="trajectory", route_m=((0.0, 0.0), (5.0, 0.0)), times_s=(0.0, 12.0))

@@ -183,6 +183,12 @@ def test_a_clean_scenario_draws_nothing() -> None:
     assert draw(load("straight"), 1) == draw(load("straight"), 2)
 
 
+@pytest.mark.parametrize("seed", [2**63, -(2**63)])
+def test_a_seed_that_no_journal_could_hold_is_refused(seed: int) -> None:
+    with pytest.raises(Refused, match=f"--seed {seed}: must be from"):
+        draw(load("straight"), seed)
+
+
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("seed", range(30))
 def test_what_is_drawn_stays_within_its_bounds_and_can_be_driven(name: str, seed: int) -> None:
