@@ -5,6 +5,7 @@ Every command module has a function `command`. Bad input, ours or the parser's, 
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -89,6 +90,10 @@ EXTRAS = {
 """What is not in the base install, by the extra that brings it."""
 
 
+DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.EISDIR, errno.ENOTDIR)
+"""What a disk refuses in the midst of work: no fault of the program."""
+
+
 def main() -> None:
     """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
     if sys.argv[1:] == ["--version"]:
@@ -143,6 +148,12 @@ def run_cli(name: str, app: typer.Typer) -> int:
         return 130
     except BrokenPipeError:  # the reader of a pipe has gone: nobody is left to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        if error.errno not in DISK:
+            raise
+        where = f"{error.filename}: " if error.filename else ""
+        _say(name, f"{where}{error.strerror}: must be a place that has room, and that this user may use")
         return 1
     return code if isinstance(code, int) else 0
 

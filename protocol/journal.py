@@ -7,6 +7,7 @@ read up to its last whole entry; one `write` a wake-up puts the entries where a 
 from __future__ import annotations
 
 import os
+import sys
 import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -61,8 +62,8 @@ class Journal:
         if directory is None:
             return
         directory.mkdir(parents=True, exist_ok=True)
-        path = directory / f"{heading.node}-{heading.incarnation}.bin"
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        self._path = directory / f"{heading.node}-{heading.incarnation}.bin"
+        self._file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
         self._append(heading)
         self.flush()
 
@@ -71,10 +72,16 @@ class Journal:
             self._append(Entry(kind, at, key, payload, digest(sent)))
 
     def flush(self) -> None:
-        """Hand everything added so far to the kernel."""
-        if self._file is not None and self._pending:
+        """Hand everything added so far to the kernel. On a full disk the journal ends; the robot does not."""
+        if self._file is None or not self._pending:
+            return
+        try:
             os.write(self._file, self._pending)
-            self._pending.clear()
+        except OSError as error:
+            print(f"{self._path}: {error.strerror}: the journal ends here", file=sys.stderr, flush=True)
+            os.close(self._file)
+            self._file = None
+        self._pending.clear()
 
     def close(self) -> None:
         self.flush()

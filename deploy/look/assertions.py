@@ -6,6 +6,7 @@ to judge: a follower that never settled has not kept its distance.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from itertools import combinations
 from math import inf
@@ -69,6 +70,12 @@ def separation_min_m(seen: Trace) -> float:
         n = min(a.shape[0], b.shape[0])
         nearest = min(nearest, float(np.min(np.hypot(a[:n, 1] - b[:n, 1], a[:n, 2] - b[:n, 2]))))
     return nearest
+
+
+def check_junit(path: Path) -> None:
+    """Raises Refused when nothing could be written there: said before a run, not after it."""
+    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise Refused(f"--junit {path}: cannot be written, must be a file in a folder that is there")
 
 
 def junit(path: Path, summary: Summary) -> None:

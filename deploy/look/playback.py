@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.look.trace import recorded
+from msgspec import DecodeError
+
+from deploy.look.trace import look_into, recorded
 from deploy.run import channels
-from deploy.run.record import RECORDING
 from protocol import clock
 from protocol.bus import Inbox
 from protocol.messages import encode
@@ -24,8 +25,7 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
     """Publish all that `folder` holds as `fleet`, `speed` times as fast. Raises Refused; needs no router to run."""
     if not speed > 0.0:
         raise Refused(f"--speed {speed:g}: must be a number above 0")
-    if not (folder / RECORDING).is_file():
-        raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
+    look_into(folder)
     with _bus(endpoint or default_endpoint(), may_open=endpoint is None) as bus:
         print(f"plays {folder} as fleet {fleet}; look at it with: lfa watch --fleet {fleet}", flush=True)
         begun, count, t = clock.now(), 0, 0.0
@@ -33,7 +33,10 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
             ahead_s = t / speed - (clock.now() - begun)
             if ahead_s > AHEAD_S_MIN:
                 clock.sleep(ahead_s)
-            message = channels.restore(body, TOPIC[channel.split("/")[2]].type)
+            try:
+                message = channels.restore(body, TOPIC[channel.split("/")[2]].type)
+            except DecodeError as error:
+                raise Refused(f"{folder}: recorded by another program or version, {channel}: {error}") from None
             bus.publish(f"lfa/{fleet}{channel}", encode(message))
             count += 1
     print(f"{count} messages, {t:.1f} s in {clock.now() - begun:.1f} s")

@@ -7,15 +7,14 @@ from typing import Annotated
 
 import typer
 
-from protocol.mission import Refused
-
 FIGURES = "figures"
 
 
 def command(folder: Annotated[Path, typer.Argument(help="A run folder.")]) -> int:
     """Draw the figures of a run folder anew."""
-    if not (folder / "recording.mcap").is_file():
-        raise Refused(f"{folder}: no run folder, it has no recording.mcap")
+    from deploy.look.trace import look_into
+
+    look_into(folder)
     for path in draw(folder):
         print(path)
     return 0

@@ -32,9 +32,11 @@ def html(folders: list[Path]) -> str:
     """The page about these runs (one or two). Raises Refused for what is no finished run folder."""
     from deploy.look import page
     from deploy.look.readings import Run
+    from deploy.look.trace import look_into
 
     for folder in folders:
         for needed in ("summary.json", "recording.mcap", "scenario.toml"):
             if not (folder / needed).is_file():
                 raise Refused(f"{folder}: no finished run, it has no {needed}")
+        look_into(folder)
     return page.of([Run(folder) for folder in folders])

@@ -126,7 +126,9 @@ def read(folder: Path) -> Summary:
     try:
         return msgspec.json.decode((folder / SUMMARY).read_bytes(), type=Summary)
     except msgspec.DecodeError as error:
-        raise Refused(f"{folder / SUMMARY}: of another version or damaged ({error}): read it with the lfa of its time") from None
+        raise Refused(
+            f"{folder / SUMMARY}: of another version or damaged ({error}): read it with the lfa of its time"
+        ) from None
 
 
 def _robot(robot: int, seen: Trace, events: Sequence[Line]) -> RobotSummary:

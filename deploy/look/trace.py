@@ -6,7 +6,9 @@ several files is read as one.
 
 from __future__ import annotations
 
+import os
 import struct
+import sys
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -91,6 +93,19 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
         except msgspec.DecodeError as error:
             by = "version of lfa" if isinstance(error, msgspec.ValidationError) else "program"
             raise Refused(f"{folder / RECORDING}: recorded by another {by}, {channel}: {error}") from None
+
+
+def look_into(folder: Path) -> None:
+    """Raises Refused when `folder` holds no recording; says on stderr when it holds one that was cut off."""
+    if not (folder / RECORDING).is_file():
+        raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
+    for path in parts(folder):
+        with path.open("rb") as stream:
+            size = stream.seek(0, os.SEEK_END)
+            stream.seek(max(0, size - len(MCAP0_MAGIC)))
+            whole = size > len(MCAP0_MAGIC) and stream.read() == MCAP0_MAGIC
+        if not whole:
+            print(f"{path}: cut off (its writer was killed, or still writes): shown as far as it goes", file=sys.stderr)
 
 
 def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:

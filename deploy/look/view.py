@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from deploy.look.onlooker import Fleet, find, listen, scenario_of_fleet
-from deploy.run.record import RECORDING, parts
+from deploy.run.record import parts
 from deploy.run.worldtime import WorldTime
 from protocol import clock
 from protocol.messages import Ask, Header, Truth, encode
@@ -70,28 +70,30 @@ def converted(folder: Path) -> Path:
 
     from deploy.look.layout import layout
     from deploy.look.scene import APPLICATION, TOPICS, Scene
-    from deploy.look.trace import messages
+    from deploy.look.trace import look_into, messages
     from deploy.run.folder import scenario_of
 
-    source, rrd = folder / RECORDING, folder / RRD
-    if not source.is_file():
-        raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
+    rrd = folder / RRD
+    look_into(folder)
     if rrd.is_file() and rrd.stat().st_mtime > max(path.stat().st_mtime for path in parts(folder)):
         return rrd
     scenario = scenario_of(folder)
     stream = rr.RecordingStream(APPLICATION, recording_id=folder.resolve().name)
     unfinished = rrd.with_suffix(".part")
     stream.save(unfinished)
-    scene = Scene(stream)
-    scene.ground(scenario.world)
-    scene.mission(scenario.mission)
-    lasted_s = 0.0
-    for owner, topic, lasted_s, message in messages(folder, TOPICS):
-        scene.see(lasted_s, owner, topic, message)
-    scene.flush()
-    stream.send_blueprint(layout(scenario, len(scenario.mission.robots), lasted_s=lasted_s))
-    stream.disconnect()
-    return unfinished.rename(rrd)
+    try:
+        scene = Scene(stream)
+        scene.ground(scenario.world)
+        scene.mission(scenario.mission)
+        lasted_s = 0.0
+        for owner, topic, lasted_s, message in messages(folder, TOPICS):
+            scene.see(lasted_s, owner, topic, message)
+        scene.flush()
+        stream.send_blueprint(layout(scenario, len(scenario.mission.robots), lasted_s=lasted_s))
+        stream.disconnect()
+        return unfinished.rename(rrd)
+    finally:
+        unfinished.unlink(missing_ok=True)  # there still, when the recording was refused in the midst of it
 
 
 def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web_port: int) -> int:

@@ -54,8 +54,6 @@ def finish(
 
 def report(ended: Ended, *, figures: bool, as_json: bool, junit: Path | None = None) -> int:
     """Draw, write the judgements as JUnit XML where wanted, print, and return the exit code. Raises Refused."""
-    if junit is not None:
-        assertions.junit(junit, ended.summary)
     if figures:
         from deploy.look.plots import draw
 
@@ -65,4 +63,6 @@ def report(ended: Ended, *, figures: bool, as_json: bool, junit: Path | None = N
         print(msgspec.json.format(msgspec.json.encode(facts), indent=1).decode())
     else:
         print(text(ended.summary, ended.folder))
+    if junit is not None:
+        assertions.junit(junit, ended.summary)
     return ended.exit_code

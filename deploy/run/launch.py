@@ -15,6 +15,7 @@ from random import Random
 
 import msgspec
 
+from deploy.look.assertions import check_junit
 from deploy.run.chosen import choose_again
 from deploy.run.crew import ROUTER_NAME, Crew, rows
 from deploy.run.ending import Ended, finish, report, reread
@@ -62,6 +63,8 @@ def command(
 ) -> int:
     chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
+    if junit is not None:
+        check_junit(junit)
     ended = run(chosen, number, out, faults)
     return report(ended, figures=figures and ended.signal is None, as_json=as_json, junit=junit)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.agent import Agent
+from deploy.look.assertions import check_junit
 from deploy.run.chosen import choose_again
 from deploy.run.ending import Ended, finish, report
 from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
@@ -48,6 +49,8 @@ def command(
 ) -> int:
     chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
+    if junit is not None:
+        check_junit(junit)
     ended = run(chosen, number, out, faults)
     return report(ended, figures=figures, as_json=as_json, junit=junit)
 

@@ -53,6 +53,25 @@ def test_a_recording_of_another_program_is_refused(copied: Path) -> None:
         view.converted(copied)
 
 
+def test_a_recording_that_was_cut_off_is_shown_as_far_as_it_goes_and_says_so(
+    copied: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = copied / "recording.mcap"
+    recording.write_bytes(recording.read_bytes()[:-2000])
+    assert report.html([copied]).startswith("<!")
+    said = capsys.readouterr().err
+    assert said.startswith(f"{recording}: cut off")
+    assert said.count("\n") == 1
+
+
+def test_a_refused_recording_leaves_nothing_half_converted(copied: Path) -> None:
+    before = sorted(copied.iterdir())
+    (copied / "recording.mcap").write_bytes(b"RIFF, and much more of another kind")
+    with pytest.raises(Refused):
+        view.converted(copied)
+    assert sorted(copied.iterdir()) == before
+
+
 def test_a_summary_of_another_version_is_refused(copied: Path) -> None:
     (copied / "summary.json").write_text('{"scenario": "straight", "robots": 3}')
     for look in (summary.read, lambda where: page.of([Run(where)])):

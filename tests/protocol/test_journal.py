@@ -39,6 +39,15 @@ def test_a_file_cut_anywhere_is_read_up_to_its_last_whole_entry(tmp_path: Path) 
         assert len(entries) < len(whole)
 
 
+def test_on_a_full_disk_the_journal_ends_with_a_line_and_its_writer_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "robot2-17.bin").symlink_to("/dev/full")
+    written(tmp_path)
+    said = capsys.readouterr().err
+    assert said == f"{tmp_path / 'robot2-17.bin'}: No space left on device: the journal ends here\n"
+
+
 def test_what_is_no_journal_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.bin"
     for content in (b"", b"abc", b"\x05\x00\x00\x00hello"):
