@@ -17,16 +17,12 @@ from functools import partial
 from math import ceil, hypot
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
 from deploy.bench.rows import Case, Quantity, measured, select, show
 from deploy.look.summary import Summary
 from protocol.mission import Refused
-
-if TYPE_CHECKING:
-    from world.maps import Map, Room
 
 SEEDS = 3
 TRIES_MAX = 4000
@@ -109,15 +105,17 @@ def pairs(ground: Ground, count: int) -> list[tuple[str, ...]]:
     assert path is not None, ground
     drawn = maps.read(path)
     room, chance, found = maps.Room(drawn), Random("pairs"), list[tuple[str, ...]]()
-    height_m, width_m = (drawn.resolution_m * cells for cells in drawn.occupied.shape)
+    free = [(int(row), int(column)) for row, column in zip(*(drawn.cells == 0).nonzero(), strict=True)]
     sets = ground.sets if ground.shipped else (f"map={path}", *ground.sets)
     for _ in range(TRIES_MAX):
         if len(found) == count:
             break
-        a, b = (drawn.to_map(chance.random() * width_m, chance.random() * height_m) for _ in range(2))
-        if hypot(a[0] - b[0], a[1] - b[1]) < ground.apart_m or not all(
-            _stands(ground, drawn, room, *p) for p in (a, b)
-        ):
+        a, b = (
+            drawn.to_map((column + chance.random()) * drawn.resolution_m, (row + chance.random()) * drawn.resolution_m)
+            for row, column in chance.choices(free, k=2)
+        )
+        clear_m = min(room.clearance_m(*a), room.clearance_m(*b))
+        if hypot(a[0] - b[0], a[1] - b[1]) < ground.apart_m or clear_m < ground.clear_m:
             continue
         pair = (*sets, f"start={a[0]:.2f},{a[1]:.2f}", f"goal={b[0]:.2f},{b[1]:.2f}")
         try:
@@ -126,12 +124,6 @@ def pairs(ground: Ground, count: int) -> list[tuple[str, ...]]:
             continue
         found.append(pair)
     return found
-
-
-def _stands(ground: Ground, drawn: Map, room: Room, x: float, y: float) -> bool:
-    """On ground that is known to be free, and with room."""
-    cell = drawn.cell_of(x, y)
-    return cell is not None and drawn.cells[cell] == 0 and room.clearance_m(x, y) >= ground.clear_m
 
 
 def _good(name: str, seed: int, sets: Sequence[str], robots: int | None = None) -> bool:
