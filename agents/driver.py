@@ -6,7 +6,7 @@ knows of terms or keys.
 
 from __future__ import annotations
 
-from math import hypot, inf, pi
+from math import cos, hypot, inf, pi, sin
 from typing import TYPE_CHECKING
 
 from agents.around import Around, resting
@@ -38,6 +38,9 @@ TRACK_EVERY = 5
 DT_MIN_S = 0.002
 OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
 """Wheels that obey are nearer than this to the command: several periods of full acceleration."""
+SLOT_AHEAD_S, SLOT_AHEAD_SHARE = 2.0, 0.4
+"""A follower's detour is to lead back to where its slot is so much later, but no more than this share of k^d ahead:
+there the predecessor would bar the way."""
 ON_TRACE_M = 0.3
 """Nearer than this to its place on a trace, a follower goes where its predecessor has gone: no detour is better."""
 FRESH_S = 0.5
@@ -242,8 +245,11 @@ class Driver:
         if self.formation.trace and self.follower.readout.error_m < ON_TRACE_M:
             return wanted
         slot_map = self.follower.readout.slot_map
-        target = in_base(pose, (slot_map.x, slot_map.y))
-        speed = min(self._mission.limits.v_max_mps, abs(sighting.twist.linear_x) + CATCH_UP_PER_S * hypot(*target))
+        speed = abs(sighting.twist.linear_x) + CATCH_UP_PER_S * hypot(slot_map.x - pose.x, slot_map.y - pose.y)
+        speed = min(self._mission.limits.v_max_mps, speed)
+        # To where the slot will be: the direction of one that the robot is in says nothing.
+        ahead_m = min(SLOT_AHEAD_S * sighting.twist.linear_x, SLOT_AHEAD_SHARE * slot.separation_m)
+        target = in_base(pose, (slot_map.x + ahead_m * cos(slot_map.theta), slot_map.y + ahead_m * sin(slot_map.theta)))
         was_detour = self._detour.decision is not None
         if not was_detour:
             points = without(points, in_base(pose, (sighting.pose.x, sighting.pose.y)), self._mission.radius_m + 0.1)

@@ -105,10 +105,15 @@ class Leadership:
         return Twist(-NOSE_MPS, 0.0) if free_along(points, Twist(-1.0, 0.0), half_width_m) > NOSE_M else STILL
 
     def _swing(self, slots: Sequence[Slot], now: float) -> float:
-        """Share of the cruise speed while the formation changes: the last robot's slot swings with all before it."""
+        """Share of the cruise speed while the formation opens: the last robot's slot swings with all before it.
+
+        Falling back into column needs none: the slots swing to the rear, and only lag.
+        """
         asked = {slot.robot: slot.phi for slot in slots}
-        if any(self._asked.get(robot, phi) != phi for robot, phi in asked.items()):
-            self._swings_until = now + SWING_S
+        for robot, phi in asked.items():
+            before = self._asked.get(robot, phi)
+            if phi != before and abs(phi) <= abs(before):
+                self._swings_until = now + SWING_S
         self._asked = asked
         return SWING_SHARE if now < self._swings_until else 1.0
 

@@ -17,6 +17,9 @@ from protocol.mission import Mission, Refused
 
 REPEAT_S = 1.0
 BEND_CHECK_S = 0.5
+FOLD_S = 3.0
+"""Between two hops' falling into column: each takes so long. All at once the last would be swung by all before it, and
+go a longer way."""
 BEND_AHEAD_M = 5.0
 """Far enough ahead for a chain of four to fall into column at cruise speed."""
 
@@ -31,7 +34,7 @@ class Orders:
         self._number = 0
         self._given = 0
         self._repeat_at = 0.0
-        self._check_at = 0.0
+        self._check_at = self._fold_at = 0.0
 
     def begin(self, progress_m: float, now: float) -> None:
         """What the route asked for so far has been asked for; requests of this term count from 0."""
@@ -63,14 +66,26 @@ class Orders:
     def _column_where_narrow(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
         """Before a bend that the formation cannot follow, and where obstacles are known: the route is past them."""
         slots = [self._formation.slot_of(robot) for robot in followers]
-        if self._formation.trace or all(abs(abs(slot.phi) - pi) < 1e-6 for slot in slots):
+        if self._formation.trace or all(map(_behind, slots)):
             return
         if self._mission.leading.known_m:
-            self.order("column", "known obstacles", followers, term, now)
+            self._fold(slots, followers, term, now)
             return
         ahead_m = lead.narrow_bend_m(slots, BEND_AHEAD_M)
         if ahead_m is not None:
             self.order("column", f"bend in {ahead_m:.1f} m", followers, term, now)
+
+    def _fold(self, slots: Sequence[Slot], followers: Sequence[int], term: Term, now: float) -> None:
+        """Into column past known obstacles, the last hop that is not yet there first."""
+        if now < self._fold_at:
+            return
+        self._fold_at = now + FOLD_S
+        last = max(n for n, slot in enumerate(slots) if not _behind(slot))
+        column = slots_of(named("column", self._mission.formation), followers)
+        self._number += 1
+        self._say((*slots[:last], *column[last:]), term, now)
+        note = {"number": self._number, "side": "column", "by": "known obstacles", "robot": followers[last]}
+        self._voice.event("formation", now, term, note)
 
     def _say(self, slots: tuple[Slot, ...], term: Term, now: float) -> None:
         header = self._voice.header("formation", now)
@@ -78,3 +93,7 @@ class Orders:
         self._formation.request(note)
         self._voice.say("formation", note)
         self._repeat_at = now + REPEAT_S
+
+
+def _behind(slot: Slot) -> bool:
+    return abs(abs(slot.phi) - pi) < 1e-6
