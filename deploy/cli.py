@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -104,6 +105,7 @@ def main() -> None:
     if sys.argv[1:] in ([], ["-h"], ["--help"]):  # answered before the parser is imported, which takes the longest
         print(overview())
         sys.exit(0)
+    signal.signal(signal.SIGTERM, _end)
     try:
         sys.exit(run_cli("lfa", build(sys.argv[1:2])))
     except KeyboardInterrupt:
@@ -113,6 +115,11 @@ def main() -> None:
         if extra is None:
             raise
         sys.exit(_say("lfa", f"{sys.argv[1]} needs {error.name}: install with: pip install 'lfa[{extra}]'"))
+
+
+def _end(*_: object) -> None:
+    """SIGTERM ends a command as Ctrl-C does: what it has started is ended, what it has laid out is removed."""
+    sys.exit(128 + signal.SIGTERM)
 
 
 def overview() -> str:

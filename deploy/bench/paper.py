@@ -10,13 +10,12 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 import msgspec
 from msgspec import Struct
 
+from deploy.run.workers import workers
 from deploy.shapes import across
 from deploy.shapes.across import Kept
 from deploy.shapes.bars import Finding
@@ -69,7 +68,7 @@ def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
 def _rows(seeds: int, jobs: int) -> list[Row]:
     kept: list[Kept] = []
     found: dict[str, dict[str, list[Finding]]] = {path: {} for path in PATHS}
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:  # forked, it would share threads
+    with workers(jobs) as pool:
         waiting = [pool.submit(one, path, seed) for seed in range(1, seeds + 1) for path in PATHS]
         for number, future in enumerate(waiting, start=1):
             scenario, seed, findings, of_it = future.result()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from fnmatch import fnmatchcase
 from math import isfinite
-from multiprocessing import get_context
 from typing import Literal
 
 from msgspec import Struct, structs
 
+from deploy.run.workers import workers
 from protocol.mission import Refused
 
 NEAR = 0.10
@@ -95,8 +94,7 @@ def measured(cases: Sequence[Case], jobs: int, glob: str = "*") -> Iterator[list
         for case in cases:
             yield _matching(case, case.measure(), glob)
         return
-    # Spawned, not forked: the caller may have threads.
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    with workers(jobs) as pool:
         waiting = [pool.submit(case.measure) for case in cases]
         for case, future in zip(cases, waiting, strict=True):
             yield _matching(case, future.result(), glob)

@@ -154,11 +154,11 @@ def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None
 
 
 def _viewer(*arguments: str) -> int:
-    """The viewer as a child, until it is closed; Ctrl-C ends it and us."""
+    """The viewer as a child, until it is closed; Ctrl-C and SIGTERM end it and us."""
     child = subprocess.Popen(["rerun", *arguments], executable=viewer_path(), env=quiet())
     try:
         return child.wait()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit):
         child.send_signal(signal.SIGTERM)
         child.wait()
         raise

@@ -10,7 +10,6 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +20,7 @@ from deploy.look.checker import Violation
 from deploy.run.chaos import Played, play, play_whole
 from deploy.run.network import Trace
 from deploy.run.schedules import KINDS, Schedule, draw, without
+from deploy.run.workers import workers
 from protocol.mission import Refused
 
 Player = Callable[[Schedule, Trace | None], Played]
@@ -146,7 +146,7 @@ def _played(seeds: range, jobs: int, player: Player) -> Iterator[Tally]:
     if jobs == 1:
         yield from map(_play_part, parts)
         return
-    with ProcessPoolExecutor(min(jobs, os.cpu_count() or 1)) as pool:
+    with workers(min(jobs, os.cpu_count() or 1)) as pool:
         yield from pool.map(_play_part, parts)
 
 

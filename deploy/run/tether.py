@@ -13,11 +13,16 @@ PR_SET_PDEATHSIG = 1
 
 def main() -> None:
     parent, signal, command = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:]
+    tie(parent, signal)
+    os.execv(command[0], command)
+
+
+def tie(parent: int, signal: int) -> None:
+    """Have the kernel send `signal` to this process when `parent` dies; ends it when that is so already."""
     if ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal) != 0:
         sys.exit(f"prctl: {os.strerror(ctypes.get_errno())}")
     if os.getppid() != parent:
         sys.exit(1)  # it died before we asked to be told
-    os.execv(command[0], command)
 
 
 if __name__ == "__main__":
