@@ -119,6 +119,8 @@ class _Seat:
         self._publish(self.host.deliver(now, "", event, b""))
 
     def _publish(self, sent: Sent) -> None:
+        if sent:
+            self.host.journal.flush()  # first: whoever hears it may outlive us, and the record must explain it
         for to, payload in sent:
             self.bus.publish(to, payload)
 

@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from protocol.bus import Inbox
 from protocol.journal import JOURNAL_VERSION, Heading, Journal, digest, read
+from protocol.runtime import _Seat
+from protocol.witness import Witness
 
 HEADING = Heading(JOURNAL_VERSION, "robot2", 17, 3, {"fleet": "f"})
 
@@ -59,3 +62,26 @@ def test_what_is_no_journal_is_refused(tmp_path: Path) -> None:
 def test_a_digest_tells_a_changed_payload_and_a_changed_key_apart() -> None:
     assert digest([("a", b"1")]) != digest([("a", b"2")])
     assert digest([("a", b"1")]) != digest([("b", b"1")])
+
+
+class Witnessing:
+    """A bus that looks, whenever something is said, at how much of the journal is on disk."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.on_disk: list[int] = []
+
+    def publish(self, key: str, payload: bytes) -> None:
+        self.on_disk.append(len(list(read(self.path)[1])))
+
+    def follow(self, interests: frozenset[str]) -> None: ...
+
+
+def test_what_is_said_was_journalled_before(tmp_path: Path) -> None:
+    """Whoever is killed with a message on the wire has left the record that explains it (a PROPOSE its promises)."""
+    bus = Witnessing(tmp_path / "witness-1.bin")
+    seat = _Seat(
+        Witness("f", 1, 1), bus, Inbox(), Journal(tmp_path, Heading(JOURNAL_VERSION, "witness", 1, 1, {})), None
+    )
+    seat.step(0.5)
+    assert set(bus.on_disk) == {1}
