@@ -12,6 +12,9 @@ from deploy.run.simulate import run
 from world import maps
 from world.scenario import load
 
+DEPOT = next(
+    (path for up in Path(__file__).resolve().parents if (path := up / "shared/data/maps/depot.yaml").is_file()), None
+)
 TEAM = ("mission.robots=[1,2]", "mission.formation.separation_m=0.6", "time_limit_s=90")
 
 BOXES = """world.obstacles=[
@@ -28,6 +31,17 @@ def room(folder: Path, *walls: tuple[int, int, int, int]) -> maps.Map:
     drawn = maps.Map(cells, 0.1)
     maps.write(folder / "room.yaml", drawn)
     return drawn
+
+
+def overlay(seen: maps.Map, true: maps.Map) -> tuple[int, float]:
+    """How many cells were seen occupied, and the share of them that lies within one cell of a true wall."""
+    space, cell_m = maps.Room(true), seen.resolution_m
+    rows, columns = np.nonzero(seen.occupied)
+    centers = [
+        seen.to_map((column + 0.5) * cell_m, (row + 0.5) * cell_m) for row, column in zip(rows, columns, strict=True)
+    ]
+    off_m = np.array([space.clearance_m(*center) for center in centers])
+    return len(off_m), float((off_m <= cell_m).mean())
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +64,22 @@ def test_the_goal_behind_an_unknown_wall_is_reached_without_contact(
 def test_the_leaders_map_overlays_the_true_one(explored: tuple[Path, maps.Map, str, int], tmp_path: Path) -> None:
     folder, true, _, _ = explored
     maps.write(tmp_path / "map.yaml", map_of(folder))
-    seen = maps.read(tmp_path / "map.yaml")
-    space = maps.Room(true)
-    rows, columns = np.nonzero(seen.occupied)
-    centers = [seen.to_map((column + 0.5) * 0.1, (row + 0.5) * 0.1) for row, column in zip(rows, columns, strict=True)]
-    off_m = np.array([space.clearance_m(*center) for center in centers])
-    assert len(off_m) > 100
-    assert (off_m <= 0.1).mean() >= 0.95
+    seen, on_walls = overlay(maps.read(tmp_path / "map.yaml"), true)
+    assert seen > 100
+    assert on_walls >= 0.95
+
+
+@pytest.mark.skipif(DEPOT is None, reason="no shared/data/maps beside the checkout or above it")
+def test_depot_given_by_set_is_explored_and_the_leaders_map_overlays_it(tmp_path: Path) -> None:
+    sets = [f"map={DEPOT}", "start=6,4", "goal=10,8", *TEAM]
+    ended = run(load("explore", sets), 0, tmp_path / "run")
+    contacts = sum(robot.contacts for robot in ended.summary.robots)
+    assert (ended.summary.outcome, contacts) == ("goal_reached", 0), f"look at {tmp_path}"
+    maps.write(tmp_path / "map.yaml", map_of(ended.folder))
+    assert DEPOT is not None
+    seen, on_walls = overlay(maps.read(tmp_path / "map.yaml"), maps.read(DEPOT))
+    assert seen > 100
+    assert on_walls >= 0.95
 
 
 def test_a_goal_that_turns_out_to_be_walled_in_ends_the_mission_with_that_reason(tmp_path: Path) -> None:
