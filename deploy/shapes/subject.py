@@ -22,7 +22,10 @@ class Subject:
 
     def __init__(self, run: Run) -> None:
         self.run = run
-        self.end_s = run.seen.end_s
+
+    @cached_property
+    def end_s(self) -> float:
+        return self.run.seen.end_s
 
     @cached_property
     def episodes(self) -> list[Episode]:
@@ -53,14 +56,16 @@ def on_course(s: Subject) -> list[Spike]:
 
 
 def duration_s(s: Subject, spike: Spike) -> float:
-    """How long there was avoiding for a spike, overlaps counted once: from `FELT_S` before it to its end; 0 with none.
+    """How long there was avoiding for a spike, overlaps counted once; 0 with none.
 
-    What lasted on after it, as of a robot that is stuck for long, or began long before, did not make it.
+    An avoidance that began at most `FELT_S` before the spike may have made it, and counts from its beginning. One that
+    began earlier, as of a robot that is stuck for long, did not make it begin: it counts from there on. What lasted on
+    after the spike did not make it either.
     """
-    first_s = spike.from_s - spikes.FELT_S
     avoided = [one for one in spikes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
-    spans = [(max(one.from_s, first_s), min(one.until_s, spike.until_s)) for one in avoided]
-    return sum(until_s - from_s for from_s, until_s in spikes.merged(spans))
+    began = [(one, one.from_s if one.from_s >= spike.from_s - spikes.FELT_S else spike.from_s) for one in avoided]
+    spans = [(from_s, min(one.until_s, spike.until_s)) for one, from_s in began]
+    return sum(until_s - from_s for from_s, until_s in spikes.merged(span for span in spans if span[0] < span[1]))
 
 
 def explained(s: Subject, found: Sequence[Spike]) -> Measured:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from math import hypot, isnan
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from agents.crossing import Crossing
 from agents.strategy import Detour
+from deploy.look.errors import Errors
 from deploy.look.met import known_obstacles
 from deploy.look.readings import Run
 from deploy.run.chosen import choose_again
@@ -19,6 +21,7 @@ from deploy.shapes import across, spikes
 from deploy.shapes.across import Kept
 from deploy.shapes.bars import Bar, Measured
 from deploy.shapes.command import command
+from deploy.shapes.subject import Subject, duration_s
 from deploy.shapes.table import PROPERTIES, of_run
 from protocol.mission import Refused
 from world.scenario import load
@@ -46,6 +49,25 @@ def test_what_stays_under_the_bar_is_no_spike_and_a_swing_through_zero_is_one() 
     assert len(spikes.spikes(2, T, both, spikes.BASE_M, spikes.SPIKE_M)) == 1
     apart = bump(2.0, 3.0, 0.2) + bump(4.5, 5.5, -0.2)
     assert len(spikes.spikes(2, T, apart, spikes.BASE_M, spikes.SPIKE_M)) == 2
+
+
+class Seen:
+    """A run in which robot 2 followed nobody that did anything."""
+
+    errors: ClassVar[dict[int, Errors]] = {}
+
+
+@pytest.mark.parametrize(
+    ("from_s", "until_s", "counts_s"),
+    [(19.0, 24.0, 5.0), (18.0, 40.0, 12.0), (2.0, 24.0, 4.0), (2.0, 16.0, 0.0), (31.0, 40.0, 0.0)],
+)
+def test_an_avoidance_counts_for_a_spike_as_far_as_it_can_have_made_it(
+    from_s: float, until_s: float, counts_s: float
+) -> None:
+    spike = spikes.Spike(2, 20.0, 30.0, 0.3)
+    subject = Subject(Seen())  # type: ignore[arg-type]
+    subject.episodes = [spikes.Episode(2, "avoidance", from_s, until_s), spikes.Episode(3, "avoidance", 19.0, 30.0)]
+    assert duration_s(subject, spike) == pytest.approx(counts_s)
 
 
 def test_rank_correlation_is_spearmans() -> None:
