@@ -23,6 +23,7 @@ from protocol.messages import (
     NO_TERM,
     Ask,
     CmdVel,
+    Config,
     FormationNote,
     GroundProfile,
     LaserScan,
@@ -60,6 +61,8 @@ class Agent:
         self._mission: Mission | None = None
         self._beliefs = Beliefs()
         self._lease: Lease | None = None
+        self._config: Config | None = None
+        self._chain_ids: tuple[int, ...] = ()
         self._driver: Driver | None = None
         self._orders: Orders | None = None
         self._reports: Reports | None = None
@@ -271,7 +274,7 @@ class Agent:
     def _adopt(self, now: float) -> None:
         """Follow whoever the newest config puts ahead."""
         assert self._lease is not None and self._driver is not None
-        chain = self._lease.chain
+        chain = self._chain(self._lease)
         place = chain.index(self._id) if self._id in chain else 0
         ahead = chain[place - 1] if place > 0 else None
         if self._id not in chain and chain and self._driver.stuck is not None:
@@ -297,7 +300,7 @@ class Agent:
         role = self._role(lease)
         if self._stopping:
             role = Role.WAITING
-        command = driver.drive(role, lease.chain, pose, twist, now)
+        command = driver.drive(role, self._chain(lease), pose, twist, now)
         self._command(command, role, now)
         told = driver.published(twist)
         self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, told, now)
@@ -309,7 +312,7 @@ class Agent:
             self._hand_over(lease, now)
             return
         if role is Role.LEADER:
-            self._orders.lead(driver.lead, lease.chain[1:], lease.term, now)
+            self._orders.lead(driver.lead, self._chain(lease)[1:], lease.term, now)
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
@@ -322,7 +325,13 @@ class Agent:
         if lease.role is Role.LEADER:
             return Role.LEADER
         follows = self._driver is not None and self._driver.predecessor is not None
-        return Role.FOLLOWER if follows and self._id != (lease.chain or (0,))[0] else Role.WAITING
+        return Role.FOLLOWER if follows and self._id != (self._chain(lease) or (0,))[0] else Role.WAITING
+
+    def _chain(self, lease: Lease) -> tuple[int, ...]:
+        """The lease's chain, asked for many times a step and made anew only when the config is another."""
+        if lease.config is not self._config:
+            self._config, self._chain_ids = lease.config, lease.chain
+        return self._chain_ids
 
     def _command(self, twist: Twist, role: Role, now: float) -> None:
         """The gateway's stamp is read before the lease is checked (lease.md section 5): no stamp, no command."""
@@ -335,7 +344,7 @@ class Agent:
                 return
             self._lease.commanded(now)
         term = self._lease.term if as_leader else self._lease.config.version.term
-        holder = self._id if as_leader else (self._lease.chain[0] if self._lease.chain else 0)
+        holder = self._id if as_leader else (self._chain(self._lease) or (0,))[0]
         header = self._voice.header("cmd_vel", now)
         self._voice.say("cmd_vel", CmdVel(header, twist, term, holder, as_leader, sensors.gateway))
 
@@ -360,7 +369,7 @@ class Agent:
 
     def _neighbours(self) -> tuple[int, ...]:
         assert self._lease is not None
-        chain = self._lease.chain
+        chain = self._chain(self._lease)
         if self._id not in chain:
             return ()
         place = chain.index(self._id)

@@ -56,7 +56,9 @@ class Around:
 
     def points(self, pose: Pose2D) -> list[Point]:
         """What bars the way near `pose`, in `base_link`."""
-        return self._scan.points(pose, LOOK_M) + self.ground.points(pose, LOOK_M)
+        floor = self.ground.points(pose, LOOK_M)
+        seen = self._scan.points(pose, LOOK_M)
+        return seen + floor if floor else seen
 
     def moving(self, pose: Pose2D, now: float) -> list[Feature]:
         """What moves, as seen by this robot and as told by others."""

@@ -12,6 +12,7 @@ from protocol.topics import TOPIC
 
 ROBOTS_MAX = 512
 ROW_S_MIN = 0.05
+ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
 """A robot is taken to go on as it went for so long after its last row."""
 TOLD_S = 1.0
@@ -54,12 +55,12 @@ class Beliefs:
         self._clocks[robot].heard(row.header.stamp, at)
 
     def fresh_sensors(self, now: float) -> Sensors | None:
-        return self.sensors if now - self.sensors_at <= (TOPIC["sensors"].timeout_s or 0.0) else None
+        return self.sensors if now - self.sensors_at <= SENSORS_S_MAX else None
 
     def pose_of(self, robot: int, now: float) -> Pose2D | None:
         """Where `robot` is in `map`: its last place, and on from there for a while; None when that is stale."""
         known = self._table.get(robot)
-        if known is None or now - known[1] > (TOPIC["table"].timeout_s or 0.0):
+        if known is None or now - known[1] > ROW_S_MAX:
             return None
         row, (vx, vy), later = known[0], self._velocity[robot], min(now - known[1], GOES_ON_S)
         return Pose2D(row.x + vx * later, row.y + vy * later, row.theta)
@@ -67,7 +68,7 @@ class Beliefs:
     def stuck(self, robot: int, now: float) -> bool:
         """Whether `robot` says that it is stuck; what it said long ago does not count."""
         known = self._table.get(robot)
-        return known is not None and known[0].stuck and now - known[1] <= (TOPIC["table"].timeout_s or 0.0)
+        return known is not None and known[0].stuck and now - known[1] <= ROW_S_MAX
 
     def delays(self, robots: tuple[int, ...], now: float) -> tuple[Delay, ...]:
         """Least (receive - send) of these robots' rows: their half of a round trip (control.md 3.3)."""

@@ -204,9 +204,13 @@ class Driver:
     def _strangers(self, pose: Pose2D, now: float) -> list[Point]:
         """The team-mates that this robot does not follow, in `base_link`: nobody else keeps the two apart."""
         ahead = None if self.predecessor is None else self.predecessor.robot
-        others = [robot for robot in self._mission.robots if robot not in (self._id, ahead)]
-        places = [self._beliefs.pose_of(robot, now) for robot in others]
-        return [in_base(pose, (place.x, place.y)) for place in places if place is not None]
+        c, s, mates = cos(pose.theta), sin(pose.theta), []
+        for robot in self._mission.robots:
+            place = None if robot in (self._id, ahead) else self._beliefs.pose_of(robot, now)
+            if place is not None:
+                dx, dy = place.x - pose.x, place.y - pose.y
+                mates.append((c * dx + s * dy, c * dy - s * dx))
+        return mates
 
     def _lead(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
         wanted, speed = self.leading.step(chain, pose, self._last, now)

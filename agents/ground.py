@@ -118,12 +118,13 @@ class Ground:
 
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
         """What bars the way nearer than `within_m`, in `base_link`."""
-        c, s, near = cos(pose_map.theta), sin(pose_map.theta), []
-        for x, y in self._barred_near(pose_map, within_m):
-            dx, dy = x - pose_map.x, y - pose_map.y
-            if dx * dx + dy * dy < within_m * within_m:
-                near.append((c * dx + s * dy, c * dy - s * dx))
-        return near
+        barred = self._barred_near(pose_map, within_m)
+        if not barred:
+            return []
+        x, y, c, s, limit = pose_map.x, pose_map.y, cos(pose_map.theta), sin(pose_map.theta), within_m * within_m
+        return [
+            (c * dx + s * dy, c * dy - s * dx) for px, py in barred if (dx := px - x) * dx + (dy := py - y) * dy < limit
+        ]
 
     def nearest(self, x: float, y: float, within_m: float) -> tuple[BarKind, float] | None:
         """Class and width of the barred floor nearest to (x, y) in `map`."""

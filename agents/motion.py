@@ -45,6 +45,7 @@ class Route:
         for a, b in pairwise(self.points):
             self.at_m.append(self.at_m[-1] + hypot(b[0] - a[0], b[1] - a[1]))
         self.length_m = self.at_m[-1]
+        self._legs = [_leg(a, b) for a, b in pairwise(self.points)]
         self.curvature = _curvatures(self.points)
 
     def point(self, s: float) -> Point:
@@ -57,15 +58,17 @@ class Route:
     def nearest(self, x: float, y: float, low_m: float = 0.0, high_m: float = inf) -> float:
         """Arc length of the point nearest to (x, y) between `low_m` and `high_m`."""
         first, last = self.segment(low_m), self.segment(min(high_m, self.length_m))
-        best, best_s = inf, low_m
-        for i in range(first, last + 1):
-            (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
-            dx, dy = bx - ax, by - ay
-            share = min(1.0, max(0.0, ((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-12)))
-            apart = hypot(x - ax - share * dx, y - ay - share * dy)
+        best, nearest, share_of_it = inf, -1, 0.0
+        for i, (ax, ay, dx, dy, square) in enumerate(self._legs[first : last + 1], first):
+            px, py = x - ax, y - ay
+            share = (px * dx + py * dy) / square
+            share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+            apart = hypot(px - share * dx, py - share * dy)
             if apart < best:
-                best, best_s = apart, self.at_m[i] + share * (self.at_m[i + 1] - self.at_m[i])
-        return best_s
+                best, nearest, share_of_it = apart, i, share
+        if nearest < 0:
+            return low_m
+        return self.at_m[nearest] + share_of_it * (self.at_m[nearest + 1] - self.at_m[nearest])
 
     def segment(self, s: float) -> int:
         """Index of the point that arc length `s` [m] lies on or behind."""
@@ -223,6 +226,12 @@ def in_base(pose: Pose2D, point: Point) -> Point:
     dx, dy = point[0] - pose.x, point[1] - pose.y
     c, s = cos(pose.theta), sin(pose.theta)
     return c * dx + s * dy, c * dy - s * dx
+
+
+def _leg(a: Point, b: Point) -> tuple[float, float, float, float, float]:
+    """Where it begins, whereto it leads, and its length squared."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return *a, dx, dy, max(dx * dx + dy * dy, 1e-12)
 
 
 def _rounded(points: Sequence[Point], radius_m: float) -> list[Point]:

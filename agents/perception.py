@@ -11,6 +11,8 @@ from protocol.messages import LaserScan
 SIGHT_M = 2.5
 """Farther points do not matter to a robot that stops within half a metre."""
 STRAIGHT_RADPS = 1e-3
+ROUNDED = 1.0 + 1e-9
+"""A square may be so much off."""
 
 Point = tuple[float, float]
 
@@ -42,18 +44,17 @@ class Surroundings:
         """The points nearer than `within_m`, in `base_link`."""
         x, y, c, s = pose_map.x, pose_map.y, cos(pose_map.theta), sin(pose_map.theta)
         limit = within_m * within_m
-        near = []
-        for px, py in self._points_map:
-            dx, dy = px - x, py - y
-            if dx * dx + dy * dy < limit:
-                near.append((c * dx + s * dy, c * dy - s * dx))
-        return near
+        return [
+            (c * dx + s * dy, c * dy - s * dx)
+            for px, py in self._points_map
+            if (dx := px - x) * dx + (dy := py - y) * dy < limit
+        ]
 
 
 def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Point]:
     """`points` less those within `radius_m` of `center`: a team-mate that is known to stand there."""
     x, y, limit = center[0], center[1], radius_m * radius_m
-    return [p for p in points if (p[0] - x) ** 2 + (p[1] - y) ** 2 > limit]
+    return [p for p in points if (dx := p[0] - x) * dx + (dy := p[1] - y) * dy > limit]
 
 
 def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> float:
@@ -66,15 +67,18 @@ def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> fl
         return inf
     sign = 1.0 if v > 0.0 else -1.0
     if abs(omega) <= STRAIGHT_RADPS * abs(v):
-        return min((_straight(sign * x, y, half_width_m) for x, y in points if abs(y) < half_width_m), default=inf)
+        ahead = [_straight(sign * x, y, half_width_m) for x, y in points if -half_width_m < y < half_width_m]
+        return min(ahead, default=inf)
     radius = abs(v / omega)
     left = 1.0 if omega * sign > 0.0 else -1.0
     center_y, inner_m, outer_m = left * radius, radius - half_width_m, radius + half_width_m
-    free_m = inf
+    free_m, far, near = inf, outer_m * outer_m * ROUNDED, inner_m * abs(inner_m) / ROUNDED
     for x, y in points:  # most points are off the bend: they are passed over without a call
-        from_center = hypot(x, y - center_y)
-        if inner_m < from_center < outer_m and from_center > 0.0:
-            free_m = min(free_m, _bent(sign * x, left * y, from_center, radius, half_width_m))
+        beside = y - center_y
+        if near < x * x + beside * beside < far:
+            from_center = hypot(x, beside)
+            if inner_m < from_center < outer_m and from_center > 0.0:
+                free_m = min(free_m, _bent(sign * x, left * y, from_center, radius, half_width_m))
     return free_m
 
 

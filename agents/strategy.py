@@ -132,7 +132,7 @@ class Detour:
     def _clear(self, points: Sequence[Point], target: Point, now: float) -> bool:
         """The straight way to the target has been free for `CLEAR_S`."""
         reach = min(hypot(*target), REACH_M)
-        if not _open(points, atan2(target[1], target[0]), reach, self._radius_m + NARROW_M):
+        if _bar(points, atan2(target[1], target[0]), reach, self._radius_m + NARROW_M) is not None:
             self._clear_since = None
             return False
         if self._clear_since is None:
@@ -257,21 +257,24 @@ def _first_open(
     """The open direction nearest to `towards` among steps `first` to `last` to one side of it."""
     for n in range(first, last + 1):
         bearing = wrap(towards + side * n * STEP_RAD)
-        if _open(points, bearing, reach_m, half_width_m):
+        bar = _bar(points, bearing, reach_m, half_width_m)
+        if bar is None:
             return bearing
+        if bar:  # what bars one direction is likely to bar the next
+            points = [*points[bar:], *points[:bar]] if side > 0.0 else [*points[bar::-1], *points[:bar:-1]]
     return None
 
 
-def _open(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: float) -> bool:
-    """No point within `half_width_m` of the straight way of `reach_m` in direction `bearing`.
+def _bar(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: float) -> int | None:
+    """Which point lies within `half_width_m` of the straight way of `reach_m` in direction `bearing`; None: it is open.
 
     A point that is already nearer than the half width bars only what goes towards it, not what passes it by.
     """
-    c, s = cos(bearing), sin(bearing)
-    for x, y in points:
+    c, s, far_m = cos(bearing), sin(bearing), reach_m + half_width_m
+    for n, (x, y) in enumerate(points):
         along = c * x + s * y
-        if 0.0 < along < reach_m + half_width_m:
+        if 0.0 < along < far_m:
             across = c * y - s * x
             if -half_width_m < across < half_width_m and along > 0.25 * abs(across):
-                return False
-    return True
+                return n
+    return None

@@ -6,6 +6,7 @@ units; a value that no robot could obey is refused with one line that names the 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from math import hypot, inf, isfinite, pi
 from typing import Literal
@@ -148,6 +149,7 @@ def robot_name(robot_id: int) -> str:
     return WITNESS_NAME if robot_id == WITNESS_ID else f"robot{robot_id}"
 
 
+@lru_cache(maxsize=1024)  # asked for each message; bounded: strangers may call themselves anything
 def robot_id_of(name: str) -> int | None:
     """The id behind a name, None when it names no robot and no witness."""
     if name == WITNESS_NAME:
