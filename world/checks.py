@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import hypot, pi
 
 from protocol.mission import Refused, check_mission, robot_name
-from world.spec import Obstacle, Point, Scenario
+from world.spec import Assert, Obstacle, Point, Scenario
 from world.terrain import check_feature, features
 
 ROBOTS_MAX = 500
@@ -24,6 +24,9 @@ def check_scenario(scenario: Scenario) -> Scenario:
         _check_obstacle(f"world.obstacles[{index}]", obstacle)
     for key, feature in features(scenario.world):
         check_feature(f"world.{key}", feature)
+    for bound in Assert.__struct_fields__:
+        value = getattr(scenario.asserted, bound)
+        _require(value is None or value >= 0, f"assert.{bound}", value, "0 or more: less can never hold, or always does")
     processes = ("router", "world", "robots", *(robot_name(robot) for robot in robots))
     strange = [robot for robot in scenario.world.real_robots if robot not in robots]
     _require(not strange, "world.real_robots", strange, f"ids among {list(robots)}")

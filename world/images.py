@@ -12,6 +12,8 @@ import numpy.typing as npt
 from protocol.mission import Refused
 
 CELLS_MAX = 64_000_000
+BYTES_MAX = 5 * CELLS_MAX
+"""A cell is up to three digits and a blank, in a P2; a device that never ends is cut here."""
 
 Shades = npt.NDArray[np.uint8]
 
@@ -19,7 +21,8 @@ Shades = npt.NDArray[np.uint8]
 def shades_of(yaml: Path, path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
     """Shades from 0 to 255, row 0 the top, and which cells an image with transparency shows."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(BYTES_MAX)
     except OSError as error:
         raise Refused(f"{yaml}: image = {path.name}: cannot be read ({error.strerror or error})") from None
     if data[:2] in (b"P2", b"P5"):
@@ -31,7 +34,7 @@ def shades_of(yaml: Path, path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | N
 
 def _pgm(path: Path, data: bytes) -> Shades:
     """P5 (bytes) or P2 (numbers), with comments; at most 255 shades."""
-    match = re.match(rb"(P[25])" + 3 * rb"(?:\s+|#[^\n]*\n)+(\d{1,9})" + rb"(?:[ \t]*#[^\n]*)?\s", data)
+    match = re.match(rb"(P[25])" + 3 * rb"(?:\s|#[^\n]*\n)+(\d{1,9})" + rb"(?:[ \t]*#[^\n]*)?\s", data)
     if match is None:
         raise Refused(f"{path}: no pgm header: must be P5 or P2, width, height and 255")
     columns, rows, top = int(match[2]), int(match[3]), int(match[4])
@@ -41,15 +44,16 @@ def _pgm(path: Path, data: bytes) -> Shades:
         raise Refused(f"{path}: largest shade {top}{bits}: must be an 8-bit pgm, at most 255")
     body = data[match.end() :]
     if match[1] == b"P5":
-        shades = np.frombuffer(body[: rows * columns], dtype=np.uint8)
+        body = body[: rows * columns] + body[rows * columns :].rstrip()  # some writers end with a new line
+        shades = np.frombuffer(body, dtype=np.uint8)
     else:
-        words = re.sub(rb"#[^\n]*", b"", body).split()[: rows * columns]
+        words = re.sub(rb"#[^\n]*", b"", body).split()
         if not all(word.isdigit() and len(word) < 4 and int(word) <= top for word in words):
             raise Refused(f"{path}: a shade that is no number from 0 to {top}: the file is corrupt")
         shades = np.array([int(word) for word in words], dtype=np.uint8)
     if shades.size != rows * columns:
         right = f"{columns} x {rows} = {columns * rows} by its header"
-        raise Refused(f"{path}: {shades.size} cells: must be {right}; the file is cut off")
+        raise Refused(f"{path}: {shades.size} cells: must be {right}; the file is cut off or of another size")
     if shades.size and int(shades.max()) > top:
         raise Refused(f"{path}: a shade of {int(shades.max())} above its largest {top}: the file is corrupt")
     scaled = shades if top == 255 else np.rint(shades * (255.0 / top)).astype(np.uint8)

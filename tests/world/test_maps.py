@@ -116,6 +116,8 @@ BAD = [
     (pgm(header=b"P5 0 3 255\n"), {}, "0 x 3 cells"),
     (pgm(header=b"P5 999999999 999999999 255\n"), {}, "must be from 1 to"),
     (b"P5 4", {}, "no pgm header"),
+    (b"P5" + b" " * 5000 + b"x", {}, "no pgm header"),
+    (pgm() + b"more", {}, "16 cells: must be 4 x 3"),
     (b"P2 2 1 255 7 x", {}, "no number"),
     (b"GIF89a", {}, "neither pgm"),
     (png()[:40], {}, "no png"),

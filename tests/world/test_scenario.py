@@ -37,6 +37,7 @@ BAD = [
     (["mission.limits.v_max=1"], ["mission.limits.v_max = 1", "did you mean 'v_max_mps'"]),
     (["colour=3"], ["colour = 3", "known are title"]),
     (["name='x'"], ["name = x", "no such key"]),
+    (["assert.separation_min_m=-1"], ["assert.separation_min_m = -1", "0 or more"]),
     (["world.body.mass_kg=-3"], ["world.body.mass_kg = -3", "from 0.1"]),
     (["world.obstacles=[{center_m=[5,0], radius_m=0.3, mass_kg=-1}]"], ["obstacles[0].mass_kg = -1", "0.01"]),
     (["world.obstacles=[{center_m=[5,0], radius_m=-0.3}]"], ["obstacles[0].radius_m = -0.3"]),
