@@ -24,6 +24,7 @@ from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
 
 ROLES = ("leader", "follower", "witness")
 EXAMPLE = "example: lfa-agent --role follower --id 2"
+RIGHT_MISSION = "must be the [mission] of a scenario in a file of its own, without that heading, in TOML or JSON"
 
 
 def main() -> None:
@@ -98,14 +99,14 @@ def read_mission(path: Path) -> Mission:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise Refused(f"{path}: {error.strerror}") from None
+        raise Refused(f"--mission {path}: {error.strerror}: {RIGHT_MISSION}") from None
     decode = msgspec.json.decode if path.suffix == ".json" else msgspec.toml.decode
     try:
         return check_mission(decode(data, type=Mission))
     except Refused as refused:
-        raise Refused(f"{path}: {refused}") from None
+        raise Refused(f"--mission {path}: {refused}") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise Refused(f"{path}: {error}") from None
+        raise Refused(f"--mission {path}: {error}: {RIGHT_MISSION}") from None
 
 
 if __name__ == "__main__":

@@ -26,7 +26,9 @@ def check_scenario(scenario: Scenario) -> Scenario:
         check_feature(f"world.{key}", feature)
     for bound in Assert.__struct_fields__:
         value = getattr(scenario.asserted, bound)
-        _require(value is None or value >= 0, f"assert.{bound}", value, "0 or more: less can never hold, or always does")
+        _require(
+            value is None or value >= 0, f"assert.{bound}", value, "0 or more: less can never hold, or always does"
+        )
     processes = ("router", "world", "robots", *(robot_name(robot) for robot in robots))
     strange = [robot for robot in scenario.world.real_robots if robot not in robots]
     _require(not strange, "world.real_robots", strange, f"ids among {list(robots)}")

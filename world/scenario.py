@@ -188,7 +188,7 @@ def _convert(document: dict[str, Any]) -> Scenario:
     except msgspec.ValidationError as error:
         text, _, place = str(error).partition(" - at `$")
         key = place.removesuffix("`").removeprefix(".").replace("[...]", "[]")
-        right = text.replace("`", "").replace("Expected ", "").replace(", got ", ", not ")
+        right = text.replace("`", "").replace("Expected ", "").replace(", got ", ", not ").replace(" | null", "")
         missing = re.fullmatch(r"Object missing required field `(\w+)`", text)
         if missing:
             name = ".".join(part for part in (key, missing[1]) if part)

@@ -192,7 +192,7 @@ def _places(file: FleetFile, robots: tuple[int, ...], mistakes: list[str]) -> di
     """Robots with their own place there, the others dealt out in turn."""
     right = f"one of {', '.join(map(str, robots))}"
     for robot, host in file.robots.on.items():
-        if not robot.isdecimal() or int(robot) not in robots:
+        if robot not in map(str, robots):
             mistakes.append(f"robots.on.{robot} = {host}: no such robot in the scenario: must be {right}")
     spread = [name for word in file.robots.spread for name in _called(file, word, mistakes)] or list(file.hosts)
     free = [robot for robot in robots if str(robot) not in file.robots.on]
@@ -222,6 +222,7 @@ def _wrong(file: FleetFile) -> list[str]:
     wrong += _wrong_together(file)
     for a, b in file.links.pairs:
         wrong += [f"links.pairs = [{a}, {b}]: {x} must be {_one_of(file.hosts)}" for x in (a, b) if x not in file.hosts]
+        wrong += [f"links.pairs = [{a}, {b}]: must be two machines"] if a == b else []
     restart = file.restart
     for key, value, low, high in (
         ("delay_s", restart.delay_s, 0.0, 600.0),

@@ -59,7 +59,7 @@ def _right(kind: Any, error: str) -> str:
         if get_origin(choice) is Literal:
             return f"one of {', '.join(map(str, get_args(choice)))}"
     text = error.partition(" - at `$")[0].replace("`", "").replace("Expected ", "").removeprefix("Object ")
-    return text.replace(", got ", ", not ").replace("int,", "whole number,")
+    return text.replace(", got ", ", not ").replace(" | null", "").replace("int,", "whole number,")
 
 
 def _is_struct(kind: Any) -> bool:

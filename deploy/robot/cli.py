@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from math import isfinite
 from pathlib import Path
 from typing import NoReturn
 
@@ -60,8 +61,11 @@ def start(arguments: argparse.Namespace) -> int:
 def _pose(text: str) -> Pose2D:
     try:
         x, y, theta = (float(part) for part in text.split(","))
+        fine = all(map(isfinite, (x, y, theta)))
     except ValueError:
-        raise Refused(f"--at {text}: must be x,y,theta in map [m, m, rad], like 0,-2.4,0") from None
+        fine = False
+    if not fine:
+        raise Refused(f"--at {text}: must be x,y,theta in map [m, m, rad], like 0,-2.4,0")
     return Pose2D(x, y, theta)
 
 

@@ -186,7 +186,7 @@ def test_a_driver_needs_the_base_install_only() -> None:
     assert done.stdout.strip() == "[]"
 
 
-@pytest.mark.parametrize("at", ["1,2", "a,b,c", ""])
+@pytest.mark.parametrize("at", ["1,2", "a,b,c", "", "nan,0,0"])
 def test_a_place_that_is_none_is_refused_in_one_line(at: str) -> None:
     command = [sys.executable, "-m", "deploy.robot.cli", "--id", "2", f"--at={at}"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
