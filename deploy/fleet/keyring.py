@@ -18,6 +18,9 @@ from deploy.fleet.file import is_fleet_file, load
 from deploy.fleet.part import store
 from protocol import clock
 from protocol.mission import Refused
+from world.checks import ROBOTS_MAX
+
+DAYS_MAX = 36500.0
 
 
 def command(
@@ -42,8 +45,10 @@ def command(
         if action == "init":
             raise Refused(f"{folder}: lfa up makes the keys of a fleet file by itself")
         folder = store(plan)
-    if days <= 0.0:
-        raise Refused(f"--days {days:g}: must be above 0")
+    if not 0.0 < days <= DAYS_MAX:
+        raise Refused(f"--days {days:g}: must be above 0 and at most {DAYS_MAX:g}")
+    if action == "init" and chosen:
+        raise Refused(f"init {' '.join(chosen)}: must be a folder alone, --robots and --hosts say who is in the fleet")
     if action == "revoke" and not chosen:
         raise Refused("revoke: say whom, as in lfa keys revoke DIR robot3")
     if action == "init":
@@ -79,12 +84,14 @@ def _change(
 
 def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: list[int]) -> Plan:
     """The plan that the options say. Raises Refused."""
-    if robots < 1:
-        raise Refused(f"--robots {robots}: must be 1 or more")
+    if not 1 <= robots <= ROBOTS_MAX:
+        raise Refused(f"--robots {robots}: must be from 1 to {ROBOTS_MAX}")
+    if not fleet or not all(c.isalnum() or c in "-_." for c in fleet):
+        raise Refused(f"--fleet {fleet!r}: must be letters, digits, '-', '_' or '.'")
     machines: dict[str, tuple[str, ...]] = {}
     for word in hosts.split(","):
         name, _, addresses = word.partition("=")
-        if not name or not all(c.isalnum() or c in "-_." for c in name) or name in machines:
+        if not name.strip(".") or not all(c.isalnum() or c in "-_." for c in name) or name in machines:
             raise Refused(f"--hosts {hosts}: must be names, each once, like a=10.0.0.1,b")
         machines[name] = tuple(address for address in addresses.split("+") if address)
     said = {word.partition("=")[0]: word.partition("=")[2].split("+") for word in places}

@@ -13,7 +13,7 @@ import pytest
 
 from deploy.fleet import authority, keys
 from deploy.fleet.access import Plan, rules, sayable
-from deploy.fleet.keyring import planned
+from deploy.fleet.keyring import command, planned
 from protocol.credentials import check_valid, credentials, validity
 from protocol.mission import Refused
 from protocol.topics import TOPICS, Topic, matches
@@ -283,3 +283,16 @@ def test_a_folder_of_another_fleet_is_refused(tmp_path: Path) -> None:
     keys.make(tmp_path / "k", plan())
     with pytest.raises(Refused, match="holds the keys of fleet 'f'"):
         keys.make(tmp_path / "k", keys.spread("g", {"a": ()}, [1]))
+
+
+@pytest.mark.parametrize("days", ["0", "nan", "1e9"])
+def test_certificates_for_no_days_or_for_ever_are_refused_before_anything_is_made(tmp_path: Path, days: str) -> None:
+    with pytest.raises(Refused, match="--days"):
+        command("init", tmp_path / "keys", days=float(days))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("fleet", ["", "a/b", "*"])
+def test_a_fleet_whose_name_would_widen_the_rules_is_refused(fleet: str) -> None:
+    with pytest.raises(Refused, match="--fleet"):
+        planned(fleet, "local", 4, [], [])
