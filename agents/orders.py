@@ -1,7 +1,7 @@
 """The leader's orientation requests: which formation, when, with its term and a number (control.md section 4).
 
 The mission's own changes come as the route comes to them; an operator may ask; and before a bend in which the outermost
-robot could not keep up, the chain falls into column.
+robot could not keep up, the chain falls into column. Where obstacles are known the chain is in column all along.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Orders:
 
     def lead(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
         """One control step of the leader: what is due by the route, and the standing request once a second."""
-        orientations = self._mission.leading.orientations
+        orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
         while self._given < len(orientations) and orientations[self._given].at_m <= lead.progress_m:
             self.order(orientations[self._given].side, "mission", followers, term, now)
             self._given += 1

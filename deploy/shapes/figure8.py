@@ -14,21 +14,32 @@ from deploy.shapes.bars import Measured
 from deploy.shapes.subject import Subject, explained, share
 
 REQUEST_S = 3.0
+SAID_S = 0.1
+"""A request's note is on its way for less, and is said again only after a second."""
 
 
 def requests_seen(s: Subject) -> Measured:
-    """The first follower's bearing against what it is asked for goes up at once."""
+    """The first follower's bearing against what it is asked for goes up at once; a request may ask nothing of it."""
     asked, mute = spikes.requests(s.run), []
     for at_s in asked:
         first = next((robot for robot, e in s.run.errors.items() if _second_in_chain(s, robot, at_s)), None)
         e = s.run.errors.get(first or 0)
         window = None if e is None else (e.t >= at_s) & (e.t <= at_s + REQUEST_S)
-        if e is None or window is None or not window.any():
+        if e is None or window is None or not window.any() or not _asked_anew(s, first or 0, at_s):
             continue
         if np.abs(e.bearing_asked[window]).max() <= spikes.SPIKE_RAD:
             mute.append(at_s)
     note = ", ".join(f"none after {at_s:.1f} s" for at_s in mute) if asked else "no request in this run"
     return Measured(share(len(asked) - len(mute), len(asked)), note)
+
+
+def _asked_anew(s: Subject, robot: int, at_s: float) -> bool:
+    """Whether what `robot` is asked for is another bearing after the request than before it."""
+    said = s.run.seen.commanded.get(robot)
+    if said is None:
+        return False
+    before, after = (said[said[:, 0] <= at_s + later_s, 2] for later_s in (-SAID_S, SAID_S))
+    return not before.size or bool(before[-1] != after[-1])
 
 
 def bearings_explained(s: Subject) -> Measured:

@@ -123,6 +123,11 @@ def test_the_papers_second_path_shows_what_its_figures_must(second_path: Path) -
     assert failed == [], "reproduce: lfa sim paper_path2 --seed 1, then lfa verify RUN"
 
 
+def test_a_follower_goes_round_what_is_in_its_way_and_does_not_turn_round_before_it(second_path: Path) -> None:
+    peaks = {spike.peak: spike for spike in Subject(Run(second_path)).distance}
+    assert max(peaks) < 0.8, f"{peaks[max(peaks)]}; reproduce: lfa sim paper_path2 --seed 1, then lfa plot RUN"
+
+
 def test_what_the_robots_met_is_where_it_stands(second_path: Path) -> None:
     known = known_obstacles(second_path)
     true = [obstacle.center_m for obstacle in Run(second_path).scenario.world.obstacles]
@@ -138,6 +143,7 @@ def test_iteration_2_with_known_obstacles_is_shorter_and_takes_less_time(second_
     assert second.iteration == 2
     assert second.way_m <= first.way_m, "reproduce: lfa sim paper_path2 --seed 1, then again with --map-from RUN"
     assert second.duration_s <= first.duration_s
+    assert [one for one in of_run(Run(again)) if one.status == "fails"] == []
 
 
 def test_a_map_from_what_is_no_run_or_for_another_motion_is_refused(second_path: Path, tmp_path: Path) -> None:

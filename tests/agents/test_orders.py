@@ -1,0 +1,44 @@
+"""The leader's orientation requests: past known obstacles the chain falls into column hop by hop, and stays in it."""
+
+from __future__ import annotations
+
+from math import pi
+
+import pytest
+
+from agents.formation import Formation
+from agents.motion import Lead
+from agents.orders import FOLD_S, Orders
+from agents.voice import Voice
+from protocol.geometry import Pose2D
+from protocol.messages import Event, FormationNote, Term
+from protocol.mission import FormationSpec, Leading, Limits, Mission, Orientation
+
+FOLLOWERS = (2, 3, 4)
+LEFT = 2.0 * pi / 3.0
+
+
+def asked(known: tuple[tuple[float, float, float], ...], until_s: float) -> list[tuple[float, ...]]:
+    """phi^d of the followers, of each request that a leader who stands half a metre along makes within that time."""
+    orientations = (Orientation(0.4, "right"),)
+    leading = Leading(route_m=((20.0, 0.0),), known_m=known, orientations=orientations)
+    mission = Mission(robots=(1, *FOLLOWERS), leading=leading, formation=FormationSpec(1.2, pi / 3.0, "left"))
+    voice, lead = Voice("fleet", 1, 1), Lead(leading, Limits())
+    orders = Orders(voice, mission, Formation.of(mission))
+    orders.begin(0.0, 0.0)
+    lead.track(Pose2D())
+    lead.track(Pose2D(0.5))
+    for n in range(round(until_s * 50)):
+        orders.lead(lead, FOLLOWERS, Term(2, 1, 1), n / 50)
+    said = [envelope.message for envelope in voice.spoken()]
+    new = [n for n, message in enumerate(said) if isinstance(message, Event) and message.kind == "formation"]
+    return [tuple(slot.phi for slot in note.slots) for n in new if isinstance(note := said[n - 1], FormationNote)]
+
+
+def test_past_known_obstacles_the_last_hop_falls_into_column_first() -> None:
+    found = asked(((10.0, 0.0, 0.25),), 5.0 * FOLD_S)
+    assert found == [pytest.approx(phis) for phis in ((LEFT, LEFT, pi), (LEFT, pi, pi), (pi, pi, pi))]
+
+
+def test_without_known_obstacles_the_missions_own_request_is_made_in_one() -> None:
+    assert asked((), 1.0) == [pytest.approx((-LEFT, -LEFT, -LEFT))]
