@@ -168,7 +168,7 @@ class Tokens:
         return through
 
     def next_due(self) -> float:
-        return min((held.at for held in self._held), default=float("inf"))
+        return min([held.at for held in self._held]) if self._held else float("inf")
 
 
 class Links:

@@ -144,6 +144,11 @@ class Reception:
         self._waiting: list[tuple[float, int, Arrival]] = []
         self._order = 0
 
+    @property
+    def is_clear(self) -> bool:
+        """What comes in would come out at once."""
+        return not self._waiting and not self.air.cuts and self.air.radio == CLEAR
+
     def put(self, arrival: Arrival) -> None:
         """A message came over the bus."""
         link = link_of(arrival.key, self._receiver)

@@ -58,6 +58,7 @@ class _Seat:
 
     def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal, weather_key: str | None) -> None:
         """`weather_key` is where an operator's weather comes, None when there shall be none."""
+        self.node = node
         self.host = Host(node, journal)
         self.bus = bus
         self.inbox = inbox
@@ -69,11 +70,11 @@ class _Seat:
 
     def next_deadline(self) -> float:
         wire = min(self._reception.next_due(), self._tokens.next_due(), self._links.anew_at)
-        return min(self.host.node.next_deadline(), wire)
+        return min(self.node.next_deadline(), wire)
 
     def step(self, now: float) -> float:
         """Feed what came, tick if due; how late the tick was [s]."""
-        host, node = self.host, self.host.node
+        host, node = self.host, self.node
         for arrival in self._through_the_air(now):
             if isinstance(arrival.payload, bytes):
                 self._publish(host.message(arrival.at, arrival.key, arrival.payload))
@@ -101,6 +102,8 @@ class _Seat:
         """What came, less what the weather took; the operator's word about the weather goes no further."""
         arrivals = self._tokens.sift(self.inbox.take(), now)
         if self._weather_key is None:
+            return arrivals
+        if self._reception.is_clear and self._weather_key not in [arrival.key for arrival in arrivals]:
             return arrivals
         for arrival in arrivals:
             if arrival.key != self._weather_key or not self._is_weather(arrival):
@@ -180,7 +183,7 @@ def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping, notify: Notify) -
     stop_by = None
     vitals = _VitalSigns(now)
     while True:
-        deadline = min(seat.next_deadline() for seat in seats)
+        deadline = min([seat.next_deadline() for seat in seats])
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
         now = clock.now()
         for seat in seats:
@@ -193,11 +196,18 @@ def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping, notify: Notify) -
             stop_by = now + STOP_GRACE_S
             for seat in seats:
                 seat.tell(Stop(), now)
-        refusals = [node.refusal for node in (seat.host.node for seat in seats) if node.refusal is not None]
-        if refusals:
-            raise Refused(refusals[0])
-        if all(seat.host.node.finished for seat in seats) or (stop_by is not None and now > stop_by):
+        if _is_over(seats) or (stop_by is not None and now > stop_by):
             return 0
+
+
+def _is_over(seats: Sequence[_Seat]) -> bool:
+    """All have finished. Raises Refused when one of them cannot take part."""
+    over = True
+    for seat in seats:
+        if seat.node.refusal is not None:
+            raise Refused(seat.node.refusal)
+        over = over and seat.node.finished
+    return over
 
 
 class _Stopping:
