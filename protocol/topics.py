@@ -71,6 +71,8 @@ TOPICS: tuple[Topic, ...] = (
     Topic("log",          m.LogLines,      ("host",),             None, False, True,  "background", None),
 )  # fmt: skip
 
+NO_ECHO = frozenset({"lease", "table", "formation", "obstacles"})
+"""Said by those who follow what all say of it: nobody is given its own word back, which would only wake it."""
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
 TRUTH_OWNER = "sim"
 HARDWARE = ("sensors", "localization", "scan", "ground", "contact")

@@ -20,7 +20,7 @@ from protocol.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_pri
 from protocol.endpoints import check_endpoints
 from protocol.mission import Profile, Refused
 from protocol.node import PeerDown, PeerUp, RouterLost
-from protocol.topics import TOPIC, Topic, address, alive_key
+from protocol.topics import NO_ECHO, TOPIC, Topic, address, alive_key
 
 LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000}
 """Silence after which a link counts as dead; over radio there are gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
@@ -124,6 +124,7 @@ class ZenohBus:
             congestion_control=zenoh.CongestionControl.DROP,
             priority=_PRIORITY[topic.priority],
             express=topic.priority == "real_time" and topic.name not in FOLLOWED_AT_ONCE,
+            allowed_destination=zenoh.Locality.REMOTE if topic.name in NO_ECHO else zenoh.Locality.ANY,
         )
 
     def _subscribe(self, key: str) -> Any:

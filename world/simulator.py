@@ -19,7 +19,7 @@ from protocol.messages import Message, decode
 from protocol.mission import Refused
 from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
 from protocol.radio import Air, Link, Radio, link_of
-from protocol.topics import TOPIC, address, alive_key, matches
+from protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
@@ -226,6 +226,8 @@ class Simulator:
             tap(self.now, key, payload, message)
         routes = self._routes.get(key)
         for seat, link in self._route(key) if routes is None else routes:
+            if seat is sender and key.split("/", 4)[3] in NO_ECHO:
+                continue
             for delay_s in LOCAL_DELAYS_S if link is None else self.air.delays(*link):
                 self.at(self.now + delay_s, self._give, seat, key, message, payload)
 

@@ -1,4 +1,4 @@
-"""A router's receiver threads are its own: no client that started it hands it fewer."""
+"""What only a real router shows: whose its receiver threads are, and who is given whose word."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 SCRIPT = """
@@ -19,17 +21,58 @@ print(os.environ.get("ZENOH_RUNTIME"))
 """
 
 
-def test_what_a_client_asks_of_zenoh_is_not_inherited_by_its_children() -> None:
+@contextmanager
+def _router() -> Iterator[str]:
+    """The endpoint of one that runs."""
     with tempfile.TemporaryDirectory(prefix="lfa-", dir="/tmp") as folder:
         endpoint = f"unixsock-stream/{Path(folder) / 'router.sock'}"
         router = subprocess.Popen(
             [sys.executable, "-m", "deploy.fleet.router", "--listen", endpoint], stdout=subprocess.DEVNULL
         )
         try:
-            client = [sys.executable, "-c", SCRIPT, endpoint]
-            fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
-            told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh)
+            yield endpoint
         finally:
             router.kill()
             router.wait()
+
+
+def test_what_a_client_asks_of_zenoh_is_not_inherited_by_its_children() -> None:
+    """A router's receiver threads are its own: no client that started it hands it fewer."""
+    with _router() as endpoint:
+        client = [sys.executable, "-c", SCRIPT, endpoint]
+        fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
+        told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh)
     assert told.stdout.strip() == "None"
+
+
+HEARD = """
+import sys
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.topics import address
+from protocol.zenoh_bus import ZenohBus, answers
+while not answers(sys.argv[1]):
+    pass
+inboxes = Inbox(every=True), Inbox(every=True)
+one, other = (ZenohBus(sys.argv[1], inbox) for inbox in inboxes)
+for bus in (one, other):
+    bus.follow(frozenset({"lfa/f/*/lease/all", "lfa/f/*/table", "lfa/f/*/event"}))
+heard = [set(), set()]
+until = clock.now() + 30.0
+while clock.now() < until and (len(heard[1]) < 3 or not heard[0]):
+    for topic in ("lease/all", "table", "event"):
+        one.publish("lfa/f/robot1/" + topic, b"")
+    clock.sleep(0.02)
+    for topics, inbox in zip(heard, inboxes):
+        topics.update(address(arrival.key).topic for arrival in inbox.take() if arrival.key)
+for bus in (one, other):
+    bus.close()
+print(sorted(heard[0]), sorted(heard[1]))
+"""
+
+
+def test_who_says_what_all_say_is_not_given_its_own_word() -> None:
+    with _router() as endpoint:
+        client = [sys.executable, "-c", HEARD, endpoint]
+        told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True)
+    assert told.stdout.strip() == "['event'] ['event', 'lease', 'table']"
