@@ -11,8 +11,9 @@ from typing import Protocol
 
 from msgspec import Struct, structs
 
+from protocol.messages import HELLO_MARK
 from protocol.node import Local, PeerDown, PeerUp, RouterLost
-from protocol.topics import TOPIC, Address, address
+from protocol.topics import TOPIC, Address, Topic, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
 ANEW_S = (1.5, 6.5)
@@ -77,15 +78,24 @@ class Wake:
 class Inbox:
     """Newest value for state topics, a bounded queue for everything else, one wake-up."""
 
-    def __init__(self, wake: Settable | None = None, size_max: int = INBOX_SIZE_MAX, *, every: bool = False) -> None:
+    def __init__(
+        self,
+        wake: Settable | None = None,
+        size_max: int = INBOX_SIZE_MAX,
+        *,
+        every: bool = False,
+        patient: bool = False,
+    ) -> None:
         """`wake` is set when something urgent came; several inboxes of one loop share it.
 
-        `every` queues state topics too: a recorder wants all values, not the newest.
+        `every` queues state topics too: a recorder wants all values, not the newest. `patient`: who looks in fifty
+        times a second anyway is not woken by HELLO, which all without a vote keep saying.
         """
         self._queue: deque[Arrival] = deque()
         self._newest: dict[str, Arrival] = {}
         self._size_max = size_max
         self._every = every
+        self._patient = patient
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
         """How many more events an owner may have queued, as of when."""
@@ -104,7 +114,7 @@ class Inbox:
                 return
             else:
                 self._queue.append(arrival)
-        if topic is None or topic.wakes:
+        if topic is None or (topic.wakes and not (self._patient and _is_hello(topic, arrival.payload))):
             self._wake.set()
 
     def _allows(self, where: Address | None, now: float) -> bool:
@@ -207,6 +217,10 @@ class Links:
         self._due.pop(0)
         self._cut_off = False
         return True
+
+
+def _is_hello(topic: Topic, payload: object) -> bool:
+    return topic.name == "lease" and isinstance(payload, bytes) and HELLO_MARK in payload
 
 
 def _at(arrival: Arrival) -> float:

@@ -147,6 +147,10 @@ class Hello(Struct, frozen=True, array_like=True, tag="hello"):
     version: Version | None
 
 
+HELLO_MARK = msgspec.msgpack.encode(Hello.__struct_config__.tag)
+"""Among the bytes of every note that holds one."""
+
+
 class Fence(Struct, frozen=True, array_like=True, tag="fence"):
     """To the gateway of the robot whose term `old` is to end: refuse everything below `term`."""
 

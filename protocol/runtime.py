@@ -23,7 +23,7 @@ from protocol.credentials import Credentials
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, OperatorNote, decode
-from protocol.mission import Refused
+from protocol.mission import WITNESS_NAME, Refused
 from protocol.node import Local, Node, Stop, Vitals
 from protocol.notify import Notify
 from protocol.radio import WEATHER, Reception
@@ -139,7 +139,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     try:
         for node in nodes:
-            inbox = Inbox(wake)
+            inbox = Inbox(wake, patient=node.name != WITNESS_NAME)
             bus = connect(options, inbox, stop)
             if bus is None:
                 return 0

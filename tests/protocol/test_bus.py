@@ -18,11 +18,26 @@ from protocol.bus import (
     Tokens,
     Wake,
 )
+from protocol.messages import Header, Hello, LeaseNote, Release, Term, encode
 from protocol.node import PeerDown, PeerUp, RouterLost
 
 
 def arrival(at: float, topic: str) -> Arrival:
     return Arrival(at, f"lfa/f/robot1/{topic}", b"")
+
+
+def test_who_looks_in_often_is_not_woken_by_hello() -> None:
+    header = Header("robot1", 1, 1, 0.0)
+    for patient, body, wakes in (
+        (True, Hello(None), False),
+        (False, Hello(None), True),
+        (True, Release(Term(1, 1, 1)), True),
+    ):
+        wake = Wake()
+        inbox = Inbox(wake, patient=patient)
+        inbox.put(Arrival(0.0, "lfa/f/robot1/lease/all", encode(LeaseNote(header, body))))
+        assert wake.wait(0.0) == wakes
+        assert len(inbox.take()) == 1
 
 
 def test_of_a_state_only_the_newest_value_is_kept() -> None:
