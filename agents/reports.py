@@ -120,6 +120,7 @@ def status(
     """Diagnostics in the sense of ROS. `driver` is None before the mission is known; `missing` stay away (E18)."""
     counters: dict[str, float] = {
         "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
+        "tick_p99_ms": round(1000.0 * vitals.tick_p99_s, 3),
         "dropped": vitals.dropped,
         "undecodable": vitals.undecodable,
         "cpu_percent": round(vitals.cpu_percent, 2),

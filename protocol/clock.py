@@ -25,5 +25,10 @@ def cpu_s() -> float:
     return time.process_time()
 
 
+def thread_s() -> float:
+    """Processor time used by this thread so far [s]: what a computation costs, however busy the machine is."""
+    return time.thread_time()
+
+
 def sleep(duration_s: float) -> None:
     time.sleep(duration_s)

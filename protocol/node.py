@@ -40,6 +40,8 @@ class Vitals(Struct, frozen=True, array_like=True, tag="vitals"):
     undecodable: int
     cpu_percent: float
     rss_mib: float
+    tick_p99_s: float = 0.0
+    """Processor time of a tick, the 99th percentile of the newest."""
 
 
 class Stop(Struct, frozen=True, array_like=True, tag="stop"):

@@ -23,13 +23,15 @@ def processes(run: Run, s: Summary) -> str:
         commands = run.seen.cmd_vel.get(int(owner.removeprefix("robot"))) if owner.startswith("robot") else None
         gaps = np.diff(commands[:, 0]) if commands is not None and commands.shape[0] > 1 else np.array([])
         rows.append((
-            owner, _largest(own, "loop_lag_ms", "ms"), _largest(own, "cpu_percent", "%"),
-            _largest(own, "rss_mib", "MiB"),            _largest(own, "dropped", ""), _largest(own, "undecodable", ""),
+            owner, _largest(own, "loop_lag_ms", "ms"), _largest(own, "tick_p99_ms", "ms"),
+            _largest(own, "cpu_percent", "%"), _largest(own, "rss_mib", "MiB"),
+            _largest(own, "dropped", ""), _largest(own, "undecodable", ""),
             f"{1.0 / gaps.mean():.1f} Hz" if gaps.size else NONE, in_ms(1000.0 * gaps.max()) if gaps.size else NONE,
         ))  # fmt: skip
     heads = (
         "process",
         "largest loop lag",
+        "99 % of ticks within",
         "largest CPU share",
         "memory",
         "dropped",

@@ -49,6 +49,8 @@ def test_the_run_folder_is_whole(tmp_path: Path) -> None:
     assert journals == ["robot1", "robot2", "witness", "world"]
     assert set(trace.read(folder).truth) == {1, 2}
     assert read(folder).robots[1].distance_error_rms_m is not None
+    ticks = [said.counters.get("tick_p99_ms", 0.0) for _, _, _, said in trace.messages(folder, frozenset({"status"}))]
+    assert max(ticks) > 0.0
 
 
 def test_the_next_in_chain_takes_over_within_half_a_second(tmp_path: Path) -> None:
