@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     from agents.mapping import Grid
 
 ASK_S = 0.5
+EASE_S = 2.0 * CONTROL_PERIOD_S
+"""A lease that lasts longer needs no grant at once: each of a round's voters would wake the leader."""
 
 
 class Agent:
@@ -71,6 +73,8 @@ class Agent:
         self._next_control = 0.0
         self._arrived = False
         self._stopping = False
+        self.at_ease = False
+        """Grants can wait for the next control step: the lease lasts well beyond it."""
         self._interests = self._wanted()
         self.refusal: str | None = None
 
@@ -263,6 +267,7 @@ class Agent:
                     self._orders.begin(self._driver.lead.progress_m, now)
                     self._control(now)
                 case StepDown(term, cause):
+                    self.at_ease = False
                     self._event("lease", now, {"change": cause}, term)
                 case AdoptChain(config):
                     self._adopt(now)
@@ -293,6 +298,7 @@ class Agent:
         assert self._lease is not None and self._driver is not None
         assert self._reports is not None and self._orders is not None and self._distress is not None
         lease, driver = self._lease, self._driver
+        self.at_ease = lease.may_command(now + EASE_S) and lease.config.previous is None
         known = driver.estimator.pose_at(now)
         if known is None:
             return

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from msgspec import Struct, structs
 
-from protocol.messages import HELLO_MARK
+from protocol.messages import GRANT_MARK, HELLO_MARK
 from protocol.node import Local, PeerDown, PeerUp, RouterLost
 from protocol.topics import TOPIC, Address, Topic, address
 
@@ -96,6 +96,8 @@ class Inbox:
         self._size_max = size_max
         self._every = every
         self._patient = patient
+        self.at_ease = False
+        """GRANT can wait as well: of one that leads, and whose lease lasts well beyond its next look."""
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
         """How many more events an owner may have queued, as of when."""
@@ -114,8 +116,13 @@ class Inbox:
                 return
             else:
                 self._queue.append(arrival)
-        if topic is None or (topic.wakes and not (self._patient and _is_hello(topic, arrival.payload))):
+        if topic is None or (topic.wakes and not self._can_wait(topic, arrival.payload)):
             self._wake.set()
+
+    def _can_wait(self, topic: Topic, payload: object) -> bool:
+        if topic.name != "lease" or not isinstance(payload, bytes):
+            return False
+        return (self._patient and HELLO_MARK in payload) or (self.at_ease and GRANT_MARK in payload)
 
     def _allows(self, where: Address | None, now: float) -> bool:
         """A token bucket an owner: whoever floods is heard less, and takes neither time nor room from the others."""
@@ -217,10 +224,6 @@ class Links:
         self._due.pop(0)
         self._cut_off = False
         return True
-
-
-def _is_hello(topic: Topic, payload: object) -> bool:
-    return topic.name == "lease" and isinstance(payload, bytes) and HELLO_MARK in payload
 
 
 def _at(arrival: Arrival) -> float:

@@ -147,7 +147,7 @@ class Hello(Struct, frozen=True, array_like=True, tag="hello"):
     version: Version | None
 
 
-HELLO_MARK = msgspec.msgpack.encode(Hello.__struct_config__.tag)
+HELLO_MARK, GRANT_MARK = (msgspec.msgpack.encode(kind.__struct_config__.tag) for kind in (Hello, Grant))
 """Among the bytes of every note that holds one."""
 
 

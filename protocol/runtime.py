@@ -97,6 +97,7 @@ class _Seat:
         elif self._links.due(now):
             self.bus.follow_anew()
         host.journal.flush()
+        self.inbox.at_ease = getattr(node, "at_ease", False)  # only a robot ever leads
         return late
 
     def tick_p99_s(self) -> float:

@@ -18,7 +18,7 @@ from protocol.bus import (
     Tokens,
     Wake,
 )
-from protocol.messages import Header, Hello, LeaseNote, Release, Term, encode
+from protocol.messages import Grant, Header, Hello, LeaseNote, Release, Term, Version, encode
 from protocol.node import PeerDown, PeerUp, RouterLost
 
 
@@ -37,6 +37,17 @@ def test_who_looks_in_often_is_not_woken_by_hello() -> None:
         inbox = Inbox(wake, patient=patient)
         inbox.put(Arrival(0.0, "lfa/f/robot1/lease/all", encode(LeaseNote(header, body))))
         assert wake.wait(0.0) == wakes
+        assert len(inbox.take()) == 1
+
+
+def test_a_leader_at_ease_is_not_woken_by_grants() -> None:
+    note = encode(LeaseNote(Header("robot2", 1, 1, 0.0), Grant(Term(1, 1, 1), 7, Version(), 0.5)))
+    for at_ease in (True, False):
+        wake = Wake()
+        inbox = Inbox(wake, patient=True)
+        inbox.at_ease = at_ease
+        inbox.put(Arrival(0.0, "lfa/f/robot2/lease/robot1", note))
+        assert wake.wait(0.0) != at_ease
         assert len(inbox.take()) == 1
 
 

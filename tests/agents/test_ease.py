@@ -1,0 +1,34 @@
+"""A leader takes grants at its next control step only while its lease lasts well beyond that."""
+
+from __future__ import annotations
+
+from agents.agent import EASE_S, Agent
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import Role
+from protocol.radio import Radio
+from protocol.witness import Witness
+from world.kinematic import Kinematic
+from world.scenario import draw, shipped
+from world.simulator import Simulator
+from world.world import World
+
+
+def test_only_a_leader_with_time_left_is_at_ease() -> None:
+    scenario = draw(shipped()["straight"], 1)
+    simulator = Simulator(Radio(), 1)
+    agents = {robot: Agent(robot, 1, "f", 1) for robot in scenario.mission.robots}
+    world = World("f", scenario, 1, 1, start_at=0.0, bodies=Kinematic)
+    for node in (world, Witness("f", 1, 1), *agents.values()):
+        simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 0, {})))
+    simulator.run(2.0)
+    assert {robot for robot, agent in agents.items() if agent.at_ease} == {1}
+    for other in ("witness", "robot2", "robot3", "robot4"):
+        simulator.kill(other, hinted=False)
+    leader, last_at_ease, led_until = agents[1], 0.0, 0.0
+    while simulator.now < 3.0:
+        simulator.run(simulator.now + 0.001)
+        if leader.lease is not None and leader.lease.role is Role.LEADER:
+            led_until = simulator.now
+        if leader.at_ease:
+            last_at_ease = simulator.now
+    assert 2.0 < last_at_ease < led_until - 0.5 * EASE_S < 2.5
