@@ -9,6 +9,7 @@ import asyncio
 import hashlib
 import sys
 import time
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -52,6 +53,8 @@ def command(
     wait: Annotated[float, typer.Option(help="Give up when it is not healthy after so many seconds.")] = 60.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
 ) -> int:
+    if not 0.0 < wait < inf:
+        raise Refused(f"--wait {wait:g}: must be above 0, in seconds")
     plan = _secured(load(file)) if secure else load(file)
     began = clock.now()
     try:

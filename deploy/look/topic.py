@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,10 +15,12 @@ from msgspec import Struct
 from deploy.look.onlooker import Fleet, find, listen
 from deploy.run import channels
 from protocol import clock
-from protocol.mission import Refused
-from protocol.topics import TOPIC
+from protocol.mission import WITNESS_NAME, Refused, robot_id_of
+from protocol.topics import HOST_PREFIX, OPERATOR_NAME, RECORDER_NAME, TOPIC, TRUTH_OWNER, WORLD_NAME
 
 POLL_S = 0.1
+SILENCE_S = 3.0
+SPEAKERS = ("*", WITNESS_NAME, WORLD_NAME, OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
 
 
 class Rate(Struct, frozen=True):
@@ -40,9 +44,11 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON; echo always does.")] = False,
 ) -> int:
     wanted = expressions(topic)
+    if count < 0 or not 0.0 < seconds < inf:
+        raise Refused(f"--count {count} --seconds {seconds:g}: must be 0 or more, and above 0")
     found = find(fleet, connect, keys)
     if action == "echo":
-        return _echo(found, wanted, count)
+        return _echo(found, wanted, count, topic or "anything")
     rates = _rates(found, wanted, seconds)
     if as_json:
         print(msgspec.json.encode(rates).decode())
@@ -56,17 +62,22 @@ def expressions(text: str) -> frozenset[str]:
     owner, _, name = text.partition("/")
     if not name and owner in TOPIC:
         owner, name = "*", owner
-    if name and name not in TOPIC:
-        raise Refused(f"topic {name!r}: must be one of {', '.join(TOPIC)}")
+    named = robot_id_of(owner) is not None or owner in SPEAKERS or owner.startswith(HOST_PREFIX)
+    if (name and name not in TOPIC) or (owner and not named):
+        raise Refused(f"topic {text!r}: must be such as robot2/pose, robot2 or pose, of {', '.join(TOPIC)}")
     return frozenset({f"{owner or '*'}/{name or '*'}", f"{owner or '*'}/{name or '*'}/*"})
 
 
-def _echo(fleet: Fleet, wanted: frozenset[str], count: int) -> int:
+def _echo(fleet: Fleet, wanted: frozenset[str], count: int, what: str) -> int:
     """Every message as one line of JSON, with its channel."""
     left = count
+    silent_at = clock.now() + SILENCE_S
     with listen(fleet, wanted, every=True) as ear:
         while True:
             ear.wait(POLL_S)
+            if left == count and clock.now() > silent_at:
+                print(f"nothing is heard of {what} yet (lfa topic list)", file=sys.stderr, flush=True)
+                silent_at = inf
             for arrival, message in ear.take():
                 channel = msgspec.json.encode(arrival.key.split("/", 2)[2]).decode()
                 print(f'{{"channel":{channel},"message":{channels.encode(message).decode()}}}', flush=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +35,8 @@ def command(
     keep: Annotated[int, typer.Option(help="Keep the first and the newest files, so many in all; 0: all.")] = 0,
     hosts: Annotated[Path | None, typer.Option(help="A fleet file: bring its machines' journals too.")] = None,
 ) -> int:
+    if not 0.0 <= seconds < inf:
+        raise Refused(f"--seconds {seconds:g}: must be above 0, or 0 for no end")
     if not split_mb >= 0.0 or keep < 0:
         raise Refused(f"--split-mb {split_mb:g} --keep {keep}: must be 0 or more")
     plan = None if hosts is None else load(hosts)

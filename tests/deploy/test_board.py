@@ -89,9 +89,10 @@ def test_a_topic_may_be_said_in_three_ways() -> None:
     assert "robot2/*" in expressions("robot2")
 
 
-def test_a_topic_that_is_none_is_refused() -> None:
-    with pytest.raises(Refused, match="must be one of mission"):
-        expressions("robot2/nonsense")
+@pytest.mark.parametrize("wrong", ["robot2/nonsense", "nonsense", "nobody/pose", "robot2/pose/x"])
+def test_a_topic_that_is_none_is_refused(wrong: str) -> None:
+    with pytest.raises(Refused, match="robot2 or pose, of mission"):
+        expressions(wrong)
 
 
 def test_the_table_keeps_every_number_whole_on_80_columns() -> None:
