@@ -18,7 +18,7 @@ from types import FrameType
 
 from msgspec import Struct
 
-from protocol import clock
+from protocol import clock, loglines
 from protocol.bus import Arrival, Inbox, Links, Tokens, Wake
 from protocol.credentials import Credentials
 from protocol.host import Host, Sent
@@ -139,6 +139,9 @@ class _Seat:
             self.host.journal.flush()  # first: whoever hears it may outlive us, and the record must explain it
         for to, payload in sent:
             self.bus.publish(to, payload)
+        for to, payload in sent:
+            if to.endswith(loglines.EVENT_ENDING):
+                loglines.tell(payload, clock.wall_ms())
 
 
 def run(nodes: Sequence[Node], options: Options, floor: int) -> int:

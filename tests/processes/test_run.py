@@ -45,6 +45,7 @@ def test_the_run_folder_is_whole(tmp_path: Path) -> None:
     assert {"fig07_distance_error", "fig08_orientation_error", "fig09_path_flow", "fig11_tracking"} <= figures
     logs = {path.name for path in (folder / "logs").iterdir()}
     assert logs == {f"{name}.log" for name in ("router", "recorder", "world", "robot1", "robot2")}
+    assert " robot1 role " in (folder / "logs" / "robot1.log").read_text()
     journals = sorted(path.name.split("-")[0] for path in (folder / "journal").iterdir())
     assert journals == ["robot1", "robot2", "witness", "world"]
     assert set(trace.read(folder).truth) == {1, 2}

@@ -1,0 +1,34 @@
+"""What a node says in its events stands in its log, and no reader of the log can hold it up."""
+
+from __future__ import annotations
+
+import os
+
+from protocol.loglines import line, tell
+from protocol.messages import Event, Header, Term, encode
+
+EVENT = Event(Header("robot2", 17, 1, 12.5), "role", Term(5, 2, 17), {"role": "leader", "chain": [2, 3], "at_m": 1 / 3})
+
+
+def test_a_line_says_when_who_and_what() -> None:
+    said = line(EVENT, 86_400_000 * 20_000 + 3_723_004)
+    assert said == "01:02:03.004Z robot2 role role=leader chain=[2,3] at_m=0.3333 term=5"
+
+
+def test_an_event_is_told_and_nothing_else_is() -> None:
+    out, into = os.pipe()
+    tell(encode(EVENT), 0, into)
+    tell(b"no event", 0, into)
+    os.close(into)
+    with os.fdopen(out) as told:
+        assert told.read() == line(EVENT, 0) + "\n"
+
+
+def test_a_reader_that_does_not_read_holds_nobody_up() -> None:
+    out, into = os.pipe()
+    for _ in range(10_000):  # far more than a pipe takes: this would hang
+        tell(encode(EVENT), 0, into)
+    os.close(out)
+    tell(encode(EVENT), 0, into)  # nor does one that has gone
+    os.close(into)
+    tell(encode(EVENT), 0, into)
