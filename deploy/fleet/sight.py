@@ -151,7 +151,7 @@ class Sight:
         return True
 
     def living(self, host: str) -> bool:
-        return bool(self._ear.bus.living(self.seen.name, f"{HOST_PREFIX}{host}"))
+        return self._ear.lives(f"{HOST_PREFIX}{host}")
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from protocol.bus import Arrival, Inbox, Links, Wake
 from protocol.credentials import credentials
 from protocol.messages import BadMessage, Message, decode
 from protocol.mission import Refused
+from protocol.node import Local, PeerDown, PeerUp
 from protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 from world.scenario import Scenario, draw, load
@@ -55,6 +56,7 @@ class Ear:
         self._inbox = inbox
         self._wake = wake
         self._links = Links()
+        self._tokens: set[tuple[str, int]] = set()
 
     @property
     def dropped(self) -> int:
@@ -69,10 +71,26 @@ class Ear:
         for arrival in arrivals:
             if not isinstance(arrival.payload, bytes):
                 self._links.see(arrival.payload, now)
+                self._see_token(arrival.payload)
         if self._links.due(now):
+            self._tokens.clear()  # those that stand are told again
             self.bus.follow_anew()
         found = ((arrival, _message(arrival)) for arrival in arrivals)
         return [(arrival, message) for arrival, message in found if message is not None]
+
+    def lives(self, name: str) -> bool:
+        """Whether a token of `name` stood when `take` was last called.
+
+        Not asked of the router: of a session that follows the tokens too, some such questions come back empty.
+        """
+        return any(owner == name for owner, _ in self._tokens)
+
+    def _see_token(self, event: Local) -> None:
+        match event:
+            case PeerUp():
+                self._tokens.add((event.name, event.incarnation))
+            case PeerDown():
+                self._tokens.discard((event.name, event.incarnation))
 
 
 @contextmanager

@@ -31,10 +31,10 @@ def command(
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
     with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status"})) as ear:
-        for robot in robots:
-            if ear.bus.living(ear.fleet.name, robot_name(robot)):
-                raise Refused(f"robot {robot} lives: end its process first, or let it join")
         leader, _ = _listen(ear, LISTEN_S)
+        for robot in robots:
+            if ear.lives(robot_name(robot)):
+                raise Refused(f"robot {robot} lives: end its process first, or let it join")
         asked = leader is None
         waits = ""
         if asked:
