@@ -6,6 +6,7 @@ Every command module has a function `command`. Bad input, ours or the parser's, 
 from __future__ import annotations
 
 import errno
+import io
 import os
 import signal
 import sys
@@ -145,6 +146,8 @@ def run_cli(name: str, app: typer.Typer) -> int:
 
     from protocol.mission import Refused
 
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no degree sign is no reason to stop
     try:
         code = app(standalone_mode=False, prog_name=name)
     except Refused as refused:

@@ -17,10 +17,9 @@ from protocol.runtime import Options, run
 from protocol.topics import WORLD_NAME
 from protocol.witness import Witness
 from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
-from world import memory
 from world.scenario import draw, load
-from world.world import World
 
+EXTRA = ("numpy", "pymunk", "PIL")
 EXAMPLE = "Example: lfa-world paper_path1 --seed 7 --set world.lidar.beams=90"
 
 
@@ -44,6 +43,9 @@ def start(
     faults: Annotated[bool, typer.Option("--faults", help="Obey an operator's radio weather: for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
+    from world import memory  # what these need is not in the base install
+    from world.world import World
+
     drawn = draw(load(scenario, set_ or (), robots), seed)
     wall_ms = clock.wall_ms()
     known_as = None if keys is None else credentials(keys, WORLD_NAME, wall_ms)
@@ -78,6 +80,10 @@ def main() -> None:
         sys.exit(app(standalone_mode=False, prog_name="lfa-world"))
     except Refused as refused:
         _refuse(str(refused))
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRA:
+            raise
+        _refuse(f"needs {error.name}: install with: pip install 'lfa[world]'")
     except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
         _refuse(error.format_message())
 

@@ -149,7 +149,7 @@ class Mistaken(Refused):
 def is_fleet_file(path: Path) -> bool:
     """True for a TOML file with a table `hosts`: a scenario has none."""
     try:
-        return "hosts" in tomllib.loads(path.read_text())
+        return "hosts" in tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
         return False
 
@@ -157,7 +157,7 @@ def is_fleet_file(path: Path) -> bool:
 def load(path: Path) -> Plan:
     """The plan in that file. Raises Refused, and Mistaken with every mistake at once."""
     try:
-        document: dict[str, Any] = tomllib.loads(path.read_text())
+        document: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise Refused(f"{path}: cannot be read ({error.strerror}): must be a fleet file in TOML") from None
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -99,7 +99,7 @@ def start(part: Part) -> Found:
     orphans = end_orphans(part.folder)
     try:
         part.run_folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        (part.run_folder / SCENARIO).write_text(part.scenario)
+        (part.run_folder / SCENARIO).write_text(part.scenario, encoding="utf-8")
         path = part.folder / parts.PART
         if part.keyed:
             unpack(part.folder / parts.KEYS, part.bundle)

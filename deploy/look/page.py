@@ -32,7 +32,7 @@ def of(runs: Sequence[Run]) -> str:
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>lfa: {escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
-        f"<style>{CSS.read_text()}</style></head>"
+        f"<style>{CSS.read_text(encoding='utf-8')}</style></head>"
         f"<body{two}><nav>{links}</nav>{''.join(parts)}</body></html>\n"
     )
 
@@ -157,7 +157,7 @@ def _details(line: chronicle.Line) -> str:
 
 
 def _configuration(run: Run, _s: Summary) -> str:
-    text = escape((run.folder / SCENARIO).read_text())
+    text = escape((run.folder / SCENARIO).read_text(encoding="utf-8"))
     return f"<details><summary>{SCENARIO}, every field, as the seed drew it</summary><pre>{text}</pre></details>"
 
 

@@ -38,7 +38,7 @@ def make(out: Path | None, scenario: Scenario) -> Path:
     path = _free(out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
     try:
         path.mkdir(parents=True, exist_ok=True)
-        (path / SCENARIO).write_text(toml(scenario))
+        (path / SCENARIO).write_text(toml(scenario), encoding="utf-8")
     except OSError as error:
         raise Refused(f"--out {path}: cannot be made ({error.strerror}), give a place to write to") from None
     return path

@@ -189,7 +189,7 @@ def _explain(seed: int, out: Path, player: Player) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{'whole-' if player is play_whole else ''}{seed}.txt"
     text = [describe(small), *lines, *(said(v) for v in played.violations)]
-    path.write_text("\n".join(text) + "\n")
+    path.write_text("\n".join(text) + "\n", encoding="utf-8")
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import pytest
@@ -33,3 +34,11 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert printed.err.startswith("lfa-world: ")
     assert printed.err.count("\n") == 1
     assert says in printed.err
+
+
+@pytest.mark.parametrize("module", ["numpy", "pymunk"])
+def test_a_missing_extra_is_named_with_the_command_that_installs_it(module: str) -> None:
+    code = f"import sys; sys.modules[{module!r}] = None; from world.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code, "straight"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr == f"lfa-world: needs {module}: install with: pip install 'lfa[world]'\n"
