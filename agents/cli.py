@@ -19,6 +19,7 @@ from protocol.credentials import credentials
 from protocol.mission import Mission, Refused, check_mission
 from protocol.node import Node
 from protocol.runtime import Options, run
+from protocol.topics import fleet_name
 from protocol.witness import Witness
 from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
 
@@ -40,7 +41,7 @@ def start(arguments: argparse.Namespace) -> int:
     """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
-    fleet, wall_ms = _fleet(arguments.fleet), clock.wall_ms()
+    fleet, wall_ms = fleet_name(arguments.fleet), clock.wall_ms()
     node = _node(arguments.role, arguments.id, fleet, wall_ms, mission)
     known = None if arguments.keys is None else credentials(arguments.keys, node.name, wall_ms)
     lease_ms = LINK_LEASES_MS[arguments.link]
@@ -86,12 +87,6 @@ def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None)
     if mission is not None and int(id) not in mission.robots:
         raise Refused(f"--id {id}: not in the mission, which has robots {list(mission.robots)}")
     return Agent(int(id), wall_ms, fleet, wall_ms, mission)
-
-
-def _fleet(name: str) -> str:
-    if not name or not all(c.isalnum() or c in "-_." for c in name):
-        raise Refused(f"--fleet {name!r}: must be letters, digits, '-', '_' or '.'")
-    return name
 
 
 def read_mission(path: Path) -> Mission:

@@ -11,6 +11,7 @@ from typing import Literal
 from msgspec import Struct
 
 from protocol import messages as m
+from protocol.mission import Refused
 
 Priority = Literal["real_time", "prompt", "data", "background"]
 
@@ -76,6 +77,13 @@ NO_ECHO = frozenset({"lease", "table", "formation", "obstacles"})
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
 TRUTH_OWNER = "sim"
 HARDWARE = ("sensors", "localization", "scan", "ground", "contact")
+
+
+def fleet_name(text: str) -> str:
+    """`text`, when it can be a part of keys that are one fleet's alone. Raises Refused."""
+    if not text or not all(c.isalnum() or c in "-_." for c in text):
+        raise Refused(f"--fleet {text!r}: must be letters, digits, '-', '_' or '.'")
+    return text
 
 
 def key(fleet: str, owner: str, topic: str, to: str | None = None) -> str:

@@ -14,7 +14,7 @@ from protocol.credentials import credentials
 from protocol.mission import Refused
 from protocol.node import Node
 from protocol.runtime import Options, run
-from protocol.topics import WORLD_NAME
+from protocol.topics import WORLD_NAME, fleet_name
 from protocol.witness import Witness
 from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
 from world.scenario import draw, load
@@ -51,7 +51,7 @@ def start(
     known_as = None if keys is None else credentials(keys, WORLD_NAME, wall_ms)
     endpoint = connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")
-    options = Options(_fleet(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as, notify)
+    options = Options(fleet_name(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as, notify)
     known = None if resume is None else memory.read(resume)
     placed = drawn if known is None else memory.resumed(drawn, known)
     world = World(fleet, placed, seed, wall_ms, start_at=clock.now(), memory=known)
@@ -59,12 +59,6 @@ def start(
     if witness and drawn.mission.witness:
         nodes.append(Witness(fleet, wall_ms, wall_ms))
     return run(nodes, options, wall_ms)
-
-
-def _fleet(name: str) -> str:
-    if not name or not all(c.isalnum() or c in "-_." for c in name):
-        raise Refused(f"--fleet {name!r}: must be letters, digits, '-', '_' or '.'")
-    return name
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ from deploy.fleet.file import is_fleet_file, load
 from deploy.fleet.part import store
 from protocol import clock
 from protocol.mission import Refused
+from protocol.topics import fleet_name
 from world.checks import ROBOTS_MAX
 
 DAYS_MAX = 36500.0
@@ -86,8 +87,6 @@ def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: lis
     """The plan that the options say. Raises Refused."""
     if not 1 <= robots <= ROBOTS_MAX:
         raise Refused(f"--robots {robots}: must be from 1 to {ROBOTS_MAX}")
-    if not fleet or not all(c.isalnum() or c in "-_." for c in fleet):
-        raise Refused(f"--fleet {fleet!r}: must be letters, digits, '-', '_' or '.'")
     machines: dict[str, tuple[str, ...]] = {}
     for word in hosts.split(","):
         name, _, addresses = word.partition("=")
@@ -95,7 +94,7 @@ def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: lis
             raise Refused(f"--hosts {hosts}: must be names, each once, like a=10.0.0.1,b")
         machines[name] = tuple(address for address in addresses.split("+") if address)
     said = {word.partition("=")[0]: word.partition("=")[2].split("+") for word in places}
-    return keys.spread(fleet, machines, range(1, robots + 1), said, drivers)
+    return keys.spread(fleet_name(fleet), machines, range(1, robots + 1), said, drivers)
 
 
 def _init(folder: Path, plan: Plan, days: float, as_json: bool) -> int:

@@ -16,7 +16,7 @@ from protocol.credentials import credentials
 from protocol.messages import BadMessage, Message, decode
 from protocol.mission import Refused
 from protocol.node import Local, PeerDown, PeerUp
-from protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key
+from protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key, fleet_name
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 from world.scenario import Scenario, draw, load
 
@@ -96,6 +96,7 @@ class Ear:
 @contextmanager
 def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iterator[Ear]:
     """An ear for the key expressions `topics` (`*/pose`) of `fleet`; `every`: all values of states, not the newest."""
+    fleet_name(fleet.name)  # what is said to `*` would be said to every fleet
     wake = Wake()
     inbox = Inbox(wake, INBOX_SIZE_MAX, every=every)
     known = None if fleet.keys is None else credentials(fleet.keys, OPERATOR_NAME, clock.wall_ms())

@@ -14,7 +14,7 @@ from protocol import clock
 from protocol.bus import Inbox
 from protocol.messages import encode
 from protocol.mission import Refused
-from protocol.topics import TOPIC
+from protocol.topics import TOPIC, fleet_name
 from protocol.zenoh_bus import ZenohBus, answers, default_endpoint, open_router
 
 AHEAD_S_MIN = 0.002
@@ -26,6 +26,7 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
     if not speed > 0.0:
         raise Refused(f"--speed {speed:g}: must be a number above 0")
     look_into(folder)
+    fleet_name(fleet)
     with _bus(endpoint or default_endpoint(), may_open=endpoint is None) as bus:
         print(f"plays {folder} as fleet {fleet}; look at it with: lfa watch --fleet {fleet}", flush=True)
         begun, count, t = clock.now(), 0, 0.0

@@ -12,7 +12,7 @@ from deploy.fleet.file import is_fleet_file, load
 from deploy.run.chosen import choose
 from deploy.run.faults import parse_all
 from deploy.run.folder import toml
-from protocol.mission import robot_name
+from protocol.mission import Refused, robot_name
 from world.scenario import draw
 
 
@@ -24,6 +24,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON instead of TOML.")] = False,
 ) -> int:
     if is_fleet_file(Path(scenario)):
+        if overrides or robots is not None:
+            raise Refused(f"{scenario}: --set and --robots are for a scenario: a fleet file has the keys set and team")
         return _fleet(Path(scenario), as_json=as_json)
     chosen = choose(scenario, overrides or (), robots)
     parse_all(chosen.mission, chosen.faults, ())

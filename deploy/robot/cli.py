@@ -19,6 +19,7 @@ from protocol.credentials import credentials
 from protocol.geometry import Pose2D
 from protocol.mission import Limits, Refused
 from protocol.runtime import Options, run
+from protocol.topics import fleet_name
 from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
 
 EXAMPLE = "example: lfa-driver --id 3 --at 0,-2.4,0 (beside lfa-world SCENARIO --set world.real_robots=[3])"
@@ -42,12 +43,13 @@ def start(arguments: argparse.Namespace) -> int:
     def make_base(limits: Limits, now: float) -> SimulatedBase:
         return SimulatedBase(start_map, limits, now)
 
-    driver = Driver(arguments.fleet, arguments.id, wall_ms, make_base)
+    fleet = fleet_name(arguments.fleet)
+    driver = Driver(fleet, arguments.id, wall_ms, make_base)
     known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
     endpoint = arguments.connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")
     options = Options(
-        arguments.fleet,
+        fleet,
         endpoint,
         None,
         False,

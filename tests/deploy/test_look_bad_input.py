@@ -14,6 +14,7 @@ import pytest
 from mcap.writer import Writer
 
 from deploy.look import page, playback, report, summary, trace, view
+from deploy.look.onlooker import Fleet, listen
 from deploy.look.readings import Run
 from deploy.run.simulate import run
 from protocol.mission import Refused
@@ -70,6 +71,14 @@ def test_a_refused_recording_leaves_nothing_half_converted(copied: Path) -> None
     with pytest.raises(Refused):
         view.converted(copied)
     assert sorted(copied.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["*", "a/b", ""])
+def test_nothing_is_said_to_more_than_one_fleet(name: str, copied: Path) -> None:
+    with pytest.raises(Refused, match="--fleet"):
+        playback.play(copied, 1.0, name, None)
+    with pytest.raises(Refused, match="--fleet"), listen(Fleet(name, "tcp/127.0.0.1:1", ()), frozenset({"*/pose"})):
+        pass
 
 
 def test_a_summary_of_another_version_is_refused(copied: Path) -> None:
