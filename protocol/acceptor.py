@@ -67,6 +67,9 @@ class Acceptor:
     def release(self, term: Term) -> bool:
         """E4: the holder of exactly `term` has stopped; answers whether that freed this voter."""
         self.released = max(self.released, term)
+        # Nothing up to here is granted any more, so nothing is promised, and refusals say what beats it: others may
+        # have started anew, with terms below, since.
+        self.promised = max(self.promised, term)
         if self.bond is None or self.bond.term != term:
             return False
         self.bond = None

@@ -10,7 +10,6 @@ from random import Random
 
 from deploy.bench.rows import Quantity, Row, row, show
 from deploy.bench.team import Broken, Team, endless
-from deploy.look.verify import verify
 from protocol import clock
 
 ROBOTS = 4
@@ -46,7 +45,7 @@ def _rows(kills: int) -> Iterator[list[Row]]:
             rejoined += 1
             slowest_s = max(slowest_s, clock.now() - began)
             _look_on(team, until)
-        verdict = verify(team.folder / "run")
+        verdict = team.judged()
     for broken_one in verdict.broken:
         print(f"{broken_one.name} at {broken_one.at:.3f} s: {broken_one.text}", file=sys.stderr, flush=True)
     yield [

@@ -18,6 +18,7 @@ from typing import Any
 from msgspec import structs
 
 from deploy.look.onlooker import Fleet
+from deploy.look.verify import Verdict, verify
 from deploy.run.crew import ROUTER_NAME, Crew, Row, rows
 from deploy.run.folder import About, make
 from deploy.run.operator import Operator
@@ -124,6 +125,14 @@ class Team:
             self._bus.close()
         self._crew.kill_all()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def judged(self) -> Verdict:
+        """End all processes, then check the journals of their whole lives.
+
+        Read one after the other while they grow, a late one would tell of a PROPOSE whose promises an early one lacks.
+        """
+        self._crew.kill_all()
+        return verify(self.folder / "run")
 
     @property
     def fleet(self) -> Fleet:

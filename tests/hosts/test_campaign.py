@@ -10,7 +10,6 @@ from random import Random
 import pytest
 
 from deploy.bench.team import Team
-from deploy.look.verify import verify
 from protocol.mission import robot_name
 from protocol.radio import WEATHER
 from protocol.topics import WORLD_NAME
@@ -120,6 +119,4 @@ def test_drawn_faults_round_after_round_break_no_invariant_and_all_come_together
             pass_time(team, faults.for_s)
             undo()
         team.await_chain(ROBOTS, WHOLE_S)
-        assert verify(team.folder / "run").broken == (), (
-            f"reproduce: LFA_SEED={SEED} LFA_ROUNDS={ROUNDS} make test-campaign"
-        )
+        assert team.judged().broken == (), f"reproduce: LFA_SEED={SEED} LFA_ROUNDS={ROUNDS} make test-campaign"

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 import pytest
 
 from deploy.bench.team import REST_MPS, Team
-from deploy.look.verify import verify
 from protocol import clock
 from protocol.mission import robot_name
 from protocol.radio import WEATHER
@@ -139,4 +138,4 @@ def test_the_world_alone_stops_everybody_and_nobody_leads_twice(whole: Whole) ->
 
 
 def test_the_journals_of_all_this_break_no_invariant(whole: Whole) -> None:
-    assert verify(whole[0].folder / "run").broken == ()
+    assert whole[0].judged().broken == ()

@@ -91,7 +91,7 @@ def _answers(voter: Acceptor, state: VoterState, now: float) -> Iterator[tuple[A
     for k in (1, 2, 3):
         after = copy(voter)
         freed = after.release(TERMS[k - 1])
-        following = state._replace(released=max(state.released, k))
+        following = state._replace(promised=max(state.promised, k), released=max(state.released, k))
         if state.bond_term == k:
             following = following._replace(bond_term=0, bond_holder=None, bond_left=0)
         # A bond that ran out may still be named: freeing that is no news.

@@ -81,6 +81,6 @@ def check_minority(live: Team, side: Sequence[int], others: Sequence[int], led: 
     else:
         until = last_heard(live, first, "pose", [robot_name(others[-1])]) + T_DR_S
     slowed_s = sum(e.data["stood_still_s"] for e in live.events if e.kind == "slowed")
-    late_s = live.moved_at[first] - until - stop_s - slowed_s
+    late_s = live.moved_at.get(first, until) - until - stop_s - slowed_s
     assert late_s <= LATE_S, f"robot {first} came to rest {late_s:.3f} s too late"
     live.wait_until(lambda: all(live.speeds_mps[robot] <= REST_MPS for robot in side), "no rest behind it", WHOLE_S)

@@ -142,6 +142,15 @@ def test_e3_a_fenced_term_binds_no_more_but_another_still_does() -> None:
     assert isinstance(bound.propose(B, right, config_of(LOW), 10.1), Grant)
 
 
+def test_e4_a_voter_promises_nothing_up_to_a_released_term_and_says_what_beats_it() -> None:
+    """Promised and then refused, a team that has forgotten the released term would elect for ever (seed 31389)."""
+    free = voter()
+    free.release(HIGH)
+    refusal = free.prepare(A, Prepare(LOW, OLD.version), OLD, 10.0)
+    assert isinstance(refusal, Nack)
+    assert refusal.promised == HIGH
+
+
 def test_e4_a_release_frees_the_bond_of_exactly_its_term() -> None:
     bound = voter()
     ask(bound, A, LOW, 10.0)
