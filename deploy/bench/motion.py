@@ -137,6 +137,8 @@ def _good(name: str, seed: int, sets: Sequence[str], robots: int | None = None) 
         summary = simulate(scenario, seed, folder / "run", parse_all(scenario.mission, scenario.faults, ())).summary
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+    if summary.outcome == "interrupted":  # the run was told to end, and the bench with it
+        raise KeyboardInterrupt
     wrong = complaint(summary)
     options = ("" if robots is None else f" --robots {robots}") + "".join(f" --set {one}" for one in sets)
     ended = f"{wrong or 'ok'}, {summary.sim_duration_s:.0f} s"
