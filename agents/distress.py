@@ -49,10 +49,10 @@ class Distress:
             self._said = driver.stuck
             self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
         if role is not Role.LEADER:
-            lease.left_out = frozenset()
-            self._led_before = lease.chain[0] if lease.chain else None
+            lease.left_out, chain = frozenset(), lease.chain
+            self._led_before = chain[0] if chain else None
             self._reign_from = now
-            if self._id not in lease.chain:
+            if self._id not in chain:
                 driver.back_out(pose)
             return False
         lease.left_out = self._left_out(lease, driver, now)
@@ -67,9 +67,10 @@ class Distress:
         before = self._led_before
         if before is not None and now >= self._reign_from + NEWS_S and not self._beliefs.stuck(before, now):
             self._led_before = None
-        waited_for = () if driver.leading.waited_out else [robot for robot in lease.chain if robot != self._led_before]
+        chain = lease.chain
+        waited_for = () if driver.leading.waited_out else [robot for robot in chain if robot != self._led_before]
         stuck = {robot for robot in self._robots if robot not in waited_for and self._beliefs.stuck(robot, now)}
-        for robot in stuck & set(lease.chain) - lease.left_out:
+        for robot in stuck.intersection(chain) - lease.left_out:
             self._event("left_out", now, lease, {"robot_left": robot})
         return frozenset(stuck)
 

@@ -102,7 +102,7 @@ class Stuck:
             return "S3: backs off without end"
         if self._again and len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
             return "S3: turned round again and again"
-        if self._again and self._entries_of_cell(now) >= CELL_ENTRIES:
+        if self._again and self._comes_back(now):
             return "S3: in the same place again and again"
         return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
 
@@ -119,9 +119,10 @@ class Stuck:
             if len(self._entries) > 256:
                 self._entries.pop(next(iter(self._entries)))
 
-    def _entries_of_cell(self, now: float) -> int:
-        entries = self._entries.get(self._cell, ()) if self._cell is not None else ()
-        return sum(now - at <= CELL_S for at in entries)
+    def _comes_back(self, now: float) -> bool:
+        """It entered its cell `CELL_ENTRIES` times lately: so many are kept, the oldest first."""
+        entries = self._entries.get(self._cell) if self._cell is not None else None
+        return entries is not None and len(entries) == CELL_ENTRIES and now - entries[0] <= CELL_S
 
     def _does_not_move(self, pose: Pose2D, wanted: Twist, now: float) -> bool:
         if abs(wanted.linear_x) < WANTED_MPS:
