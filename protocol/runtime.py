@@ -24,7 +24,7 @@ from protocol.credentials import Credentials
 from protocol.host import Host, Sent
 from protocol.journal import JOURNAL_VERSION, Heading, Journal
 from protocol.messages import BadMessage, OperatorNote, decode
-from protocol.mission import WITNESS_NAME, Refused
+from protocol.mission import WITNESS_NAME, Refused, robot_id_of
 from protocol.node import Local, Node, Stop, Vitals
 from protocol.notify import Notify
 from protocol.radio import WEATHER, Reception
@@ -294,7 +294,8 @@ def _refuse_twin(bus: ZenohBus, options: Options, node: Node, dead: list[int]) -
 
 
 def _double(fleet: str, node: Node) -> Refused:
-    return Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another --id")
+    other = "--id" if robot_id_of(node.name) else "--fleet"
+    return Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another {other}")
 
 
 def _speakers(inbox: Inbox) -> dict[int, float]:

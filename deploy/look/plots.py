@@ -5,18 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 
 FIGURES = "figures"
 
 
-def command(folder: Annotated[Path, typer.Argument(help="A run folder.")]) -> int:
+def command(
+    folder: Annotated[Path, typer.Argument(help="A run folder.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the figures' files as JSON.")] = False,
+) -> int:
     """Draw the figures of a run folder anew."""
     from deploy.look.trace import look_into
 
     look_into(folder)
-    for path in draw(folder):
-        print(path)
+    drawn = [str(path) for path in draw(folder)]
+    print(msgspec.json.encode({"figures": drawn}).decode() if as_json else "\n".join(drawn))
     return 0
 
 

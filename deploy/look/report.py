@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 
 from protocol.mission import Refused
@@ -16,6 +17,7 @@ def command(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
     other: Annotated[Path | None, typer.Argument(metavar="[RUN2]", help="Another one, to stand beside it.")] = None,
     out: Annotated[Path | None, typer.Option(help="Where to; default report.html in the (first) run folder.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print where it is as JSON.")] = False,
 ) -> int:
     folders = [folder] if other is None else [folder, other]
     path = out or folder / (REPORT if other is None else f"report-vs-{other.resolve().name}.html")
@@ -24,7 +26,7 @@ def command(
         path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise Refused(f"--out {path}: cannot be written ({error.strerror})") from None
-    print(path)
+    print(msgspec.json.encode({"report": str(path)}).decode() if as_json else path)
     return 0
 
 

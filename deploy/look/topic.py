@@ -16,7 +16,7 @@ from deploy.look.onlooker import Fleet, find, listen
 from deploy.run import channels
 from protocol import clock
 from protocol.mission import WITNESS_NAME, Refused, robot_id_of
-from protocol.topics import HOST_PREFIX, OPERATOR_NAME, RECORDER_NAME, TOPIC, TRUTH_OWNER, WORLD_NAME
+from protocol.topics import DRIVER_PREFIX, HOST_PREFIX, OPERATOR_NAME, RECORDER_NAME, TOPIC, TRUTH_OWNER, WORLD_NAME
 
 POLL_S = 0.1
 SILENCE_S = 3.0
@@ -62,7 +62,7 @@ def expressions(text: str) -> frozenset[str]:
     owner, _, name = text.partition("/")
     if not name and owner in TOPIC:
         owner, name = "*", owner
-    named = robot_id_of(owner) is not None or owner in SPEAKERS or owner.startswith(HOST_PREFIX)
+    named = robot_id_of(owner) is not None or owner in SPEAKERS or owner.startswith((HOST_PREFIX, DRIVER_PREFIX))
     if (name and name not in TOPIC) or (owner and not named):
         raise Refused(f"topic {text!r}: must be such as robot2/pose, robot2 or pose, of {', '.join(TOPIC)}")
     return frozenset({f"{owner or '*'}/{name or '*'}", f"{owner or '*'}/{name or '*'}/*"})

@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 
 from deploy.fleet import journals
@@ -34,6 +35,7 @@ def command(
     split_mb: Annotated[float, typer.Option(help="Go on in a new file once one has so many MB; 0: never.")] = SPLIT_MB,
     keep: Annotated[int, typer.Option(help="Keep the first and the newest files, so many in all; 0: all.")] = 0,
     hosts: Annotated[Path | None, typer.Option(help="A fleet file: bring its machines' journals too.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was recorded as JSON.")] = False,
 ) -> int:
     if not 0.0 <= seconds < inf:
         raise Refused(f"--seconds {seconds:g}: must be above 0, or 0 for no end")
@@ -46,7 +48,7 @@ def command(
         about = About(found.name, "onlooker", 0, found.name).metadata()
         recorder = Recorder(folder, about, split_bytes=round(1e6 * split_mb), keep=keep)
         kept = journals.of_processes(found.name)
-        print(f"records fleet {found.name} into {folder}", flush=True)
+        print(f"records fleet {found.name} into {folder}", flush=True, file=sys.stderr if as_json else sys.stdout)
         begun, seen = clock.now(), WorldTime()
         while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
             clock.sleep(POLL_S)
@@ -58,6 +60,11 @@ def command(
         came += fetched
         for line in wrong:
             print(f"lfa: {line}", file=sys.stderr)
+    recording.dropped = ear.dropped
+    if as_json:
+        facts = {"folder": str(folder), "fleet": found.name, "journals": came}
+        print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
+        return 0 if recording.messages and not recording.dropped else 1
     files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
     print(f"{recording.messages} messages, {ear.dropped} lost, {files}, {came} journals: {folder}")
     return 0 if recording.messages and not ear.dropped else 1
