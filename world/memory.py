@@ -7,7 +7,9 @@ counted. Bodies are at rest then, as robots are whose driver died; gateways are 
 from __future__ import annotations
 
 import os
-from math import cos, sin
+import sys
+from contextlib import suppress
+from math import cos, inf, sin
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +64,7 @@ class Remembering:
     def __init__(self, world: World, run: Path) -> None:
         self._world = world
         self._path = run / STATE
-        self._next_at = float("-inf")
+        self._next_at = -inf
 
     def receive(self, received: Received) -> list[Envelope]:
         return self._world.receive(received)
@@ -71,10 +73,20 @@ class Remembering:
         sent = self._world.tick(now)
         if now >= self._next_at:
             self._next_at = now + EVERY_S
-            fresh = self._path.with_suffix(".new")
+            self._keep()
+        return sent
+
+    def _keep(self) -> None:
+        """On a full disk the world goes on, with the state as last kept."""
+        fresh = self._path.with_suffix(".new")
+        try:
             fresh.write_bytes(msgspec.json.encode(self._world.memory()))
             os.replace(fresh, self._path)  # whoever reads finds one whole state or the other
-        return sent
+        except OSError as error:
+            print(f"{self._path}: {error.strerror}: the state is kept no more", file=sys.stderr, flush=True)
+            self._next_at = inf
+            with suppress(OSError):
+                fresh.unlink(missing_ok=True)
 
     def next_deadline(self) -> float:
         return self._world.next_deadline()

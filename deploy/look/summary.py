@@ -118,7 +118,13 @@ def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, f
 
 
 def write(folder: Path, summary: Summary) -> None:
-    (folder / SUMMARY).write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n")
+    """All of it or, on a full disk, nothing."""
+    fresh = (folder / SUMMARY).with_suffix(".new")
+    try:
+        fresh.write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n")
+        fresh.replace(folder / SUMMARY)
+    finally:
+        fresh.unlink(missing_ok=True)
 
 
 def read(folder: Path) -> Summary:
