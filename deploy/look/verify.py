@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Struct
 
 from agents.agent import Agent
+from deploy.look import chronicle
 from deploy.look.again import call, node_of
 from deploy.look.checker import Violation, listeners
 from deploy.look.checkers import SAFETY
@@ -55,6 +56,7 @@ def verify(folder: Path) -> Verdict:
     paths = sorted((folder / JOURNALS).glob("*.bin"))
     if not paths:
         raise Refused(f"{folder}: no journals, must be a run folder of lfa run or lfa sim")
+    _refuse_lost({path.stem.rpartition("-")[0] for path in paths}, folder)
     timing = timing_of(scenario_of(folder).mission.profile)
     happenings = sorted((h for path in paths for h in _happenings(path, timing)), key=lambda h: h.at)
     checkers = [checker(timing) for checker in SAFETY]
@@ -65,6 +67,14 @@ def verify(folder: Path) -> Verdict:
     began = happenings[0].at if happenings else 0.0
     broken = sorted((v for checker in checkers for v in checker.violations), key=lambda v: v.at)
     return Verdict(len(paths), len(happenings), tuple(Violation(v.name, v.at - began, v.text) for v in broken))
+
+
+def _refuse_lost(journalled: set[str], folder: Path) -> None:
+    """What one did that took part and left no journal would look like what the others made up."""
+    for event in chronicle.of_kind(chronicle.lines(folder), "peer_up"):
+        name = str(event.get("name"))
+        if name not in journalled and (name == WORLD_NAME or robot_id_of(name) is not None):
+            raise Refused(f"{folder}: no journal of {name}, which took part: must be the whole run folder")
 
 
 def obeyed(folder: Path) -> Iterator[tuple[float, CmdVel]]:

@@ -37,6 +37,17 @@ def test_a_sound_run_has_no_violation(folder: Path) -> None:
     assert verdict.happenings > 1000
 
 
+def test_a_run_without_the_journal_of_one_that_took_part_is_refused(folder: Path, tmp_path: Path) -> None:
+    lost = Path(shutil.copytree(folder, tmp_path / "lost"))
+    (lost / "journal" / "robot3-1.bin").unlink()
+    with (lost / "events.jsonl").open("a") as events:  # as the recorder of `lfa run` tells it
+        events.write(
+            '{"t":0.0,"robot":3,"term":null,"kind":"peer_up","from":"recorder","name":"robot3","incarnation":1}\n'
+        )
+    with pytest.raises(Refused, match="no journal of robot3"):
+        verify.verify(lost)
+
+
 def test_an_old_leaders_command_is_harmless_unless_a_gateway_obeys_it(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
