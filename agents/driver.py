@@ -117,7 +117,12 @@ class Driver:
 
     def avoid_trap(self, note: ObstacleNote, now: float) -> None:
         """Keep out of a place in which another robot got stuck."""
-        self._around.avoid_trap(note.x, note.y, now)
+        self._bar((note.x, note.y), now)
+
+    def _bar(self, trap: Point, now: float) -> None:
+        """No more into `trap`; an explorer's map tells where it can go, and in a corner it would be barred in."""
+        if self.explore is None:
+            self._around.avoid_trap(*trap, now)
 
     def back_out(self, pose: Pose2D) -> None:
         """Leave this place, in which the robot is stuck, the way that it came."""
@@ -237,7 +242,7 @@ class Driver:
         self._detour.decision = None
         self.follower.rejoin(pose, self._last)
         if self._retreat.trap is not None:
-            self._around.avoid_trap(*self._retreat.trap, now)
+            self._bar(self._retreat.trap, now)
         return wanted
 
     def _follow(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
