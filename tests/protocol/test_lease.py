@@ -10,6 +10,9 @@ from deploy.look.checker import Checker
 from deploy.look.checkers import SAFETY
 from deploy.look.liveness import Steady
 from deploy.run.arena import Arena
+from deploy.run.chaos import play
+from deploy.run.network import Weather
+from deploy.run.schedules import Schedule
 from protocol.acceptor import Acceptor
 from protocol.effects import BecomeLeader, Effect, LeaseExtended, Send, StepDown
 from protocol.election import COLD_START_S
@@ -315,6 +318,13 @@ def test_e18_a_life_that_promised_and_was_replaced_makes_no_full_house() -> None
     team.start(2)
     team.run(2.1 + STD.grant_s + 3.0 * STD.heartbeat_s)
     assert team.leaders() == [1]
+
+
+def test_l5_a_pair_without_witness_keeps_its_leader_at_a_fifth_of_all_messages_lost() -> None:
+    """Each round needs both of two messages: sent once a heartbeat only, a third of such leaders fell within 8 s."""
+    for seed in range(10):
+        schedule = Schedule(seed, 2, False, "std", False, {}, (), Weather(delay_max=0.005, loss=0.2), False)
+        assert play(schedule).violations == [], f"of draw {seed}"
 
 
 @pytest.mark.parametrize("seed", range(5))
