@@ -715,12 +715,14 @@ def test_bug_7_an_amnesiac_does_not_bring_an_old_majority_back() -> None:
     team.run(4.0)
     assert team.leaders() == [1]
     assert {m.id for m in team.lease_of(1).config.voters} == {0, 1, 2}
+    known = team.lease_of(4).config.version
     team.kill(2, hinted=False)
     team.heal()
     team.cut((2, 3, 4))
     team.start(2)
     team.run(8.0)
     assert team.leaders() == [1]
+    assert team.lease_of(4).config.version == known, "proposed on the promise of one that has forgotten"
     assert team.safe()
     team.heal()
     team.run(11.0)
