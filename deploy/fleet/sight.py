@@ -94,7 +94,9 @@ class Sight:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return self.seen.hosts or tuple(sorted(self.hosts))
+        """Known by the fleet's file, else all that have spoken or whose tokens stand."""
+        there = {name.removeprefix(HOST_PREFIX) for name in self._ear.living if name.startswith(HOST_PREFIX)}
+        return self.seen.hosts or tuple(sorted(there | self.hosts.keys()))
 
     def hear(self) -> list[tuple[float, Message]]:
         """All that has come, with the moments; what is the hosts' is remembered."""

@@ -73,17 +73,21 @@ class Ear:
                 self._links.see(arrival.payload, now)
                 self._see_token(arrival.payload)
         if self._links.due(now):
-            self._tokens.clear()  # those that stand are told again
             self.bus.follow_anew()
         found = ((arrival, _message(arrival)) for arrival in arrivals)
         return [(arrival, message) for arrival, message in found if message is not None]
+
+    @property
+    def living(self) -> set[str]:
+        """Whose tokens stood when `take` was last called."""
+        return {owner for owner, _ in self._tokens}
 
     def lives(self, name: str) -> bool:
         """Whether a token of `name` stood when `take` was last called.
 
         Not asked of the router: of a session that follows the tokens too, some such questions come back empty.
         """
-        return any(owner == name for owner, _ in self._tokens)
+        return name in self.living
 
     def _see_token(self, event: Local) -> None:
         match event:
