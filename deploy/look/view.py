@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 RRD = "recording.rrd"
 PICTURE = "view.png"
-FLUSH_S = 0.33  # what a batch costs depends little on its size: at 0.1 s it would be twice as dear
+FLUSH_S = 0.33  # what a batch costs depends little on its size: at 0.1 s it would be more than twice as dear
 PORT, WEB_PORT = 9876, 9090
 SHOT_S = 5.0  # of a running fleet, before its picture is taken
 
