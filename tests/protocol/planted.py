@@ -270,6 +270,26 @@ def _full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(protocol.lease, "of_full_house", of_full_house)
 
 
+def _promises_up_to_a_released_term(patch: pytest.MonkeyPatch) -> None:
+    honest = Acceptor.release
+
+    def release(self: Acceptor, term: Term) -> bool:
+        promised = self.promised
+        freed = honest(self, term)
+        self.promised = promised
+        return freed
+
+    patch.setattr(Acceptor, "release", release)
+
+
+def _replaced_lives_make_a_full_house(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Candidate, "_answering", lambda self, _superseded: {m.id: m for m in sorted(self._promised)})
+
+
+def _one_try_a_heartbeat(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(protocol.holder, "RETRY_HEARTBEATS", 1.0)
+
+
 def _given_up_restamp_is_released(patch: pytest.MonkeyPatch) -> None:
     def drop(self: Lease, now: float, effects: list[Any]) -> None:
         candidate, self._candidate = self._candidate, None
@@ -447,6 +467,12 @@ PLANTED: tuple[Bug, ...] = (
         "gateway::test_e11_a_fenced_gateway_brakes_and_refuses_what_is_below"),
     Bug("rule E6", "a candidate waits for grants of lives that have ended", _ended_lives_may_still_grant,
         "usual_bugs::test_e6_an_attempt_that_only_ended_lives_could_still_grant_is_given_up_at_once"),
+    Bug("rule E4", "a voter promises up to a released term", _promises_up_to_a_released_term,
+        "lease::test_e4_a_voter_promises_nothing_up_to_a_released_term_and_says_what_beats_it"),
+    Bug("rule E18", "a replaced life makes a full house", _replaced_lives_make_a_full_house,
+        "lease::test_e18_a_life_that_promised_and_was_replaced_makes_no_full_house"),
+    Bug("rule E2", "one try a heartbeat", _one_try_a_heartbeat,
+        "lease::test_l5_a_pair_without_witness_keeps_its_leader_at_a_fifth_of_all_messages_lost"),
     Bug("rule E8", "the chain forgets its order", _chain_forgets_its_order,
         "lease::test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_within_its_bond", (0,)),
 )
