@@ -9,7 +9,7 @@ from protocol.holder import Holder
 from protocol.lease import Lease
 from protocol.messages import Grant, Hello, LeaseBody, Member, Nack, Prepare, Promise, Propose, Release, Term, Version
 from protocol.timing import CLOCK_RATE_ERROR
-from tests.protocol.test_lease import (
+from tests.protocol.scenes import (
     HIGH,
     LOW,
     OLD,

@@ -1,0 +1,165 @@
+"""How the rules of elections, of hand-over and of membership are broken on purpose, each by a patch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import protocol.holder
+import protocol.lease
+import protocol.membership
+import protocol.quorum
+import protocol.reshape
+from protocol.acceptor import Acceptor
+from protocol.candidate import Candidate
+from protocol.election import Election
+from protocol.holder import Holder
+from protocol.lease import Lease
+from protocol.messages import Config, Member, Propose, Term
+from protocol.peers import Peers
+
+
+def hint_taken_as_proof(patch: pytest.MonkeyPatch) -> None:
+    honest = Lease.hint
+
+    def hint(self: Lease, id: int, incarnation: int, up: bool, now: float) -> Any:
+        effects = honest(self, id, incarnation, up, now)
+        self._acceptor.bond = None
+        return effects
+
+    patch.setattr(Lease, "hint", hint)
+
+
+def announced_with_the_first_grant(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(protocol.holder, "quorum_time", lambda config, times: max(times.values()))
+
+
+def amnesiac_votes(patch: pytest.MonkeyPatch) -> None:
+    """Ids vote instead of lives, and a blank promise counts."""
+    promised = Candidate.promised
+    patch.setattr(Candidate, "promised", lambda self, src, needs, blank: promised(self, src, needs, False))
+
+    def is_half(voters: Any, tie: Any, present: Any) -> bool:
+        here = {m.id for m in present}
+        count = sum(v.id in here for v in voters)
+        return 2 * count > len(voters) or (2 * count == len(voters) and tie is not None and tie.id in here)
+
+    patch.setattr(protocol.quorum, "is_half", is_half)
+
+
+def voters_change_without_a_joint_config(patch: pytest.MonkeyPatch) -> None:
+    honest = protocol.membership.rewritten
+
+    def rewritten(config: Config, *arguments: Any) -> Config:
+        newer = honest(config, *arguments)
+        return Config(newer.version, newer.voters, newer.tie, None, newer.chain)
+
+    patch.setattr(protocol.reshape, "rewritten", rewritten)
+
+
+def full_house_of_a_majority(patch: pytest.MonkeyPatch) -> None:
+    def full_house(self: Candidate, config: Config, universe: tuple[int, ...], *_: object) -> Any:
+        lives = tuple(sorted(self._promised))
+        return lives if 2 * len(lives) > len(universe) else ()
+
+    patch.setattr(Candidate, "full_house", full_house)
+
+
+def chain_forgets_its_order(patch: pytest.MonkeyPatch) -> None:
+    honest = protocol.membership.led_by
+
+    def led_by(*arguments: Any, **named: Any) -> Config:
+        config = honest(*arguments, **named)
+        head, *rest = config.chain
+        return Config(config.version, config.voters, config.tie, config.previous, (head, *reversed(rest)))
+
+    patch.setattr(protocol.lease, "led_by", led_by)
+
+
+def restart_votes_at_once(patch: pytest.MonkeyPatch) -> None:
+    amnesiac_votes(patch)
+    honest = Acceptor.__init__
+
+    def begin(self: Acceptor, floor: Term, grant_s: float, now: float) -> None:
+        honest(self, floor, grant_s, now)
+        self.silent_until = now
+
+    patch.setattr(Acceptor, "__init__", begin)
+
+
+def new_term_with_every_asking(patch: pytest.MonkeyPatch) -> None:
+    honest = Candidate.asked
+
+    def asked(self: Candidate, now: float) -> None:
+        honest(self, now)
+        self.term = Term(self.term.n + 1, self.term.issuer, self.term.incarnation)
+
+    patch.setattr(Candidate, "asked", asked)
+
+
+def equal_ranks(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Election, "rank", lambda self, config, robot_id, peers: 0)
+    patch.setattr(Lease, "_stands_before", lambda self, src, body: False)
+
+
+def hand_over_writes_a_config(patch: pytest.MonkeyPatch) -> None:
+    honest = Lease._hand_over
+
+    def hand_over(self: Lease, holder: Holder, now: float, effects: list[Any]) -> None:
+        honest(self, holder, now, effects)
+        gift = self._stopping.gift
+        if gift is not None:
+            written = protocol.membership.led_by(self.config, gift.holder, gift.term, lambda m: False, keep_leader=True)
+            self._stopping.gift = Propose(gift.term, written, gift.round, gift.holder, nonce=gift.nonce)
+
+    patch.setattr(Lease, "_hand_over", hand_over)
+
+
+def full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
+    honest = protocol.membership.of_full_house
+
+    def of_full_house(*arguments: Any) -> Config:
+        config = honest(*arguments)
+        return Config(config.version, config.voters, config.tie, None, config.chain)
+
+    patch.setattr(protocol.lease, "of_full_house", of_full_house)
+
+
+def replaced_lives_make_a_full_house(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Candidate, "_answering", lambda self, _superseded: {m.id: m for m in sorted(self._promised)})
+
+
+def given_up_restamp_is_released(patch: pytest.MonkeyPatch) -> None:
+    def drop(self: Lease, now: float, effects: list[Any]) -> None:
+        candidate, self._candidate = self._candidate, None
+        if candidate is not None and candidate.holder is not None:
+            self._acceptor.release(candidate.term)
+            effects.append(protocol.lease.Send("all", protocol.lease.Release(candidate.term)))
+
+    patch.setattr(Lease, "_drop_candidate", drop)
+
+
+def acts_under_a_restamp_at_once(patch: pytest.MonkeyPatch) -> None:
+    def term(self: Lease) -> Term:
+        if self._holder is None:
+            return self.config.version.term
+        asked = self._candidate is not None and self._candidate.holder is not None
+        return self._candidate.term if asked and self._candidate is not None else self._holder.term
+
+    patch.setattr(Lease, "term", property(term))
+
+
+def forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
+    honest = Lease.request_forget
+
+    def request_forget(self: Lease, lost: tuple[Member, ...], now: float) -> Any:
+        effects = honest(self, lost, now)
+        self._election.forget_until = float("inf")
+        return effects
+
+    patch.setattr(Lease, "request_forget", request_forget)
+
+
+def ended_lives_may_still_grant(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Peers, "has_ended", lambda self, member: False)

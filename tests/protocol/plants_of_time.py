@@ -1,0 +1,219 @@
+"""How the rules of voters, of lease time and of gateways are broken on purpose, each by a patch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from msgspec import structs
+
+import protocol.holder
+from deploy.run import schedules
+from deploy.run.arena import Arena
+from deploy.run.network import Clock
+from protocol.acceptor import Acceptor
+from protocol.effects import StepDown
+from protocol.gateway import Gateway
+from protocol.holder import Holder
+from protocol.lease import Lease
+from protocol.messages import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
+from protocol.stopping import Stopping
+from protocol.timing import Timing
+from tests.protocol import test_usual_bugs
+
+Plant = Callable[[pytest.MonkeyPatch], None]
+
+
+def counted_from_the_grant(patch: pytest.MonkeyPatch) -> None:
+    honest = Holder.granted
+
+    def granted(self: Holder, src: Any, grant: Any, config: Config, now: float) -> bool:
+        self._sent_at[grant.round] = now
+        return honest(self, src, grant, config, now)
+
+    patch.setattr(Holder, "granted", granted)
+
+
+def bond_as_short_as_the_lease(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Timing, "grant_s", property(lambda self: self.act_s))
+
+
+def bond_of_half_the_lease(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Timing, "grant_s", property(lambda self: self.act_s / 2.0))
+
+
+def bond_ignored(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Acceptor, "bound", lambda self, now: None)
+
+
+def release_before_the_stop_is_confirmed(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Stopping, "at_rest_at", float("-inf"))
+
+
+def released_term_granted_again(patch: pytest.MonkeyPatch) -> None:
+    honest = Acceptor.release
+
+    def release(self: Acceptor, term: Term) -> bool:
+        freed = honest(self, term)
+        self.released = Term()
+        return freed
+
+    patch.setattr(Acceptor, "release", release)
+
+
+def expired_leader_goes_on(patch: pytest.MonkeyPatch) -> None:
+    """It leads and asks on, and its gateway alone still refuses."""
+    patch.setattr(Lease, "may_command", lambda self, now: self._holder is not None)
+    deaf_leader_goes_on_asking(patch)
+
+
+def silence_of_four_heartbeats(patch: pytest.MonkeyPatch) -> None:
+    honest = Holder.silent
+    patch.setattr(Holder, "silent", lambda self, member, now, s: honest(self, member, now, s / 4.0))
+
+
+def terms_begin_again_at_a_restart(patch: pytest.MonkeyPatch) -> None:
+    honest = Lease.__init__
+    patch.setattr(
+        Lease, "__init__", lambda self, me, mission, timing, now, floor: honest(self, me, mission, timing, now, 0)
+    )
+
+
+def gateway_without(reason: str) -> Plant:
+    def plant(patch: pytest.MonkeyPatch) -> None:
+        honest = Gateway._objection
+
+        def objection(self: Gateway, cmd: Any, now: float) -> str | None:
+            found = honest(self, cmd, now)
+            return None if found == reason else found
+
+        patch.setattr(Gateway, "_objection", objection)
+
+    return plant
+
+
+def fence_without_effect(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Gateway, "fence", lambda self, fence, now: Fenced(fence.old, fence.term))
+
+
+def wall_clock_in_lease_arithmetic(patch: pytest.MonkeyPatch) -> None:
+    honest = Arena.step_wall
+
+    def step_wall(self: Arena, robot_id: int, by_s: float) -> None:
+        honest(self, robot_id, by_s)
+        process = self.processes[robot_id]
+        process.clock = Clock(process.clock.offset + by_s, process.clock.rate)
+        process.wakes_at = self.now
+        self.at(self.now, self._wake, process)
+
+    patch.setattr(Arena, "step_wall", step_wall)
+
+
+def lease_end_not_told(patch: pytest.MonkeyPatch) -> None:
+    honest = Lease._expire
+
+    def expire(self: Lease, now: float, effects: list[Any]) -> None:
+        mine: list[Any] = []
+        honest(self, now, mine)
+        effects += [effect for effect in mine if not isinstance(effect, StepDown)]
+
+    patch.setattr(Lease, "_expire", expire)
+
+
+def refusal_raises_the_promise(patch: pytest.MonkeyPatch) -> None:
+    honest = Acceptor.prepare
+
+    def prepare(self: Acceptor, src: Any, body: Any, *arguments: Any) -> Any:
+        answer = honest(self, src, body, *arguments)
+        if isinstance(answer, Nack):
+            self.promised = max(self.promised, body.term)
+        return answer
+
+    patch.setattr(Acceptor, "prepare", prepare)
+
+
+def deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
+    """It commands no more, but its PROPOSEs keep the voters bound."""
+    honest = Lease.next_deadline
+
+    def next_deadline(self: Lease) -> float:
+        if self._holder is None:
+            return honest(self)
+        asking = self._holder.next_round_at if self._candidate is None else self._candidate.deadline
+        return min(self._hello_at, self._stopping.release_at, asking)
+
+    patch.setattr(Lease, "next_deadline", next_deadline)
+    patch.setattr(Lease, "_expire", lambda self, now, effects: None)
+
+
+def clocks_a_quarter_wrong(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(test_usual_bugs, "RATE_ERROR", 0.25)
+    patch.setattr(schedules, "CLOCK_RATE_ERROR", 0.25)
+
+
+def promises_up_to_a_released_term(patch: pytest.MonkeyPatch) -> None:
+    honest = Acceptor.release
+
+    def release(self: Acceptor, term: Term) -> bool:
+        promised = self.promised
+        freed = honest(self, term)
+        self.promised = promised
+        return freed
+
+    patch.setattr(Acceptor, "release", release)
+
+
+def one_try_a_heartbeat(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(protocol.holder, "RETRY_HEARTBEATS", 1.0)
+
+
+def needs_fence_without_the_holder(patch: pytest.MonkeyPatch) -> None:
+    """All that is known of the term to be fenced is who issued it."""
+    honest = Acceptor.prepare
+
+    def prepare(self: Acceptor, *arguments: Any) -> Any:
+        answer = honest(self, *arguments)
+        if isinstance(answer, Promise) and answer.needs_fence is not None:
+            term = answer.needs_fence.term
+            guess = Grantee(term, Member(term.issuer, term.incarnation))
+            return Promise(answer.term, answer.config, guess, answer.blank)
+        return answer
+
+    patch.setattr(Acceptor, "prepare", prepare)
+
+
+def one_highest_fenced_term(patch: pytest.MonkeyPatch) -> None:
+    honest = Acceptor.propose
+
+    def propose(self: Acceptor, src: Any, body: Propose, config: Config, now: float) -> Any:
+        bond = self.bound(now)
+        if bond is not None and body.fenced and bond.term <= max(body.fenced):
+            fenced = (*body.fenced, bond.term)
+            body = Propose(body.term, body.config, body.round, body.holder, fenced, body.nonce)
+        return honest(self, src, body, config, now)
+
+    patch.setattr(Acceptor, "propose", propose)
+
+
+def rounds_that_restart(patch: pytest.MonkeyPatch) -> None:
+    honest = Holder.given
+
+    def given(self: Holder, number: int, since: float) -> None:
+        honest(self, number, since)
+        self._round = 0
+
+    patch.setattr(Holder, "given", given)
+
+
+def stamp_read_after_the_check(patch: pytest.MonkeyPatch) -> None:
+    """What a pause holds back gets a fresh stamp before it leaves."""
+    honest = Arena.resume
+
+    def resume(self: Arena, robot_id: int, shuffled: bool = False) -> None:
+        process, stamp = self.processes[robot_id], self.stamp(robot_id)
+        if process.paused and process.drawn is not None and stamp is not None:
+            process.drawn = structs.replace(process.drawn, gateway=stamp)
+        honest(self, robot_id, shuffled)
+
+    patch.setattr(Arena, "resume", resume)

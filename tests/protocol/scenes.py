@@ -1,0 +1,112 @@
+"""What the tests of voter, lease and team begin with: a voter, a lease among two others, a team that robot 1 leads."""
+
+from __future__ import annotations
+
+from deploy.look.checker import Checker
+from deploy.look.checkers import SAFETY
+from deploy.run.arena import Arena
+from protocol.acceptor import Acceptor
+from protocol.effects import BecomeLeader, Effect, Send
+from protocol.lease import Lease
+from protocol.messages import (
+    Config,
+    Grant,
+    Hello,
+    LeaseBody,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Term,
+    Version,
+)
+from protocol.mission import Leading, Mission
+from protocol.timing import timing_of
+
+STD = timing_of("std")
+TEAM = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))
+
+
+class Team(Arena):
+    """An arena whose safety checkers are on, with everybody started and led by robot 1 at 1 s, or at `led_by`."""
+
+    def __init__(self, robots: int = 4, led_by: float = 1.0, **options: object) -> None:
+        super().__init__(robots, **options)  # type: ignore[arg-type]
+        self.checkers: list[Checker] = [checker(self.timing) for checker in SAFETY]
+        self.listen(self.checkers)
+        self.start_all().run(led_by)
+        assert self.leaders() == [1]
+
+    def safe(self) -> bool:
+        found = [v for checker in self.checkers for v in checker.violations]
+        assert not found, found
+        return True
+
+    def changes(self, since: float = 1.0) -> list[tuple[int, str]]:
+        """Who became leader or stepped down since then."""
+        return [(who, type(effect).__name__) for at, who, effect in self.log if at > since]
+
+    def led_at(self, since: float) -> float:
+        """When somebody first became leader after `since`."""
+        return next(at for at, _, effect in self.log if at > since and isinstance(effect, BecomeLeader))
+
+
+def config_of(term: Term, seq: int = 0) -> Config:
+    """Four robots and the witness, in their first lives."""
+    chain = tuple(Member(i, 1) for i in TEAM.robots)
+    tie = Member(0, 1)
+    return Config(Version(term, seq), (*chain, tie), tie, None, chain)
+
+
+OLD = config_of(Term(1, 1, 1))
+
+
+def voter(now: float = 10.0) -> Acceptor:
+    """One that has been up for long."""
+    return Acceptor(Term(), STD.grant_s, now - 1.0)
+
+
+def ask(voter: Acceptor, who: Member, term: Term, now: float, number: int = 0) -> Grant | Nack | None:
+    return voter.propose(who, Propose(term, config_of(term), number, who), OLD, now)
+
+
+A, B = Member(1, 7), Member(2, 8)
+LOW, HIGH = Term(5, 1, 7), Term(6, 2, 8)
+
+
+def alone() -> Lease:
+    """Robot 1 of two with a witness; it has heard the others."""
+    mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
+    lease = Lease(Member(1, 7), mission, STD, 0.0, floor=0)
+    for other in OTHERS:
+        lease.receive(other, Hello(None), 0.0)
+    return lease
+
+
+OTHERS = (Member(0, 3), Member(2, 4))
+
+
+def sent(effects: list[Effect], kind: type) -> list[LeaseBody]:
+    return [e.body for e in effects if isinstance(e, Send) and isinstance(e.body, kind)]
+
+
+def proposed(lease: Lease, at: float) -> Propose:
+    """What it proposes when both others promise at `at`."""
+    [prepare] = sent(lease.tick(STD.grant_s), Prepare)
+    assert isinstance(prepare, Prepare)
+    promise = Promise(prepare.term, lease.config, None, True)
+    effects = [e for other in OTHERS for e in lease.receive(other, promise, at)]
+    [propose] = sent(effects, Propose)
+    assert isinstance(propose, Propose)
+    return propose
+
+
+def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
+    """Robot 1 asked at `asked_at`; the others' grants came `slow_s` later."""
+    lease, asked_at = alone(), STD.grant_s + 0.001
+    propose = proposed(lease, asked_at)
+    at = asked_at + slow_s
+    grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
+    effects = [e for other in OTHERS for e in lease.receive(other, grant, at)]
+    return lease, asked_at, at, effects
