@@ -21,8 +21,8 @@ FLAT_SHARE = 0.1
 """So is what is wider than this and bulges by less than this share of its width."""
 SMALL_M = 0.08
 """Of less than this radius only a piece is seen."""
-SAME_M = 0.5
-"""A thing is taken for the one that was seen nearer than this to where it should be by now."""
+SAME_M, SAME_MPS = 0.15, 1.0
+"""A thing is taken for the one that should be nearer than this by now: so much for the eye, the rest for its motion."""
 FORGET_S = 1.0
 ALPHA, BETA = 0.5, 0.25
 MOVING_MPS = 0.12
@@ -58,15 +58,21 @@ class _Track(Struct):
     y: float
     radius_m: float
     seen_at: float
-    anchors: list[tuple[float, float, float]]
-    """Where it was when: now and then, the newest last."""
+    ends: tuple[Point, Point]
+    """The first and the last of its points."""
+    anchors: list[tuple[float, tuple[Point, ...]]]
+    """When it was where, centre and ends: now and then, the newest last."""
     vx: float = 0.0
     vy: float = 0.0
 
+    def places(self) -> tuple[Point, ...]:
+        return ((self.x, self.y), *self.ends)
+
     def moves(self) -> bool:
-        at, x, y = self.anchors[0]
+        """All of it has moved: of what comes out from behind a thing, or seems to join one, an end stays."""
+        at, before = self.anchors[0]
         lasted = self.seen_at - at
-        far_m = hypot(self.x - x, self.y - y)
+        far_m = min([hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)])
         return lasted >= ANCHOR_S and far_m > MOVING_MPS * lasted and hypot(self.vx, self.vy) > MOVING_MPS
 
 
@@ -99,7 +105,7 @@ class Tracker:
                 # What comes out from behind another thing, and a wall that is seen end on, would seem to move.
                 self._seen.append((cluster, Feature("stationary", x, y, radius_m, whole=whole)))
             else:
-                track = self._follow(x, y, radius_m, now)
+                track = self._follow((x, y, radius_m), (cluster[0], cluster[-1]), now)
                 if track is not None:
                     self._seen.append((cluster, track))
 
@@ -122,26 +128,27 @@ class Tracker:
     def moving(self, now: float) -> list[Feature]:
         return [_feature(track, now) for track in self._tracks if track.moves()]
 
-    def _follow(self, x: float, y: float, radius_m: float, now: float) -> _Track | None:
-        best, best_m = None, SAME_M
+    def _follow(self, circle: tuple[float, float, float], ends: tuple[Point, Point], now: float) -> _Track | None:
+        x, y, radius_m = circle
+        best, best_m = None, inf
         for track in self._tracks:
             dt = now - track.seen_at
             apart = hypot(x - track.x - track.vx * dt, y - track.y - track.vy * dt)
-            if dt > 0.0 and apart < best_m:
+            if dt > 0.0 and apart < min(best_m, SAME_M + SAME_MPS * dt):
                 best, best_m = track, apart
         if best is None:
             if len(self._tracks) >= TRACKS_MAX:
                 return None
-            self._tracks.append(_Track(x, y, radius_m, now, [(now, x, y)]))
+            self._tracks.append(_Track(x, y, radius_m, now, ends, [(now, ((x, y), *ends))]))
             return self._tracks[-1]
         dt = now - best.seen_at
         rx, ry = x - best.x - best.vx * dt, y - best.y - best.vy * dt
         best.x, best.y = x - (1.0 - ALPHA) * rx, y - (1.0 - ALPHA) * ry
         best.vx, best.vy = best.vx + BETA * rx / dt, best.vy + BETA * ry / dt
         best.radius_m = 0.7 * best.radius_m + 0.3 * radius_m
-        best.seen_at = now
+        best.seen_at, best.ends = now, ends
         if now - best.anchors[-1][0] >= ANCHOR_S:
-            best.anchors = [best.anchors[-1], (now, best.x, best.y)]
+            best.anchors = [best.anchors[-1], (now, best.places())]
         return best
 
 

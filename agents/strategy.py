@@ -106,7 +106,7 @@ class Detour:
     ) -> Twist | None:
         """The twist of a detour towards `target` (both in `base_link`), or None: the wanted twist may go on.
 
-        `thing` tells what bars the way so far ahead [m]; it is asked once, when the detour begins.
+        `thing` tells what bars the way so far ahead [m]; it is asked when the detour begins, and while it creeps.
         """
         blocked_m = self._blocked(points, wanted)
         if self.decision is None and blocked_m is None:
@@ -115,6 +115,8 @@ class Detour:
             self._since, self._clear_since = now, None
             self._side, self._crept_s = 0.0, 0.0
             self._thing = thing(inf if blocked_m is None else blocked_m)
+        elif self.decision.action == "creep" and blocked_m is not None:
+            self._thing = thing(blocked_m)  # what it creeps for is to see more of it
         elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
             return None

@@ -56,6 +56,19 @@ def test_a_piece_of_wall_that_comes_into_sight_is_a_wall_and_does_not_move() -> 
     assert [feature.kind for feature in tracker.features(2.9)] == ["wall"]
 
 
+def test_what_comes_out_from_behind_a_thing_does_not_move_for_one_end_stays() -> None:
+    tracker, whole = Tracker(), [(1.5 - 0.4 * sin(k * pi / 20), -0.4 * cos(k * pi / 20)) for k in range(21)]
+    for n in range(16):
+        tracker.update(whole[: 6 + n], (0.0, 0.0), [], 0.5, 0.1 * n)
+        assert tracker.moving(0.1 * n) == []
+
+
+def test_a_thing_that_shows_beside_one_that_no_longer_does_is_another() -> None:
+    places = [(1.5, 0.0)] * 15 + [(1.5, 0.4)] * 15
+    for shown in range(1, len(places)):
+        assert seen(places[:shown], [(0.0, 0.0)] * shown).moving(0.1 * shown - 0.1) == []
+
+
 def test_a_team_mate_is_no_obstacle() -> None:
     assert seen([(1.5, 0.0)] * 5, [(0.0, 0.0)] * 5, mates=[(1.6, 0.1)]).features(0.4) == []
 

@@ -25,6 +25,8 @@ from world.world import World
 GOAL_X = 5.0
 CORRIDOR = "world.walls_m=[[-1.5,0.55,7.0,0.55],[-1.5,-0.55,7.0,-0.55]]"
 BARS = "world.walls_m=[[-1.5,0.55,2.5,0.55],[2.5,0.55,2.5,-0.55],[2.5,-0.55,-1.5,-0.55]]"
+HALF_HIDDEN = "world.obstacles=[{{center_m=[2.0,{}],radius_m=0.35}},{{center_m=[1.35,0.42],radius_m=0.12}}]"
+"""The left end of a thing lies behind a nearer one; it comes into sight within 0.2 m where it reaches less far."""
 FINE = "world.ground={reach_m=1.0,increment_m=0.02}"
 
 
@@ -114,6 +116,20 @@ CASES = (
         "turned",
     ),
     Case(
+        "stationary",
+        "its end is not in sight",
+        ("creep",),
+        (HALF_HIDDEN.format(0.2),),
+        "goal",
+    ),
+    Case(
+        "stationary",
+        "its end stays out of sight",
+        ("u_turn",),
+        (HALF_HIDDEN.format(0.3),),
+        "before",
+    ),
+    Case(
         "bump",
         "low enough",
         ("climb",),
@@ -135,8 +151,6 @@ CASES = (
         "before",
     ),
 )
-UNSEEN = {("stationary", "its end is not in sight"), ("stationary", "its end stays out of sight")}
-"""Driven in tests/agents/test_strategy.py: a thing whose end is hidden for as long as a robot creeps towards it."""
 
 
 def driven(case: Case, seconds: float) -> tuple[list[dict[str, Any]], list[Pose2D]]:
@@ -186,4 +200,4 @@ def test_a_row_of_the_table_is_done(case: Case) -> None:
 
 
 def test_every_row_is_driven() -> None:
-    assert {(row.kind, row.name) for row in TABLE} == {(case.kind, case.row) for case in CASES} | UNSEEN
+    assert {(row.kind, row.name) for row in TABLE} == {(case.kind, case.row) for case in CASES}
