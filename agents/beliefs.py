@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import hypot
 
 from agents.clocks import ClockOffset
-from agents.features import SAME_M, Feature
+from agents.features import Feature
 from protocol.geometry import Pose2D
 from protocol.messages import Delay, ObstacleNote, Sensors, TableRow
 from protocol.topics import TOPIC
@@ -17,6 +17,8 @@ GOES_ON_S = 0.6
 """A robot is taken to go on as it went for so long after its last row."""
 TOLD_S = 1.0
 """What another robot saw moving is believed so long."""
+SAME_M = 0.5
+"""Told of nearer than this to a robot, or to what is seen or told of already, it is no other thing."""
 
 
 class Beliefs:

@@ -21,7 +21,7 @@ FLAT_SHARE = 0.1
 """So is what is wider than this and bulges by less than this share of its width."""
 SMALL_M = 0.08
 """Of less than this radius only a piece is seen."""
-SAME_M, SAME_MPS = 0.15, 1.0
+NEXT_M, NEXT_MPS = 0.15, 1.0
 """A thing is taken for the one that should be nearer than this by now: so much for the eye, the rest for its motion."""
 FORGET_S = 1.0
 ALPHA, BETA = 0.5, 0.25
@@ -134,7 +134,7 @@ class Tracker:
         for track in self._tracks:
             dt = now - track.seen_at
             apart = hypot(x - track.x - track.vx * dt, y - track.y - track.vy * dt)
-            if dt > 0.0 and apart < min(best_m, SAME_M + SAME_MPS * dt):
+            if dt > 0.0 and apart < min(best_m, NEXT_M + NEXT_MPS * dt):
                 best, best_m = track, apart
         if best is None:
             if len(self._tracks) >= TRACKS_MAX:

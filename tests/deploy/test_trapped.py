@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+from math import hypot, inf
+from typing import Any, ClassVar
+
 import pytest
 
+from agents.agent import Agent
+from agents.around import TRAP_M
 from deploy.look import chronicle
 from deploy.look.summary import Summary
 from deploy.run.simulate import run
+from protocol.geometry import Pose2D
+from protocol.journal import JOURNAL_VERSION, Heading, Journal
+from protocol.messages import Header, Message, ObstacleNote, Truth
+from protocol.node import Envelope, Node, Received
+from protocol.topics import key
+from protocol.witness import Witness
 from world.scenario import load
+from world.simulator import Simulator
+from world.world import World
 
 HANDOVER_S = 10.0
 Trapped = tuple[Summary, list[chronicle.Line]]
@@ -41,3 +54,44 @@ def test_all_four_reach_the_goal_without_contact(trapped: Trapped) -> None:
     assert summary.left_behind == []
     assert sum(robot.contacts for robot in summary.robots) == 0
     assert summary.violations == []
+
+
+class Warner:
+    """In robot 2's name it warns of the place in which robot 1 starts, as a robot that got stuck there would."""
+
+    name, incarnation, finished, refusal = "robot2", 1, False, None
+    started_with: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, fleet: str, place: Pose2D) -> None:
+        self._warning = ObstacleNote(Header(self.name, 1, 1, 0.0), "trap", place.x, place.y, TRAP_M)
+        self._key = key(fleet, self.name, "obstacles")
+        self.interests = frozenset({self._key})
+        self._at = 1.0
+
+    def receive(self, received: Received) -> list[Envelope]:
+        return []
+
+    def tick(self, now: float) -> list[Envelope]:
+        self._at = inf
+        return [Envelope(self._key, self._warning)]
+
+    def next_deadline(self) -> float:
+        return self._at
+
+
+def test_an_explorer_is_not_barred_in_by_a_trap_that_it_is_told_of() -> None:
+    scenario = load("explore", ["mission.robots=[1,2]"])
+    start, fleet = Pose2D(*scenario.world.starts[0]), "warned"
+    simulator = Simulator(scenario.radio, seed=1)
+    places: list[Pose2D] = []
+
+    def hear(_now: float, _key: str, _payload: bytes, message: Message) -> None:
+        if isinstance(message, Truth):
+            places.append(Pose2D(message.robots[0].x, message.robots[0].y, 0.0))
+
+    simulator.taps.append(hear)
+    nodes: list[Node] = [World(fleet, scenario, 1, 1, start_at=0.0), Witness(fleet, 1, 1), Agent(1, 1, fleet, 1)]
+    for node in (*nodes, Warner(fleet, start)):
+        simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 1, {})))
+    simulator.run(12.0)
+    assert hypot(places[-1].x - start.x, places[-1].y - start.y) > TRAP_M
