@@ -16,8 +16,9 @@ from pathlib import Path
 from deploy.look.view import quiet, viewer_path
 from protocol.mission import Refused
 
-SIZE = "1600x1000"
-SCREEN = "3400x2200x24"
+SIZE, SCALE = "1600x1000", "2"
+"""Of the window in the toolkit's points, and how many pixels each has: what a screen's density would decide else."""
+SCREEN = "6600x4200x24"
 """So large that the pointer, in its middle, lies beside the window and shows no hint over what it happens to be on."""
 SHOT_S_MAX = 120.0
 
@@ -47,7 +48,11 @@ def _by_viewer(rrd: Path, picture: Path) -> str | None:
         command = [viewer_path(), str(rrd), "--screenshot-to", str(picture), "--window-size", SIZE, "--port", "auto"]
         try:
             subprocess.run(
-                command, env=quiet() | {"DISPLAY": display}, timeout=SHOT_S_MAX, capture_output=True, check=True
+                command,
+                env=quiet() | {"DISPLAY": display, "WINIT_X11_SCALE_FACTOR": SCALE},
+                timeout=SHOT_S_MAX,
+                capture_output=True,
+                check=True,
             )
         except subprocess.TimeoutExpired:
             return f"the viewer took no picture within {SHOT_S_MAX:g} s"
