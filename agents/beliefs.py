@@ -15,8 +15,8 @@ ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
 """A robot is taken to go on as it went for so long after its last row."""
-TOLD_S = 1.0
-"""What another robot saw moving is believed so long."""
+TOLD_S = 3.0
+"""What another robot saw moving is believed to go on so long: behind a thing nobody may see it for a while."""
 SAME_M = 0.5
 """Told of nearer than this to a robot, or to what is seen or told of already, it is no other thing."""
 

@@ -21,9 +21,10 @@ FLAT_SHARE = 0.1
 """So is what is wider than this and bulges by less than this share of its width."""
 SMALL_M = 0.08
 """Of less than this radius only a piece is seen."""
-NEXT_M, NEXT_MPS = 0.15, 1.0
+NEXT_M, NEXT_MPS, NEXT_M_MAX = 0.15, 1.0, 0.5
 """A thing is taken for the one that should be nearer than this by now: so much for the eye, the rest for its motion."""
-FORGET_S = 1.0
+FORGET_S, HIDDEN_S = 1.0, 3.0
+"""What is unseen for so long is gone; what moved is known again for longer, where it comes out from behind a thing."""
 ALPHA, BETA = 0.5, 0.25
 MOVING_MPS = 0.12
 ANCHOR_S = 1.0
@@ -64,15 +65,20 @@ class _Track(Struct):
     """When it was where, centre and ends: now and then, the newest last."""
     vx: float = 0.0
     vy: float = 0.0
+    moves: bool = False
 
     def places(self) -> tuple[Point, ...]:
         return ((self.x, self.y), *self.ends)
 
-    def moves(self) -> bool:
-        """All of it has moved: of what comes out from behind a thing, or seems to join one, an end stays."""
+    def has_moved(self) -> bool:
+        """All of it has: of what comes out from behind a thing, or seems to join one, an end stays.
+
+        What is known to move and then passes a thing loses an end to it as well: of that the centre is enough.
+        """
         at, before = self.anchors[0]
         lasted = self.seen_at - at
-        far_m = min([hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)])
+        far = [hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)]
+        far_m = far[0] if self.moves else min(far)
         return lasted >= ANCHOR_S and far_m > MOVING_MPS * lasted and hypot(self.vx, self.vy) > MOVING_MPS
 
 
@@ -89,7 +95,7 @@ class Tracker:
     ) -> None:
         """Points of one scan in beam order, seen from `eye`; what is within `mate_m` of a team-mate is left out."""
         self._seen = []
-        self._tracks = [track for track in self._tracks if now - track.seen_at <= FORGET_S]
+        self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
         clusters = _clusters(points_map)
         for n, cluster in enumerate(clusters):
             x, y, radius_m = _circle(cluster, eye)
@@ -123,10 +129,10 @@ class Tracker:
     def features(self, now: float) -> list[Feature]:
         """All things as of `now`."""
         walls = [thing for _, thing in self._seen if isinstance(thing, Feature)]
-        return walls + [_feature(track, now) for track in self._tracks]
+        return walls + [_feature(track, now) for track in self._tracks if now - track.seen_at <= FORGET_S]
 
     def moving(self, now: float) -> list[Feature]:
-        return [_feature(track, now) for track in self._tracks if track.moves()]
+        return [_feature(t, now) for t in self._tracks if t.moves and now - t.seen_at <= FORGET_S]
 
     def _follow(self, circle: tuple[float, float, float], ends: tuple[Point, Point], now: float) -> _Track | None:
         x, y, radius_m = circle
@@ -134,7 +140,7 @@ class Tracker:
         for track in self._tracks:
             dt = now - track.seen_at
             apart = hypot(x - track.x - track.vx * dt, y - track.y - track.vy * dt)
-            if dt > 0.0 and apart < min(best_m, NEXT_M + NEXT_MPS * dt):
+            if dt > 0.0 and apart < min(best_m, NEXT_M + NEXT_MPS * dt, NEXT_M_MAX):
                 best, best_m = track, apart
         if best is None:
             if len(self._tracks) >= TRACKS_MAX:
@@ -149,6 +155,7 @@ class Tracker:
         best.seen_at, best.ends = now, ends
         if now - best.anchors[-1][0] >= ANCHOR_S:
             best.anchors = [best.anchors[-1], (now, best.places())]
+        best.moves = best.has_moved()
         return best
 
 
@@ -221,7 +228,7 @@ def _flat(cluster: Sequence[Point]) -> bool:
 
 def _feature(track: _Track, now: float) -> Feature:
     dt = now - track.seen_at
-    if not track.moves():
+    if not track.moves:
         return Feature("stationary", track.x, track.y, track.radius_m)
     x, y = track.x + track.vx * dt, track.y + track.vy * dt
     return Feature("moving", x, y, track.radius_m, track.vx, track.vy)

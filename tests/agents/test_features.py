@@ -81,3 +81,14 @@ def test_what_is_no_longer_seen_is_forgotten() -> None:
     tracker = seen([(1.5, 0.0)] * 5, [(0.0, 0.0)] * 5)
     tracker.update([], (0.0, 0.0), [], 0.5, 2.0)
     assert tracker.features(2.0) == []
+
+
+def test_what_moved_and_comes_out_from_behind_a_thing_is_known_to_move_at_once() -> None:
+    eye = (0.0, 0.0)
+    places = [(1.5, -1.0 + 0.03 * n) for n in range(60)]
+    tracker = seen(places[:30], [eye] * 30)
+    for n in range(30, 50):
+        tracker.update([], eye, [], 0.5, 0.1 * n)
+    tracker.update(arc(*places[50], 0.25, eye), eye, [], 0.5, 5.0)
+    [feature] = tracker.moving(5.0)
+    assert feature.vy == pytest.approx(0.3, abs=0.05)
