@@ -62,7 +62,7 @@ class Around:
 
     def moving(self, pose: Pose2D, now: float) -> list[Feature]:
         """What moves, as seen by this robot and as told by others."""
-        return self._beliefs.moving(self._tracker.moving(now), pose, now)
+        return self._beliefs.moving(self._tracker.moving(now), pose, now, self._tracker.shows)
 
     def thing(self, pose: Pose2D, wanted: Twist, free_m: float, now: float) -> Thing:
         """What ends the way along `wanted` after `free_m`."""

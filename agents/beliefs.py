@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import hypot
 
 from agents.clocks import ClockOffset
@@ -15,8 +16,9 @@ ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
 """A robot is taken to go on as it went for so long after its last row."""
-TOLD_S = 3.0
-"""What another robot saw moving is believed to go on so long: behind a thing nobody may see it for a while."""
+TOLD_S, GLIMPSED_S = 3.0, 6.0
+"""What another robot saw moving is believed to go on so long: behind a thing nobody may see it for a while. It is for
+longer where this robot sees something by now: a piece of it, or it before its motion can be told."""
 SAME_M = 0.5
 """Told of nearer than this to a robot, or to what is seen or told of already, it is no other thing."""
 
@@ -82,13 +84,22 @@ class Beliefs:
         if note.kind == "moving" and (robot in self._told or len(self._told) < ROBOTS_MAX):
             self._told[robot] = (note, at)
 
-    def moving(self, seen: list[Feature], here: Pose2D, now: float) -> list[Feature]:
-        """`seen`, and what others saw moving elsewhere, as of `now`; not what is where a robot is."""
+    def moving(
+        self,
+        seen: list[Feature],
+        here: Pose2D,
+        now: float,
+        glimpsed: Callable[[float, float, float], bool] = lambda x, y, within_m: False,
+    ) -> list[Feature]:
+        """`seen`, and what others saw moving elsewhere, as of `now`; not what is where a robot is.
+
+        `glimpsed` tells whether this robot sees anything there (x, y in `map`) at the moment.
+        """
         known = list(seen)
         for note, at in self._told.values():
-            if now - at <= TOLD_S:
-                vx, vy = note.twist_map
-                x, y = note.x + vx * (now - at), note.y + vy * (now - at)
+            vx, vy = note.twist_map
+            x, y = note.x + vx * (now - at), note.y + vy * (now - at)
+            if now - at <= TOLD_S or (now - at <= GLIMPSED_S and glimpsed(x, y, SAME_M)):
                 robots = (here, *(self.pose_of(robot, now) for robot in self._table))
                 ours = any(p is not None and hypot(x - p.x, y - p.y) < SAME_M for p in robots)
                 if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):

@@ -126,6 +126,11 @@ class Tracker:
         thing = self._seen[n][1]
         return thing if isinstance(thing, Feature) else _feature(thing, now), sqrt(square)
 
+    def shows(self, x: float, y: float, within_m: float) -> bool:
+        """A thing of the newest scan, and no wall, has its centre within so much of (x, y) in `map`."""
+        things = (thing for _, thing in self._seen if isinstance(thing, _Track) or thing.kind != "wall")
+        return any(hypot(thing.x - x, thing.y - y) < within_m for thing in things)
+
     def features(self, now: float) -> list[Feature]:
         """All things as of `now`."""
         walls = [thing for _, thing in self._seen if isinstance(thing, Feature)]

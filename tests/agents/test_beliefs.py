@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from agents.beliefs import TOLD_S, Beliefs
+from agents.beliefs import GLIMPSED_S, TOLD_S, Beliefs
 from agents.features import Feature
 from protocol.geometry import Pose2D
 from protocol.messages import Header, ObstacleNote, Role, TableRow
@@ -80,3 +80,11 @@ def test_a_robot_is_stuck_as_long_as_it_says_so() -> None:
     assert not beliefs.stuck(2, 4.1)
     beliefs.hear_row(2, row(2, 0.0), 4.2)
     assert not beliefs.stuck(2, 4.2)
+
+
+def test_what_another_saw_moving_is_believed_for_longer_where_something_is_seen() -> None:
+    beliefs = Beliefs()
+    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
+    later = TOLD_S + 0.1
+    assert beliefs.moving([], AWAY, later, lambda x, y, within_m: abs(x - 1.0 - 0.2 * later) < within_m)
+    assert beliefs.moving([], AWAY, GLIMPSED_S + 0.1, lambda x, y, within_m: True) == []

@@ -92,3 +92,10 @@ def test_what_moved_and_comes_out_from_behind_a_thing_is_known_to_move_at_once()
     tracker.update(arc(*places[50], 0.25, eye), eye, [], 0.5, 5.0)
     [feature] = tracker.moving(5.0)
     assert feature.vy == pytest.approx(0.3, abs=0.05)
+
+
+def test_a_piece_of_a_thing_shows_and_a_wall_does_not() -> None:
+    tracker = Tracker()
+    tracker.update([(1.5, -1.0 + 0.1 * n) for n in range(21)] + [(0.0, 1.5)], (0.0, 0.0), [], 0.5, 0.0)
+    assert tracker.shows(0.0, 1.5, 0.3)
+    assert not tracker.shows(1.5, 0.0, 0.5)
