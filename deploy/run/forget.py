@@ -11,8 +11,9 @@ import typer
 from deploy.look.onlooker import Ear, find, listen
 from deploy.run.operator import Operator
 from protocol import clock
-from protocol.messages import Event, PoseStamped, Role, Status, encode
+from protocol.messages import Ask, Event, Header, MissionNote, PoseStamped, Role, Status, encode
 from protocol.mission import Refused, robot_id_of, robot_name
+from protocol.topics import OPERATOR_NAME, key
 
 LISTEN_S = 1.2
 """Long enough to hear a leader's pose and everybody's status."""
@@ -30,16 +31,20 @@ def command(
     for robot in robots:
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
-    with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status"})) as ear:
-        leader, _ = _listen(ear, LISTEN_S)
+    with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status", "*/mission"})) as ear:
+        ask = Ask(Header(OPERATOR_NAME, clock.wall_ms(), 1, clock.now()), "mission")
+        ear.bus.publish(key(ear.fleet.name, OPERATOR_NAME, "ask"), encode(ask))
+        leader, _, team = _listen(ear, LISTEN_S)
         for robot in robots:
+            if team and robot not in team:
+                raise Refused(f"id {robot}: must be one of the fleet's robots {', '.join(map(str, team))}")
             if ear.lives(robot_name(robot)):
                 raise Refused(f"robot {robot} lives: end its process first, or let it join")
         asked = leader is None
         waits = ""
         if asked:
             _say(ear, robots)
-            leader, waits = _listen(ear, ANSWER_S_MAX, until_led=True)
+            leader, waits, _ = _listen(ear, ANSWER_S_MAX, until_led=True)
     if as_json:
         print(msgspec.json.encode({"robots": robots, "asked": asked, "leader": leader}).decode())
     elif not asked:
@@ -59,9 +64,11 @@ def _say(ear: Ear, robots: list[int]) -> None:
     ear.bus.publish(operator.orders_key, encode(operator.orders("forget", clock.now(), lives=lives)))
 
 
-def _listen(ear: Ear, seconds: float, until_led: bool = False) -> tuple[int | None, str]:
-    """Who leads, and what is said about waiting for others; with `until_led`, no longer than needed."""
-    leader, waits = None, ""
+def _listen(ear: Ear, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:
+    """Who leads, what is said about waiting for others, and the mission's robots, where it was told; with `until_led`,
+    no longer than needed."""
+    leader: int | None = None
+    waits, team = "", tuple[int, ...]()
     until = clock.now() + seconds
     while clock.now() < until and not (until_led and leader is not None):
         ear.wait(0.05)
@@ -73,4 +80,6 @@ def _listen(ear: Ear, seconds: float, until_led: bool = False) -> tuple[int | No
                     leader = None
                 case Status(text=text) if text.startswith("waiting for"):
                     waits = f": {message.header.sender} is {text}"
-    return leader, waits
+                case MissionNote(mission=mission):
+                    team = mission.robots
+    return leader, waits, team

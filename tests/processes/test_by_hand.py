@@ -174,6 +174,8 @@ def test_a_fleet_goes_on_without_robots_that_the_operator_declares_lost(terminal
     eventually(lambda: any(isinstance(m, Status) and m.text == waits for m in terminals.heard()), waits)
     alive = terminals.lfa("forget", "1")
     assert (alive.returncode, alive.stderr) == (2, "lfa: robot 1 lives: end its process first, or let it join\n")
+    stranger = terminals.lfa("forget", "2", "9")
+    assert (stranger.returncode, stranger.stderr) == (2, "lfa: id 9: must be one of the fleet's robots 1, 2, 3, 4\n")
     done = terminals.lfa("forget", "2", "3", "4")
     assert (done.returncode, done.stdout) == (0, "forgotten: robot2, robot3, robot4; robot1 leads\n"), done.stderr
     again = terminals.lfa("forget", "3")
