@@ -9,8 +9,6 @@ from deploy.shapes.bars import Measured
 from deploy.shapes.subject import Subject, explained, on_course, share, where
 
 LATE_SHARE = 0.1
-FEW = 10
-"""Of fewer avoidances than this one may be too slight to show, as of so many: nine tenths of three would be all."""
 
 
 def baseline(s: Subject) -> Measured:
@@ -31,8 +29,7 @@ def episodes_felt(s: Subject) -> Measured:
     told = [one for one in s.episodes if one.kind == "avoidance"]
     mute = [one for one in told if not spikes.felt(s.run, one, s.distance)]
     named = [f"robot {one.robot} at {one.from_s:.1f} s" for one in mute]
-    of = max(FEW, len(told)) if told else 0
-    return Measured(share(of - len(mute), of), ", ".join(named))
+    return Measured(share(len(told) - len(mute), len(told)), ", ".join(named))
 
 
 def early_spikes(s: Subject) -> Measured:

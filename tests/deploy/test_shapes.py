@@ -21,9 +21,8 @@ from deploy.shapes import across, spikes
 from deploy.shapes.across import Kept
 from deploy.shapes.bars import Bar, Measured
 from deploy.shapes.command import command
-from deploy.shapes.figure7 import episodes_felt
 from deploy.shapes.subject import Subject, duration_s
-from deploy.shapes.table import MATCHED_MIN, PROPERTIES, of_run
+from deploy.shapes.table import PROPERTIES, of_run
 from protocol.mission import Refused
 from world.scenario import load
 
@@ -69,14 +68,6 @@ def test_an_avoidance_counts_for_a_spike_as_far_as_it_can_have_made_it(
     subject = Subject(Seen())  # type: ignore[arg-type]
     subject.episodes = [spikes.Episode(2, "avoidance", from_s, until_s), spikes.Episode(3, "avoidance", 19.0, 30.0)]
     assert duration_s(subject, spike) == pytest.approx(counts_s)
-
-
-@pytest.mark.parametrize(("count", "slight", "holds"), [(3, 1, True), (3, 2, False), (20, 2, True), (20, 3, False)])
-def test_nine_tenths_of_the_avoidances_show_and_of_a_few_all_but_one(count: int, slight: int, holds: bool) -> None:
-    subject = Subject(Seen())  # type: ignore[arg-type]
-    subject.episodes = [spikes.Episode(2, "avoidance", 20.0 * n, 20.0 * n + 2.0) for n in range(count)]
-    subject.distance = [spikes.Spike(2, one.from_s, one.until_s, 0.3) for one in subject.episodes[slight:]]
-    assert (episodes_felt(subject).value >= MATCHED_MIN) is holds
 
 
 def test_rank_correlation_is_spearmans() -> None:
