@@ -26,6 +26,10 @@ WIDE_M = 0.20
 """Kept from the body's surface where there is room."""
 NARROW_M = 0.08
 """Never less (control.md section 7)."""
+NOISE_M = 0.02
+"""A reading of the scan may be so much too short: four standard deviations of the scanner in the paper's worlds."""
+BESIDE = 0.25
+"""Less than this ahead, as a share of how far aside: beside the robot, which comes no nearer to it than 3 %."""
 REACH_M = 1.6
 HEADWAY_S = 0.8
 KEEP_SIDE_RAD = 0.6
@@ -109,9 +113,9 @@ class Detour:
         `thing` tells what bars the way so far ahead [m]; it is asked when the detour begins, and while it creeps.
         """
         blocked_m = self._blocked(points, wanted)
-        if self.decision is None and blocked_m is None:
-            return None
         if self.decision is None:
+            if blocked_m is None or self._blocked(self._not_passed(points, wanted), wanted) is None:
+                return None
             self._since, self._clear_since = now, None
             self._side, self._crept_s = 0.0, 0.0
             self._thing = thing(inf if blocked_m is None else blocked_m)
@@ -130,6 +134,13 @@ class Detour:
         free_m = free_along(points, wanted, self._radius_m + NARROW_M)
         needed_m = v * v / (2.0 * self._limits.a_max_mps2) + HEADWAY_S * v + 0.15
         return free_m if free_m < needed_m else None
+
+    def _not_passed(self, points: Sequence[Point], wanted: Twist) -> list[Point]:
+        """`points` less those that the robot has beside it, nearer than it keeps by no more than a scan's noise: it
+        is about to have passed them."""
+        sign = 1.0 if wanted.linear_x > 0.0 else -1.0
+        kept_m = self._radius_m + NARROW_M - NOISE_M
+        return [(x, y) for x, y in points if sign * x > BESIDE * abs(y) or hypot(x, y) < kept_m]
 
     def _clear(self, points: Sequence[Point], target: Point, now: float) -> bool:
         """The straight way to the target has been free for `CLEAR_S`."""
@@ -277,6 +288,6 @@ def _bar(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: 
         along = c * x + s * y
         if 0.0 < along < far_m:
             across = c * y - s * x
-            if -half_width_m < across < half_width_m and along > 0.25 * abs(across):
+            if -half_width_m < across < half_width_m and along > BESIDE * abs(across):
                 return n
     return None

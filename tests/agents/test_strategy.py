@@ -99,3 +99,14 @@ def test_what_has_no_visible_end_is_crept_towards_for_two_seconds_and_then_turne
         ("u_turn", "its end stays out of sight", "speed and position"),
     ]
     assert actions[1][3] == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_reading_that_is_too_short_beside_the_robot_starts_no_detour() -> None:
+    """What is passed at 9 cm shows at 8 in one scan, when the robot has almost passed it (paper_path2, seed 10)."""
+    beside, wanted = [(0.038, -0.226)], Twist(0.5, -0.01)
+    assert Detour(RADIUS_M, LIMITS).steer(beside, (1.0, 0.0), wanted, 0.5, 0.0) is None
+
+
+@pytest.mark.parametrize("point", [(0.4, -0.226), (0.038, -0.205)])
+def test_what_is_still_to_be_passed_or_nearer_than_noise_explains_starts_one(point: tuple[float, float]) -> None:
+    assert Detour(RADIUS_M, LIMITS).steer([point], (1.0, 0.0), Twist(0.5, -0.01), 0.5, 0.0) is not None
