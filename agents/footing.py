@@ -1,0 +1,124 @@
+"""What a step costs: the ground as a search takes it, while the map itself may change.
+
+Ground that nobody has seen can be driven at a price; near what is known to be occupied the price grows, so that a way
+keeps to the middle where there is room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from math import ceil, hypot, inf
+
+from agents.mapping import CELL_M, NEAR_PER_CELL, REACH, Grid, Point
+
+FREE, UNSEEN = 10, 13
+"""Price of a straight step; a diagonal one costs `DIAGONAL` / `STRAIGHT` as much."""
+STRAIGHT, DIAGONAL = 5, 7
+SKIN_M = 0.04
+"""The way's middle stays so much farther than the radius from an occupied cell's centre than half a cell."""
+CLOSE = 60
+"""Added to the price of a step just not touching, falling with the square of the clearance gained."""
+ROOM_M = 0.45
+"""Clearance beyond which more is worth nothing."""
+BARRED = 1000
+"""Price of a point where no robot can be."""
+SETTLE_CELLS = 6
+"""How far from a barred start or goal a free cell is looked for."""
+
+Box = tuple[float, float, float, float]
+"""x1, y1, x2, y2 in `map` [m]."""
+
+
+class Footing:
+    """Of one search. `near` is a copy of the grid's nearness, so what is barred here is barred for this search only."""
+
+    def __init__(self, grid: Grid, prices: bytes) -> None:
+        """`prices` as `prices_of` gives them."""
+        self.grid = grid
+        self.prices = prices
+        self.near = bytearray(grid.near)
+
+    def bar_runs(self, runs: Sequence[tuple[int, int]]) -> None:
+        """No way through the cells of `runs` (`runs_of`)."""
+        for low, high in runs:
+            self.near[low:high] = bytes([NEAR_PER_CELL * REACH]) * (high - low)
+
+    def bar(self, center: Point, apart_m: float, own: Point) -> None:
+        """No way within `apart_m` of `center`, but for where the robot itself stands, at `own`."""
+        grid, cell = self.grid, self.grid.cell(*center)
+        if cell is None:
+            return
+        reach = min(REACH, int(apart_m / CELL_M))
+        for row in range(-reach, reach + 1):
+            for column in range(-reach, reach + 1):
+                if hypot(row, column) * CELL_M <= apart_m:
+                    place = cell + row * grid.columns + column
+                    x, y = grid.center(place)
+                    if hypot(x - own[0], y - own[1]) > 2.0 * CELL_M:
+                        self.near[place] = NEAR_PER_CELL * REACH
+
+    def settled(self, point: Point) -> int | None:
+        """The nearest cell to `point` that a robot can stand in, within `SETTLE_CELLS`."""
+        cell = self.grid.cell(*point)
+        if cell is None:
+            return None
+        reach = range(-SETTLE_CELLS, SETTLE_CELLS + 1)
+        around = (
+            (row * row + column * column, cell + row * self.grid.columns + column) for row in reach for column in reach
+        )
+        return min((pair for pair in around if self.prices[self.near[pair[1]]] > 0), default=(0, None))[1]
+
+    def price(self, point: Point) -> int:
+        """Of a step there; `BARRED` where none can be."""
+        cell = self.grid.cell(*point)
+        price = 0 if cell is None else self.prices[self.near[cell]]
+        return price or BARRED
+
+    def price_of_cells(self, cells: Sequence[int]) -> int:
+        """Of a chain of neighbours, as the search counts."""
+        near, prices, scores, straight = self.near, self.prices, self.grid.scores, (1, self.grid.columns)
+        return sum(
+            (prices[near[cell]] + (UNSEEN - FREE if scores[cell] == 0 else 0))
+            * (STRAIGHT if abs(cell - last) in straight else DIAGONAL)
+            for last, cell in pairwise(cells)
+        )
+
+    def price_of_line(self, a: Point, b: Point) -> float:
+        """Of the straight way, by its length; inf when it is barred."""
+        total, count = 0, 0
+        for x, y in between(a, b):
+            cell = self.grid.cell(x, y)
+            price = 0 if cell is None else self.prices[self.near[cell]]
+            if cell is None or price == 0:
+                return inf
+            total += price + (UNSEEN - FREE if self.grid.scores[cell] == 0 else 0)
+            count += 1
+        return STRAIGHT * total / count * hypot(b[0] - a[0], b[1] - a[1]) / CELL_M
+
+
+def prices_of(radius_m: float) -> bytes:
+    """Price of a straight step by nearness; 0: barred."""
+    barred_m = radius_m + 0.5 * CELL_M + SKIN_M
+    prices = []
+    for near in range(256):
+        clear_m = (REACH - near / NEAR_PER_CELL) * CELL_M
+        lacking = min(1.0, max(0.0, (barred_m + ROOM_M - clear_m) / ROOM_M))
+        prices.append(0 if near and clear_m < barred_m - 1e-9 else round(FREE + CLOSE * lacking * lacking))
+    return bytes(prices)
+
+
+def between(a: Point, b: Point) -> Iterator[Point]:
+    """Points from `a` to `b`, one every cell's length."""
+    steps = max(1, ceil(hypot(b[0] - a[0], b[1] - a[1]) / CELL_M))
+    return ((a[0] + (b[0] - a[0]) * n / steps, a[1] + (b[1] - a[1]) * n / steps) for n in range(1, steps + 1))
+
+
+def runs_of(grid: Grid, box: Box) -> Iterator[tuple[int, int]]:
+    """The cells of a box as runs of indices."""
+    x1, y1, x2, y2 = box
+    low = max(0, int((x1 - grid.x0_m) / CELL_M)), max(0, int((y1 - grid.y0_m) / CELL_M))
+    high = min(grid.columns, ceil((x2 - grid.x0_m) / CELL_M)), min(grid.rows, ceil((y2 - grid.y0_m) / CELL_M))
+    if low[0] < high[0]:
+        for row in range(low[1], high[1]):
+            yield row * grid.columns + low[0], row * grid.columns + high[0]

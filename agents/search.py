@@ -1,0 +1,120 @@
+"""A* from the goal to the robot, a few cells at a time.
+
+Backwards, because a goal that is walled in is then found out after its own small room, not after the rest of the
+world. A search is a generator that gives the number of cells it has looked at, so it goes on in the next tick where
+the budget ended this one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from heapq import heappop, heappush
+
+from agents.footing import DIAGONAL, FREE, STRAIGHT, UNSEEN, Footing
+from agents.mapping import REACH
+
+GUESS = 11
+"""Of the way still to go, a step: a little above `FREE`, so that unknown ground is not searched in its whole width."""
+LOOKED_PER_YIELD = 16
+LONG_CELLS, ROOM_CELLS_MAX = 12_000, 60_000
+"""A search that has looked at so many cells asks whether the robot is walled in, in a room of at most so many."""
+
+
+def search(footing: Footing, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
+    """Whether there is a way; each `toward[cell]` becomes the number, from 1, of the step by which it was reached."""
+    looked_at, asked = 0, False
+    for looked in _spread(footing, goal, start, toward):
+        looked_at += abs(looked)
+        yield abs(looked)
+        if looked < 0:
+            return True
+        if looked_at > LONG_CELLS and not asked:
+            asked = True
+            if (yield from _closed_in(footing, start, goal)):
+                break
+    return False
+
+
+def chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
+    """The cells from `start` to `goal`, each step of the search taken back."""
+    offsets, cells = _offsets(columns), [start]
+    while cells[-1] != goal:
+        cells.append(cells[-1] - offsets[toward[cells[-1]] - 1])
+    return cells
+
+
+def _spread(footing: Footing, goal: int, start: int, toward: bytearray) -> Iterator[int]:
+    """A* from `goal`: `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. Ends
+    with a negative number when `start` is reached, else when nothing is left."""
+    grid, near, prices = footing.grid, footing.near, footing.prices
+    columns, scores = grid.columns, grid.scores
+    steps = tuple(
+        (number, offset, DIAGONAL if abs(offset) not in (1, columns) else STRAIGHT)
+        for number, offset in enumerate(_offsets(columns), start=1)
+    )
+    best = memoryview(bytearray(4 * len(near))).cast("i")
+    closed = bytearray(len(near))
+    start_row, start_column = divmod(start, columns)
+    rim = (REACH, grid.rows - REACH)
+    heap = [goal]
+    best[goal] = 1
+    looked = 0
+    while heap:
+        cell = heappop(heap) & 0xFFFFFF
+        if closed[cell]:
+            continue
+        closed[cell] = 1
+        if cell == start:
+            yield -1 - looked
+            return
+        looked += 1
+        if looked == LOOKED_PER_YIELD:
+            yield looked
+            looked = 0
+        row, column = divmod(cell, columns)
+        if not (rim[0] <= row < rim[1] and REACH <= column < columns - REACH):
+            continue
+        cost = best[cell]
+        for number, offset, length in steps:
+            other = cell + offset
+            if closed[other]:
+                continue
+            price = prices[near[other]]
+            if price == 0:
+                continue
+            if scores[other] == 0:
+                price += UNSEEN - FREE
+            total = cost + length * price
+            known = best[other]
+            if known == 0 or total < known:
+                best[other] = total
+                toward[other] = number
+                row, column = divmod(other, columns)
+                dr, dc = abs(row - start_row), abs(column - start_column)
+                guess = GUESS * (STRAIGHT * max(dr, dc) + (DIAGONAL - STRAIGHT) * min(dr, dc))
+                heappush(heap, (total + guess) << 24 | other)
+    yield looked
+
+
+def _closed_in(footing: Footing, start: int, goal: int) -> Generator[int, None, bool]:
+    """Whether the ground around the robot ends before the goal: a long search would find that out last."""
+    near, prices, columns, rows = footing.near, footing.prices, footing.grid.columns, footing.grid.rows
+    seen = bytearray(len(near))
+    seen[start] = 1
+    cells = [start]
+    for cell in cells:
+        if cell == goal or len(cells) > ROOM_CELLS_MAX:
+            return False
+        row, column = divmod(cell, columns)
+        if not (REACH <= row < rows - REACH and REACH <= column < columns - REACH):
+            return False
+        for other in (cell + 1, cell - 1, cell + columns, cell - columns):
+            if not seen[other] and prices[near[other]]:
+                seen[other] = 1
+                cells.append(other)
+        yield 1
+    return True
+
+
+def _offsets(columns: int) -> tuple[int, ...]:
+    return tuple(row * columns + column for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)

@@ -1,0 +1,50 @@
+"""From the cells of a search to a route that can be driven: straight where that costs nothing, round at its corners.
+
+Generators, like the search: each step gives the work done so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import ceil, hypot
+
+from agents.footing import FREE, STRAIGHT, Footing
+from agents.mapping import Point
+
+PIECE_M = 0.4
+"""Between the points of a route; a cut corner is rounded over several."""
+SMOOTHINGS = 12
+CUT_MAX = 48
+"""A shortcut replaces at most so many cells of path."""
+
+
+def straightened(footing: Footing, cells: Sequence[int]) -> Iterator[tuple[int, list[Point]]]:
+    """Shortcuts where the straight line is not dearer than the cells it replaces; work and points so far."""
+    grid = footing.grid
+    at = 0
+    points = [grid.center(cells[0])]
+    while at < len(cells) - 1:
+        looked, to, span = 0, at + 1, min(CUT_MAX, len(cells) - 1 - at)
+        while span > 1:
+            looked += 2 * span
+            straight = footing.price_of_line(grid.center(cells[at]), grid.center(cells[at + span]))
+            if straight <= footing.price_of_cells(cells[at : at + span + 1]) + 0.5 * FREE * STRAIGHT:
+                to = at + span
+                break
+            span //= 2
+        a, b = grid.center(cells[at]), grid.center(cells[to])
+        pieces = max(1, ceil(hypot(b[0] - a[0], b[1] - a[1]) / PIECE_M))
+        points += [(a[0] + (b[0] - a[0]) * n / pieces, a[1] + (b[1] - a[1]) * n / pieces) for n in range(1, pieces + 1)]
+        at = to
+        yield looked, points
+
+
+def smoothed(footing: Footing, points: list[Point]) -> Iterator[list[Point]]:
+    """Each point drawn to the middle of its neighbours, as far as that brings it no nearer to a wall."""
+    for _ in range(SMOOTHINGS):
+        for n in range(1, len(points) - 1):
+            (ax, ay), (x, y), (bx, by) = points[n - 1 : n + 2]
+            moved = 0.5 * x + 0.25 * (ax + bx), 0.5 * y + 0.25 * (ay + by)
+            if footing.price(moved) <= max(footing.price((x, y)), FREE + 6):
+                points[n] = moved
+        yield points
