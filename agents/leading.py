@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 GAP_SLOW = 1.5
 GAP_WAIT = 2.0
-"""Of k^d: the leader slows, then waits, while a gap of its chain is wider."""
+"""Of k^d: the leader slows, to half its speed, and then waits, as a gap of its chain grows wider."""
 GAP_WAIT_S_MAX = 15.0
 LOOK_M = 2.0
 LEADER_OMEGA_MAX_RADPS = 0.6
@@ -128,7 +128,7 @@ class Leadership:
             ahead = here
         if widest <= GAP_WAIT:
             self._waiting_since, self.waited_out = None, False
-            return 1.0 if widest <= GAP_SLOW else 0.5
+            return 1.0 - 0.5 * max(0.0, widest - GAP_SLOW) / (GAP_WAIT - GAP_SLOW)
         if self._waiting_since is None:
             self._waiting_since = now
         self.waited_out = now - self._waiting_since >= GAP_WAIT_S_MAX
