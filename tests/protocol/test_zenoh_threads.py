@@ -76,3 +76,40 @@ def test_who_says_what_all_say_is_not_given_its_own_word() -> None:
         client = [sys.executable, "-c", HEARD, endpoint]
         told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True)
     assert told.stdout.strip() == "['event'] ['event', 'lease', 'table']"
+
+
+THREADS = """
+import sys, threading
+from pathlib import Path
+from protocol import clock
+from protocol.bus import Inbox
+from protocol.zenoh_bus import ZenohBus, answers
+here = threading.local()
+class Remembering(Inbox):
+    most = 0
+    def put(self, arrival):
+        here.puts = getattr(here, "puts", 0) + 1
+        self.most = max(self.most, here.puts)
+while not answers(sys.argv[1]):
+    pass
+inbox = Remembering()
+one, other = ZenohBus(sys.argv[1], Inbox()), ZenohBus(sys.argv[1], inbox)
+other.follow(frozenset({"lfa/f/*/event"}))
+until = clock.now() + 10.0
+while clock.now() < until and inbox.most < 2:
+    one.publish("lfa/f/robot1/event", b"")
+    clock.sleep(0.01)
+names = [task.read_text().strip() for task in Path("/proc/self/task").glob("*/comm")]
+one.close()
+other.close()
+print(inbox.most, {name.split("-")[0] for name in names if "-" in name})
+"""
+
+
+def test_a_client_has_one_pool_of_threads_and_python_knows_each_of_them_for_good() -> None:
+    """What a callback leaves with its thread is there at that thread's next one: nothing is made anew a sample."""
+    with _router() as endpoint:
+        client = [sys.executable, "-c", THREADS, endpoint]
+        fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
+        told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh)
+    assert told.stdout.strip() == "2 {'rx'}"
