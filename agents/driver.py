@@ -170,7 +170,8 @@ class Driver:
             self._retreat.keep(pose)
         self._watch(role, pose, wanted, now)
         limits = self._mission.limits
-        self._last = safe(wanted, self._last, points, self._mission.radius_m, limits, dt)
+        braked_for = points + self._around.ground.doubtful(pose)
+        self._last = safe(wanted, self._last, braked_for, self._mission.radius_m, limits, dt)
         self.follower.overridden(self._last)
         return self._last
 

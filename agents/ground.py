@@ -6,12 +6,14 @@ What cannot be crossed is remembered as points in `map`, so that a detour treats
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil, copysign, cos, floor, inf, isnan, pi, sin
+from math import ceil, copysign, cos, floor, inf, isnan, pi, sin, sqrt
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from agents.decisions import Situation, decide
+from agents.motion import in_base
 from agents.perception import Point
 from agents.strategy import Decision
 from protocol.geometry import Pose2D, Twist
@@ -30,7 +32,7 @@ CELLS_MAX = 4000
 MOVED_M = 0.3
 """What is barred near the robot is looked up anew when it has moved so far, or something new bars the way."""
 NOWHERE = (inf, inf, 0.0)
-JUDGE_M = 0.6
+JUDGE_M = 0.5
 """Nearer than this, what has no visible end has none."""
 NEAR_M = 0.5
 CROSSING_MPS = 0.2
@@ -38,6 +40,10 @@ CROSSING_MPS = 0.2
 SEEN_MIN = 4
 AGAIN_S = 0.3
 """A cell counts when it was seen so often, each time within so long of the last: one bad reading is no hole."""
+BESIDE_M = 0.05
+"""What lies so far inside of a wheel's line is looked at before a bend brings the wheel there: the body's edge."""
+LATE_S = 0.1
+"""From a look at the floor until the robot brakes."""
 
 
 class GroundFeature(Struct, frozen=True, gc=False):
@@ -77,26 +83,36 @@ class Ground:
         self.decision: Decision | None = None
         """While something is crossed, and on the way to it."""
         self._crossing_until = 0.0
+        self._doubtful: list[Point] = []
+        """In `map`, where the newest profile shows what may be a hole and is none yet."""
+        self._looks = False
 
     def profile(self, profile: GroundProfile, pose_map: Pose2D, now: float) -> None:
         """Take a profile that was made at `pose_map`."""
         features = [(line, feature) for line in range(len(profile.heights_m)) for feature in _runs(profile, line)]
         ditch = _is_ditch([feature for _, feature in features], len(profile.heights_m))
-        self.ahead = None
+        self.ahead, self._looks, self._doubtful = None, True, []
+        gaps = _gaps(features, self._limits)
         for line, found in features:
-            feature = GroundFeature("ditch", *_facts(found)) if ditch and found.kind == "pothole" else found
-            if feature.width_m == inf and (feature.near_m > JUDGE_M or feature.size_m <= self._limits.climb_step_m):
-                continue  # its end will be seen from nearer by; or the floor that the robot came from is higher
+            feature = replace(found, kind="ditch") if ditch and found.kind == "pothole" else found
+            if feature.width_m == inf and feature.size_m <= self._limits.climb_step_m:
+                continue  # the floor that the robot came from is higher
+            if not feature.crossable(self._limits) and feature.width_m > 1.5 * profile.increment_m:
+                self._doubtful.append(_at(pose_map, feature.near_m, profile.offsets_m[line]))
+            if feature.width_m == inf and feature.near_m > JUDGE_M:
+                continue  # its end will be seen from nearer by
             if not feature.crossable(self._limits):
                 self._bar(profile, line, feature, pose_map, now)
-            elif self._confirmed(profile.offsets_m[line], feature, pose_map, now) and (
-                self.ahead is None or feature.near_m < self.ahead.near_m
-            ):
-                self.ahead = feature
+            elif self._confirmed(profile.offsets_m[line], feature, pose_map, now):
+                if line in gaps and feature.kind != "bump":
+                    self._free(profile, line, feature, pose_map)
+                if self.ahead is None or feature.near_m < self.ahead.near_m:
+                    self.ahead = feature
 
     def cross(self, wanted: Twist, radius_m: float, now: float) -> Twist:
-        """`wanted`, straight and slow over what can be crossed, until the whole robot is behind it."""
-        ahead = self.ahead
+        """`wanted`, straight and slow over what can be crossed, until the whole robot is behind it; and at any time
+        slow enough in a bend to stop before what a look ahead shows there first."""
+        ahead, wanted = self.ahead, self._in_sight(wanted)
         if ahead is not None and ahead.near_m < NEAR_M and wanted.linear_x > 0.0:
             row = decide(Situation(ahead.kind, ahead.near_m, ahead.width_m, crossable=True))
             if row is not None:
@@ -108,6 +124,16 @@ class Ground:
         if wanted.linear_x <= CROSSING_MPS:
             return wanted
         return Twist(CROSSING_MPS, wanted.angular_z * CROSSING_MPS / wanted.linear_x)
+
+    def _in_sight(self, wanted: Twist) -> Twist:
+        """The lines look straight ahead: on a bend of radius R the floor before the inner wheel is `BESIDE_M` off its
+        line in a distance of sqrt(2 R BESIDE_M), and was never seen from farther away."""
+        v, omega = wanted.linear_x, abs(wanted.angular_z)
+        if v <= 0.0 or omega == 0.0 or not self._looks:
+            return wanted
+        seen_m, a = sqrt(2.0 * BESIDE_M * v / omega), self._limits.a_max_mps2
+        v_max = sqrt(a * a * LATE_S * LATE_S + 2.0 * a * seen_m) - a * LATE_S
+        return wanted if v <= v_max else Twist(v_max, wanted.angular_z * v_max / v)
 
     def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind, now: float) -> None:
         """Nobody of this robot's size gets into the circle about (x, y) in `map` any more."""
@@ -125,6 +151,11 @@ class Ground:
         return [
             (c * dx + s * dy, c * dy - s * dx) for px, py in barred if (dx := px - x) * dx + (dy := py - y) * dy < limit
         ]
+
+    def doubtful(self, pose_map: Pose2D) -> list[Point]:
+        """Edges, in `base_link`, that the newest profile shows and that may bar the way: braked for before they are
+        believed, since a robot that waits for the next looks does not stop before them any more."""
+        return [in_base(pose_map, point) for point in self._doubtful]
 
     def nearest(self, x: float, y: float, within_m: float) -> tuple[BarKind, float] | None:
         """Class and width of the barred floor nearest to (x, y) in `map`."""
@@ -159,14 +190,17 @@ class Ground:
 
     def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D, now: float) -> None:
         """The feature's seen points on this line."""
-        y, c, s = profile.offsets_m[line], cos(pose_map.theta), sin(pose_map.theta)
-        last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
-        x = feature.near_m
-        while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
-            self._bar_cell(
-                pose_map.x + c * x - s * y, pose_map.y + s * x + c * y, feature.kind, feature.width_m, 1, now
-            )
-            x += profile.increment_m
+        for x, y in _seen(profile, line, feature, pose_map):
+            self._bar_cell(x, y, feature.kind, feature.width_m, 1, now)
+
+    def _free(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
+        """A gap that wheels bridge seems too wide to one who looks at it askew: seen like this it bars nothing more."""
+        for x, y in _seen(profile, line, feature, pose_map):
+            i, j = floor(x / CELL_M), floor(y / CELL_M)
+            for cell in [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]:
+                if self._cells.get(cell) and self._kinds[cell][0] in ("pothole", "ditch"):
+                    self._cells[cell] = 0
+                    self._looked_at = NOWHERE
 
     def _bar_cell(self, x: float, y: float, kind: BarKind, width_m: float, seen: int, now: float) -> None:
         cell = floor(x / CELL_M), floor(y / CELL_M)
@@ -177,6 +211,22 @@ class Ground:
             before = 0
         self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, (kind, width_m)
         self._looked_at = NOWHERE
+
+
+def _seen(profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> list[Point]:
+    """The feature's readings on `line`, in `map`."""
+    last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
+    x, readings = feature.near_m, []
+    while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
+        readings.append(_at(pose_map, x, profile.offsets_m[line]))
+        x += profile.increment_m
+    return readings
+
+
+def _at(pose_map: Pose2D, x: float, y: float) -> Point:
+    """(x, y) of `base_link` in `map`."""
+    c, s = cos(pose_map.theta), sin(pose_map.theta)
+    return pose_map.x + c * x - s * y, pose_map.y + s * x + c * y
 
 
 def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:
@@ -210,5 +260,7 @@ def _is_ditch(features: Sequence[GroundFeature], lines: int) -> bool:
     return abs(edges[0] - 2.0 * edges[1] + edges[2]) < STRAIGHT_M
 
 
-def _facts(feature: GroundFeature) -> tuple[float, float, float]:
-    return feature.near_m, feature.width_m, feature.size_m
+def _gaps(features: Sequence[tuple[int, GroundFeature]], limits: Limits) -> set[int]:
+    """The lines on which a gap is that wheels bridge and that a line beside shows too: no round hole's rim is."""
+    narrow = {line for line, f in features if f.kind == "pothole" and f.width_m <= limits.bridge_gap_m}
+    return {line for line in narrow if line - 1 in narrow or line + 1 in narrow}

@@ -4,7 +4,8 @@ from math import inf, nan
 
 import pytest
 
-from agents.ground import CROSSING_MPS, SEEN_MIN, Ground
+from agents.ground import BESIDE_M, CROSSING_MPS, LATE_S, SEEN_MIN, Ground
+from agents.safety import safe
 from protocol.geometry import Pose2D, Twist
 from protocol.messages import GroundProfile, Header
 from protocol.mission import Limits
@@ -115,3 +116,72 @@ def test_crossing_is_slow_until_the_robot_is_behind_it() -> None:
     assert ground.cross(Twist(0.5, 0.0), 0.15, 1.0).linear_x == CROSSING_MPS
     assert ground.cross(Twist(0.5, 0.0), 0.15, 6.0) == Twist(0.5, 0.0)
     assert ground.decision is None
+
+
+def looking(near_m: float, width_m: float, lines: tuple[int, ...] = (0, 1, 2)) -> GroundProfile:
+    """Readings every 2 cm as far as 1 m: a deep hole on `lines`."""
+    row = tuple(-0.2 if near_m <= 0.1 + 0.02 * n < near_m + width_m else 0.0 for n in range(46))
+    rows = tuple(row if line in lines else (0.0,) * 46 for line in range(3))
+    return GroundProfile(HEADER, 0.1, 0.02, (0.12, 0.0, -0.12), rows)
+
+
+def test_a_hole_whose_end_a_nearer_look_shows_is_not_taken_for_endless() -> None:
+    ground = Ground(LIMITS)
+    for n, near_m in enumerate((0.59, 0.57, 0.55, 0.53)):
+        ground.profile(looking(near_m, 0.49), Pose2D(0.6 - near_m, 0.0, 0.0), 0.05 * n)
+    assert ground.points(Pose2D(), 2.0) == []
+    for n, near_m in enumerate((0.49, 0.47, 0.45, 0.43)):
+        ground.profile(looking(near_m, 0.49), Pose2D(0.6 - near_m, 0.0, 0.0), 0.2 + 0.05 * n)
+    found = ground.nearest(0.6, 0.0, 0.3)
+    assert found is not None
+    assert found[1] == pytest.approx(0.49, abs=0.03)
+
+
+@pytest.mark.parametrize("near_m", [0.4, 0.7])
+def test_what_may_be_a_hole_is_braked_for_before_it_is_believed(near_m: float) -> None:
+    ground = looked_at(looking(near_m, 0.9, lines=(2,)), times=1)
+    assert ground.points(Pose2D(), 2.0) == []
+    braked_for = ground.doubtful(Pose2D(0.1, 0.0, 0.0))
+    assert braked_for == [pytest.approx((near_m - 0.1, -0.12), abs=0.02)]
+    fast = Twist(1.0, 0.0)
+    assert safe(fast, fast, braked_for, 0.15, LIMITS, 0.02).linear_x < 1.0
+
+
+def test_one_bad_reading_is_not_braked_for() -> None:
+    assert looked_at(looking(0.5, 0.02, lines=(1,)), times=1).doubtful(Pose2D()) == []
+
+
+@pytest.mark.parametrize("wanted", [Twist(1.0, 1.7), Twist(0.8, -1.6)])
+def test_in_a_bend_the_robot_stops_before_what_a_look_ahead_shows_there_first(wanted: Twist) -> None:
+    slower = looked_at(profile(), times=1).cross(wanted, 0.15, 0.0)
+    v, radius_m = slower.linear_x, abs(slower.linear_x / slower.angular_z)
+    assert v / slower.angular_z == pytest.approx(wanted.linear_x / wanted.angular_z)
+    assert LATE_S * v + v * v / (2.0 * LIMITS.a_max_mps2) <= (2.0 * radius_m * BESIDE_M) ** 0.5 + 1e-9
+
+
+@pytest.mark.parametrize("wanted", [Twist(1.0, 0.0), Twist(0.3, 0.6), Twist(0.0, 2.0), Twist(-0.3, 1.5)])
+def test_straight_on_and_in_slow_bends_nothing_is_slowed(wanted: Twist) -> None:
+    assert looked_at(profile(), times=1).cross(wanted, 0.15, 0.0) == wanted
+
+
+def test_a_robot_that_does_not_look_at_the_floor_is_not_slowed_in_a_bend() -> None:
+    assert Ground(LIMITS).cross(Twist(1.0, 1.7), 0.15, 0.0) == Twist(1.0, 1.7)
+
+
+def test_a_gap_that_seemed_too_wide_askew_bars_nothing_once_it_is_seen_straight_on() -> None:
+    ground = Ground(LIMITS)
+    for n in range(SEEN_MIN):
+        ground.profile(looking(0.5, 0.12), Pose2D(), 0.05 * n)
+    assert ground.points(Pose2D(), 2.0) != []
+    for n in range(SEEN_MIN):
+        for near_m in (0.5, 0.54, 0.6):
+            ground.profile(looking(near_m, 0.04), Pose2D(), 0.3 + 0.05 * n)
+    assert ground.points(Pose2D(), 2.0) == []
+
+
+def test_the_rim_of_a_round_hole_on_one_line_frees_nothing() -> None:
+    ground = looked_at(looking(0.5, 0.4, lines=(1,)))
+    before = ground.points(Pose2D(), 2.0)
+    for n in range(SEEN_MIN):
+        ground.profile(looking(0.5, 0.04, lines=(1,)), Pose2D(), 0.2 + 0.05 * n)
+    assert ground.points(Pose2D(), 2.0) == before != []
