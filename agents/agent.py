@@ -114,7 +114,7 @@ class Agent:
     def next_deadline(self) -> float:
         if self._lease is None:
             return self._next_ask
-        return min(self._next_control, self._lease.next_deadline())
+        return min(self._next_control, self._lease.next_deadline(self._next_control))
 
     def tick(self, now: float) -> list[Envelope]:
         if self._lease is None:

@@ -168,16 +168,23 @@ class Lease:
         elif self._holder is None and now >= self._election.at:
             self._stand(now, effects)
         if now >= self._hello_at:
-            self._hello_at = now + HELLO_HEARTBEATS * self._timing.heartbeat_s
+            pause_s = HELLO_HEARTBEATS * self._timing.heartbeat_s
+            on_time = now < self._hello_at + pause_s  # then late looks do not add up
+            self._hello_at = (self._hello_at if on_time else now) + pause_s
             if self._is_out(now) and not self._stopping.closing:
                 effects.append(Send("all", Hello(None if is_first(self.config) else self.config.version)))
         if self.leader is not None and self._holder is None and now >= self._leader_until:
             self.leader = None
         return effects
 
-    def next_deadline(self) -> float:
-        """When to tick next."""
-        at = min(self._hello_at, self._stopping.release_at)
+    def next_deadline(self, looks_in_at: float = float("-inf")) -> float:
+        """When to tick next.
+
+        Who ticks at `looks_in_at` anyway is not woken before it only to find that it need not say HELLO.
+        """
+        at = self._stopping.release_at
+        if self._hello_at >= looks_in_at or self._candidate is not None or self._is_out(self._hello_at):
+            at = min(at, self._hello_at)
         if self._holder is not None:
             at = min(at, _expiry(self._holder))
             if self._candidate is None:

@@ -137,12 +137,19 @@ class ZenohBus:
         if len(parts) == 5 and parts[3] == "alive":
             callback = zenoh.handlers.Callback(self._on_token, indirect=False)
             return self._session.liveliness().declare_subscriber(key, callback, history=True)
-        return self._session.declare_subscriber(key, zenoh.handlers.Callback(self._on_sample, indirect=False))
+        return self._session.declare_subscriber(key, zenoh.handlers.Callback(self._on_sample(key), indirect=False))
 
-    def _on_sample(self, sample: zenoh.Sample) -> None:
-        if get_ident() not in _attached:
-            _attach()
-        self._inbox.put(Arrival(clock.now(), str(sample.key_expr), sample.payload.to_bytes()))
+    def _on_sample(self, expression: str) -> Callable[[zenoh.Sample], None]:
+        """What to do with a sample on `expression`, which is its key when it is no pattern."""
+        put = self._inbox.put
+        known = None if "*" in expression else expression
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            if get_ident() not in _attached:
+                _attach()
+            put(Arrival(clock.now(), known or str(sample.key_expr), sample.payload.to_bytes()))
+
+        return on_sample
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)

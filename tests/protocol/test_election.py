@@ -10,6 +10,7 @@ from protocol.election import COLD_START_S
 from protocol.lease import Lease
 from protocol.messages import (
     Config,
+    Hello,
     Member,
     Prepare,
     Propose,
@@ -138,6 +139,32 @@ def test_e6_a_robot_without_a_vote_does_not_wait_for_a_lease_that_was_released()
         now = max(newcomer.next_deadline(), now + 1e-6)
         asked = sent(newcomer.tick(now), Prepare)
     assert now <= 10.01 + 4 * STD.rank_step_s * 2
+
+
+def _under_a_leader(*chain: Member) -> Lease:
+    """Robot 2, which voted for robot 1 at 10 s; the leader's chain is robot 1 and `chain`."""
+    mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
+    term, leader, witness = Term(5, 1, 7), Member(1, 7), Member(0, 3)
+    config = Config(Version(term, 0), (leader, Member(2, 4), witness), witness, None, (leader, *chain))
+    lease = Lease(Member(2, 4), mission, STD, 0.0, floor=0)
+    lease.receive(leader, Propose(term, config, 3, leader), 10.0)
+    lease.tick(10.0)
+    return lease
+
+
+def test_e9_who_looks_in_soon_is_woken_for_a_hello_only_when_it_has_one_to_say() -> None:
+    follower, out = _under_a_leader(Member(2, 4)), _under_a_leader()
+    hello_at = out.next_deadline()
+    assert follower.next_deadline() == hello_at, "without control steps of its own nobody else asks"
+    assert follower.next_deadline(hello_at + 0.02) > hello_at
+    assert out.next_deadline(hello_at + 0.02) == hello_at
+
+
+def test_e9_hellos_keep_their_beat_when_a_look_comes_late() -> None:
+    out = _under_a_leader()
+    first = out.next_deadline()
+    assert sent(out.tick(first + 0.015), Hello)
+    assert out.next_deadline() - first == pytest.approx(first - 10.0)
 
 
 def test_followers_that_leave_stay_out_of_the_election() -> None:
