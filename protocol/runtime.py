@@ -6,6 +6,7 @@ the cores answer, write the journals once. Nothing else decides here.
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import resource
 import signal
@@ -37,6 +38,7 @@ VITALS_S = 1.0
 NAMESAKE_LEASES = 1.75  # of the two that are waited: one that waits for its mission speaks once a second only
 TWIN_LEASES = 1.5
 WAIT_S_MAX = 0.5
+M_ARENA_MAX = -8  # malloc.h
 TICKS_KEPT = 1000
 """Of 20 s of control: ten of them are above the 99th percentile."""
 
@@ -149,6 +151,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
 
     Waits for a router as long as it takes. Raises Refused when a node's name already lives in the fleet.
     """
+    _libc("mallopt", M_ARENA_MAX, 1)  # not a heap for each of Zenoh's threads
     wake = Wake()
     stop = _on_signals(wake)
     seats: list[_Seat] = []
@@ -167,6 +170,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             _refuse_twin(bus, options, node, dead)
         gc.collect()
         gc.freeze()
+        _libc("malloc_trim", 0)  # what starting took and freed
         return _loop(seats, wake, stop, Notify(options.notify))
     finally:
         for seat in seats:
@@ -338,6 +342,13 @@ class _VitalSigns:
         lag_s, self._lag_s = self._lag_s, 0.0
         dropped, undecodable = seat.inbox.dropped, seat.host.undecodable
         return Vitals(lag_s, dropped, undecodable, self._cpu_percent, _resident_mib(), seat.tick_p99_s())
+
+
+def _libc(name: str, *numbers: int) -> None:
+    """Call a function with which glibc alone is told to take less memory."""
+    function = getattr(ctypes.CDLL(None), name, None)
+    if function is not None:
+        function(*numbers)
 
 
 def _resident_mib() -> float:
