@@ -39,7 +39,7 @@ CROSSING_MPS = 0.2
 """Slow enough for the wheels, whatever they meet (control.md section 7)."""
 SEEN_MIN = 4
 AGAIN_S = 0.3
-"""A cell counts when it was seen so often, each time within so long of the last: one bad reading is no hole."""
+"""A cell counts when so many looks showed it, each within so long of the last: a bad reading or two are no hole."""
 BESIDE_M = 0.05
 """What lies so far inside of a wheel's line is looked at before a bend brings the wheel there: the body's edge."""
 LATE_S = 0.1
@@ -140,7 +140,8 @@ class Ground:
         count = ceil(2.0 * pi * radius_m / CELL_M)
         for n in range(count):
             angle = 2.0 * pi * n / count
-            self._bar_cell(x + radius_m * cos(angle), y + radius_m * sin(angle), kind, 2.0 * radius_m, SEEN_MIN, now)
+            cell = floor((x + radius_m * cos(angle)) / CELL_M), floor((y + radius_m * sin(angle)) / CELL_M)
+            self._bar_cell(cell, kind, 2.0 * radius_m, SEEN_MIN, now)
 
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
         """What bars the way nearer than `within_m`, in `base_link`."""
@@ -189,9 +190,10 @@ class Ground:
         return before
 
     def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D, now: float) -> None:
-        """The feature's seen points on this line."""
-        for x, y in _seen(profile, line, feature, pose_map):
-            self._bar_cell(x, y, feature.kind, feature.width_m, 1, now)
+        """The cells of the feature's readings on this line, each seen once, however many of the readings it holds."""
+        readings = _seen(profile, line, feature, pose_map)
+        for cell in dict.fromkeys((floor(x / CELL_M), floor(y / CELL_M)) for x, y in readings):
+            self._bar_cell(cell, feature.kind, feature.width_m, 1, now)
 
     def _free(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
         """A gap that wheels bridge seems too wide to one who looks at it askew: seen like this it bars nothing more."""
@@ -202,8 +204,7 @@ class Ground:
                     self._cells[cell] = 0
                     self._looked_at = NOWHERE
 
-    def _bar_cell(self, x: float, y: float, kind: BarKind, width_m: float, seen: int, now: float) -> None:
-        cell = floor(x / CELL_M), floor(y / CELL_M)
+    def _bar_cell(self, cell: tuple[int, int], kind: BarKind, width_m: float, seen: int, now: float) -> None:
         if cell not in self._cells and len(self._cells) >= CELLS_MAX:
             return
         before = self._cells.get(cell, 0)

@@ -81,6 +81,13 @@ def test_bad_readings_now_and_then_in_one_place_are_no_hole() -> None:
     assert ground.points(Pose2D(), 2.0) == []
 
 
+def test_a_look_counts_once_for_a_cell_however_many_of_its_readings_lie_in_it() -> None:
+    rows = tuple(tuple(0.09 if line == 1 and n == 20 else 0.0 for n in range(46)) for line in range(3))
+    bad = GroundProfile(HEADER, 0.1, 0.02, (0.12, 0.0, -0.12), rows)
+    assert looked_at(bad, times=SEEN_MIN - 1).points(Pose2D(), 2.0) == []
+    assert looked_at(bad, times=SEEN_MIN).points(Pose2D(), 2.0) != []
+
+
 def test_a_bump_is_as_high_as_most_of_its_readings() -> None:
     rows = profile((0.5, 0.7, 0.009)).heights_m
     noisy = tuple(tuple(0.013 if n == 9 else h for n, h in enumerate(row)) for row in rows)
