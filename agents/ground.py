@@ -1,32 +1,27 @@
-"""From the ground profile to potholes, bumps and ditches: which can be crossed, and where the others bar the way.
+"""The floor ahead: over what can be crossed the robot goes straight and slowly; the rest bars the way.
 
-What cannot be crossed is remembered as points in `map`, so that a detour treats its edge like an obstacle's.
+What cannot be crossed is remembered as points in `map`, so that a detour treats its edge like an obstacle's. What a
+single look shows is `profile.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import ceil, copysign, cos, floor, inf, isnan, pi, sin, sqrt
+from math import ceil, cos, floor, inf, pi, sin, sqrt
 from typing import Literal
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from agents.decisions import Situation, decide
 from agents.motion import in_base
 from agents.perception import Point
+from agents.profile import GroundFeature, at, bridged_lines, is_ditch, readings_of, runs
 from agents.strategy import Decision
 from protocol.geometry import Pose2D, Twist
 from protocol.messages import GroundProfile
 from protocol.mission import Limits
 
-GroundKind = Literal["pothole", "bump", "ditch"]
 BarKind = Literal["pothole", "bump", "ditch", "wall"]
 
-FLAT_M = 0.004
-"""Lower than this over the floor around is noise, and no wheel feels it."""
-STRAIGHT_M = 0.08
-"""A hole whose near edge is this straight over all three lines is a ditch."""
 CELL_M = 0.05
 CELLS_MAX = 4000
 MOVED_M = 0.3
@@ -44,24 +39,6 @@ BESIDE_M = 0.05
 """What lies so far inside of a wheel's line is looked at before a bend brings the wheel there: the body's edge."""
 LATE_S = 0.1
 """From a look at the floor until the robot brakes."""
-
-
-class GroundFeature(Struct, frozen=True, gc=False):
-    """One thing on the floor ahead, as far as seen."""
-
-    kind: GroundKind
-    near_m: float
-    """Way to its near edge."""
-    width_m: float
-    """Along the direction of travel; inf when the far edge is out of sight."""
-    size_m: float
-    """Depth of a hole, height of a bump."""
-
-    def crossable(self, limits: Limits) -> bool:
-        """Wheels bridge the gap, or climb the step; what has no visible end is neither."""
-        if self.kind == "bump":
-            return self.width_m < inf and self.size_m <= limits.climb_step_m
-        return self.width_m <= limits.bridge_gap_m or self.size_m <= limits.climb_step_m
 
 
 class Ground:
@@ -89,22 +66,22 @@ class Ground:
 
     def profile(self, profile: GroundProfile, pose_map: Pose2D, now: float) -> None:
         """Take a profile that was made at `pose_map`."""
-        features = [(line, feature) for line in range(len(profile.heights_m)) for feature in _runs(profile, line)]
-        ditch = _is_ditch([feature for _, feature in features], len(profile.heights_m))
+        features = [(line, feature) for line in range(len(profile.heights_m)) for feature in runs(profile, line)]
+        ditch = is_ditch([feature for _, feature in features], len(profile.heights_m))
         self.ahead, self._looks, self._doubtful = None, True, []
-        gaps = _gaps(features, self._limits)
+        bridged = bridged_lines(features, self._limits)
         for line, found in features:
             feature = replace(found, kind="ditch") if ditch and found.kind == "pothole" else found
             if feature.width_m == inf and feature.size_m <= self._limits.climb_step_m:
                 continue  # the floor that the robot came from is higher
             if not feature.crossable(self._limits) and feature.width_m > 1.5 * profile.increment_m:
-                self._doubtful.append(_at(pose_map, feature.near_m, profile.offsets_m[line]))
+                self._doubtful.append(at(pose_map, feature.near_m, profile.offsets_m[line]))
             if feature.width_m == inf and feature.near_m > JUDGE_M:
                 continue  # its end will be seen from nearer by
             if not feature.crossable(self._limits):
                 self._bar(profile, line, feature, pose_map, now)
             elif self._confirmed(profile.offsets_m[line], feature, pose_map, now):
-                if line in gaps and feature.kind != "bump":
+                if line in bridged and feature.kind != "bump":
                     self._free(profile, line, feature, pose_map)
                 if self.ahead is None or feature.near_m < self.ahead.near_m:
                     self.ahead = feature
@@ -191,13 +168,13 @@ class Ground:
 
     def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D, now: float) -> None:
         """The cells of the feature's readings on this line, each seen once, however many of the readings it holds."""
-        readings = _seen(profile, line, feature, pose_map)
+        readings = readings_of(profile, line, feature, pose_map)
         for cell in dict.fromkeys((floor(x / CELL_M), floor(y / CELL_M)) for x, y in readings):
             self._bar_cell(cell, feature.kind, feature.width_m, 1, now)
 
     def _free(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
         """A gap that wheels bridge seems too wide to one who looks at it askew: seen like this it bars nothing more."""
-        for x, y in _seen(profile, line, feature, pose_map):
+        for x, y in readings_of(profile, line, feature, pose_map):
             i, j = floor(x / CELL_M), floor(y / CELL_M)
             for cell in [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]:
                 if self._cells.get(cell) and self._kinds[cell][0] in ("pothole", "ditch"):
@@ -212,56 +189,3 @@ class Ground:
             before = 0
         self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, (kind, width_m)
         self._looked_at = NOWHERE
-
-
-def _seen(profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> list[Point]:
-    """The feature's readings on `line`, in `map`."""
-    last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
-    x, readings = feature.near_m, []
-    while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
-        readings.append(_at(pose_map, x, profile.offsets_m[line]))
-        x += profile.increment_m
-    return readings
-
-
-def _at(pose_map: Pose2D, x: float, y: float) -> Point:
-    """(x, y) of `base_link` in `map`."""
-    c, s = cos(pose_map.theta), sin(pose_map.theta)
-    return pose_map.x + c * x - s * y, pose_map.y + s * x + c * y
-
-
-def _runs(profile: GroundProfile, line: int) -> list[GroundFeature]:
-    """Runs of readings off the floor on one line; a missing reading neither begins nor ends one.
-
-    A run's size is its median reading: the largest one would be noise's.
-    """
-    heights, features = profile.heights_m[line], []
-    start, sign = 0, 0.0
-    run: list[float] = []
-    for n, height in enumerate((*heights, 0.0)):
-        missing = isnan(height)
-        off = 0.0 if missing or abs(height) < FLAT_M else copysign(1.0, height)
-        if run and off != sign and not missing:
-            width = inf if n == len(heights) else (n - start) * profile.increment_m
-            near_m, size_m = profile.first_m + start * profile.increment_m, sorted(run)[len(run) // 2]
-            features.append(GroundFeature("bump" if sign > 0.0 else "pothole", near_m, width, size_m))
-            run = []
-        if off != 0.0:
-            if not run:
-                start, sign = n, off
-            run.append(abs(height))
-    return features
-
-
-def _is_ditch(features: Sequence[GroundFeature], lines: int) -> bool:
-    """A hole on every line, with a straight near edge."""
-    edges = [feature.near_m for feature in features if feature.kind == "pothole"]
-    if len(edges) != lines or lines < 3:
-        return False
-    return abs(edges[0] - 2.0 * edges[1] + edges[2]) < STRAIGHT_M
-
-
-def _gaps(features: Sequence[tuple[int, GroundFeature]], limits: Limits) -> set[int]:
-    """The lines on which a gap is that wheels bridge and that a line beside shows too: no round hole's rim is."""
-    narrow = {line for line, f in features if f.kind == "pothole" and f.width_m <= limits.bridge_gap_m}
-    return {line for line in narrow if line - 1 in narrow or line + 1 in narrow}
