@@ -124,10 +124,12 @@ class Agent:
                 self._next_ask = now + ASK_S
                 self._voice.say("ask", Ask(self._voice.header("ask", now), "mission"))
             return self._voice.spoken()
-        if now >= self._lease.next_deadline():
-            self._apply(self._lease.tick(now), now)
-        if now >= self._next_control:
+        step = now >= self._next_control
+        if step:
             self._next_control = _next_on_grid(self._next_control, now, CONTROL_PERIOD_S)
+        if step or now >= self._lease.next_deadline():
+            self._apply(self._lease.tick(now, self._next_control), now)
+        if step:
             self._control(now)
         return self._voice.spoken()
 

@@ -48,6 +48,8 @@ __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Se
 
 NEVER = float("inf")
 HELLO_HEARTBEATS = 3
+LATE_S = 1e-3
+"""A round that falls due no longer than this before somebody looks in anyway waits until then."""
 
 
 def gateway_of(robot_id: int) -> str:
@@ -153,15 +155,16 @@ class Lease:
                 pass  # a gateway's matter
         return effects
 
-    def tick(self, now: float) -> list[Effect]:
-        """A deadline passed."""
+    def tick(self, now: float, again_at: float = float("-inf")) -> list[Effect]:
+        """A deadline passed. A round that would fall due before `again_at`, the next tick, is sent now."""
         effects: list[Effect] = []
         self._expire(now, effects)
         if now >= self._stopping.release_at:
             self._stopped(now, effects)
-        if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
+        due_by = max(now, again_at - LATE_S)
+        if self._holder is not None and self._candidate is None and due_by >= self._holder.next_round_at:
             self._reshape(now, effects)
-        if self._holder is not None and self._candidate is None and now >= self._holder.next_round_at:
+        if self._holder is not None and self._candidate is None and due_by >= self._holder.next_round_at:
             self._send_round(self._holder, now, effects)
         if self._candidate is not None:
             self._press(self._candidate, now, effects)
@@ -180,14 +183,16 @@ class Lease:
     def next_deadline(self, looks_in_at: float = float("-inf")) -> float:
         """When to tick next.
 
-        Who ticks at `looks_in_at` anyway is not woken before it only to find that it need not say HELLO.
+        Who ticks at `looks_in_at` anyway is not woken before it only to find that it need not say HELLO, nor just
+        before it for a round.
         """
         at = self._stopping.release_at
         if self._hello_at >= looks_in_at or self._candidate is not None or self._is_out(self._hello_at):
             at = min(at, self._hello_at)
         if self._holder is not None:
             at = min(at, _expiry(self._holder))
-            if self._candidate is None:
+            waits = looks_in_at - LATE_S <= self._holder.next_round_at < looks_in_at
+            if self._candidate is None and not waits:
                 at = min(at, self._holder.next_round_at)
         elif self.leader is not None:
             at = min(at, self._leader_until)

@@ -54,6 +54,31 @@ def test_e2_bug_1_a_renewal_counts_from_its_round_not_from_the_grants() -> None:
     )
 
 
+def test_e2_the_round_is_asked_for_in_the_step_before_it_is_due() -> None:
+    """A leader with control steps, each a little late, is woken by them alone, and asks in every second one."""
+    lease, asked_at, _, _ = elected(slow_s=0.001)
+    step_s = STD.heartbeat_s / 2.0
+    asked = []
+    for n in range(1, 9):
+        now, again_at = asked_at + 0.007 + n * step_s + 0.0004 * (n % 3), asked_at + 0.007 + (n + 1) * step_s
+        rounds = sent(lease.tick(now, again_at), Propose)
+        for propose in rounds:
+            assert isinstance(propose, Propose)
+            grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
+            for other in OTHERS:
+                lease.receive(other, grant, now + 0.001)
+        asked += [n] * len(rounds)
+        assert lease.next_deadline(again_at) >= again_at
+    assert asked == [1, 3, 5, 7]
+
+
+def test_e2_who_looks_in_less_often_than_rounds_are_due_is_woken_for_them() -> None:
+    lease, asked_at, _, _ = elected(slow_s=0.001)
+    due_at = lease.next_deadline()
+    assert due_at == asked_at + STD.heartbeat_s
+    assert lease.next_deadline(asked_at + 1.0) == due_at
+
+
 def test_bug_6_leadership_is_announced_only_with_the_quorums_grants() -> None:
     lease = alone()
     propose = proposed(lease, STD.grant_s)
