@@ -142,8 +142,12 @@ def failovers(events: Sequence[Line], reigns: Sequence[Reign]) -> list[Failover]
 
 
 def last_chain(events: Sequence[Line]) -> list[int]:
-    """The chain of the newest config that anybody spoke of; empty when nobody did."""
-    spoken = [line for line in of_kind(events, "chain") if line["term"] is not None]
+    """The chain of the newest config that anybody spoke of; empty when nobody did.
+
+    Not what the team makes of it when it is told to stop: whoever leads sees some of the others go before itself.
+    """
+    over_at = next((line["t"] for line in of_kind(events, "over")), float("inf"))
+    spoken = [line for line in of_kind(events, "chain") if line["term"] is not None and line["t"] <= over_at]
     newest = max(spoken, key=lambda line: (line["term"], line.get("seq", 0)), default=None)
     return [] if newest is None else list(newest["chain"])
 

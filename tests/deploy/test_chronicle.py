@@ -79,3 +79,8 @@ def test_the_last_chain_is_the_newest_configs() -> None:
     late = [_line(9.0, 3, "chain", SECOND, chain=[2, 3, 1], seq=1), _line(9.1, 2, "chain", SECOND, chain=[2, 3], seq=0)]
     assert chronicle.last_chain([*KILLED, *late]) == [2, 3, 1]
     assert chronicle.last_chain([]) == []
+
+
+def test_what_becomes_of_the_chain_when_all_are_told_to_stop_is_not_the_runs() -> None:
+    stopping = [_line(9.0, 0, "over"), _line(9.01, 2, "chain", SECOND, chain=[2], seq=1)]
+    assert chronicle.last_chain([*KILLED, *stopping]) == [2, 3]

@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 
-from deploy.look import trace
+from deploy.look import chronicle, trace
 from deploy.look.summary import read
 from protocol.bus import Inbox
 from protocol.messages import Clock, Header, encode
@@ -30,7 +30,7 @@ def test_a_team_reaches_its_goal_and_keeps_its_distances(tmp_path: Path) -> None
     assert done.returncode == 0, done.stderr + done.stdout
     facts = json.loads(done.stdout)
     assert facts["outcome"] == "goal_reached"
-    assert facts["violations"] == []
+    assert facts["violations"] == facts["left_behind"] == []
     for robot in facts["robots"][1:]:
         assert robot["distance_error_rms_m"] < DISTANCE_RMS_M_MAX, robot
         assert robot["final_speed_mps"] < 1e-3, robot
@@ -52,6 +52,8 @@ def test_the_run_folder_is_whole(tmp_path: Path) -> None:
     assert read(folder).robots[1].distance_error_rms_m is not None
     ticks = [said.counters.get("tick_p99_ms", 0.0) for _, _, _, said in trace.messages(folder, frozenset({"status"}))]
     assert max(ticks) > 0.0
+    kinds = [line["kind"] for line in chronicle.lines(folder)]
+    assert kinds.index("over") < kinds.index("peer_down"), "what counts is how it was before all were told to stop"
 
 
 def test_the_next_in_chain_takes_over_within_half_a_second(tmp_path: Path) -> None:
