@@ -7,7 +7,7 @@ the way to its target has been free for a while.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import atan2, cos, hypot, inf, pi, sin
+from math import atan2, cos, hypot, inf, pi, sin, sqrt
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -26,6 +26,9 @@ WIDE_M = 0.20
 """Kept from the body's surface where there is room."""
 NARROW_M = 0.08
 """Never less (control.md section 7)."""
+NEARER_M, LEAST_M = 0.005, 0.02
+"""Who is nearer to a thing than `NARROW_M` already may go where it comes no nearer than it is but for so much, and not
+nearer than it would brake for anyway (safety.py)."""
 NOISE_M = 0.02
 """A reading of the scan may be so much too short: four standard deviations of the scanner in the paper's worlds."""
 BESIDE = 0.25
@@ -90,6 +93,8 @@ class Detour:
         """A leader turns more slowly than its drive could: its followers' slots swing with it."""
         self.decision: Decision | None = None
         """None while the wanted way is taken."""
+        self._kept_m = NARROW_M
+        """`NARROW_M`, less where the robot is nearer to something already."""
         self._thing = Thing()
         self._side = 0.0
         self._side_at = -inf
@@ -154,6 +159,8 @@ class Detour:
 
     def _round(self, points: Sequence[Point], target: Point, speed_mps: float, free_m: float, now: float) -> Twist:
         """The row of the table that holds, and the twist of its action."""
+        near_m = min((hypot(x, y) for x, y in points), default=inf) - self._radius_m
+        self._kept_m = max(LEAST_M, min(NARROW_M, near_m - NEARER_M))
         towards = atan2(target[1], target[0])
         reach = min(max(hypot(*target), 0.3), REACH_M)
         openings = self._openings(points, towards, reach)
@@ -186,7 +193,9 @@ class Detour:
 
     def _row(self, points: Sequence[Point], openings: _Openings, free_m: float) -> Row | None:
         """The table's row for what was met: an opening is as wide as the robot needs, whatever lies beside it."""
-        ahead_m = self._radius_m + min(free_m, free_along(points, AHEAD, self._radius_m))
+        nose_m = free_along(points, AHEAD, self._radius_m)
+        # A bend that would lead nearer to what the robot has beside it says nothing of what is before its nose.
+        ahead_m = self._radius_m + (nose_m if self._kept_m < NARROW_M else min(free_m, nose_m))
         kind = "stationary" if self._thing.kind == "moving" else self._thing.kind
         return decide(
             Situation(
@@ -204,7 +213,7 @@ class Detour:
 
     def _openings(self, points: Sequence[Point], towards: float, reach_m: float) -> _Openings:
         """With room to spare where there is, else just not touching."""
-        for margin_m in (WIDE_M, NARROW_M):
+        for margin_m in dict.fromkeys((WIDE_M, NARROW_M, self._kept_m)):
             half_width_m = self._radius_m + margin_m
             left = _first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             right = _first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
@@ -215,7 +224,7 @@ class Detour:
 
     def _rear(self, points: Sequence[Point], towards: float, reach_m: float) -> float | None:
         side = self._side or 1.0
-        for margin_m in (WIDE_M, NARROW_M):
+        for margin_m in dict.fromkeys((WIDE_M, NARROW_M, self._kept_m)):
             half_width_m = self._radius_m + margin_m
             rear = _first_open(points, towards, side, ASIDE_STEPS + 1, ALL_STEPS, reach_m, half_width_m)
             if rear is not None:
@@ -259,9 +268,15 @@ class Detour:
         omega = max(-omega_max, min(omega_max, TURN_GAIN * bearing))
         if abs(bearing) > IN_PLACE_RAD:
             return Twist(0.0, omega)
-        free_m = free_along(points, Twist(1.0, 0.0), self._radius_m + NARROW_M)
-        braking = (self._limits.a_max_mps2 * max(0.0, free_m - 0.1)) ** 0.5
+        braking = self._braking(points, NARROW_M)
+        if self._kept_m < NARROW_M:  # slowly past what it is too near to
+            braking = max(braking, min(CREEP_MPS, self._braking(points, self._kept_m)))
         return Twist(min(speed_mps, braking) * cos(bearing), omega)
+
+    def _braking(self, points: Sequence[Point], margin_m: float) -> float:
+        """Speed from which the robot stops before what is ahead of it, `margin_m` wider than it is."""
+        free_m = free_along(points, AHEAD, self._radius_m + margin_m)
+        return sqrt(self._limits.a_max_mps2 * max(0.0, free_m - 0.1))
 
 
 def _first_open(

@@ -110,3 +110,34 @@ def test_a_reading_that_is_too_short_beside_the_robot_starts_no_detour() -> None
 @pytest.mark.parametrize("point", [(0.4, -0.226), (0.038, -0.205)])
 def test_what_is_still_to_be_passed_or_nearer_than_noise_explains_starts_one(point: tuple[float, float]) -> None:
     assert Detour(RADIUS_M, LIMITS).steer([point], (1.0, 0.0), Twist(0.5, -0.01), 0.5, 0.0) is not None
+
+
+CORRIDOR = [(0.05 * n - 0.5, 0.22) for n in range(60)]
+BESIDE = circle(0.03, -0.33, 0.15)
+"""A team-mate 3 cm off, nearer than anybody passes, and a wall on the other side, nearer than that too."""
+
+
+def test_a_robot_that_something_is_too_near_to_creeps_out_where_it_comes_no_nearer() -> None:
+    detour = Detour(RADIUS_M, LIMITS)
+    twist = detour.steer([*CORRIDOR, *BESIDE], (1.5, 0.0), Twist(0.3, 0.0), 0.5, 0.0)
+    assert detour.decision is not None
+    assert detour.decision.action != "blocked"
+    assert twist is not None
+    assert 0.05 < twist.linear_x <= 0.1
+
+
+def test_a_robot_beside_which_something_stands_does_not_back_off_from_it() -> None:
+    """Were a bend towards a team-mate beside it taken for what is before its nose, two that turn round side by side in
+    a pocket would back into it and wedge there (paper_path1, seed 7)."""
+    detour = Detour(RADIUS_M, LIMITS)
+    thing = Thing("wall", 0.5)
+    twist = detour.steer(circle(0.03, 0.35, 0.15), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: thing)
+    assert twist is not None
+    assert twist.linear_x >= 0.0
+
+
+def test_a_robot_with_its_nose_at_a_wall_backs_off() -> None:
+    detour = Detour(RADIUS_M, LIMITS)
+    twist = detour.steer(wall(0.19, -0.5, 0.5), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: Thing("wall", 0.5))
+    assert twist is not None
+    assert twist.linear_x < 0.0
