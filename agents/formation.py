@@ -20,6 +20,9 @@ from protocol.mission import FormationSpec, Limits, Mission, Refused, Side
 SEPARATION_MAX_M = 100.0
 BLEND_SHARE_MIN = 0.1
 """A swing goes on at least this fast (of its rate limit), however fast the predecessor drives."""
+OFFSET_PER_S, OFFSET_LAST_MPS = 2.0, 0.01
+"""The offset's last part is taken back more slowly, by this share of it and so much at least: a robot that comes into
+its slot at an angle and finds it at rest there all at once swings past it."""
 SPEED_MARGIN = 0.9
 PLANNED_MARGIN = 0.8
 SLOT_SPEED_MIN_MPS = 0.05
@@ -252,7 +255,7 @@ class SlotMotion:
         k_rate = _towards(dk, gains.separation_rate_max_mps, dt)
         phi_rate = _towards(dphi, gains.phi_rate_max_radps, dt)
         o = hypot(ox, oy)
-        o_rate = _towards(-o, gains.offset_rate_max_mps, dt)
+        o_rate = _towards(-o, min(gains.offset_rate_max_mps, OFFSET_PER_S * o + OFFSET_LAST_MPS), dt)
         o_vx, o_vy = (o_rate * ox / o, o_rate * oy / o) if o > 0.0 else (0.0, 0.0)
         bx = k_rate * c - self.separation_m * phi_rate * s + o_vx
         by = k_rate * s + self.separation_m * phi_rate * c + o_vy

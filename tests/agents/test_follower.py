@@ -224,6 +224,19 @@ def test_after_an_override_the_law_is_rejoined_without_a_jump() -> None:
     assert max(abs(w.linear_x) for w in log.twists) < 0.95
 
 
+def test_a_robot_that_comes_back_at_an_angle_does_not_swing_past_its_slot() -> None:
+    log = _one(heading_filter_m=0.36).run(_straight, 8.0)
+    chain, robot = log.chain, log.chain.robots[0]
+    robot.pose = Pose2D(robot.pose.x - 0.3, robot.pose.y + 0.6, -0.9)  # after a detour to the left
+    robot.follower.rejoin(robot.pose, robot.twist)
+    past_m = 0.0
+    while chain.time_s < 14.0:
+        log.run(_straight, DT)
+        past_m = max(past_m, chain.leader_pose.y + 1.2 * sin(2 * pi / 3) - robot.pose.y)
+    assert past_m < 0.02
+    assert log.last_outside(0.05, since=8.0) <= 3.0
+
+
 def test_saturation_keeps_the_ratio_of_v_and_omega() -> None:
     follower = Follower(DEFAULT, Limits(a_max_mps2=1e6, alpha_max_radps2=1e6), _Wants(Twist(3.0, 3.0)))
     sighting = Sighting(1, 0, Pose2D(3.0, 0.0, 0.0), Twist(0.5, 0.0), 0.0, 0.0, 0.0, Trace(4.0))
