@@ -4,7 +4,7 @@ slow enough to stop before what the scan shows."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, isfinite
+from math import atan2, hypot, isfinite, pi
 
 from agents.perception import Point, free_along
 from protocol.geometry import STILL, Twist
@@ -15,8 +15,9 @@ SKIN_M = 0.02
 BRAKING_SHARE = 0.8
 """Of the drive's deceleration, planned with: the rest is for what a 10 Hz scan has not seen yet."""
 
-SHARED_SHARE = 0.5
-"""Cosine of the angle off the motion within which a team-mate is ahead."""
+SHARED_RAD = pi / 3
+"""Angle off the motion, now or where it turns to within `TURN_S`, within which a team-mate is ahead."""
+TURN_S = 0.4
 
 
 def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, limits: Limits, dt: float) -> Twist:
@@ -39,8 +40,10 @@ def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limi
     the other one may be coming, and the same holds for it."""
     v = wanted.linear_x
     sign = 1.0 if v >= 0.0 else -1.0
+    turn = wanted.angular_z * TURN_S
     for x, y in mates:
-        if sign * x > SHARED_SHARE * hypot(x, y):
+        bearing = atan2(sign * y, sign * x)
+        if abs(bearing - max(min(turn, 0.0), min(max(turn, 0.0), bearing))) < SHARED_RAD:
             room_m = max(0.0, 0.5 * (hypot(x, y) - 2.0 * radius_m) - SKIN_M)
             v_max = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * room_m) ** 0.5
             if abs(v) > v_max:

@@ -65,6 +65,14 @@ def test_two_robots_that_meet_each_stop_within_half_of_the_room() -> None:
         assert out.angular_z * 1.0 == pytest.approx(0.2 * out.linear_x)
 
 
+def test_a_team_mate_that_the_robot_turns_towards_is_ahead_before_its_nose_is() -> None:
+    """Half a second later it would be before the nose, too near to stop (explore, seed 1)."""
+    beside = (0.10, 0.45)
+    assert sharing(Twist(0.65, 0.0), [beside], 0.15, LIMITS) == Twist(0.65, 0.0)
+    assert sharing(Twist(0.65, -1.5), [beside], 0.15, LIMITS) == Twist(0.65, -1.5)
+    assert sharing(Twist(0.65, 1.5), [beside], 0.15, LIMITS).linear_x < 0.4
+
+
 def test_a_team_mate_beside_or_behind_slows_nobody() -> None:
     for place in ((0.1, 0.5), (-0.5, 0.0)):
         assert sharing(Twist(0.5, 0.0), [place], 0.15, LIMITS) == Twist(0.5, 0.0)
