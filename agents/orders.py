@@ -17,9 +17,9 @@ from protocol.mission import Mission, Refused
 
 REPEAT_S = 1.0
 BEND_CHECK_S = 0.5
-FOLD_S = 3.0
-"""Between two hops' falling into column: each takes so long. All at once the last would be swung by all before it, and
-go a longer way."""
+FOLD_S = 6.0
+"""Between two hops' falling into column: each takes half of it, and then comes to rest. All at once the last would be
+swung by all before it, and go a longer way."""
 BEND_AHEAD_M = 5.0
 """Far enough ahead for a chain of four to fall into column at cruise speed."""
 
