@@ -117,7 +117,7 @@ class Ground:
         count = ceil(2.0 * pi * radius_m / CELL_M)
         for n in range(count):
             angle = 2.0 * pi * n / count
-            cell = floor((x + radius_m * cos(angle)) / CELL_M), floor((y + radius_m * sin(angle)) / CELL_M)
+            cell = _cell((x + radius_m * cos(angle), y + radius_m * sin(angle)))
             self._bar_cell(cell, kind, 2.0 * radius_m, SEEN_MIN, now)
 
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
@@ -157,8 +157,7 @@ class Ground:
 
     def _confirmed(self, y: float, feature: GroundFeature, pose_map: Pose2D, now: float) -> bool:
         """Whether the near edge was seen hereabouts a moment ago too."""
-        c, s, x = cos(pose_map.theta), sin(pose_map.theta), feature.near_m
-        i, j = floor((pose_map.x + c * x - s * y) / CELL_M), floor((pose_map.y + s * x + c * y) / CELL_M)
+        i, j = _cell(at(pose_map, feature.near_m, y))
         around = [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]
         before = any(0.0 < now - self._crossable.get(cell, -inf) <= AGAIN_S for cell in around)
         if len(self._crossable) >= CELLS_MAX:
@@ -168,14 +167,12 @@ class Ground:
 
     def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D, now: float) -> None:
         """The cells of the feature's readings on this line, each seen once, however many of the readings it holds."""
-        readings = readings_of(profile, line, feature, pose_map)
-        for cell in dict.fromkeys((floor(x / CELL_M), floor(y / CELL_M)) for x, y in readings):
+        for cell in dict.fromkeys(map(_cell, readings_of(profile, line, feature, pose_map))):
             self._bar_cell(cell, feature.kind, feature.width_m, 1, now)
 
     def _free(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
         """A gap that wheels bridge seems too wide to one who looks at it askew: seen like this it bars nothing more."""
-        for x, y in readings_of(profile, line, feature, pose_map):
-            i, j = floor(x / CELL_M), floor(y / CELL_M)
+        for i, j in map(_cell, readings_of(profile, line, feature, pose_map)):
             for cell in [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]:
                 if self._cells.get(cell) and self._kinds[cell][0] in ("pothole", "ditch"):
                     self._cells[cell] = 0
@@ -189,3 +186,8 @@ class Ground:
             before = 0
         self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, (kind, width_m)
         self._looked_at = NOWHERE
+
+
+def _cell(point: Point) -> tuple[int, int]:
+    """The cell of the memory that a point in `map` lies in."""
+    return floor(point[0] / CELL_M), floor(point[1] / CELL_M)

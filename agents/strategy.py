@@ -12,6 +12,7 @@ from math import atan2, cos, hypot, inf, pi, sin, sqrt
 from msgspec import Struct
 from msgspec.structs import replace
 
+from agents import safety
 from agents.config import CONTROL_PERIOD_S
 from agents.decisions import Class, Row, Situation, decide
 from agents.perception import Point, free_along
@@ -25,8 +26,8 @@ the opposite direction, so that it does not flip there."""
 WIDE_M = 0.20
 """Kept from the body's surface where there is room."""
 NARROW_M = 0.08
-"""Never less (control.md section 7)."""
-NEARER_M, LEAST_M = 0.005, 0.02
+"""Never less (control.md section 7), but beside what the robot is nearer to already."""
+NEARER_M, LEAST_M = 0.005, safety.SKIN_M
 """Who is nearer to a thing than `NARROW_M` already may go where it comes no nearer than it is but for so much, and not
 nearer than it would brake for anyway (safety.py)."""
 NOISE_M = 0.02
