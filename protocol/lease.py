@@ -49,7 +49,7 @@ __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Se
 NEVER = float("inf")
 HELLO_HEARTBEATS = 3
 LATE_S = 1e-3
-"""A round that falls due no longer than this before somebody looks in anyway waits until then."""
+"""A round that falls due no longer than this before the next tick waits until then."""
 
 
 def gateway_of(robot_id: int) -> str:
@@ -180,18 +180,18 @@ class Lease:
             self.leader = None
         return effects
 
-    def next_deadline(self, looks_in_at: float = float("-inf")) -> float:
+    def next_deadline(self, again_at: float = float("-inf")) -> float:
         """When to tick next.
 
-        Who ticks at `looks_in_at` anyway is not woken before it only to find that it need not say HELLO, nor just
+        Who ticks at `again_at` anyway is not woken before it only to find that it need not say HELLO, nor just
         before it for a round.
         """
         at = self._stopping.release_at
-        if self._hello_at >= looks_in_at or self._candidate is not None or self._is_out(self._hello_at):
+        if self._hello_at >= again_at or self._candidate is not None or self._is_out(self._hello_at):
             at = min(at, self._hello_at)
         if self._holder is not None:
             at = min(at, _expiry(self._holder))
-            waits = looks_in_at - LATE_S <= self._holder.next_round_at < looks_in_at
+            waits = again_at - LATE_S <= self._holder.next_round_at < again_at
             if self._candidate is None and not waits:
                 at = min(at, self._holder.next_round_at)
         elif self.leader is not None:

@@ -137,9 +137,9 @@ def deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
     """It commands no more, but its PROPOSEs keep the voters bound."""
     honest = Lease.next_deadline
 
-    def next_deadline(self: Lease, looks_in_at: float = float("-inf")) -> float:
+    def next_deadline(self: Lease, again_at: float = float("-inf")) -> float:
         if self._holder is None:
-            return honest(self, looks_in_at)
+            return honest(self, again_at)
         asking = self._holder.next_round_at if self._candidate is None else self._candidate.deadline
         return min(self._hello_at, self._stopping.release_at, asking)
 
