@@ -10,16 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-SCRIPT = """
-import os, sys
-from protocol.bus import Inbox
-from protocol.zenoh_bus import ZenohBus, answers
-while not answers(sys.argv[1]):
-    pass
-ZenohBus(sys.argv[1], Inbox()).close()
-print(os.environ.get("ZENOH_RUNTIME"))
-"""
-
 
 @contextmanager
 def _router() -> Iterator[str]:
@@ -36,13 +26,28 @@ def _router() -> Iterator[str]:
             router.wait()
 
 
+def _printed(script: str) -> str:
+    """What `script` prints, given the endpoint of a router that runs, in a process with no wishes for its threads."""
+    fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
+    with _router() as endpoint:
+        client = [sys.executable, "-c", script, endpoint]
+        return subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh).stdout.strip()
+
+
+SCRIPT = """
+import os, sys
+from protocol.bus import Inbox
+from protocol.zenoh_bus import ZenohBus, answers
+while not answers(sys.argv[1]):
+    pass
+ZenohBus(sys.argv[1], Inbox()).close()
+print(os.environ.get("ZENOH_RUNTIME"))
+"""
+
+
 def test_what_a_client_asks_of_zenoh_is_not_inherited_by_its_children() -> None:
     """A router's receiver threads are its own: no client that started it hands it fewer."""
-    with _router() as endpoint:
-        client = [sys.executable, "-c", SCRIPT, endpoint]
-        fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
-        told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh)
-    assert told.stdout.strip() == "None"
+    assert _printed(SCRIPT) == "None"
 
 
 HEARD = """
@@ -72,10 +77,7 @@ print(sorted(heard[0]), sorted(heard[1]))
 
 
 def test_who_says_what_all_say_is_not_given_its_own_word() -> None:
-    with _router() as endpoint:
-        client = [sys.executable, "-c", HEARD, endpoint]
-        told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True)
-    assert told.stdout.strip() == "['event'] ['event', 'lease', 'table']"
+    assert _printed(HEARD) == "['event'] ['event', 'lease', 'table']"
 
 
 THREADS = """
@@ -108,8 +110,4 @@ print(inbox.most, {name.split("-")[0] for name in names if "-" in name})
 
 def test_a_client_has_one_pool_of_threads_and_python_knows_each_of_them_for_good() -> None:
     """What a callback leaves with its thread is there at that thread's next one: nothing is made anew a sample."""
-    with _router() as endpoint:
-        client = [sys.executable, "-c", THREADS, endpoint]
-        fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
-        told = subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh)
-    assert told.stdout.strip() == "2 {'rx'}"
+    assert _printed(THREADS) == "2 {'rx'}"
