@@ -87,16 +87,14 @@ class _Seat:
             else:
                 self._links.see(arrival.payload, now)
                 self._publish(host.deliver(arrival.at, "", arrival.payload, b""))
+        self._follow()  # before it asks: an answer that comes at once would pass by
         late = now - node.next_deadline()
         if late >= 0.0:
             before_s = clock.thread_s()
             sent = host.tick(clock.now())
             self._ticks_s.append(clock.thread_s() - before_s)
             self._publish(sent)
-        if node.interests is not self._followed:
-            self._followed = node.interests
-            self.bus.follow(node.interests | self._weather_interest(node.interests))
-        elif self._links.due(now):
+        if not self._follow() and self._links.due(now):
             self.bus.follow_anew()
         host.journal.flush()
         self.inbox.at_ease = getattr(node, "at_ease", False)  # only a robot ever leads
@@ -106,6 +104,15 @@ class _Seat:
         """Processor time of a tick, at the 99th percentile of the newest; 0 before the first."""
         ordered = sorted(self._ticks_s)
         return ordered[int(0.99 * len(ordered))] if ordered else 0.0
+
+    def _follow(self) -> bool:
+        """Hear what the node wants to hear; whether that is something else than before."""
+        wanted = self.node.interests
+        if wanted is self._followed:
+            return False
+        self._followed = wanted
+        self.bus.follow(wanted | self._weather_interest(wanted))
+        return True
 
     def _weather_interest(self, interests: frozenset[str]) -> frozenset[str]:
         """Nothing when there is no weather, or when the node hears operators anyway."""
