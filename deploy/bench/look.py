@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-import signal
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from socket import socket
 import msgspec
 from msgspec.structs import replace
 
+from deploy.bench.beside import cpu_s, pause, started
 from deploy.bench.rows import Quantity, Row, row, show
 from deploy.bench.team import Team, endless
 from deploy.look import report
@@ -28,7 +28,6 @@ from deploy.look.onlooker import Ear, Fleet, listen
 from deploy.look.view import converted
 from deploy.run import simulate
 from deploy.run.folder import About, make
-from deploy.run.processes import cpu_s, identify
 from deploy.run.recorder import LastWord, Task
 from deploy.run.referee import Verdict
 from protocol import clock
@@ -52,17 +51,17 @@ def _rows() -> Iterator[list[Row]]:
     yield _help()
     with Team(endless(ROBOTS)) as team, tempfile.TemporaryDirectory() as place:
         team.await_chain(ROBOTS)
-        _pause(team, SETTLE_S)
+        pause(team, SETTLE_S)
         with listen(team.fleet, frozenset({"*/status"}), every=True) as ear:
             alone = _lags(team, ear, WATCHED_S)
             yield _recorder(team, Path(place))
             yield _watch(team)
-            with _started([*LFA, *_view(team.fleet)]) as viewer:
-                _pause(team, SETTLE_S)
+            with started([*LFA, *_view(team.fleet)]) as viewer:
+                pause(team, SETTLE_S)
                 ear.take()
-                before, since = _cpu_s(viewer), clock.now()
+                before, since = cpu_s(viewer), clock.now()
                 watched = _lags(team, ear, WATCHED_S)
-                share = 100.0 * (_cpu_s(viewer) - before) / (clock.now() - since)
+                share = 100.0 * (cpu_s(viewer) - before) / (clock.now() - since)
     yield [row("viewer bridge", Quantity("share of a core", "%", 10.0), share)]
     yield [
         row("loop lag", Quantity("median without a viewer", "ms"), alone),
@@ -87,11 +86,11 @@ def _recorder(team: Team, place: Path) -> list[Row]:
     folder = make(place / "run", team.scenario)
     task = Task(str(folder), About("endless", "bench", 0, team.fleet.name), team.fleet.endpoint, str(place / "none"))
     words = [sys.executable, "-m", "deploy.run.recorder", msgspec.json.encode(task).decode()]
-    with _started(words, stdin=subprocess.PIPE) as process:
-        _pause(team, SETTLE_S)
-        before, since = _cpu_s(process), clock.now()
-        _pause(team, WATCHED_S)
-        share = 100.0 * (_cpu_s(process) - before) / (clock.now() - since)
+    with started(words, stdin=subprocess.PIPE) as process:
+        pause(team, SETTLE_S)
+        before, since = cpu_s(process), clock.now()
+        pause(team, WATCHED_S)
+        share = 100.0 * (cpu_s(process) - before) / (clock.now() - since)
         process.communicate(msgspec.json.encode(LastWord(Verdict("time_limit"), WATCHED_S, ())) + b"\n")
     kept = msgspec.json.decode((folder / "summary.json").read_bytes())["recording"]
     return [
@@ -107,11 +106,11 @@ def _watch(team: Team) -> list[Row]:
     termios.tcsetwinsize(inside, (24, 80))
     threading.Thread(target=_drain, args=(terminal,), daemon=True).start()
     words = [*LFA, "watch", "--fleet", team.fleet.name, "--connect", team.fleet.endpoint]
-    with _started(words, inside, inside) as process:
-        _pause(team, SETTLE_S)
-        before, since = _cpu_s(process), clock.now()
-        _pause(team, WATCHED_S)
-        share = 100.0 * (_cpu_s(process) - before) / (clock.now() - since)
+    with started(words, inside, inside) as process:
+        pause(team, SETTLE_S)
+        before, since = cpu_s(process), clock.now()
+        pause(team, WATCHED_S)
+        share = 100.0 * (cpu_s(process) - before) / (clock.now() - since)
     os.close(inside)
     return [row("watch", Quantity("share of a core", "%", 5.0), share)]
 
@@ -154,41 +153,15 @@ def _view(fleet: Fleet) -> list[str]:
     return ["view", "--fleet", fleet.name, "--connect", fleet.endpoint, "--serve-web", *where]
 
 
-@contextlib.contextmanager
-def _started(
-    words: Sequence[str], stdin: int = subprocess.DEVNULL, stdout: int = subprocess.DEVNULL
-) -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen(words, stdin=stdin, stdout=stdout, stderr=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        process.send_signal(signal.SIGTERM)
-        process.wait()
-
-
 def _took(words: Sequence[str]) -> float:
     since = clock.now()
     subprocess.run(words, stdout=subprocess.DEVNULL, check=True)
     return clock.now() - since
 
 
-def _pause(team: Team, duration_s: float) -> None:
-    """The team's own news are heard meanwhile, so that they do not pile up."""
-    until = clock.now() + duration_s
-    while clock.now() < until:
-        team.listen()
-        clock.sleep(0.1)
-
-
 def _lags(team: Team, ear: Ear, duration_s: float) -> float:
     """Median over the agents' largest lags of each second [ms]."""
     ear.take()
-    _pause(team, duration_s)
+    pause(team, duration_s)
     told = [message for _, message in ear.take() if isinstance(message, Status)]
     return statistics.median(status.counters["loop_lag_ms"] for status in told if "loop_lag_ms" in status.counters)
-
-
-def _cpu_s(process: subprocess.Popen[bytes]) -> float:
-    identity = identify(process.pid)
-    assert identity is not None, "it has ended"
-    return cpu_s(identity)

@@ -1,0 +1,128 @@
+"""What an agent costs: its share of a core and memory while a team of four drives, and how soon it speaks.
+
+Beside the agents, in the same run, a bare process (bare.py) does what one of them does on the wire and nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import statistics
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from deploy.bench import bare
+from deploy.bench.beside import cpu_s, pause, started
+from deploy.bench.rows import Quantity, Row, row, show
+from deploy.bench.team import Team
+from deploy.look.onlooker import listen
+from deploy.run import processes
+from protocol import clock
+from protocol.mission import robot_name
+from protocol.topics import HARDWARE, key
+from world.scenario import load
+
+SCENARIO = "straight"
+LIKE = 3
+"""The robot that the bare process is to equal: one that follows and is followed."""
+SETTLE_S = 5.0
+WATCHED_S = 30.0
+MIB = 2**20
+
+
+def run(as_json: bool) -> int:
+    """Print the rows; 0 when all hold."""
+    return show(_rows(), as_json)
+
+
+def _rows() -> Iterator[list[Row]]:
+    with Team(load(SCENARIO)) as team:
+        robots = team.scenario.mission.robots
+        team.await_chain(len(robots))
+        pause(team, SETTLE_S)
+        task = _task(team)
+        elsewhere = replace(team.fleet, name=_elsewhere(team))
+        words = [sys.executable, "-m", "deploy.bench.bare", msgspec.json.encode(task).decode()]
+        with listen(elsewhere, frozenset({f"{robot_name(LIKE)}/**"})), started(words) as process:
+            pause(team, SETTLE_S)
+            agents = [team.process_of(robot_name(robot)) for robot in robots]
+            since, before, bare_before = clock.now(), [processes.cpu_s(agent) for agent in agents], cpu_s(process)
+            pause(team, WATCHED_S)
+            passed_s = clock.now() - since
+            used = [processes.cpu_s(agent) - was for agent, was in zip(agents, before, strict=True)]
+            yield _costs(
+                [100.0 * used_s / passed_s for used_s in used], 100.0 * (cpu_s(process) - bare_before) / passed_s
+            )
+            largest = max(_resident_mib(agent) for agent in agents)
+            yield [row("agent", Quantity("resident, the largest", "MiB", 35.0), largest)]
+        yield [row("agent", Quantity("first pose after its start", "s", 1.0), _first_pose_s(team, robots[-1]))]
+
+
+def _costs(shares: Sequence[float], bare_share: float) -> list[Row]:
+    """Of each agent and of the bare process, in percent of a core."""
+    mean = statistics.mean(shares)
+    return [
+        row("agent", Quantity("share of a core, mean", "%", 5.0), mean),
+        row("agent", Quantity("share of a core, the largest", "%", 5.0), max(shares)),
+        row("bare process", Quantity("share of a core", "%"), bare_share),
+        row("agent", Quantity("times a bare process", "1"), mean / bare_share),
+    ]
+
+
+def _task(team: Team) -> bare.Task:
+    """What robot `LIKE` hears, and what it is heard to say, on keys of a fleet that nobody else is in."""
+    fleet, name, ahead = team.fleet.name, robot_name(LIKE), robot_name(LIKE - 1)
+    agent = Agent(LIKE, 1, fleet, 1, team.scenario.mission)
+    agent.tick(0.0)
+    count: Counter[str] = Counter()
+    size: Counter[str] = Counter()
+    with listen(team.fleet, frozenset({f"{name}/*", f"{name}/lease/*"}), every=True) as ear:
+        ear.take()
+        since = clock.now()
+        pause(team, SETTLE_S)
+        for arrival, _ in ear.take():
+            if isinstance(arrival.payload, bytes) and _of_agent(arrival.key):
+                count[arrival.key] += 1
+                size[arrival.key] += len(arrival.payload)
+        passed_s = clock.now() - since
+    says = (
+        bare.Saying(where.replace(fleet, _elsewhere(team), 1), size[where] // count[where], count[where] / passed_s)
+        for where in sorted(count)
+    )
+    return bare.Task(team.fleet.endpoint, (*sorted(agent.interests), key(fleet, ahead, "pose")), tuple(says))
+
+
+def _of_agent(where: str) -> bool:
+    """Not what its hardware says on the robot's own keys."""
+    return where.split("/")[3] not in HARDWARE
+
+
+def _elsewhere(team: Team) -> str:
+    return f"{team.fleet.name}-bare"
+
+
+def _first_pose_s(team: Team, robot: int) -> float:
+    """Of an agent that is killed and started again, from its start on."""
+    with listen(team.fleet, frozenset({f"{robot_name(robot)}/pose"})) as ear:
+        team.signal(robot, signal.SIGKILL)
+        at = clock.now()
+        team.restart(robot)
+        stamps: list[float] = []
+
+        def spoke() -> bool:
+            stamps.extend(message.header.stamp for _, message in ear.take() if message.header.stamp >= at)
+            return bool(stamps)
+
+        team.wait_until(spoke, f"no pose of {robot_name(robot)}")
+    return stamps[0] - at
+
+
+def _resident_mib(agent: processes.Identity) -> float:
+    pages = int(Path(f"/proc/{agent.pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGESIZE") / MIB
