@@ -14,17 +14,24 @@ from protocol.mission import Refused
 CELLS_MAX = 64_000_000
 BYTES_MAX = 5 * CELLS_MAX
 """A cell is up to three digits and a blank, in a P2; a device that never ends is cut here."""
+PATH_SHOWN_MAX = 200
 
 Shades = npt.NDArray[np.uint8]
 
 
-def shades_of(yaml: Path, path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
-    """Shades from 0 to 255, row 0 the top, and which cells an image with transparency shows."""
+def shades_of(yaml: Path, image: str) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
+    """Shades from 0 to 255, row 0 the top, and which cells an image with transparency shows.
+
+    `image` is a path as `yaml` gives it, relative to that file's folder. Raises Refused with one line.
+    """
+    path = yaml.parent / image
     try:
         with path.open("rb") as file:
             data = file.read(BYTES_MAX)
-    except OSError as error:
-        raise Refused(f"{yaml}: image = {path.name}: cannot be read ({error.strerror or error})") from None
+    except (OSError, ValueError) as error:  # a path with a null byte is a ValueError
+        why = getattr(error, "strerror", None) or error
+        given = image if len(image) <= PATH_SHOWN_MAX else f"{image[:PATH_SHOWN_MAX]}..."
+        raise Refused(f"{yaml}: image = {given}: cannot be read ({why}): must be a pgm or png file") from None
     if data[:2] in (b"P2", b"P5"):
         return _pgm(path, data), None
     if data[:8] == b"\x89PNG\r\n\x1a\n":
@@ -70,6 +77,8 @@ def _png(path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
             image = Image.open(path)
         with image:
             _check_size(path, *image.size)
+            image.verify()  # every chunk's check sum, which reading the cells leaves out
+        with Image.open(path) as image:
             if image.mode.startswith(("I", "F")):
                 raise Refused(f"{path}: png of mode {image.mode} (16-bit): must be 8-bit")
             pixels = np.asarray(image.convert("RGBA"))

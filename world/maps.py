@@ -76,7 +76,7 @@ def read(path: Path) -> Map:
     negate = fields.get("negate", "0").lower()
     if negate not in ("0", "1", "true", "false"):
         raise Refused(f"{path}: negate = {negate}: must be 0 or 1")
-    shades, opaque = shades_of(path, path.parent / image)
+    shades, opaque = shades_of(path, image)
     cells = _occupancy(shades, mode, negate in ("1", "true"), free_thresh, occupied_thresh)
     if opaque is not None:
         cells[~opaque] = UNKNOWN
@@ -173,13 +173,17 @@ def _fields(path: Path) -> dict[str, str]:
         raise Refused(f"{path}: cannot be read ({error.strerror or error}): must be a map.yaml") from None
     except UnicodeDecodeError:
         raise Refused(f"{path}: no text: must be a map.yaml") from None
+    except ValueError as error:  # a null byte in the path
+        raise Refused(f"{str(path)!r}: cannot be read ({error}): must be a map.yaml") from None
+    if len(text) > YAML_BYTES_MAX:
+        raise Refused(f"{path}: longer than {YAML_BYTES_MAX} bytes: must be a map.yaml")
     fields: dict[str, str] = {}
-    for number, line in enumerate(re.sub(r"\n\s*-\s+", r" - ", text).splitlines(), start=1):
+    for number, line in enumerate(re.sub(r"\n[ \t]*-[ \t]+", r" - ", text).splitlines(), start=1):
         stripped = re.sub(r"(^|\s)#.*$", "", line).strip()
         if not stripped or stripped in ("---", "..."):
             continue
         match = re.fullmatch(r"(\w+)\s*:\s*(.*)", stripped)
-        if match is None or len(text) > YAML_BYTES_MAX:
+        if match is None:
             raise Refused(f"{path} line {number}: {stripped[:40]!r}: must be `key: value` as in a ROS map.yaml")
         fields[match[1]] = match[2].strip().strip("'\"")
     return fields

@@ -100,6 +100,10 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
 BAD = [
     (pgm(), {"image": None}, "image is missing"),
     (pgm(), {"image": "none.pgm"}, "none.pgm: cannot be read"),
+    (pgm(), {"image": "m\0.pgm"}, "cannot be read (embedded null byte): must be a pgm or png"),
+    (pgm(), {"image": "x" * 5000}, "xxx...: cannot be read (File name too long)"),
+    (pgm(), {"image": "../no/m.pgm"}, "image = ../no/m.pgm: cannot be read"),
+    (pgm(), {"mode": "trinary" + "\n" * 70_000}, "longer than 65536 bytes"),
     (pgm(), {"resolution": 0}, "resolution = 0"),
     (pgm(), {"resolution": "nan"}, "resolution = nan"),
     (pgm(), {"resolution": None}, "resolution is missing"),
@@ -121,6 +125,7 @@ BAD = [
     (b"P2 2 1 255 7 x", {}, "no number"),
     (b"GIF89a", {}, "neither pgm"),
     (png()[:40], {}, "no png"),
+    (png()[:-13] + b"?" + png()[-12:], {}, "no png that can be read (broken PNG file"),
     (png(size=(60000, 60000)), {}, "far too many cells"),
     (png(depth=16), {}, "16-bit"),
 ]
