@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from math import hypot, pi
+from math import atan2, hypot, pi
 
+from protocol.geometry import TAU
 from protocol.mission import Refused, check_mission, robot_name
 from world.spec import Assert, Obstacle, Point, Scenario
 from world.terrain import check_feature, features
@@ -114,14 +115,17 @@ def _check_obstacle(where: str, obstacle: Obstacle) -> None:
 
 
 def _convex(corners_m: tuple[Point, ...]) -> bool:
+    """Left at every corner, and once round in all: a five-pointed star goes twice."""
     if len(corners_m) < 3:
         return False
-    following = corners_m[1:] + corners_m[:1]
-    after = corners_m[2:] + corners_m[:2]
-    return all(
-        (bx - ax) * (cy - by) - (by - ay) * (cx - bx) > LENGTH_M_MIN**2
-        for (ax, ay), (bx, by), (cx, cy) in zip(corners_m, following, after, strict=True)
-    )
+    turned_rad = 0.0
+    for n, (cx, cy) in enumerate(corners_m):
+        (ax, ay), (bx, by) = corners_m[n - 2], corners_m[n - 1]
+        across = (bx - ax) * (cy - by) - (by - ay) * (cx - bx)
+        if across <= LENGTH_M_MIN**2:
+            return False
+        turned_rad += atan2(across, (bx - ax) * (cx - bx) + (by - ay) * (cy - by))
+    return turned_rad < 1.5 * TAU
 
 
 def _require(fine: bool, where: str, value: object, right: str) -> None:

@@ -46,6 +46,7 @@ BAD = [
     (["world.obstacles=[{radius_m=1}]"], ["obstacles[0].center_m is missing"]),
     (["world.obstacles=[{center_m=[5,0,1], radius_m=1}]"], ["obstacles[0].center_m = [5, 0, 1]", "length 2"]),
     (["world.obstacles=[{center_m=[5,0], corners_m=[[0,0],[0,1],[1,0]]}]"], ["corners_m", "counter-clockwise"]),
+    (["world.obstacles=[{center_m=[5,0], corners_m=[[2,0],[-2,1],[1,-2],[1,2],[-2,-1]]}]"], ["corners_m", "convex"]),
     (["world.obstacles=[{center_m=[5,0], radius_m=1, waypoints_m=[[6,0]]}]"], ["speed_mps = 0", "above 0"]),
     (["world.obstacles=[{center_m=[5,0], radius_m=1, waypoints_m=[[5,0]], speed_mps=1}]"], ["other than center_m"]),
     (["mission.robots=[1,2,2]"], ["mission.robots", "id 2 is given twice"]),
