@@ -30,6 +30,8 @@ def on_map(scenario: Scenario, folder: Path) -> Scenario:
     world, mission = scenario.world, scenario.mission
     if world.start is not None and len(world.start) not in (2, 3):
         raise Refused(f"world.start = {list(world.start)}: must be [x, y] or [x, y, theta]")
+    if world.start is not None and world.starts is not None:
+        raise Refused(f"world.start = {list(world.start)}: must be left out where world.starts says it of every robot")
     if world.keepout is not None:
         leading = replace(mission.leading, keepout_m=_keepout(folder / world.keepout))
         mission = replace(mission, leading=leading)
@@ -39,7 +41,7 @@ def on_map(scenario: Scenario, folder: Path) -> Scenario:
         world, room = replace(world, walls_m=(*world.walls_m, *maps.walls(drawn))), Room(drawn)
         _check_goal(scenario, drawn, room)
         _check_start(scenario, drawn)
-    if world.starts is None or world.start is not None:
+    if world.starts is None:
         starts = _starts(scenario, room)
         world = replace(world, starts=tuple((pose.x, pose.y, pose.theta) for pose in starts) if starts else None)
     return replace(scenario, mission=mission, world=replace(world, map=None, keepout=None, start=None))
@@ -75,9 +77,17 @@ def _check_goal(scenario: Scenario, drawn: Map, room: Room) -> None:
 
 
 def _check_start(scenario: Scenario, drawn: Map) -> None:
-    x, y, *_ = scenario.world.start or (0.0, 0.0)
-    if scenario.world.starts is None and drawn.cell_of(x, y) is None:
-        raise Refused(f"world.start = {[x, y]}: outside of the map {scenario.world.map}: must be within it")
+    """Of those that are given; nearer to a wall than their radius is looked at with all other starts."""
+    world = scenario.world
+    given = {"world.start": world.start or (0.0, 0.0)}
+    if world.starts is not None:
+        given = {f"world.starts[{n}]": start for n, start in enumerate(world.starts)}
+    for key, (x, y, *_) in given.items():
+        cell = drawn.cell_of(x, y)
+        if cell is None:
+            raise Refused(f"{key} = {[x, y]}: outside of the map {world.map}: must be within it")
+        if drawn.occupied[cell]:
+            raise Refused(f"{key} = {[x, y]}: inside a wall of the map {world.map}: must have room for a robot")
 
 
 def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
@@ -87,7 +97,7 @@ def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
         return None
     x, y = (start[0], start[1]) if start is not None else (0.0, 0.0)
     if room is not None and room.clearance_m(x, y) < mission.radius_m:
-        what = "inside a wall" if room.clearance_m(x, y) == 0.0 else f"{room.clearance_m(x, y):.2f} m from a wall"
+        what = f"{room.clearance_m(x, y):.2f} m from a wall"
         raise Refused(f"world.start = {[x, y]}: {what} of the map {scenario.world.map}: must have room for a robot")
     if (start is not None and len(start) == 3) or not mission.leading.route_m:
         headings = [start[2] if start is not None and len(start) == 3 else 0.0]

@@ -57,6 +57,8 @@ SHORT_FORMS = {
     "goal": "mission.leading.route_m",
 }
 """What `--set` knows by a shorter name; `goal=[x, y]` is a route of one point."""
+INSTEAD_OF = {"world.start": "starts", "world.starts": "start"}
+"""Two ways of saying where robots start: the one that is set takes the place of the other."""
 QUOTES = "'\""
 FILE_BYTES_MAX = 4 * 1024 * 1024
 NUMBER_MAX = 1e9
@@ -147,6 +149,8 @@ def _override(document: dict[str, Any], override: str) -> str:
     if not _holds(table, last):
         raise Refused(f"--set {key} = {text}: must name a field of a scenario, and {key} is in none")
     table[last] = value
+    if key in INSTEAD_OF:
+        table.pop(INSTEAD_OF[key], None)
     return key
 
 

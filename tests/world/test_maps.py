@@ -184,6 +184,8 @@ def test_a_chain_without_room_behind_it_is_laid_out_round_the_corner(tmp_path: P
         (["goal=50,3"], "outside of the map"),
         (["start=5.0,3.0"], "inside a wall"),
         (["start=1"], "world.start"),
+        (["world.starts=[[4,1,0],[5,3,0]]"], r"world.starts\[1\] = \[5.0, 3.0\]: inside a wall of the map"),
+        (["world.starts=[[4,1,0],[-9,3,0]]"], r"world.starts\[1\] = \[-9.0, 3.0\]: outside of the map"),
         (["map=none.yaml"], "world.map = none.yaml"),
         (["start=-1,3"], r"world.start = \[-1.0, 3.0\]: outside of the map"),
         (["world.walls_m=[[7.0, 0.0, 7.0, 6.0]]"], r"\[8.5, 4.5\]: must be a goal that can be reached, walls part it"),
@@ -193,6 +195,21 @@ def test_a_start_or_goal_without_room_is_one_line(tmp_path: Path, sets: list[str
     with pytest.raises(Refused, match=said) as refused:
         load("explore", [f"map={room(tmp_path)}", "start=4,1", "goal=8.5,4.5", *sets])
     assert "\n" not in str(refused.value)
+
+
+def test_starts_given_with_set_take_the_place_of_the_scenarios_start_and_the_other_way_round(tmp_path: Path) -> None:
+    poses = ((4.0, 1.0, 0.0), (3.0, 1.0, 0.0))
+    sets = [f"map={room(tmp_path)}", "goal=8.5,4.5", "start=2,2", f"world.starts={[list(pose) for pose in poses]}"]
+    assert load("explore", sets, robots=2).world.starts == poses
+    assert starts_of(load("explore", [*sets, "start=2,2"], robots=2))[0].x == 2.0
+
+
+def test_a_start_beside_starts_in_one_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "both.toml"
+    both = "[world]\nstart = [1.0, 1.0]\nstarts = [[0.0, 0.0, 0.0]]\n"
+    path.write_text(f"title = 'x'\ntime_limit_s = 9.0\n[mission]\nrobots = [1]\nleading.route_m = [[9.0, 0.0]]\n{both}")
+    with pytest.raises(Refused, match=r"both.toml: world.start = \[1.0, 1.0\]: must be left out where world.starts"):
+        load(str(path))
 
 
 def test_a_keepout_mask_becomes_boxes_that_the_mission_tells(tmp_path: Path) -> None:
