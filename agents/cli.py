@@ -16,7 +16,7 @@ import msgspec
 from agents.agent import Agent
 from protocol import clock
 from protocol.credentials import credentials
-from protocol.mission import Mission, Refused, check_mission
+from protocol.mission import Mission, Refused, check_mission, whole_number
 from protocol.node import Node
 from protocol.runtime import Options, run
 from protocol.topics import fleet_name
@@ -82,11 +82,12 @@ def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None)
         if id not in ("w", "0"):
             raise Refused(f"--id {id}: the witness is w")
         return Witness(fleet, wall_ms, wall_ms, mission)
-    if not id.isdecimal() or int(id) < 1 or int(id) > 2**31:
+    robot = whole_number(id) or 0
+    if not 1 <= robot <= 2**31:
         raise Refused(f"--id {id}: must be a robot's number, 1 or higher")
-    if mission is not None and int(id) not in mission.robots:
+    if mission is not None and robot not in mission.robots:
         raise Refused(f"--id {id}: not in the mission, which has robots {list(mission.robots)}")
-    return Agent(int(id), wall_ms, fleet, wall_ms, mission)
+    return Agent(robot, wall_ms, fleet, wall_ms, mission)
 
 
 def read_mission(path: Path) -> Mission:

@@ -15,6 +15,7 @@ from msgspec import Struct
 
 WITNESS_ID = 0
 WITNESS_NAME = "witness"
+DIGITS_MAX = 18
 KNOWN_MAX = 64
 """Known obstacles that a leader plans past: each costs planning time."""
 ROUTE_M_MAX = 10_000.0
@@ -155,9 +156,12 @@ def robot_id_of(name: str) -> int | None:
     if name == WITNESS_NAME:
         return WITNESS_ID
     digits = name.removeprefix("robot")
-    if name.startswith("robot") and digits.isdecimal() and not digits.startswith("0"):
-        return int(digits)
-    return None
+    return whole_number(digits) if name.startswith("robot") and not digits.startswith("0") else None
+
+
+def whole_number(text: str) -> int | None:
+    """What `text` says in digits, so few of them that messages and journals can hold it; None when it is no such."""
+    return int(text) if len(text) <= DIGITS_MAX and text.isascii() and text.isdecimal() else None
 
 
 def check_mission(mission: Mission) -> Mission:

@@ -20,7 +20,7 @@ from protocol import clock
 from protocol.bus import Arrival, Inbox
 from protocol.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
 from protocol.endpoints import check_endpoints
-from protocol.mission import Profile, Refused
+from protocol.mission import Profile, Refused, whole_number
 from protocol.node import PeerDown, PeerUp, RouterLost
 from protocol.topics import NO_ECHO, TOPIC, Topic, address, alive_key
 
@@ -341,6 +341,7 @@ def _reason(error: zenoh.ZError) -> str:
 
 def _peer(key: str, kind: type[PeerUp] | type[PeerDown]) -> PeerUp | PeerDown | None:
     where = address(key)
-    if where is None or where.topic != "alive" or where.to is None or not where.to.isdecimal():
+    if where is None or where.topic != "alive" or where.to is None:
         return None
-    return kind(where.owner, int(where.to))
+    incarnation = whole_number(where.to)
+    return None if incarnation is None else kind(where.owner, incarnation)

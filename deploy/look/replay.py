@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
-from protocol.mission import Refused, robot_name
+from protocol.mission import Refused, robot_name, whole_number
 
 if TYPE_CHECKING:
     from deploy.look.again import Comparison
@@ -33,7 +33,8 @@ def command(
 
 def journals(folder: Path, robot: str) -> list[Path]:
     """The journals of every life of `robot`: an id, a name, or `all`. Raises Refused when there is none."""
-    name = robot_name(int(robot)) if robot.isdecimal() else robot
+    number = whole_number(robot)
+    name = robot if number is None else robot_name(number)
     found = sorted((folder / "journal").glob("*.bin"))
     lives = [path for path in found if name in ("all", path.stem.rpartition("-")[0])]
     if not lives:

@@ -14,7 +14,7 @@ from typing import Literal, cast
 from msgspec import Struct
 
 from deploy.run.weather import order
-from protocol.mission import Mission, Refused
+from protocol.mission import Mission, Refused, whole_number
 
 Deed = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
 
@@ -48,6 +48,8 @@ RESTART: Deed = "restart"
 """Done by whoever started the fleet: to one that runs already, an operator's word asks for it."""
 COMMON = ("router", "world")
 """What can be killed, stopped and continued besides robots, where the fleet runs as processes."""
+TIME_S_MAX = 1e6
+"""A scenario's longest time limit."""
 RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"
 _SENTENCE = re.compile(
     r"(?P<deed>\w+)(?: +(?!at )(?P<target>[\w.,>-]+))?"
@@ -76,6 +78,8 @@ def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
     match = _SENTENCE.fullmatch(text.strip())
     if match is None or match["deed"] not in DEEDS or match["at"] is None:
         raise Refused(f"{where} {text!r}: must be like {RIGHT}")
+    if max(float(match["at"]), float(match["duration"] or 0.0)) > TIME_S_MAX:
+        raise Refused(f"{where} {text!r}: times must be at most {TIME_S_MAX:g} s, what the longest run lasts")
     if match["deed"] in ORDERS:
         target = _ordered(match["deed"], match["target"] or "", text, mission, where)
     else:
@@ -131,16 +135,17 @@ def _ordered(deed: str, word: str, text: str, mission: Mission, where: str) -> i
         order(deed, word, mission.robots)
     except Refused as refused:
         raise Refused(f"{where} {text!r}: {refused}") from None
-    return int(word) if deed in ("cut", "heal") and word.isdecimal() else word
+    robot = whole_number(word) if deed in ("cut", "heal") else None
+    return word if robot is None else robot
 
 
 def _target(word: str, text: str, mission: Mission, where: str) -> int | str:
     if word == LEADER or word in COMMON:
         return word
-    digits = word.removeprefix("robot")
-    if not digits.isdecimal() or int(digits) not in mission.robots:
+    robot = whole_number(word.removeprefix("robot"))
+    if robot is None or robot not in mission.robots:
         raise Refused(f"{where} {text!r}: no robot {word!r}, must be leader, router, world or one of {_ids(mission)}")
-    return int(digits)
+    return robot
 
 
 def _ids(mission: Mission) -> str:

@@ -21,7 +21,7 @@ from deploy.run.chaos import Played, play, play_whole
 from deploy.run.network import Trace
 from deploy.run.schedules import KINDS, Schedule, draw, without
 from deploy.run.workers import workers
-from protocol.mission import Refused
+from protocol.mission import Refused, whole_number
 
 Player = Callable[[Schedule, Trace | None], Played]
 
@@ -78,9 +78,10 @@ def command(
 def parse_seeds(text: str) -> range:
     """`1000` or `5000..5999`. Raises Refused for anything else."""
     first, dots, last = text.partition("..")
-    if not all(part.isdecimal() for part in ((first, last) if dots else (first,))):
+    low, high = whole_number(first), whole_number(last)
+    if low is None or (high is None and dots):
         raise Refused(f"--seeds {text}: must be a number (1000) or a range (5000..5999)")
-    chosen = range(int(first), int(last) + 1) if dots else range(int(first))
+    chosen = range(low) if high is None else range(low, high + 1)
     if not 0 < chosen.stop - chosen.start <= SEEDS_MAX:
         raise Refused(f"--seeds {text}: must name at least one seed, and at most {SEEDS_MAX}")
     return chosen

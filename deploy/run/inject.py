@@ -24,7 +24,7 @@ from protocol import clock
 from protocol.bus import Arrival, Inbox
 from protocol.credentials import credentials
 from protocol.messages import BadMessage, Event, PoseStamped, Role, decode, encode
-from protocol.mission import Refused, robot_id_of
+from protocol.mission import Refused, robot_id_of, whole_number
 from protocol.topics import OPERATOR_NAME, key
 from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
 
@@ -91,7 +91,8 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
         whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
         operator = Operator(fleet, clock.wall_ms())
         said = note(operator, clock.now(), deed, whom, robots)
-        event = operator.says("fault", clock.now(), deed=deed, robot=int(whom) if whom.isdecimal() else whom)
+        robot = whole_number(whom)
+        event = operator.says("fault", clock.now(), deed=deed, robot=whom if robot is None else robot)
         bus.publish(operator.key, encode(event))
         bus.publish(operator.orders_key, encode(said))
         clock.sleep(SENT_S)
@@ -144,12 +145,12 @@ def _agent(identity: Identity) -> Running | None:
     names = {word.rpartition("/")[2] for word in words[:3]}
     if not names & {"agents.cli", "lfa-agent"}:
         return None
-    robot = option(words, "--id", "")
-    if not robot.isdecimal():
+    robot = whole_number(option(words, "--id", ""))
+    if robot is None:
         return None
     endpoint = option(words, "--connect", default_endpoint())
     keys = option(words, "--keys", "")
-    return Running(int(robot), option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)
+    return Running(robot, option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)
 
 
 def option(words: Sequence[str], name: str, default: str) -> str:
@@ -194,9 +195,9 @@ def _is_common(name: str, words: Sequence[str], agent: Running) -> bool:
 
 
 def _victim(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> Running:
-    digits = target.removeprefix("robot")
-    robot = _leader(team[0].fleet, bus, inbox) if target == LEADER else int(digits) if digits.isdecimal() else None
-    if robot is None and target == LEADER:
+    leads = target == LEADER
+    robot = _leader(team[0].fleet, bus, inbox) if leads else whole_number(target.removeprefix("robot"))
+    if robot is None and leads:
         raise Refused(f"fleet {team[0].fleet} has no leader at the moment")
     victim = next((agent for agent in team if agent.robot == robot), None)
     if victim is None:

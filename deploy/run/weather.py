@@ -13,7 +13,7 @@ from typing import Any
 
 from deploy.run.operator import Operator
 from protocol.messages import OperatorNote
-from protocol.mission import Refused, robot_name
+from protocol.mission import Refused, robot_name, whole_number
 from protocol.radio import WEATHER, Link
 from protocol.topics import WORLD_NAME
 
@@ -39,7 +39,7 @@ def links(text: str, robots: tuple[int, ...]) -> tuple[Link, ...]:
 
 def _side(text: str, robots: tuple[int, ...], right: str) -> list[str]:
     words = text.split(",")
-    if not all(word == WORLD_WORD or (word.isdecimal() and int(word) in robots) for word in words):
+    if not all(word == WORLD_WORD or (whole_number(word) in robots) for word in words):
         raise Refused(f"cut side {text!r}: must be {right}")
     return [WORLD_NAME if word == WORLD_WORD else robot_name(int(word)) for word in words]
 

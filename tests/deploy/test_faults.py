@@ -42,7 +42,8 @@ def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
         "kill 0 at 1 s", "hug leader at 20 s", "kill 2 at 1 s for 3 s", "restart leader at 2 s",
         "cut at 1 s", "cut 5 at 1 s", "cut 1,2-2 at 1 s", "cut 1>w>2 at 1 s", "loss 2 at 1 s", "loss some at 1 s",
         "handover 2 at 1 s", "heal at 1 s for 2 s", "cut leader-2 at 1 s", "kill 1,2 at 1 s", "kill at 1 s",
-        "kill leader at 1 s or so", "kill \u0662 at 1 s", "kill leader at 1e3 s",
+        "kill leader at 1 s or so", "kill \u0662 at 1 s", "kill leader at 1e3 s", f"kill {'9' * 5000} at 1 s",
+        f"kill leader at {'9' * 400} s", f"cut {'9' * 5000} at 1 s",
     ],
 )  # fmt: skip
 def test_what_is_no_fault_is_refused_in_one_line(text: str) -> None:

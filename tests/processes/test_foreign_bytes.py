@@ -51,7 +51,8 @@ class Stranger:
                 self.tracked.add(message.header.sender)
 
     def babble(self) -> None:
-        """Once on every topic of every owner."""
+        """Once on every topic of every owner, and a life that no number of a message holds."""
+        self._bus.announce(FLEET, "robot1", 10 ** self._random.randrange(19, 4000))
         for topic in TOPICS:
             for owner in OWNERS:
                 for to in ("all", "robot1", "gateway2") if topic.name == "lease" else (None,):

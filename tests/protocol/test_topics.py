@@ -65,3 +65,7 @@ def test_key_expressions_match_as_zenoh_does(expression: str, key: str, yes: boo
 def test_names_and_ids_say_the_same() -> None:
     assert [robot_id_of(robot_name(i)) for i in (0, 1, 42)] == [0, 1, 42]
     assert [robot_id_of(n) for n in ("robot", "robot01", "world", "robot-1", "robotx")] == [None] * 5
+
+
+def test_a_strangers_name_is_no_id_whatever_its_digits() -> None:
+    assert [robot_id_of(f"robot{digits}") for digits in ("9" * 5000, "9" * 19, "\u0663", "\u00b2")] == [None] * 4
