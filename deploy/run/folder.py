@@ -35,8 +35,9 @@ def make(out: Path | None, scenario: Scenario) -> Path:
 
     Raises Refused when it cannot be made.
     """
-    path = _free(out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}")
+    path = out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
+        path = _free(path)
         path.mkdir(parents=True, exist_ok=True)
         (path / SCENARIO).write_text(toml(scenario), encoding="utf-8")
     except OSError as error:
@@ -71,6 +72,9 @@ def _value(value: Any) -> str:
 
 
 def _free(path: Path) -> Path:
+    """`path`, or one beside it by a like name. Raises Refused for one without a name, such as `.`, that is taken."""
+    if path.name in ("", "..") and not _empty(path):
+        raise Refused(f"--out {path}: is not empty, must be a new or an empty folder")
     suffix, candidate = 1, path
     while candidate.exists() and not _empty(candidate):
         suffix += 1

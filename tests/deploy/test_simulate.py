@@ -14,9 +14,10 @@ from msgspec.structs import replace
 from deploy.look import errors, trace
 from deploy.look.summary import Summary, read
 from deploy.run.faults import parse_all
-from deploy.run.folder import scenario_of
+from deploy.run.folder import make, scenario_of
 from deploy.run.simulate import run
 from protocol import journal
+from protocol.mission import Refused
 from world.scenario import draw, load
 
 SHORT = ("mission.leading.route_m=[[2.0, 0.0]]",)
@@ -43,6 +44,17 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_hash_seed(tmp_path: Pat
     first, second = (_bytes(tmp_path / seed, seed) for seed in ("0", "1"))
     assert first[0] == second[0], "events.jsonl differs: lfa sim leader_killed --seed 5, PYTHONHASHSEED=0 and 1"
     assert first[1] == second[1], "recording.mcap differs: lfa sim leader_killed --seed 5, PYTHONHASHSEED=0 and 1"
+
+
+@pytest.mark.parametrize("out", [".", "..", "/", "n" * 300])
+def test_a_place_where_no_folder_can_be_made_is_refused_by_its_name(
+    out: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    (tmp_path / "here" / "something").touch()
+    with pytest.raises(Refused, match=f"^--out {out}: "):
+        make(Path(out), load("straight"))
 
 
 def test_two_seeds_differ_where_there_is_noise(tmp_path: Path) -> None:
