@@ -16,10 +16,11 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from protocol.mission import Refused
+from protocol.mission import Refused, whole_number
 from protocol.radio import Radio
-from world.checks import check_scenario
+from world.checks import ROBOTS_MAX, check_scenario
 from world.course import check_course, draw, starts_of
+from world.fields import converted, structs_in, value_at
 from world.spec import (
     Body,
     Lidar,
@@ -31,6 +32,7 @@ from world.spec import (
     Vary,
     WorldSpec,
 )
+from world.toml_file import read_toml
 
 __all__ = [
     "Body",
@@ -60,7 +62,6 @@ SHORT_FORMS = {
 INSTEAD_OF = {"world.start": "starts", "world.starts": "start"}
 """Two ways of saying where robots start: the one that is set takes the place of the other."""
 QUOTES = "'\""
-FILE_BYTES_MAX = 4 * 1024 * 1024
 NUMBER_MAX = 1e9
 
 
@@ -76,7 +77,7 @@ def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = 
     Raises Refused with one line: file, key, value, what would be right.
     """
     path = _path_of(name_or_path)
-    document = _read(path)
+    document = read_toml(path, "a scenario file")
     keys = [_override(document, override) for override in overrides]
     if robots is not None:
         _renumber(document, robots)
@@ -84,7 +85,7 @@ def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = 
     try:
         _refuse_unknown(document)
         _refuse_endless(document)
-        scenario = _on_map(replace(_convert(document), name=path.stem), path.parent)
+        scenario = _on_map(replace(converted(document), name=path.stem), path.parent)
         return check_course(check_scenario(scenario))
     except Refused as refused:
         raise Refused(f"{_source(str(refused), keys, robots, path)}: {refused}") from None
@@ -114,20 +115,6 @@ def _path_of(name_or_path: str) -> Path:
     raise Refused(f"no scenario {name_or_path!r}: {hint}")
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        with path.open("rb") as file:
-            text = file.read(FILE_BYTES_MAX + 1)
-    except OSError as error:
-        raise Refused(f"{path}: cannot be read ({error.strerror or error}): must be a scenario file in TOML") from None
-    if len(text) > FILE_BYTES_MAX:
-        raise Refused(f"{path}: longer than {FILE_BYTES_MAX} bytes: must be a scenario file in TOML")
-    try:
-        return tomllib.loads(text.decode())
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise Refused(f"{path}: no TOML ({_one_line(error)}): must be a scenario file in TOML") from None
-
-
 def _override(document: dict[str, Any], override: str) -> str:
     """Put `a.b=value` or `a.b[0].c=value` into `document`; the key that it sets."""
     key, equals, text = override.partition("=")
@@ -141,7 +128,7 @@ def _override(document: dict[str, Any], override: str) -> str:
         text = f"'{Path(text.strip(QUOTES)).absolute()}'"
     if not equals or not re.fullmatch(r"\w+(\.\w+|\[\d+\])*", key):
         raise Refused(f"--set {override!r}: must be key=value, such as world.lidar.beams=360")
-    *way, last = (int(part) if part.isdecimal() else part for part in re.findall(r"\w+", key))
+    *way, last = (part if whole_number(part) is None else int(part) for part in re.findall(r"\w+", key))
     value = _toml_value(key, text)
     table: Any = document
     for part in way:
@@ -178,6 +165,8 @@ def _holds(table: Any, part: str | int) -> bool:
 
 def _renumber(document: dict[str, Any], robots: int) -> None:
     """A team of 1..N; a longer list of starts is cut, a shorter one is refused later."""
+    if robots > ROBOTS_MAX:  # before a list is made of them
+        raise Refused(f"--robots {robots}: mission.robots = {robots} ids: must be at most {ROBOTS_MAX} ids")
     mission, world = document.setdefault("mission", {}), document.get("world", {})
     if isinstance(mission, dict):
         mission["robots"] = list(range(1, robots + 1))
@@ -186,41 +175,13 @@ def _renumber(document: dict[str, Any], robots: int) -> None:
         world["starts"] = starts[:robots]
 
 
-def _convert(document: dict[str, Any]) -> Scenario:
-    try:
-        return msgspec.convert(document, Scenario)
-    except msgspec.ValidationError as error:
-        text, _, place = str(error).partition(" - at `$")
-        key = place.removesuffix("`").removeprefix(".").replace("[...]", "[]")
-        right = text.replace("`", "").replace("Expected ", "").replace(", got ", ", not ").replace(" | null", "")
-        missing = re.fullmatch(r"Object missing required field `(\w+)`", text)
-        if missing:
-            name = ".".join(part for part in (key, missing[1]) if part)
-            raise Refused(f"{name} is missing: must be given") from None
-        raise Refused(f"{key} = {_value_at(document, key)}: must be {right}") from None
-
-
-def _value_at(document: Any, key: str) -> object:
-    """The value that a key of msgspec's error names, as far as the key says it."""
-    for part in re.findall(r"\w+|\[\d*\]", key):
-        index = part.strip("[]")
-        if isinstance(document, dict):
-            document = document.get(index, "...")
-        elif isinstance(document, list) and index.isdecimal() and int(index) < len(document):
-            document = document[int(index)]
-        else:
-            break
-    text = str(document)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
 def _refuse_unknown(document: dict[str, Any]) -> None:
     for where, known, given in _tables(document, Scenario, ""):
         for key in given:
             if key not in known:
                 close = get_close_matches(key, known, n=1)
                 hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-                raise Refused(f"{where}{key} = {_value_at(given, key)}: no such key: {hint}")
+                raise Refused(f"{where}{key} = {value_at(given, key)}: no such key: {hint}")
 
 
 def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str, ...], dict[str, Any]]]:
@@ -229,7 +190,7 @@ def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str
         for index, item in enumerate(value):
             yield from _tables(item, type_, f"{where.removesuffix('.')}[{index}].")
         return
-    struct = next((t for t in _structs_in(type_)), None)
+    struct = next((t for t in structs_in(type_)), None)
     if struct is None or not isinstance(value, dict):
         return
     fields = {field.encode_name: field.type for field in msgspec.structs.fields(struct)}
@@ -237,14 +198,6 @@ def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str
     for key, item in value.items():
         if key in fields:
             yield from _tables(item, fields[key], f"{where}{key}.")
-
-
-def _structs_in(type_: Any) -> Iterator[type[msgspec.Struct]]:
-    """The Structs that an annotation speaks of: `Lidar`, `tuple[Obstacle, ...]`."""
-    if isinstance(type_, type) and issubclass(type_, msgspec.Struct):
-        yield type_
-    for argument in getattr(type_, "__args__", ()):
-        yield from _structs_in(argument)
 
 
 def _refuse_endless(value: Any, where: str = "") -> None:
@@ -263,7 +216,3 @@ def _source(refusal: str, keys: list[str], robots: int | None, path: Path) -> st
         return f"--robots {robots}"
     given = any(re.match(rf"{re.escape(key)}\b", refusal) for key in keys)
     return f"{path.name} with --set" if given else str(path if path.parent != SCENARIOS else path.name)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -14,6 +13,7 @@ from deploy.fleet import tables
 from deploy.run.chosen import choose
 from protocol.mission import Profile, Refused
 from world.scenario import Scenario, draw
+from world.toml_file import read_toml
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,30}")
 LOCAL = ("localhost", "127.0.0.1", "::1")
@@ -149,19 +149,14 @@ class Mistaken(Refused):
 def is_fleet_file(path: Path) -> bool:
     """True for a TOML file with a table `hosts`: a scenario has none."""
     try:
-        return "hosts" in tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return "hosts" in read_toml(path, "a fleet file")
+    except Refused:
         return False
 
 
 def load(path: Path) -> Plan:
     """The plan in that file. Raises Refused, and Mistaken with every mistake at once."""
-    try:
-        document: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise Refused(f"{path}: cannot be read ({error.strerror}): must be a fleet file in TOML") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise Refused(f"{path}: no TOML ({' '.join(str(error).split())}): must be a fleet file") from None
+    document = read_toml(path, "a fleet file")
     mistakes: list[str] = []
     file = tables.read(document, FleetFile, mistakes)
     if file is None or not file.hosts:

@@ -73,6 +73,10 @@ BAD = [
     (["nonsense"], ["--set 'nonsense'", "key=value"]),
     (["mission.leading.route_m=[[1,2,]"], ["--set mission.leading.route_m", "TOML value"]),
     (["mission.leading.route_m=[]"], ["mission.leading.route_m", "way-point"]),
+    (["mission.formation.side=up"], ["mission.formation.side = up", "one of left, right, column, zigzag"]),
+    (["mission.leading.orientations=[{at_m=1, side='up'}]"], ["orientations[0].side = up", "one of left, right"]),
+    (["restart.world=always"], ["restart.world = always", "one of never, on-failure"]),
+    (["mission.following.gains={b_m=1, k_per_s='x'}"], ["mission.following.gains.k_per_s = x", "float, not str"]),
 ]
 
 
@@ -118,7 +122,7 @@ def test_an_unreadable_file_is_refused_in_one_line(tmp_path: Path) -> None:
         load(f"{tmp_path}/absent.toml")
 
 
-@pytest.mark.parametrize("robots", [0, -1, 100_000])
+@pytest.mark.parametrize("robots", [0, -1, 100_000, 10**15])
 def test_an_impossible_number_of_robots_is_refused(robots: int) -> None:
     with pytest.raises(Refused, match=f"^--robots {robots}: mission.robots"):
         load("straight", robots=robots)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.fleet.file import FleetFile, Mistaken, load
+from deploy.fleet.file import FleetFile, Mistaken, is_fleet_file, load
 from deploy.look import schema
 from protocol.mission import Refused
 
@@ -85,10 +85,16 @@ def test_all_mistakes_are_said_at_once(tmp_path: Path) -> None:
     assert len(refused.value.lines) == len(lines) - 1
 
 
-@pytest.mark.parametrize("text", ["hosts = {}", "", "hosts = 3", "\x00", "[hosts"])
+@pytest.mark.parametrize("text", ["hosts = {}", "", "hosts = 3", "\x00", "[hosts", f"x = {'[' * 5000}"])
 def test_what_is_no_fleet_file_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(Refused):
         load(_file(tmp_path, text))
+
+
+def test_what_never_ends_is_no_fleet_file() -> None:
+    assert not is_fleet_file(Path("/dev/zero"))
+    with pytest.raises(Refused, match=r"^/dev/zero: longer than"):
+        load(Path("/dev/zero"))
 
 
 def test_every_key_of_the_example_is_documented() -> None:
