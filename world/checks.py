@@ -6,7 +6,7 @@ from math import atan2, hypot, pi
 
 from protocol.geometry import TAU
 from protocol.mission import Refused, check_mission, robot_name
-from world.spec import Assert, Obstacle, Point, Scenario
+from world.spec import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Point, Scenario
 from world.terrain import check_feature, features
 
 ROBOTS_MAX = 500
@@ -101,13 +101,13 @@ def _check_obstacle(where: str, obstacle: Obstacle) -> None:
     _require(len(given) <= 1, where, " and ".join(given), "one way of moving")
     _require(not (given and mass_kg is not None), f"{where}.mass_kg", mass_kg, f"left out with {''.join(given)}")
     paced = given not in ([], ["velocity_mps"])
-    low, high = (0.001, 10.0) if paced else (0.0, 0.0)
+    low, high = (SPEED_MPS_MIN, SPEED_MPS_MAX) if paced else (0.0, 0.0)
     right = "above 0 with waypoints_m or walk_m, and 0 without"
     _require(low <= obstacle.speed_mps <= high, f"{where}.speed_mps", obstacle.speed_mps, right)
     still = bool(obstacle.waypoints_m) and all(point == obstacle.center_m for point in obstacle.waypoints_m)
     _require(not still, f"{where}.waypoints_m", list(obstacle.center_m), "a place other than center_m")
     if obstacle.velocity_mps is not None:
-        fast_enough = 0.001 <= hypot(*obstacle.velocity_mps) <= 10.0
+        fast_enough = SPEED_MPS_MIN <= hypot(*obstacle.velocity_mps) <= SPEED_MPS_MAX
         _require(fast_enough, f"{where}.velocity_mps", list(obstacle.velocity_mps), "from 0.001 to 10 m/s")
     if obstacle.walk_m is not None:
         right = "a number from speed_mps (the way of one second) to 1000"

@@ -11,13 +11,15 @@ from msgspec.structs import replace
 from protocol.geometry import TAU, Pose2D, compose
 from protocol.mission import Mission, Refused
 from world.reach import parted
-from world.spec import Obstacle, Point, Scenario
+from world.spec import SPEED_MPS_MAX, SPEED_MPS_MIN, Obstacle, Point, Scenario
 from world.terrain import Ditch, Feature, features, patch_of, patches_of
 from world.ways import way_of
 
 DRAW_MARGIN_M = 0.5
 """What is drawn stays this far from the robots' starts and from the goal."""
 SEED_MAX = 2**63 - 1
+WALK_SEED_BITS = 29
+"""Within the numbers that a scenario's file may hold: what is drawn is written down, and read again."""
 DRAWS_MAX = 50
 """An obstacle or a start for which so many draws find no room stays where the scenario puts it."""
 
@@ -78,9 +80,9 @@ def check_course(scenario: Scenario) -> Scenario:
 def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
     radius_m = scenario.mission.radius_m
     for index, obstacle in enumerate(scenario.world.obstacles):
-        center_m = way_of(obstacle).at(0.0) if obstacle.moves else obstacle.center_m
-        if gap_to(place, replace(obstacle, center_m=center_m)) < radius_m:
-            raise Refused(f"world.obstacles[{index}] = at {list(center_m)}: must be clear of {whose}")
+        begins = _as_it_begins(obstacle)
+        if gap_to(place, begins) < radius_m:
+            raise Refused(f"world.obstacles[{index}] = at {list(begins.center_m)}: must be clear of {whose}")
     for key, feature in features(scenario.world):
         patch = patch_of(feature)
         if patch.gap_m(*place) < radius_m:
@@ -88,6 +90,11 @@ def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
     for index, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
         if to_segment(place, (x1, y1), (x2, y2)) < radius_m:
             raise Refused(f"world.walls_m[{index}] = {[x1, y1, x2, y2]}: must be clear of {whose}")
+
+
+def _as_it_begins(obstacle: Obstacle) -> Obstacle:
+    """With its centre where it is at the world's time 0."""
+    return replace(obstacle, center_m=way_of(obstacle).at(0.0)) if obstacle.moves else obstacle
 
 
 def draw(scenario: Scenario, seed: int) -> Scenario:
@@ -102,16 +109,18 @@ def draw(scenario: Scenario, seed: int) -> Scenario:
     goal = scenario.mission.goal_m
     anchors = [*((pose.x, pose.y) for pose in starts_of(scenario)), goal]
     margin_m = scenario.mission.radius_m + vary.starts_m + DRAW_MARGIN_M
-    obstacles = tuple(
-        _draw_obstacle(obstacle, vary.obstacles_m, vary.moving_phase, anchors, margin_m, Random(f"{seed}/obstacle{n}"))
-        for n, obstacle in enumerate(_draw_walks(world.obstacles, seed))
-    )
+    obstacles: list[Obstacle] = []
+    for n, obstacle in enumerate(_draw_walks(world.obstacles, seed)):
+        chance = Random(f"{seed}/obstacle{n}")
+        if vary.moving_phase:
+            obstacle = _draw_pace(obstacle, anchors, scenario.mission.radius_m, chance)
+        obstacles.append(_draw_obstacle(obstacle, vary.obstacles_m, anchors, margin_m, chance))
     ground: dict[str, list[Feature]] = {"potholes": [], "bumps": [], "ditches": []}
     for key, feature in features(world):
         moved = _draw_feature(feature, vary.obstacles_m, anchors, margin_m, Random(f"{seed}/{key}"))
         ground[key.partition("[")[0]].append(moved)
     terrain = {kind: tuple(several) for kind, several in ground.items()}
-    drawn = replace(scenario, world=replace(world, obstacles=obstacles, **terrain, vary=type(vary)()))
+    drawn = replace(scenario, world=replace(world, obstacles=tuple(obstacles), **terrain, vary=type(vary)()))
     starts: list[Pose2D] = []
     for robot_id, pose in zip(scenario.mission.robots, starts_of(scenario), strict=True):
         starts.append(
@@ -124,20 +133,33 @@ def draw(scenario: Scenario, seed: int) -> Scenario:
 def _draw_walks(obstacles: tuple[Obstacle, ...], seed: int) -> tuple[Obstacle, ...]:
     """Walks are the seed's even in a scenario that varies nothing."""
     return tuple(
-        obstacle if obstacle.walk_m is None else replace(obstacle, walk_seed=Random(f"{seed}/walk{n}").getrandbits(32))
+        obstacle
+        if obstacle.walk_m is None
+        else replace(obstacle, walk_seed=Random(f"{seed}/walk{n}").getrandbits(WALK_SEED_BITS))
         for n, obstacle in enumerate(obstacles)
     )
 
 
-def _draw_obstacle(
-    obstacle: Obstacle, within_m: float, phased: bool, anchors: list[Point], margin_m: float, chance: Random
-) -> Obstacle:
-    if phased and obstacle.waypoints_m:
-        speed_mps = obstacle.speed_mps * chance.uniform(0.8, 1.2)
-        obstacle = replace(obstacle, phase=chance.random(), speed_mps=speed_mps)
-    elif phased and obstacle.velocity_mps is not None:
+def _draw_pace(obstacle: Obstacle, anchors: list[Point], radius_m: float, chance: Random) -> Obstacle:
+    """How fast it moves, and where on its way to and fro it begins: in no robot of `radius_m` at one of `anchors`."""
+    if obstacle.velocity_mps is not None:
         (vx, vy), faster = obstacle.velocity_mps, chance.uniform(0.8, 1.2)
-        obstacle = replace(obstacle, velocity_mps=(faster * vx, faster * vy))
+        paced = replace(obstacle, velocity_mps=(faster * vx, faster * vy))
+        return paced if SPEED_MPS_MIN <= hypot(faster * vx, faster * vy) <= SPEED_MPS_MAX else obstacle
+    if not obstacle.waypoints_m:
+        return obstacle
+    speed_mps = obstacle.speed_mps * chance.uniform(0.8, 1.2)
+    obstacle = replace(obstacle, speed_mps=max(SPEED_MPS_MIN, min(SPEED_MPS_MAX, speed_mps)))
+    for _ in range(DRAWS_MAX):
+        moved = replace(obstacle, phase=chance.random())
+        if all(gap_to(anchor, _as_it_begins(moved)) >= radius_m for anchor in anchors):
+            return moved
+    return obstacle
+
+
+def _draw_obstacle(
+    obstacle: Obstacle, within_m: float, anchors: list[Point], margin_m: float, chance: Random
+) -> Obstacle:
     if within_m == 0.0:
         return obstacle
     for _ in range(DRAWS_MAX):
@@ -172,11 +194,13 @@ def _draw_start(
     scenario: Scenario, pose: Pose2D, within_m: float, within_rad: float, placed: list[Pose2D], chance: Random
 ) -> Pose2D:
     radius_m, patches = scenario.mission.radius_m, patches_of(scenario.world)
+    obstacles = [_as_it_begins(obstacle) for obstacle in scenario.world.obstacles]
     for _ in range(DRAWS_MAX):
         dx, dy = _in_disc(within_m, chance)
         drawn = Pose2D(pose.x + dx, pose.y + dy, pose.theta + chance.uniform(-within_rad, within_rad))
         free = all(hypot(drawn.x - other.x, drawn.y - other.y) > 2.0 * radius_m for other in placed)
         free = free and all(patch.gap_m(drawn.x, drawn.y) > radius_m for patch in patches)
+        free = free and all(gap_to((drawn.x, drawn.y), obstacle) > radius_m for obstacle in obstacles)
         if free and all(to_segment((drawn.x, drawn.y), w[:2], w[2:]) > radius_m for w in scenario.world.walls_m):
             return drawn
     return pose

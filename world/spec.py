@@ -16,6 +16,8 @@ from protocol.radio import Radio
 from world.terrain import Bump, Ditch, Pothole
 
 Point = tuple[float, float]
+SPEED_MPS_MIN, SPEED_MPS_MAX = 0.001, 10.0
+"""Of an obstacle that moves."""
 STATE = "state.json"
 """Where a world keeps in its run folder what it remembers over its own death (`memory.py`)."""
 

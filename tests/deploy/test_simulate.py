@@ -104,6 +104,26 @@ def test_the_scenario_in_the_folder_is_the_one_that_was_run(tmp_path: Path) -> N
     assert replace(ran, name="paper_path1") == wanted
 
 
+@pytest.mark.parametrize(
+    ("obstacle", "vary"),
+    [
+        ("center_m=[20,3], walk_m=2, speed_mps=0.3", "moving_phase=true"),
+        ("center_m=[20,3], waypoints_m=[[20,9]], speed_mps=9.9", "moving_phase=true"),
+        ("center_m=[20,3], velocity_mps=[0,9.9]", "moving_phase=true"),
+        ("center_m=[20,3], velocity_mps=[0,0.001]", "moving_phase=true"),
+        ("center_m=[-1,0], waypoints_m=[[5,0]], speed_mps=0.3", "moving_phase=true"),
+        ("center_m=[39,0], waypoints_m=[[41,0]], speed_mps=0.3", "moving_phase=true"),
+        ("center_m=[0.5,0], mass_kg=1", "starts_m=0.3"),
+    ],
+)
+def test_what_a_seed_draws_in_bounds_is_read_again_from_the_folder(tmp_path: Path, obstacle: str, vary: str) -> None:
+    scenario = load("straight", [f"world.obstacles=[{{{obstacle}, radius_m=0.3}}]", f"world.vary.{vary}"])
+    for seed in range(20):
+        drawn = draw(scenario, seed)
+        assert replace(scenario_of(make(tmp_path / "run", drawn)), name="straight") == drawn, f"seed {seed}"
+        (tmp_path / "run" / "scenario.toml").unlink()
+
+
 def test_every_node_has_a_journal_and_every_robot_a_trace(tmp_path: Path) -> None:
     _summary(tmp_path / "run", "straight", "time_limit_s=2.0")
     names = {path.name: path for path in (tmp_path / "run" / "journal").iterdir()}
