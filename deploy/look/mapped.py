@@ -54,7 +54,10 @@ def map_of(run: Path, robot: int | None = None) -> Map:
     lives = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
     if not lives:
         raise Refused(f"{run}: no journal of {robot_name(robot)}: must be a run folder with that robot in it")
-    heading, entries = journal.read(lives[-1])
+    try:
+        heading, entries = journal.read(lives[-1])
+    except (OSError, ValueError) as error:
+        raise Refused(f"{lives[-1]}: cannot be read ({error})") from None
     node = again.node_of(lives[-1], heading)
     host = Host(node, Journal(None, heading))
     for entry in entries:

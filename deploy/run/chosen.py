@@ -8,6 +8,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from agents.following import follower_of
+from deploy.run.folder import SCENARIO
 from protocol.mission import Refused, check_mission
 from world.scenario import Scenario, load
 
@@ -23,20 +24,19 @@ def choose_again(
     chosen = choose(scenario, overrides, robots)
     if map_from is None:
         return chosen, seed or 0
-    from deploy.look.met import known_obstacles  # reads recordings: numpy
+    from deploy.look import summary  # both read recordings: numpy
+    from deploy.look.met import known_obstacles
 
+    earlier = summary.read(map_from) if (map_from / summary.SUMMARY).is_file() else None
+    if earlier is not None and chosen.name not in (earlier.scenario, Path(SCENARIO).stem):  # or the earlier run's own
+        raise Refused(f"--map-from {map_from}: a run of {earlier.scenario}, must be one of {chosen.name}")
     leading = replace(chosen.mission.leading, known_m=known_obstacles(map_from))
     try:
         mission = check_mission(replace(chosen.mission, leading=leading))
     except Refused as refused:
         raise Refused(f"{scenario} with --map-from {map_from}: {refused}") from None
-    return replace(chosen, mission=mission), _seed_of(map_from) if seed is None else seed
-
-
-def _seed_of(folder: Path) -> int:
-    from deploy.look import summary
-
-    return summary.read(folder).seed if (folder / summary.SUMMARY).is_file() else 0
+    known_seed = 0 if earlier is None else earlier.seed
+    return replace(chosen, mission=mission), known_seed if seed is None else seed
 
 
 def choose(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:

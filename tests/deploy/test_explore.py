@@ -9,6 +9,7 @@ import pytest
 
 from deploy.look.mapped import map_of
 from deploy.run.simulate import run
+from protocol.mission import Refused
 from world import maps
 from world.scenario import load
 
@@ -67,6 +68,13 @@ def test_the_leaders_map_overlays_the_true_one(explored: tuple[Path, maps.Map, s
     seen, on_walls = overlay(maps.read(tmp_path / "map.yaml"), true)
     assert seen > 100
     assert on_walls >= 0.95
+
+
+def test_a_map_of_a_damaged_journal_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "journal").mkdir()
+    (tmp_path / "journal" / "robot1-1.bin").write_bytes(b"no journal")
+    with pytest.raises(Refused, match=r"robot1-1.bin: cannot be read \(.*not a journal\)"):
+        map_of(tmp_path)
 
 
 @pytest.mark.skipif(DEPOT is None, reason="no shared/data/maps beside the checkout or above it")

@@ -150,7 +150,13 @@ def test_a_map_from_what_is_no_run_or_for_another_motion_is_refused(second_path:
     with pytest.raises(Refused, match="no run folder"):
         choose_again("paper_path2", (), None, None, tmp_path)
     with pytest.raises(Refused, match=r"known_m .* left out without motion"):
-        choose_again("explore", (), None, None, second_path)
+        choose_again("paper_path2", ["mission.leading.motion='point_to_point'"], None, None, second_path)
+
+
+def test_a_map_from_another_scenarios_run_is_refused(second_path: Path) -> None:
+    with pytest.raises(Refused, match=r"--map-from .*: a run of paper_path2, must be one of paper_path1"):
+        choose_again("paper_path1", (), None, None, second_path)
+    assert choose_again(str(second_path / "scenario.toml"), (), None, None, second_path)[1] == 1
 
 
 def test_with_obstacle_avoidance_switched_off_the_verdict_is_1(
