@@ -186,6 +186,9 @@ def check_mission(mission: Mission) -> Mission:
     _require(len(mission.leading.route_m) >= 1, "mission.leading.route_m", "[]", "at least one way-point [x, y]")
     _check_times(mission.leading)
     _check_known(mission.leading)
+    for box in mission.leading.keepout_m:
+        fine = all(map(isfinite, box)) and box[0] < box[2] and box[1] < box[3]
+        _require(fine, "mission.leading.keepout_m", list(box), "x1, y1, x2, y2 [m] with x1 < x2 and y1 < y2")
     for orientation in mission.leading.orientations:
         fine = isfinite(orientation.at_m) and orientation.at_m >= 0.0
         _require(fine, "mission.leading.orientations.at_m", orientation.at_m, ">= 0, metres along the route")

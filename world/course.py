@@ -71,10 +71,17 @@ def check_course(scenario: Scenario) -> Scenario:
         right = f"walls part it from the start of robot {mission.robots[0]} at ({first[0]:.2f}, {first[1]:.2f})"
         raise Refused(f"mission.leading.route_m = {value}: must be a goal that can be reached, {right}")
     for box in mission.leading.keepout_m:
-        if box[0] <= goal[0] <= box[2] and box[1] <= goal[1] <= box[3]:
+        if _within(goal, box):
             value = f"... [{goal[0]:g}, {goal[1]:g}]"
             raise Refused(f"mission.leading.route_m = {value}: must be a goal outside of the keep-out box {list(box)}")
+        if _within(first, box):
+            right = f"clear of the start of robot {mission.robots[0]} at ({first[0]:.2f}, {first[1]:.2f})"
+            raise Refused(f"mission.leading.keepout_m = ... {list(box)}: must be {right}")
     return scenario
+
+
+def _within(place: Point, box: tuple[float, float, float, float]) -> bool:
+    return box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3]
 
 
 def _check_place(scenario: Scenario, place: Point, whose: str) -> None:

@@ -220,6 +220,18 @@ def test_a_keepout_mask_becomes_boxes_that_the_mission_tells(tmp_path: Path) -> 
     assert load("explore", sets).mission.leading.keepout_m == ((6.0, 1.0, 8.0, 2.0),)
 
 
+@pytest.mark.parametrize(
+    ("box", "said"),
+    [
+        ("[3.0, 0.5, 4.5, 1.5]", r"keepout_m = ... .*: must be clear of the start of robot 1 at \(4.00, 1.00\)"),
+        ("[2.0, 5.0, 1.0, 4.0]", r"keepout_m = \[2.0, 5.0, 1.0, 4.0\]: must be x1, y1, x2, y2"),
+    ],
+)
+def test_a_keepout_box_that_forbids_the_start_or_nothing_is_refused(tmp_path: Path, box: str, said: str) -> None:
+    with pytest.raises(Refused, match=said):
+        load("explore", [f"map={room(tmp_path)}", "start=4,1", "goal=8.5,4.5", f"mission.leading.keepout_m=[{box}]"])
+
+
 def test_a_goal_in_a_keepout_zone_is_refused(tmp_path: Path) -> None:
     cells = np.zeros((60, 100), dtype=np.int16)
     cells[40:50, 80:90] = 100
