@@ -28,7 +28,7 @@ from protocol.gateway import Gateway
 from protocol.host import Host
 from protocol.journal import Entry, Heading, Journal, digest
 from protocol.messages import BadMessage, CmdVel, Fence, LeaseNote, Member, decode
-from protocol.mission import Refused, robot_id_of
+from protocol.mission import Mission, Refused, robot_id_of, robot_name
 from protocol.node import Local, PeerDown, PeerUp, RouterLost
 from protocol.timing import Timing, timing_of
 from protocol.topics import TOPIC, WORLD_NAME, address
@@ -56,8 +56,9 @@ def verify(folder: Path) -> Verdict:
     paths = sorted((folder / JOURNALS).glob("*.bin"))
     if not paths:
         raise Refused(f"{folder}: no journals, must be a run folder of lfa run or lfa sim")
-    _refuse_lost({path.stem.rpartition("-")[0] for path in paths}, folder)
-    timing = timing_of(scenario_of(folder).mission.profile)
+    mission = scenario_of(folder).mission
+    _refuse_lost({path.stem.rpartition("-")[0] for path in paths}, folder, mission)
+    timing = timing_of(mission.profile)
     happenings = sorted((h for path in paths for h in _happenings(path, timing)), key=lambda h: h.at)
     checkers = [checker(timing) for checker in SAFETY]
     tell = listeners(checkers)
@@ -69,11 +70,14 @@ def verify(folder: Path) -> Verdict:
     return Verdict(len(paths), len(happenings), tuple(Violation(v.name, v.at - began, v.text) for v in broken))
 
 
-def _refuse_lost(journalled: set[str], folder: Path) -> None:
+def _refuse_lost(journalled: set[str], folder: Path, mission: Mission) -> None:
     """What one did that took part and left no journal would look like what the others made up."""
-    for event in chronicle.of_kind(chronicle.lines(folder), "peer_up"):
-        name = str(event.get("name"))
-        if name not in journalled and (name == WORLD_NAME or robot_id_of(name) is not None):
+    team = {WORLD_NAME, *map(robot_name, mission.robots)}
+    for event in chronicle.lines(folder):
+        came = event["kind"] == "peer_up"  # who only speaks is one of the team, and not anybody in its name
+        name = str(event.get("name" if came else "from"))
+        took_part = name in team or (came and robot_id_of(name) is not None)
+        if took_part and name not in journalled:
             raise Refused(f"{folder}: no journal of {name}, which took part: must be the whole run folder")
 
 

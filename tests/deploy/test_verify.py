@@ -37,15 +37,22 @@ def test_a_sound_run_has_no_violation(folder: Path) -> None:
     assert verdict.happenings > 1000
 
 
-def test_a_run_without_the_journal_of_one_that_took_part_is_refused(folder: Path, tmp_path: Path) -> None:
-    lost = Path(shutil.copytree(folder, tmp_path / "lost"))
-    (lost / "journal" / "robot3-1.bin").unlink()
-    with (lost / "events.jsonl").open("a") as events:  # as the recorder of `lfa run` tells it
+@pytest.mark.parametrize("lost", ["robot3", "world"])
+def test_a_run_without_the_journal_of_one_that_took_part_is_refused(folder: Path, tmp_path: Path, lost: str) -> None:
+    part = Path(shutil.copytree(folder, tmp_path / "part"))
+    (part / "journal" / f"{lost}-1.bin").unlink()
+    with pytest.raises(Refused, match=f"no journal of {lost}"):
+        verify.verify(part)
+
+
+def test_so_is_one_without_the_journal_of_one_that_came_and_said_nothing(folder: Path, tmp_path: Path) -> None:
+    part = Path(shutil.copytree(folder, tmp_path / "part"))
+    with (part / "events.jsonl").open("a") as events:  # as the recorder of `lfa run` tells it
         events.write(
-            '{"t":0.0,"robot":3,"term":null,"kind":"peer_up","from":"recorder","name":"robot3","incarnation":1}\n'
+            '{"t":0.0,"robot":7,"term":null,"kind":"peer_up","from":"recorder","name":"robot7","incarnation":1}\n'
         )
-    with pytest.raises(Refused, match="no journal of robot3"):
-        verify.verify(lost)
+    with pytest.raises(Refused, match="no journal of robot7"):
+        verify.verify(part)
 
 
 def test_an_old_leaders_command_is_harmless_unless_a_gateway_obeys_it(
