@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from math import atan2, cos, hypot, pi, sin
+from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 TAU = 2.0 * pi
+NUMBER_MAX = 1e9
+Number = Annotated[float, Meta(ge=-NUMBER_MAX, le=NUMBER_MAX)]
+"""A measure that a core computes with: what comes in bytes is refused beyond it, long before a sum has no end."""
 
 
 class Pose2D(Struct, frozen=True, array_like=True, gc=False):
     """Position [m] and yaw [rad] of one frame in another; the frame is in the variable's name."""
 
-    x: float = 0.0
-    y: float = 0.0
-    theta: float = 0.0
+    x: Number = 0.0
+    y: Number = 0.0
+    theta: Number = 0.0
 
 
 class Twist(Struct, frozen=True, array_like=True, gc=False):
     """Velocity of `base_link` in itself: forward [m/s] and yaw rate [rad/s]."""
 
-    linear_x: float = 0.0
-    angular_z: float = 0.0
+    linear_x: Number = 0.0
+    angular_z: Number = 0.0
 
 
 STILL = Twist(0.0, 0.0)
