@@ -314,7 +314,8 @@ class _Launch:
     def _end(self, word: LastWord) -> None:
         """Agents and world, then the recorder, which sums up, then the router; each with a grace."""
         team = [row.name for row in self._rows if row.name not in (ROUTER_NAME, RECORDER_NAME)]
-        self._say("over")
+        # When it is said: on a busy machine some of the team are gone before this comes to the recorder.
+        self._say("over", t=self._time.of(clock.now()))
         self._crew.end(team)
         if self._crew.runs(RECORDER_NAME):
             self._crew.tell(RECORDER_NAME, msgspec.json.encode(word))
