@@ -16,6 +16,8 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from protocol.mission import Refused
+
 JOURNAL_VERSION = 1
 
 
@@ -96,13 +98,25 @@ class Journal:
 
 
 def read(path: Path) -> tuple[Heading, Iterator[Entry]]:
-    """Heading and entries of a journal, up to its last whole entry. Raises ValueError when it is none."""
+    """Heading and entries of a journal, up to its last whole entry. Raises ValueError when it is none.
+
+    The entries raise Refused where bytes were changed.
+    """
     bodies = _bodies(path.read_bytes())
     try:
         heading = _heading_decoder.decode(next(bodies))
     except (StopIteration, msgspec.DecodeError) as error:
         raise ValueError(f"{path}: not a journal") from error
-    return heading, (_entry_decoder.decode(body) for body in bodies)
+    return heading, _entries(path, bodies)
+
+
+def _entries(path: Path, bodies: Iterator[bytes]) -> Iterator[Entry]:
+    """Raises Refused where one of them is no entry: bytes that were changed, not cut off."""
+    for n, body in enumerate(bodies, start=1):
+        try:
+            yield _entry_decoder.decode(body)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise Refused(f"{path}: entry {n} cannot be read: must be a journal as a process wrote it") from None
 
 
 def _bodies(data: bytes) -> Iterator[bytes]:

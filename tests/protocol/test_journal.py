@@ -6,6 +6,7 @@ import pytest
 
 from protocol.bus import Inbox
 from protocol.journal import JOURNAL_VERSION, Heading, Journal, digest, read
+from protocol.mission import Refused
 from protocol.runtime import _Seat
 from protocol.witness import Witness
 
@@ -40,6 +41,13 @@ def test_a_file_cut_anywhere_is_read_up_to_its_last_whole_entry(tmp_path: Path) 
         entries = list(read(path)[1])
         assert entries == whole[: len(entries)], f"cut at byte {cut}"
         assert len(entries) < len(whole)
+
+
+def test_a_byte_changed_within_an_entry_is_refused_by_the_entrys_number(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"message", b"m\xffssage", 1))
+    with pytest.raises(Refused, match="entry 1 cannot be read"):
+        list(read(path)[1])
 
 
 def test_on_a_full_disk_the_journal_ends_with_a_line_and_its_writer_goes_on(
