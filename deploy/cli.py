@@ -95,6 +95,9 @@ EXTRAS = {
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.EISDIR, errno.ENOTDIR)
 """What a disk refuses in the midst of work: no fault of the program."""
 
+NAMES = (errno.ENAMETOOLONG, errno.ELOOP)
+"""What nothing can be called, whoever asks for it."""
+
 
 def main() -> None:
     """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
@@ -160,6 +163,8 @@ def run_cli(name: str, app: typer.Typer) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
+        if error.errno in NAMES:
+            return _say(name, f"{error.filename}: {error.strerror}: must be the path of a file or a folder")
         if error.errno not in DISK:
             raise
         where = f"{error.filename}: " if error.filename else ""

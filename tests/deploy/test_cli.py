@@ -28,6 +28,14 @@ def test_the_habits_of_other_programs_are_answered(asked: str, begins: str) -> N
     assert subprocess.run([*LFA, asked], capture_output=True, text=True, check=True).stdout.startswith(begins)
 
 
+def test_a_path_that_nothing_can_have_is_refused_in_one_line() -> None:
+    done = subprocess.run([*LFA, "replay", "n" * 300], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"lfa: {'n' * 300}")
+    assert done.stderr.endswith("File name too long: must be the path of a file or a folder\n")
+    assert done.stderr.count("\n") == 1
+
+
 def test_help_does_not_wait_for_the_parser() -> None:
     code = "import sys; from deploy import cli; cli.overview(); print('typer' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
