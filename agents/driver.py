@@ -197,7 +197,8 @@ class Driver:
             return
         decision = self.decision
         action = None if decision is None else decision.action
-        self._plight.watch(pose, wanted, action, self.estimator.age_s(now), now)
+        leads = role is Role.LEADER and self.leading.under_way
+        self._plight.watch(pose, wanted, action, self.estimator.age_s(now), now, leads=leads)
 
     def _mates(self, now: float) -> list[Pose2D]:
         """Where the team-mates are, as far as known: the predecessor by its poses, the others by the table."""

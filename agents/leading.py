@@ -61,6 +61,12 @@ class Leadership:
         self._swings_until = 0.0
         self.waited_out = False
         """It has waited for its team as long as is allowed."""
+        self._speed_mps = 0.0
+
+    @property
+    def under_way(self) -> bool:
+        """It is to go: it knows where to, and neither its team nor its timetable has it wait."""
+        return self._speed_mps > 0.0 and (self.explore is None or bool(self.explore.route))
 
     @property
     def waiting(self) -> bool:
@@ -86,6 +92,7 @@ class Leadership:
         if self._timetable is not None:
             speed = self._timetable.speed(self.lead.progress_m, now)
         speed *= self._patience(chain, pose, now) * self._swing(slots, now)
+        self._speed_mps = speed
         return self.lead.step(pose, last, slots, speed), DETOUR_SHARE * speed
 
     def target(self, pose: Pose2D) -> Point:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections import deque
 from math import floor, hypot
 
-from protocol.geometry import Pose2D, Twist
+from protocol.geometry import Pose2D, Twist, distance
 
 STILL_S, STILL_M = 3.0, 0.10
+STANDS_S = 20.0
+"""A leader that has somewhere to go stands no longer than this, whatever it is that its command stays small for: more
+than it waits for its team, or for what moves."""
 WANTED_MPS = 0.05
 BLOCKED_S = 1.5
 TURNS, TURNS_S = 3, 10.0
@@ -31,6 +34,8 @@ class Plight:
         self._stuck = Stuck(again=again)
         self._at: Pose2D | None = None
         self._held_at = 0.0
+        self._stands: tuple[float, Pose2D] | None = None
+        """Since when, and where, a leader that is to go has stood."""
         self.reason: str | None = None
         self.backing_out = False
         """It stays stuck until it is out of the place."""
@@ -38,14 +43,21 @@ class Plight:
     def begin(self, *, leading: bool) -> None:
         """A new role. Whoever leads starts anew; who was stuck as leader is so still as a follower."""
         self._stuck.reset()
+        self._stands = None
         if leading:
             self.out()
 
-    def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> None:
-        """One control step on the way; arguments as of `Stuck.watch`."""
+    def watch(
+        self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool = False
+    ) -> None:
+        """One control step on the way; arguments as of `Stuck.watch`. `leads`: it is a leader, and is to go."""
         if self.backing_out:
             return
         held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
+        if not leads:
+            self._stands = None
+        elif self._stands_for_s(pose, now) >= STANDS_S and held is None:
+            held = "S1: stands on its way"
         if held is None:
             self._ease(pose, now)
             return
@@ -56,12 +68,19 @@ class Plight:
     def rest(self, pose: Pose2D, now: float) -> None:
         """One control step in which nothing is wanted."""
         self._stuck.reset()
+        self._stands = None
         self._ease(pose, now)
 
     def out(self) -> None:
         """It has left the place."""
         self.reason, self._at, self.backing_out = None, None, False
         self._stuck.reset()
+
+    def _stands_for_s(self, pose: Pose2D, now: float) -> float:
+        """How long it has been within `STILL_M` of one place."""
+        if self._stands is None or distance(pose, self._stands[1]) >= STILL_M:
+            self._stands = now, pose
+        return now - self._stands[0]
 
     def _ease(self, pose: Pose2D, now: float) -> None:
         if self.reason is None or self._at is None or self.backing_out:

@@ -34,3 +34,15 @@ def test_a_leader_waits_15_s_and_then_goes_on_slowly() -> None:
     assert GAP_WAIT_S_MAX == 15.0
     assert share_of(3.0, since_s=14.9) == 0.0
     assert share_of(3.0, since_s=15.1) == 0.5
+
+
+def test_a_leader_is_under_way_but_where_its_team_has_it_wait() -> None:
+    mission = load("trajectory").mission
+    leader = Leadership(mission, Formation.of(mission), beliefs := Beliefs())
+    leader.begin(Pose2D(), 0.0)
+    leader.step((1,), Pose2D(), STILL, 0.0)
+    assert leader.under_way
+    far = TableRow(Header("robot2", 1, 0, 0.0), -9.0, 0.0, 0.0, 0.0, 0.0, Role.FOLLOWER)
+    beliefs.hear_row(2, far, 0.0)
+    leader.step((1, 2), Pose2D(), STILL, 0.0)
+    assert not leader.under_way

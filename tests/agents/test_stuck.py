@@ -1,6 +1,6 @@
 """S1 to S5: when a robot is stuck, and when it only waits."""
 
-from agents.stuck import CALM_S, CELL_ENTRIES, FREED_M, STILL_S, TURNS, WAITING_S, Plight, Stuck
+from agents.stuck import CALM_S, CELL_ENTRIES, FREED_M, STANDS_S, STILL_S, TURNS, WAITING_S, Plight, Stuck
 from protocol.geometry import STILL, Pose2D, Twist
 
 AHEAD = Twist(0.4, 0.0)
@@ -21,6 +21,25 @@ def test_S1_commanded_to_move_and_did_not() -> None:
 
 def test_who_is_not_asked_to_move_is_not_stuck() -> None:
     assert watched(20.0, wanted=STILL) is None
+
+
+def stood(seconds: float, *, leads: bool, speed_mps: float = 0.0) -> str | None:
+    """The plight of one that wants next to nothing, and says no other reason."""
+    plight = Plight()
+    for n in range(round(seconds / 0.02)):
+        plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, "left", 0.0, 0.02 * n, leads=leads)
+    return plight.reason
+
+
+def test_S1_a_leader_that_is_to_go_stands_for_20_s_whatever_for() -> None:
+    assert STANDS_S == 20.0
+    assert str(stood(20.2, leads=True)).startswith("S1")
+    assert stood(19.0, leads=True) is None
+    assert stood(60.0, leads=True, speed_mps=0.02) is None
+
+
+def test_a_follower_stands_as_long_as_its_slot_does() -> None:
+    assert stood(60.0, leads=False) is None
 
 
 def test_S2_blocked_on_all_sides() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import hypot, inf
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
@@ -95,3 +96,11 @@ def test_an_explorer_is_not_barred_in_by_a_trap_that_it_is_told_of() -> None:
         simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 1, {})))
     simulator.run(12.0)
     assert hypot(places[-1].x - start.x, places[-1].y - start.y) > TRAP_M
+
+
+def test_a_leader_that_only_stands_before_a_thing_says_so_at_last(tmp_path: Path) -> None:
+    """A splinter that one beam in a few scans meets: there is a way beside it, but never for long enough to take it."""
+    thing = "world.obstacles=[{center_m=[4.0,0.0], corners_m=[[0,0],[0.005,0],[0.005,0.005]]}]"
+    short = ("mission.leading.route_m=[[8.0,0.0]]", "time_limit_s=90.0", "mission.leading.cruise_mps=0.5")
+    summary = run(load("straight", (thing, *short), robots=1), 0, tmp_path / "run").summary
+    assert (summary.outcome, str(summary.reason).rpartition(": ")[2]) == ("failed", "stands on its way")
