@@ -48,7 +48,7 @@ class Plight:
             self.out()
 
     def watch(
-        self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool = False
+        self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool
     ) -> None:
         """One control step on the way; arguments as of `Stuck.watch`. `leads`: it is a leader, and is to go."""
         if self.backing_out:

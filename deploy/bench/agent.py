@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import signal
 import statistics
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -52,20 +53,25 @@ def _rows() -> Iterator[list[Row]]:
         with listen(elsewhere, frozenset({f"{robot_name(LIKE)}/**"})), started(words) as process:
             pause(team, SETTLE_S)
             agents = [team.process_of(robot_name(robot)) for robot in robots]
-            since, before, bare_before = clock.now(), [processes.cpu_s(agent) for agent in agents], cpu_s(process)
-            pause(team, WATCHED_S)
-            passed_s = clock.now() - since
-            used = [processes.cpu_s(agent) - was for agent, was in zip(agents, before, strict=True)]
-            yield _costs(
-                [100.0 * used_s / passed_s for used_s in used], 100.0 * (cpu_s(process) - bare_before) / passed_s
-            )
+            yield _costs(*_shares(team, agents, process))
             largest = max(_resident_mib(agent) for agent in agents)
             yield [row("agent", Quantity("resident, the largest", "MiB", 35.0), largest)]
         yield [row("agent", Quantity("first pose after its start", "s", 1.0), _first_pose_s(team, robots[-1]))]
 
 
+def _shares(
+    team: Team, agents: Sequence[processes.Identity], process: subprocess.Popen[bytes]
+) -> tuple[list[float], float]:
+    """Of each agent and of the bare process, in percent of a core, over the same time."""
+    since, before, bare_before = clock.now(), [processes.cpu_s(agent) for agent in agents], cpu_s(process)
+    pause(team, WATCHED_S)
+    percent = 100.0 / (clock.now() - since)
+    used = [processes.cpu_s(agent) - was for agent, was in zip(agents, before, strict=True)]
+    return [percent * used_s for used_s in used], percent * (cpu_s(process) - bare_before)
+
+
 def _costs(shares: Sequence[float], bare_share: float) -> list[Row]:
-    """Of each agent and of the bare process, in percent of a core."""
+    """What those shares [%] make as rows."""
     mean = statistics.mean(shares)
     return [
         row("agent", Quantity("share of a core, mean", "%", 5.0), mean),

@@ -91,16 +91,16 @@ def test_a_reset_forgets() -> None:
 def in_a_plight() -> Plight:
     plight = Plight()
     for n in range(150):
-        plight.watch(Pose2D(), STILL, "blocked", 0.0, 0.02 * n)
+        plight.watch(Pose2D(), STILL, "blocked", 0.0, 0.02 * n, leads=False)
     assert plight.reason is not None
     return plight
 
 
 def test_who_is_stuck_is_so_until_it_is_half_a_metre_away() -> None:
     plight = in_a_plight()
-    plight.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.1)
+    plight.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.1, leads=False)
     assert plight.reason is not None
-    plight.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.2)
+    plight.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.2, leads=False)
     assert plight.reason is None
 
 
