@@ -49,7 +49,7 @@ model: $(STAMP)
 
 # Planted bugs: which invariant falls after how many schedules of faults; minutes.
 planted: $(STAMP)
-	$(BIN)/python -m tests.protocol.hunt
+	$(BIN)/python -m tests.protocol.lease.hunt
 
 # The table of a scenario's keys, from the types, to the end of its page.
 pages: $(STAMP)

@@ -10,42 +10,36 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from agents.beliefs import Beliefs
-from agents.config import CONTROL_PERIOD_S
-from agents.distress import Distress
-from agents.driver import Driver
-from agents.orders import Orders
-from agents.reports import Reports, status
-from agents.voice import Voice
-from protocol.geometry import STILL, Twist
-from protocol.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
-from protocol.messages import (
-    NO_TERM,
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.agents.leading.formation_commands import Orders
+from lfa.agents.navigator import Driver
+from lfa.agents.stuck_policy import Distress
+from lfa.agents.team_state import Beliefs
+from lfa.agents.telemetry import Reports, status
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.lease.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import NO_TERM, Config, LeaseNote, Member, Role, Term
+from lfa.protocol.messages.robot import CmdVel, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.team import (
     Ask,
-    CmdVel,
-    Config,
     FormationNote,
-    GroundProfile,
-    LaserScan,
-    LeaseNote,
-    Localization,
-    Member,
     MissionNote,
     ObstacleNote,
     OperatorNote,
     PoseStamped,
-    Role,
-    Sensors,
     TableRow,
-    Term,
 )
-from protocol.mission import Mission, Refused, check_mission, robot_id_of, robot_name
-from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
-from protocol.timing import timing_of
-from protocol.topics import TOPIC, alive_key
+from lfa.protocol.mission import Mission
+from lfa.protocol.mission_checks import check_mission
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
+from lfa.protocol.outbox import Voice
+from lfa.protocol.topics import TOPIC, alive_key
 
 if TYPE_CHECKING:
-    from agents.mapping import Grid
+    from lfa.agents.exploration.occupancy_grid import Grid
 
 ASK_S = 0.5
 EASE_S = 2.0 * CONTROL_PERIOD_S
@@ -198,7 +192,7 @@ class Agent:
             case ObstacleNote(kind="trap"):
                 driver.avoid_trap(message, now)
             case ObstacleNote():
-                self._beliefs.hear_obstacle(robot, message, now)
+                self._beliefs.obstacles.update(robot, message, now)
             case FormationNote():
                 if driver.formation.request(message):
                     self._event("formation", now, {"number": message.number, "trace": message.trace})

@@ -13,15 +13,18 @@ from typing import NoReturn
 
 import msgspec
 
-from agents.agent import Agent
-from protocol import clock
-from protocol.credentials import credentials
-from protocol.mission import Mission, Refused, check_mission, whole_number
-from protocol.node import Node
-from protocol.runtime import Options, run
-from protocol.topics import fleet_name
-from protocol.witness import Witness
-from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
+from lfa.agents.agent import Agent
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.mission import Mission
+from lfa.protocol.mission_checks import check_mission
+from lfa.protocol.names import whole_number
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.node_runner import Options, run
+from lfa.protocol.topics import fleet_name
+from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 
 ROLES = ("leader", "follower", "witness")
 EXAMPLE = "example: lfa-agent --role follower --id 2"

@@ -9,7 +9,8 @@ from math import inf, isfinite
 
 from msgspec import Struct
 
-from protocol.mission import Limits, Refused
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Limits
 
 CONTROL_HZ = 50.0
 CONTROL_PERIOD_S = 1.0 / CONTROL_HZ

@@ -9,28 +9,32 @@ from __future__ import annotations
 from math import cos, hypot, inf, pi, sin
 from typing import TYPE_CHECKING
 
-from agents.around import Around, resting
-from agents.beliefs import Beliefs
-from agents.config import CONTROL_PERIOD_S
-from agents.crossing import Crossing
-from agents.estimator import Estimator
-from agents.features import Feature
-from agents.following import follower_of, predecessor_of
-from agents.formation import Formation
-from agents.leading import LEADER_OMEGA_MAX_RADPS, Leadership
-from agents.motion import Lead, in_base
-from agents.perception import Point, without
-from agents.predecessor import Predecessor
-from agents.retreat import Retreat
-from agents.safety import safe, sharing
-from agents.strategy import Decision, Detour
-from agents.stuck import Plight
-from protocol.geometry import STILL, Pose2D, Twist
-from protocol.messages import GroundProfile, LaserScan, ObstacleNote, Role
-from protocol.mission import Mission
+from lfa.agents.avoidance.decision import Decision
+from lfa.agents.avoidance.detour import Detour
+from lfa.agents.avoidance.ground_crossing import GroundCrossing
+from lfa.agents.avoidance.moving_obstacle import Crossing
+from lfa.agents.avoidance.safety import safe, sharing
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.agents.following.factory import follower_of, predecessor_of
+from lfa.agents.following.predecessor import Predecessor
+from lfa.agents.formation.formation import Formation
+from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
+from lfa.agents.leading.path_follower import Lead
+from lfa.agents.localization.estimator import Estimator
+from lfa.agents.perception.obstacle_model import Around, resting
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.agents.perception.scan import Point, without
+from lfa.agents.recovery.back_up import Retreat
+from lfa.agents.recovery.stuck_detector import Plight
+from lfa.agents.team_state import Beliefs
+from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.robot import GroundProfile, LaserScan
+from lfa.protocol.messages.team import ObstacleNote
+from lfa.protocol.mission import Mission
 
 if TYPE_CHECKING:
-    from agents.explore import Explore
+    from lfa.agents.exploration.explorer import Explore
 
 CATCH_UP_PER_S = 0.8
 TRACK_EVERY = 5
@@ -59,7 +63,8 @@ class Driver:
         self.follower = follower_of(mission)
         self.leading = Leadership(mission, self.formation, beliefs)
         self.predecessor: Predecessor | None = None
-        self._around = Around(mission.radius_m, mission.limits, beliefs)
+        self._around = Around(mission.radius_m, mission.limits, beliefs.obstacles)
+        self._ground_crossing = GroundCrossing(self._around.ground, mission.limits, mission.radius_m)
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing()
         self._plight = Plight(again=mission.leading.motion != "explore")
@@ -86,7 +91,7 @@ class Driver:
     @property
     def decision(self) -> Decision | None:
         """What is being done about the surroundings, None on the wanted way."""
-        return self._crossing.decision or self._detour.decision or self._around.ground.decision
+        return self._crossing.decision or self._detour.decision or self._ground_crossing.decision
 
     @property
     def last(self) -> Twist:
@@ -164,7 +169,7 @@ class Driver:
             wanted = STILL
         if role is not Role.WAITING:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
-            wanted = self._around.ground.cross(wanted, self._mission.radius_m, now)
+            wanted = self._ground_crossing.cross(wanted, now)
             wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
         if not self._retreat.under_way:
             self._retreat.keep(pose)

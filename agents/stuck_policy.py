@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from math import floor, inf
 
-from agents.around import TRAP_M
-from agents.beliefs import Beliefs
-from agents.driver import Driver
-from agents.stuck import POSE_LOST
-from agents.voice import Voice
-from protocol.geometry import Pose2D
-from protocol.lease import Lease
-from protocol.messages import ObstacleNote, Role
-from protocol.mission import Mission
+from lfa.agents.navigator import Driver
+from lfa.agents.perception.obstacle_model import TRAP_M
+from lfa.agents.recovery.stuck_detector import POSE_LOST
+from lfa.agents.team_state import Beliefs
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.team import ObstacleNote
+from lfa.protocol.mission import Mission
+from lfa.protocol.outbox import Voice
 
 HANDOVER_S = 2.0
 """At least between two hand-overs that a stuck leader asks for."""

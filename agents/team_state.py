@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import hypot
-
-from agents.clocks import ClockOffset
-from agents.features import Feature
-from protocol.geometry import Pose2D
-from protocol.messages import Delay, ObstacleNote, Sensors, TableRow
-from protocol.topics import TOPIC
+from lfa.agents.localization.clock_offset import ClockOffset
+from lfa.agents.perception.shared_obstacles import SharedObstacles
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.robot import Sensors
+from lfa.protocol.messages.team import Delay, TableRow
+from lfa.protocol.topics import TOPIC
 
 ROBOTS_MAX = 512
 ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
 """A robot is taken to go on as it went for so long after its last row."""
-TOLD_S, GLIMPSED_S = 3.0, 6.0
-"""What another robot saw moving is believed to go on so long: behind a thing nobody may see it for a while. It is for
-longer where this robot sees something by now: a piece of it, or it before its motion can be told."""
-SAME_M = 0.5
-"""Told of nearer than this to a robot, or to what is seen or told of already, it is no other thing."""
 
 
 class Beliefs:
@@ -35,7 +28,8 @@ class Beliefs:
         self._velocity: dict[int, tuple[float, float]] = {}
         """From one row to the next, in `map`."""
         self._clocks: dict[int, ClockOffset] = {}
-        self._told: dict[int, tuple[ObstacleNote, float]] = {}
+        self.obstacles = SharedObstacles(self.poses)
+        """What other robots reported as moving."""
 
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
         self.sensors, self.sensors_at = sensors, at
@@ -69,6 +63,10 @@ class Beliefs:
         row, (vx, vy), later = known[0], self._velocity[robot], min(now - known[1], GOES_ON_S)
         return Pose2D(row.x + vx * later, row.y + vy * later, row.theta)
 
+    def poses(self, now: float) -> list[Pose2D | None]:
+        """Return the poses in `map` of all robots in the table; None for a stale one."""
+        return [self.pose_of(robot, now) for robot in self._table]
+
     def stuck(self, robot: int, now: float) -> bool:
         """Whether `robot` says that it is stuck; what it said long ago does not count."""
         known = self._table.get(robot)
@@ -78,33 +76,6 @@ class Beliefs:
         """Least (receive - send) of these robots' rows: their half of a round trip (control.md 3.3)."""
         clocks = [(robot, self._clocks.get(robot)) for robot in robots]
         return tuple(Delay(robot, clock.least(now)) for robot, clock in clocks if clock is not None and clock.known)
-
-    def hear_obstacle(self, robot: int, note: ObstacleNote, at: float) -> None:
-        """The last thing that `robot` saw moving."""
-        if note.kind == "moving" and (robot in self._told or len(self._told) < ROBOTS_MAX):
-            self._told[robot] = (note, at)
-
-    def moving(
-        self,
-        seen: list[Feature],
-        here: Pose2D,
-        now: float,
-        glimpsed: Callable[[float, float, float], bool] = lambda x, y, within_m: False,
-    ) -> list[Feature]:
-        """`seen`, and what others saw moving elsewhere, as of `now`; not what is where a robot is.
-
-        `glimpsed` tells whether this robot sees anything there (x, y in `map`) at the moment.
-        """
-        known = list(seen)
-        for note, at in self._told.values():
-            vx, vy = note.twist_map
-            x, y = note.x + vx * (now - at), note.y + vy * (now - at)
-            if now - at <= TOLD_S or (now - at <= GLIMPSED_S and glimpsed(x, y, SAME_M)):
-                robots = (here, *(self.pose_of(robot, now) for robot in self._table))
-                ours = any(p is not None and hypot(x - p.x, y - p.y) < SAME_M for p in robots)
-                if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
-                    known.append(Feature("moving", x, y, note.radius_m, vx, vy))
-        return known
 
 
 def _order(row: TableRow) -> tuple[int, int]:

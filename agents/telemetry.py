@@ -4,28 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from agents.beliefs import Beliefs
-from agents.driver import Driver
-from agents.strategy import Decision
-from agents.voice import Voice
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import (
-    Level,
-    ObstacleNote,
-    PlanNote,
-    PoseStamped,
-    Role,
-    Status,
-    TableRow,
-    Term,
-    Tracking,
-    Version,
-)
-from protocol.mission import robot_name
-from protocol.node import Vitals
+from lfa.agents.avoidance.decision import Decision
+from lfa.agents.navigator import Driver
+from lfa.agents.team_state import Beliefs
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.consensus import Role, Term, Version
+from lfa.protocol.messages.team import Level, ObstacleNote, PlanNote, PoseStamped, Status, TableRow, Tracking
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Vitals
+from lfa.protocol.outbox import Voice
 
 if TYPE_CHECKING:
-    from agents.explore import Explore  # a map and a planner: memory that only explorers need
+    from lfa.agents.exploration.explorer import Explore  # a map and a planner: memory that only explorers need
 
 TRACKING_EVERY = 2
 PLAN_EVERY = 10

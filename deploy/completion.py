@@ -14,8 +14,8 @@ import typer
 from msgspec import Struct
 from typer.models import OptionInfo
 
-from deploy.cli import COMMANDS, Entry
-from world.scenario import shipped
+from lfa.deploy.cli import COMMANDS, Entry
+from lfa.world.description.load import shipped
 
 
 class Words(Struct, frozen=True):

@@ -1,6 +1,6 @@
 """A scenario from a notebook or a script:
 
-from deploy.simulate import run
+from lfa.deploy.simulate import run
 
 done = run("paper_path1", seed=7, set=["mission.leading.cruise_mps=0.4"], faults=["kill leader at 9 s"])
 t, x, y, theta, v, omega = done.truth[2].T       # numpy: s, m, m, rad, m/s, rad/s in map
@@ -12,13 +12,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from deploy.look.readings import Run
-from deploy.run import simulate
-from deploy.run.faults import parse_all
-from world.scenario import Scenario, load
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run import simulate
+from lfa.world.description.load import Scenario, load
 
-__all__ = ["Run", "run"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Result", "run"]
+
+
+class Result(Run):
+    """A finished run: its data, and its figures for a notebook."""
+
+    def figure(self, name: str) -> Figure:
+        """Return the figure `name` of `catalogue.FIGURES`. Raises KeyError with the names that there are."""
+        from lfa.deploy.view.figures import catalogue
+
+        if name not in (known := [known for known, *_ in catalogue.FIGURES]):
+            raise KeyError(f"{name}: must be one of {', '.join(known)}")
+        return catalogue.drawn(name, self)
 
 
 def run(
@@ -29,7 +45,7 @@ def run(
     robots: int | None = None,
     faults: Sequence[str] = (),
     out: Path | None = None,
-) -> Run:
+) -> Result:
     """Run `scenario` (shipped name, file, or as loaded) in virtual time, as `lfa sim` does, and read the result.
 
     `set` holds texts `a.b=value` and `robots` a team's size, for a scenario given by name. The run folder is `out`,
@@ -37,4 +53,4 @@ def run(
     """
     chosen = load(scenario, set, robots) if isinstance(scenario, str) else scenario
     ended = simulate.run(chosen, seed, out, parse_all(chosen.mission, chosen.faults, faults))
-    return Run(ended.folder)
+    return Result(ended.folder)

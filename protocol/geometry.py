@@ -83,3 +83,13 @@ def distance(a: Pose2D, b: Pose2D) -> float:
 def bearing(origin: Pose2D, target: Pose2D) -> float:
     """Direction [rad] from `origin` to `target` in the frame that both are given in."""
     return atan2(target.y - origin.y, target.x - origin.x)
+
+
+Point = tuple[float, float]
+
+
+def in_base(pose: Pose2D, point: Point) -> Point:
+    """`point` (in `map`) as seen from `pose`."""
+    dx, dy = point[0] - pose.x, point[1] - pose.y
+    c, s = cos(pose.theta), sin(pose.theta)
+    return c * dx + s * dy, c * dy - s * dx

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from msgspec import Struct
 
-from protocol.messages import Message
+from lfa.protocol.messages.codec import Message
 
 
 class PeerUp(Struct, frozen=True, array_like=True, tag="peer_up"):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from protocol.messages import Event, Header, Message, Term
-from protocol.mission import robot_name
-from protocol.node import Envelope
-from protocol.topics import TOPIC, key
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Event
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Envelope
+from lfa.protocol.topics import TOPIC, key
 
 
 class Voice:

@@ -10,8 +10,24 @@ from typing import Literal
 
 from msgspec import Struct
 
-from protocol import messages as m
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.consensus import LeaseNote
+from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
+from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.simulation import Clock, Truth
+from lfa.protocol.messages.team import (
+    Ask,
+    Event,
+    FormationNote,
+    MissionNote,
+    ObstacleNote,
+    OperatorNote,
+    PlanNote,
+    PoseStamped,
+    Status,
+    TableRow,
+    Tracking,
+)
 
 Priority = Literal["real_time", "prompt", "data", "background"]
 
@@ -47,29 +63,29 @@ ANYONE = (*TEAM, "operator", "world")
 
 #         name            type             publishers             rate  state  wakes  priority      timeout
 TOPICS: tuple[Topic, ...] = (
-    Topic("mission",      m.MissionNote,   ("operator", "world"), None, False, True,  "prompt",     None),
-    Topic("ask",          m.Ask,           TEAM,                  None, False, True,  "prompt",     None),
-    Topic("pose",         m.PoseStamped,   ("agent",),            50.0, True,  False, "real_time",  0.5),
-    Topic("table",        m.TableRow,      ("agent",),            2.0,  True,  False, "data",       3.0),
-    Topic("tracking",     m.Tracking,      ("agent",),            25.0, True,  False, "background", 1.0),
-    Topic("cmd_vel",      m.CmdVel,        ("agent",),            50.0, False, False, "real_time",  0.06),
-    Topic("lease",        m.LeaseNote,     TEAM,                  None, False, True,  "real_time",  None),
-    Topic("formation",    m.FormationNote, ("agent",),            1.0,  True,  True,  "prompt",     3.0),
-    Topic("obstacles",    m.ObstacleNote,  ("agent",),            None, False, False, "data",       None),
-    Topic("plan",         m.PlanNote,      ("agent",),            5.0,  False, False, "background", None),
-    Topic("operator",     m.OperatorNote,  ("operator",),         None, False, True,  "prompt",     None),
-    Topic("status",       m.Status,        TEAM,                  1.0,  True,  False, "background", 3.0),
-    Topic("event",        m.Event,         ANYONE,                None, False, False, "background", None),
-    Topic("sensors",      m.Sensors,       ("driver",),           50.0, True,  False, "real_time",  0.2),
-    Topic("localization", m.Localization,  ("driver",),           10.0, True,  False, "real_time",  1.0),
-    Topic("scan",         m.LaserScan,     ("driver",),           10.0, True,  False, "data",       0.35),
-    Topic("ground",       m.GroundProfile, ("driver",),           20.0, True,  False, "data",       0.25),
-    Topic("contact",      m.Contact,       ("driver",),           None, False, False, "data",       None),
-    Topic("truth",        m.Truth,         ("world",),            50.0, False, False, "background", None),
-    Topic("clock",        m.Clock,         ("world",),            1.0,  True,  False, "background", None),
-    Topic("host",         m.HostStatus,    ("host",),             1.0,  True,  True,  "data",       3.0),
-    Topic("order",        m.HostOrder,     ("operator",),         None, False, True,  "prompt",     None),
-    Topic("log",          m.LogLines,      ("host",),             None, False, True,  "background", None),
+    Topic("mission",      MissionNote,   ("operator", "world"), None, False, True,  "prompt",     None),
+    Topic("ask",          Ask,           TEAM,                  None, False, True,  "prompt",     None),
+    Topic("pose",         PoseStamped,   ("agent",),            50.0, True,  False, "real_time",  0.5),
+    Topic("table",        TableRow,      ("agent",),            2.0,  True,  False, "data",       3.0),
+    Topic("tracking",     Tracking,      ("agent",),            25.0, True,  False, "background", 1.0),
+    Topic("cmd_vel",      CmdVel,        ("agent",),            50.0, False, False, "real_time",  0.06),
+    Topic("lease",        LeaseNote,     TEAM,                  None, False, True,  "real_time",  None),
+    Topic("formation",    FormationNote, ("agent",),            1.0,  True,  True,  "prompt",     3.0),
+    Topic("obstacles",    ObstacleNote,  ("agent",),            None, False, False, "data",       None),
+    Topic("plan",         PlanNote,      ("agent",),            5.0,  False, False, "background", None),
+    Topic("operator",     OperatorNote,  ("operator",),         None, False, True,  "prompt",     None),
+    Topic("status",       Status,        TEAM,                  1.0,  True,  False, "background", 3.0),
+    Topic("event",        Event,         ANYONE,                None, False, False, "background", None),
+    Topic("sensors",      Sensors,       ("driver",),           50.0, True,  False, "real_time",  0.2),
+    Topic("localization", Localization,  ("driver",),           10.0, True,  False, "real_time",  1.0),
+    Topic("scan",         LaserScan,     ("driver",),           10.0, True,  False, "data",       0.35),
+    Topic("ground",       GroundProfile, ("driver",),           20.0, True,  False, "data",       0.25),
+    Topic("contact",      Contact,       ("driver",),           None, False, False, "data",       None),
+    Topic("truth",        Truth,         ("world",),            50.0, False, False, "background", None),
+    Topic("clock",        Clock,         ("world",),            1.0,  True,  False, "background", None),
+    Topic("host",         HostStatus,    ("host",),             1.0,  True,  True,  "data",       3.0),
+    Topic("order",        HostOrder,     ("operator",),         None, False, True,  "prompt",     None),
+    Topic("log",          LogLines,      ("host",),             None, False, True,  "background", None),
 )  # fmt: skip
 
 NO_ECHO = frozenset({"lease", "table", "formation", "obstacles"})

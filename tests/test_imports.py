@@ -22,7 +22,7 @@ MAY: dict[str, set[str]] = {
 
 #           module       only imported by (within these packages)
 ONLY: dict[str, tuple[set[str], tuple[str, ...]]] = {
-    "zenoh":    ({"protocol/zenoh_bus.py"}, PACKAGES),
+    "zenoh":    ({"protocol/transport/zenoh_bus.py"}, PACKAGES),
     "time":     ({"protocol/clock.py"},     ("protocol", "agents")),
     "rerun":    (set(),                     ("protocol", "agents", "world")),
 }  # fmt: skip
@@ -76,14 +76,14 @@ def _loaded(code: str, unwanted: tuple[str, ...]) -> str:
 
 
 def test_an_agents_process_loads_nothing_heavy() -> None:
-    assert _loaded("import agents.cli", NEVER_ON_A_ROBOT) == "[]"
+    assert _loaded("import lfa.agents.cli", NEVER_ON_A_ROBOT) == "[]"
 
 
 def test_what_runs_on_every_machine_of_a_fleet_needs_no_more_than_the_base() -> None:
-    code = "import deploy.fleet.host, deploy.fleet.supervise, deploy.fleet.router"
+    code = "import lfa.deploy.fleet.host.host, lfa.deploy.fleet.host.supervisor, lfa.deploy.fleet.host.router"
     assert _loaded(code, (*NEVER_ON_A_ROBOT[:-2], "asyncssh", "cryptography")) == "[]"
 
 
 def test_help_loads_no_command() -> None:
     heavy = (*NEVER_ON_A_ROBOT[:-1], "zenoh", "agents")
-    assert _loaded("from deploy import cli; cli.build([])", heavy) == "[]"
+    assert _loaded("from lfa.deploy import cli; cli.build([])", heavy) == "[]"

@@ -8,19 +8,19 @@ from typing import Any
 
 import pytest
 
-from agents.agent import Agent
-from deploy.look import schema
-from deploy.simulate import run
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.mission import Leading, Mission
-from protocol.radio import CLEAR
+from lfa.agents.agent import Agent
+from lfa.deploy.config import schema
+from lfa.deploy.simulate import run
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.mission import Leading, Mission
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.transport.link_model import CLEAR
+from lfa.world.simulator import Simulator
 from tests.test_paper_map import ROOT, names_of
-from world.simulator import Simulator
 
 DRIVER = (ROOT / "protocol" / "DRIVER.md").read_text()
 SCENARIO = (ROOT / "world" / "SCENARIO.md").read_text()
-PAGES = {"DRIVER": DRIVER, "SCENARIO": SCENARIO, "LOOK": (ROOT / "deploy" / "look" / "README.md").read_text()}
+PAGES = {"DRIVER": DRIVER, "SCENARIO": SCENARIO, "VIEW": (ROOT / "deploy" / "view" / "README.md").read_text()}
 NAMED = sorted(
     {(page, quoted) for page, text in PAGES.items() for quoted in re.findall(r"`([a-z_/]+\.py(?::\w+)?)`", text)}
 )
@@ -42,7 +42,7 @@ def test_a_file_and_a_name_on_a_page_exist(page: str, quoted: str) -> None:
 
 @pytest.mark.parametrize(("page", "path"), PICTURES)
 def test_a_picture_on_a_page_is_there_and_small(page: str, path: str) -> None:
-    folder = {"DRIVER": "protocol", "SCENARIO": "world", "LOOK": "deploy/look"}[page]
+    folder = {"DRIVER": "protocol", "SCENARIO": "world", "VIEW": "deploy/view"}[page]
     assert 0 < (ROOT / folder / path).stat().st_size < 150_000
 
 

@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from deploy.cli import COMMANDS
-from deploy.look.figures import FIGURES
-from world.scenario import shipped
+from lfa.deploy.cli import COMMANDS
+from lfa.deploy.view.figures.catalogue import FIGURES
+from lfa.world.description.load import shipped
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "agents" / "PAPER.md").read_text()

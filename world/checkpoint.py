@@ -16,11 +16,11 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from protocol.geometry import Pose2D
-from protocol.mission import Refused
-from protocol.node import Envelope, Received
-from world.spec import STATE, Obstacle, Scenario
-from world.world import Memory, World
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.node import Envelope, Received
+from lfa.world.description.scenario import STATE, Obstacle, Scenario
+from lfa.world.world import Memory, World
 
 EVERY_S = 0.1
 

@@ -9,15 +9,15 @@ from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from protocol import clock
-from protocol.credentials import credentials
-from protocol.mission import Refused
-from protocol.node import Node
-from protocol.runtime import Options, run
-from protocol.topics import WORLD_NAME, fleet_name
-from protocol.witness import Witness
-from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
-from world.scenario import draw, load
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.node_runner import Options, run
+from lfa.protocol.topics import WORLD_NAME, fleet_name
+from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
+from lfa.world.description.load import draw, load
 
 EXTRA = ("numpy", "pymunk", "PIL")
 EXAMPLE = "Example: lfa-world paper_path1 --seed 7 --set world.lidar.beams=90"
@@ -43,8 +43,8 @@ def start(
     faults: Annotated[bool, typer.Option("--faults", help="Obey an operator's radio weather: for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
-    from world import memory  # what these need is not in the base install
-    from world.world import World
+    from lfa.world import checkpoint  # what these need is not in the base install
+    from lfa.world.world import World
 
     drawn = draw(load(scenario, set_ or (), robots), seed)
     wall_ms = clock.wall_ms()
@@ -52,10 +52,10 @@ def start(
     endpoint = connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")
     options = Options(fleet_name(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as, notify)
-    known = None if resume is None else memory.read(resume)
-    placed = drawn if known is None else memory.resumed(drawn, known)
+    known = None if resume is None else checkpoint.read(resume)
+    placed = drawn if known is None else checkpoint.resumed(drawn, known)
     world = World(fleet, placed, seed, wall_ms, start_at=clock.now(), memory=known)
-    nodes: list[Node] = [world if state is None else memory.Remembering(world, state)]
+    nodes: list[Node] = [world if state is None else checkpoint.Remembering(world, state)]
     if witness and drawn.mission.witness:
         nodes.append(Witness(fleet, wall_ms, wall_ms))
     return run(nodes, options, wall_ms)

@@ -4,28 +4,19 @@ from __future__ import annotations
 
 from math import atan2
 
-from protocol.gateway import Gateway
-from protocol.geometry import TAU, Pose2D, wrap
-from protocol.messages import (
-    CmdVel,
-    Contact,
-    Fence,
-    GroundProfile,
-    Header,
-    LaserScan,
-    LeaseNote,
-    Localization,
-    Message,
-    Sensors,
-    Term,
-)
-from protocol.mission import robot_name
-from protocol.node import Envelope
-from protocol.timing import timing_of
-from protocol.topics import TO_ALL, WORLD_NAME, key
-from world.lidar import ANGLE_MIN, Floats
-from world.sensors import HeightNoise, Localizer, RangeNoise, WheelOdometry
-from world.spec import Scenario
+from lfa.protocol.geometry import TAU, Pose2D, wrap
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Envelope
+from lfa.protocol.topics import TO_ALL, WORLD_NAME, key
+from lfa.world.description.scenario import Scenario
+from lfa.world.sensors.lidar import ANGLE_MIN, Floats
+from lfa.world.sensors.noise import HeightNoise, Localizer, RangeNoise, WheelOdometry
 
 REFUSAL_EVERY_S = 0.2
 """Between two events of a gateway about the same reason, however often the term changes."""

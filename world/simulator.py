@@ -13,13 +13,13 @@ from typing import Any
 
 from msgspec import Struct
 
-from protocol.host import Host, Sent
-from protocol.journal import Journal
-from protocol.messages import Message, decode
-from protocol.mission import Refused
-from protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
-from protocol.radio import Air, Link, Radio, link_of
-from protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import Message, decode
+from lfa.protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
+from lfa.protocol.runtime.journal import Journal
+from lfa.protocol.runtime.node_host import Host, Sent
+from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
+from lfa.protocol.transport.link_model import Air, Link, Radio, link_of
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)

@@ -12,33 +12,22 @@ from math import floor, inf
 import msgspec
 from msgspec import Struct
 
-from protocol.gateway import Gateway
-from protocol.geometry import STILL, Pose2D, Twist
-from protocol.messages import (
-    Ask,
-    Clock,
-    CmdVel,
-    Event,
-    Fence,
-    Header,
-    LeaseNote,
-    Localization,
-    MissionNote,
-    Sensors,
-    Term,
-    TrueObstacle,
-    TrueRobot,
-    Truth,
-)
-from protocol.mission import robot_name
-from protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
-from protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
-from world.ground import Profiler
-from world.kinematic import Kinematic, Touch
-from world.lidar import Scanner
-from world.physics import Physics
-from world.robot import Robot
-from world.spec import Scenario
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel, Localization, Sensors
+from lfa.protocol.messages.simulation import Clock, TrueObstacle, TrueRobot, Truth
+from lfa.protocol.messages.team import Ask, Event, MissionNote
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
+from lfa.world.description.scenario import Scenario
+from lfa.world.physics.kinematics import Kinematic, Touch
+from lfa.world.physics.rigid_bodies import Physics
+from lfa.world.robot_hardware import Robot
+from lfa.world.sensors.ground_sensor import Profiler
+from lfa.world.sensors.lidar import Scanner
 
 CATCH_UP_STEPS_MAX = 20
 """Steps in one tick: after a longer pause the world's time has stood still for the rest."""
@@ -56,7 +45,7 @@ class Remembered(Struct, frozen=True):
 
 
 class Memory(Struct, frozen=True):
-    """All of a world that outlives its process (`memory.py`)."""
+    """All of a world that outlives its process (`checkpoint.py`)."""
 
     step: int
     """Of the grid of time."""

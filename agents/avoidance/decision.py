@@ -12,7 +12,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-Class = Literal["stationary", "moving", "wall", "pothole", "bump", "ditch"]
+from lfa.agents.perception.obstacle import Class
+
 Updates = Literal["speed and position", "angle"]
 
 
@@ -96,3 +97,20 @@ TABLE: tuple[Row, ...] = (
 def decide(situation: Situation) -> Row | None:
     """The first row of the situation's class that holds; None when the robot is stuck."""
     return next((row for row in TABLE if row.kind == situation.kind and row.holds(situation)), None)
+
+
+class Decision(Struct, frozen=True):
+    """What a detour does now, with the values that it was decided by, for the log."""
+
+    action: str
+    """`left`, `right`, `u_turn`, `back`, `creep`, `blocked`; of what moves: `slow`, `wait`, `back`, `ahead`;
+    on the ground: `overcome`, `climb`."""
+    free_m: float
+    """Clear way along the motion that was wanted."""
+    bearing: float
+    """Chosen direction in `base_link` [rad]."""
+    kind: Class = "stationary"
+    """Class of what is met."""
+    condition: str = ""
+    """The row of the decision table, by its condition, and what the decision updates (decisions.py)."""
+    updates: str = ""

@@ -7,33 +7,24 @@ the way to its target has been free for a while.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import atan2, cos, hypot, inf, pi, sin, sqrt
+from math import atan2, cos, hypot, inf, pi, sqrt
 
-from msgspec import Struct
 from msgspec.structs import replace
 
-from agents import safety
-from agents.config import CONTROL_PERIOD_S
-from agents.decisions import Class, Row, Situation, decide
-from agents.perception import Point, free_along
-from protocol.geometry import STILL, Twist, wrap
-from protocol.mission import Limits
+from lfa.agents.avoidance import safety
+from lfa.agents.avoidance.decision import Decision, Row, Situation, decide
+from lfa.agents.avoidance.openings import ALL_STEPS, ASIDE_STEPS, BESIDE, NARROW_M, WIDE_M, _bar, _first_open, _Openings
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.agents.perception.obstacle import Thing
+from lfa.agents.perception.scan import Point, free_along
+from lfa.protocol.geometry import STILL, Twist, wrap
+from lfa.protocol.mission import Limits
 
-STEP_RAD = pi / 24
-ASIDE_STEPS, ALL_STEPS = 18, 30
-"""Directions up to 135 degrees off the wanted one lead past a thing, the others back; a side once taken reaches beyond
-the opposite direction, so that it does not flip there."""
-WIDE_M = 0.20
-"""Kept from the body's surface where there is room."""
-NARROW_M = 0.08
-"""Never less (control.md section 7), but beside what the robot is nearer to already."""
 NEARER_M, LEAST_M = 0.005, safety.SKIN_M
 """Who is nearer to a thing than `NARROW_M` already may go where it comes no nearer than it is but for so much, and not
 nearer than it would brake for anyway (safety.py)."""
 NOISE_M = 0.02
 """A reading of the scan may be so much too short: four standard deviations of the scanner in the paper's worlds."""
-BESIDE = 0.25
-"""Less than this ahead, as a share of how far aside: beside the robot, which comes no nearer to it than 3 %."""
 REACH_M = 1.6
 HEADWAY_S = 0.8
 KEEP_SIDE_RAD = 0.6
@@ -49,39 +40,6 @@ SWING_M = 0.05
 CREEP_MPS, CREEP_S, CREEP_FREE_M = 0.1, 2.0, 0.25
 """Towards what has no visible end, to see it, for a bounded time."""
 IN_PLACE_RAD = 0.9
-
-
-class Decision(Struct, frozen=True):
-    """What a detour does now, with the values that it was decided by, for the log."""
-
-    action: str
-    """`left`, `right`, `u_turn`, `back`, `creep`, `blocked`; of what moves: `slow`, `wait`, `back`, `ahead`;
-    on the ground: `overcome`, `climb`."""
-    free_m: float
-    """Clear way along the motion that was wanted."""
-    bearing: float
-    """Chosen direction in `base_link` [rad]."""
-    kind: Class = "stationary"
-    """Class of what is met."""
-    condition: str = ""
-    """The row of the decision table, by its condition, and what the decision updates (decisions.py)."""
-    updates: str = ""
-
-
-class Thing(Struct, frozen=True):
-    """What bars the way."""
-
-    kind: Class = "stationary"
-    width_m: float = 0.0
-    """As far as seen; inf when its end is out of sight."""
-
-
-class _Openings(Struct, frozen=True):
-    """The open direction nearest to the wanted one on either side, and the one that leads back; None where none is."""
-
-    left: float | None
-    right: float | None
-    rear: float | None
 
 
 class Detour:
@@ -278,32 +236,3 @@ class Detour:
         """Speed from which the robot stops before what is ahead of it, `margin_m` wider than it is."""
         free_m = free_along(points, AHEAD, self._radius_m + margin_m)
         return sqrt(self._limits.a_max_mps2 * max(0.0, free_m - 0.1))
-
-
-def _first_open(
-    points: Sequence[Point], towards: float, side: float, first: int, last: int, reach_m: float, half_width_m: float
-) -> float | None:
-    """The open direction nearest to `towards` among steps `first` to `last` to one side of it."""
-    for n in range(first, last + 1):
-        bearing = wrap(towards + side * n * STEP_RAD)
-        bar = _bar(points, bearing, reach_m, half_width_m)
-        if bar is None:
-            return bearing
-        if bar:  # what bars one direction is likely to bar the next
-            points = [*points[bar:], *points[:bar]] if side > 0.0 else [*points[bar::-1], *points[:bar:-1]]
-    return None
-
-
-def _bar(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: float) -> int | None:
-    """Which point lies within `half_width_m` of the straight way of `reach_m` in direction `bearing`; None: it is open.
-
-    A point that is already nearer than the half width bars only what goes towards it, not what passes it by.
-    """
-    c, s, far_m = cos(bearing), sin(bearing), reach_m + half_width_m
-    for n, (x, y) in enumerate(points):
-        along = c * x + s * y
-        if 0.0 < along < far_m:
-            across = c * y - s * x
-            if -half_width_m < across < half_width_m and along > BESIDE * abs(across):
-                return n
-    return None

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, inf
 
-from agents.decisions import Situation, decide
-from agents.features import Feature
-from agents.strategy import Decision
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.agents.avoidance.decision import Decision, Situation, decide
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
 CLEARANCE_M = 0.6
 """From the robot's centre to the surface of what moves; nearer within the horizon is a conflict."""

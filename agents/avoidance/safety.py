@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import atan2, hypot, isfinite, pi
 
-from agents.perception import Point, free_along
-from protocol.geometry import STILL, Twist
-from protocol.mission import Limits
+from lfa.agents.perception.scan import Point, free_along
+from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.mission import Limits
 
 SKIN_M = 0.02
 """Kept between the body and the nearest point when braking."""

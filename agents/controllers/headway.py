@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from agents.config import Gains
-from agents.controller import Law, Reference
-from protocol.geometry import Pose2D, Twist
-from protocol.mission import Limits
+from lfa.agents.config import Gains
+from lfa.agents.following.controller import Law, Reference
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.mission import Limits
 
 HEADWAY_S = 0.3
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from agents.config import Gains
-from agents.controller import Reference, guard
-from protocol.geometry import Pose2D, Twist, wrap
-from protocol.mission import Limits
+from lfa.agents.config import Gains
+from lfa.agents.following.controller import Reference, guard
+from lfa.protocol.geometry import Pose2D, Twist, wrap
+from lfa.protocol.mission import Limits
 
 KX_PER_S = 1.5
 KY_PER_M2 = 6.0

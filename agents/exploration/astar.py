@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from heapq import heappop, heappush
 
-from agents.footing import DIAGONAL, FREE, STRAIGHT, UNSEEN, Footing
-from agents.mapping import REACH
+from lfa.agents.exploration.costmap import DIAGONAL, FREE, STRAIGHT, UNSEEN, Footing
+from lfa.agents.exploration.occupancy_grid import REACH
 
 GUESS = 11
 """Of the way still to go, a step: a little above `FREE`, so that unknown ground is not searched in its whole width."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import ceil, hypot, inf
 
-from agents.mapping import CELL_M, NEAR_PER_CELL, REACH, Grid, Point
+from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, REACH, Grid, Point
 
 FREE, UNSEEN = 10, 13
 """Price of a straight step; a diagonal one costs `DIAGONAL` / `STRAIGHT` as much."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agents.mapping import Mapping, Point, bounds
-from agents.planner import Planner
-from agents.tiles import Shown, Tiles
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import LaserScan
-from protocol.mission import Mission
+from lfa.agents.exploration.map_tiles import Shown, Tiles
+from lfa.agents.exploration.occupancy_grid import Mapping, Point, bounds
+from lfa.agents.exploration.path_planner import Planner
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.mission import Mission
 
 MARGIN_M = 15.0
 """Around start and goal: what lies farther out is not mapped, and no route leads through it."""
@@ -33,7 +33,7 @@ class Explore:
         self._tiles: Tiles | None = None
 
     def shown(self, pose: Pose2D) -> Shown | None:
-        """A tile of the map, for views (agents/tiles.py)."""
+        """A tile of the map, for views (agents/exploration/map_tiles.py)."""
         if self.mapping is None:
             return None
         if self._tiles is None:

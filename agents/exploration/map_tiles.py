@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import floor
 from zlib import crc32
 
-from agents.mapping import CELL_M, OCCUPIED, Grid, Point
+from lfa.agents.exploration.occupancy_grid import CELL_M, OCCUPIED, Grid, Point
 
 TILE_CELLS = 64
 LOOKED_MAX = 24

@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from math import ceil, cos, floor, hypot, inf, sin
 
-from protocol.geometry import Pose2D
-from protocol.messages import LaserScan
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.robot import LaserScan
 
 CELL_M = 0.1
 SIDE_CELLS_MAX = 1200

@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import ceil, cos, hypot, inf, sin
 
-from agents.footing import Box, Footing, between, prices_of, runs_of
-from agents.mapping import CELL_M, Grid, Point
-from agents.search import chain, search
-from agents.shaping import PIECE_M, smoothed, straightened
-from protocol.geometry import Pose2D
+from lfa.agents.exploration.astar import chain, search
+from lfa.agents.exploration.costmap import Box, Footing, between, prices_of, runs_of
+from lfa.agents.exploration.occupancy_grid import CELL_M, Grid, Point
+from lfa.agents.exploration.path_smoothing import PIECE_M, smoothed, straightened
+from lfa.protocol.geometry import Pose2D
 
 MATE_GAP_M = 0.10
 """Kept from the skin of a team-mate that is gone round: out of a dead end the way leads past those behind."""

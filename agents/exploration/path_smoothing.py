@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import ceil, hypot
 
-from agents.footing import FREE, STRAIGHT, Footing
-from agents.mapping import Point
+from lfa.agents.exploration.costmap import FREE, STRAIGHT, Footing
+from lfa.agents.exploration.occupancy_grid import Point
 
 PIECE_M = 0.4
 """Between the points of a route; a cut corner is rounded over several."""

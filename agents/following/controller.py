@@ -11,9 +11,10 @@ from typing import Protocol
 
 from msgspec import Struct
 
-from agents.config import Gains
-from protocol.geometry import Pose2D, Twist, wrap
-from protocol.mission import Limits, Refused
+from lfa.agents.config import Gains
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D, Twist, wrap
+from lfa.protocol.mission import Limits
 
 ENTRY_POINTS = "lfa.controllers"
 DEFAULT_CONTROLLER = "law"

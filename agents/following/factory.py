@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import msgspec
 
-from agents.config import CONTROL_PERIOD_S, Gains, check_gains
-from agents.controller import find_controller
-from agents.follower import Follower
-from agents.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
-from protocol.mission import Mission, Refused
+from lfa.agents.config import CONTROL_PERIOD_S, Gains, check_gains
+from lfa.agents.following.controller import find_controller
+from lfa.agents.following.follower import Follower
+from lfa.agents.following.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Mission
 
 
 def gains_of(mission: Mission) -> Gains:

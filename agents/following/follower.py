@@ -12,14 +12,15 @@ from math import atan2, cos, hypot, isfinite, sin
 
 from msgspec import Struct
 
-from agents.config import CONTROL_PERIOD_S, Gains
-from agents.controller import SLOT_SPEED_MIN_MPS, Controller, Reference
-from agents.formation import SlotMotion
-from agents.observer import SlotVelocityObserver, plausible
-from agents.predecessor import Sighting
-from protocol.geometry import STILL, Pose2D, Twist, wrap
-from protocol.messages import Slot
-from protocol.mission import Limits
+from lfa.agents.config import CONTROL_PERIOD_S, Gains
+from lfa.agents.following.controller import SLOT_SPEED_MIN_MPS, Controller, Reference
+from lfa.agents.following.observer import SlotVelocityObserver
+from lfa.agents.following.predecessor import Sighting
+from lfa.agents.formation.formation import SlotMotion
+from lfa.agents.localization.plausibility import plausible
+from lfa.protocol.geometry import STILL, Pose2D, Twist, wrap
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Limits
 
 REVERSE_BELOW_MPS = -0.05
 FORWARD_ABOVE_MPS = 0.02

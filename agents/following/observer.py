@@ -12,7 +12,8 @@ from __future__ import annotations
 from math import cos, exp, hypot, isfinite, sin, sqrt
 from typing import Literal
 
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.agents.localization.plausibility import plausible
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 
 Mode = Literal["velocity", "pose"]
 
@@ -27,9 +28,6 @@ JUMP_M = 0.15
 """A position this far from the predicted one is a fault; two in a row are a jump."""
 JUMP_MPS2 = 1.0
 """What an honest predecessor may add to it by accelerating unseen."""
-POSITION_MAX_M = 1e6
-SPEED_MAX = 50.0
-"""[m/s, rad/s] More is no robot of ours."""
 
 
 class Observer:
@@ -160,17 +158,6 @@ class SlotVelocityObserver:
         det = g1 * g1 + g2 * g2
         self._w = ((g1 * dx - g2 * dy) / det, (g2 * dx + g1 * dy) / det)
         return self._w
-
-
-def plausible(pose: Pose2D, twist: Twist) -> bool:
-    """Whether a robot of ours can be there and so fast. Anything that is not finite is not (nan compares false)."""
-    return (
-        abs(pose.x) < POSITION_MAX_M
-        and abs(pose.y) < POSITION_MAX_M
-        and abs(pose.theta) < POSITION_MAX_M
-        and abs(twist.linear_x) < SPEED_MAX
-        and abs(twist.angular_z) < SPEED_MAX
-    )
 
 
 def _integral(turn: float, h: float) -> tuple[float, float]:

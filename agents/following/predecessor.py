@@ -10,11 +10,12 @@ from math import isfinite
 
 from msgspec import Struct
 
-from agents.clocks import ClockOffset
-from agents.observer import Mode, Observer, plausible
-from agents.trace import JitterBuffer, Sample, Trace
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import PoseStamped
+from lfa.agents.following.observer import Mode, Observer
+from lfa.agents.formation.pose_history import JitterBuffer, Sample, Trace
+from lfa.agents.localization.clock_offset import ClockOffset
+from lfa.agents.localization.plausibility import plausible
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.team import PoseStamped
 
 DEAD_RECKONING_FOLLOWERS_MAX = 3
 """More followers than this use the buffer (control.md 5.1: dead reckoning amplifies along a chain)."""

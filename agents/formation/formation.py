@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import cos, hypot, isfinite, pi, sin, sqrt
 
-from agents.config import Gains
-from agents.model import slot_velocity
-from agents.trace import Trace
-from protocol.geometry import TAU, Pose2D, Twist, bearing, wrap
-from protocol.messages import NO_TERM, FormationNote, Slot, Term
-from protocol.mission import FormationSpec, Limits, Mission, Refused, Side
+from lfa.agents.config import Gains
+from lfa.agents.formation.kinematics import slot_velocity
+from lfa.agents.formation.pose_history import Trace
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import TAU, Pose2D, Twist, bearing, wrap
+from lfa.protocol.messages.consensus import NO_TERM, Term
+from lfa.protocol.messages.team import FormationNote, Slot
+from lfa.protocol.mission import FormationSpec, Limits, Mission, Side
 
 SEPARATION_MAX_M = 100.0
 BLEND_SHARE_MIN = 0.1

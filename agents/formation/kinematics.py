@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import atan2, cos, sin
 
-from protocol.geometry import Pose2D, Twist, wrap
+from lfa.protocol.geometry import Pose2D, Twist, wrap
 
 
 def slot(predecessor: Pose2D, k: float, phi: float) -> tuple[float, float]:

@@ -12,8 +12,8 @@ from math import cos, hypot, sin
 
 from msgspec import Struct
 
-from agents.config import CONTROL_PERIOD_S
-from protocol.geometry import Pose2D, Twist, along_arc, between, compose, part_of_arc, sinc, wrap
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, part_of_arc, sinc, wrap
 
 SAMPLES_MAX = 64
 SPACING_M = 0.02

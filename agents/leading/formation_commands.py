@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import pi
 
-from agents.formation import Formation, named, slots_of
-from agents.motion import Lead
-from agents.voice import Voice
-from protocol.messages import FormationNote, Slot, Term
-from protocol.mission import Mission, Refused
+from lfa.agents.formation.formation import Formation, named, slots_of
+from lfa.agents.leading.path_follower import Lead
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.team import FormationNote, Slot
+from lfa.protocol.mission import Mission
+from lfa.protocol.outbox import Voice
 
 REPEAT_S = 1.0
 BEND_CHECK_S = 0.5

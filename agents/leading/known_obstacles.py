@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, cos, hypot, inf, sin
 
-from protocol.geometry import Pose2D
+from lfa.protocol.geometry import Pose2D
 
 STATION_M = 0.5
 SHIFT_M = 0.1

@@ -10,18 +10,18 @@ from collections.abc import Callable, Sequence
 from math import atan2
 from typing import TYPE_CHECKING
 
-from agents.beliefs import Beliefs
-from agents.formation import Formation
-from agents.motion import Lead
-from agents.perception import Point, free_along
-from agents.safety import SKIN_M
-from protocol.geometry import STILL, Pose2D, Twist, distance
-from protocol.messages import Slot
-from protocol.mission import Mission
+from lfa.agents.avoidance.safety import SKIN_M
+from lfa.agents.formation.formation import Formation
+from lfa.agents.leading.path_follower import Lead
+from lfa.agents.perception.scan import Point, free_along
+from lfa.agents.team_state import Beliefs
+from lfa.protocol.geometry import STILL, Pose2D, Twist, distance
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Mission
 
 if TYPE_CHECKING:
-    from agents.explore import Explore
-    from agents.timetable import Timetable
+    from lfa.agents.exploration.explorer import Explore
+    from lfa.agents.leading.timed_route import Timetable
 
 GAP_SLOW = 1.5
 GAP_WAIT = 2.0
@@ -49,11 +49,11 @@ class Leadership:
         self.explore: Explore | None = None
         self._timetable: Timetable | None = None
         if mission.leading.motion == "explore":
-            from agents.explore import Explore  # a map and a planner: memory that only explorers need
+            from lfa.agents.exploration.explorer import Explore  # a map and a planner: memory that only explorers need
 
             self.explore = Explore(mission)
         elif mission.leading.motion == "trajectory":
-            from agents.timetable import Timetable
+            from lfa.agents.leading.timed_route import Timetable
 
             self._timetable = Timetable(mission.leading)
         self._waiting_since: float | None = None

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, ceil, cos, hypot, inf, pi, sin, tan
 
-from agents.config import CONTROL_PERIOD_S
-from agents.formation import COLUMN_BELOW_MPS, PLANNED_MARGIN, leader_speed_cap
-from protocol.geometry import Pose2D, Twist, wrap
-from protocol.messages import Slot
-from protocol.mission import Leading, Limits
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.agents.formation.formation import COLUMN_BELOW_MPS, PLANNED_MARGIN, leader_speed_cap
+from lfa.protocol.geometry import Point, Pose2D, Twist, in_base, wrap
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Leading, Limits
 
 CORNER_RADIUS_M = 2.5
 SPACING_M = 0.1
@@ -32,8 +32,6 @@ SLOWEST_SHARE = 0.25
 """Of the speed, where a planned route bends away: it is kept to, at walking pace if need be."""
 ARRIVED_MPS = 0.02
 LATERAL_GAIN = 1.2
-
-Point = tuple[float, float]
 
 
 class Route:
@@ -213,19 +211,12 @@ class Lead:
         if hypot(points[0][0] - points[-1][0], points[0][1] - points[-1][1]) < 1e-6 and len(points) == 2:
             points[0] = (points[0][0] - 0.01, points[0][1])
         if self._leading.known_m:
-            from agents.known import past_known  # only in an iteration 2
+            from lfa.agents.leading.known_obstacles import past_known  # only in an iteration 2
 
             if hypot(points[0][0] - pose.x, points[0][1] - pose.y) > CORNER_RADIUS_M:
                 points = [(pose.x, pose.y), *points]
             points = past_known(points, self._leading.known_m, self._radius_m)
         return Route(points)
-
-
-def in_base(pose: Pose2D, point: Point) -> Point:
-    """`point` (in `map`) as seen from `pose`."""
-    dx, dy = point[0] - pose.x, point[1] - pose.y
-    c, s = cos(pose.theta), sin(pose.theta)
-    return c * dx + s * dy, c * dy - s * dx
 
 
 def _leg(a: Point, b: Point) -> tuple[float, float, float, float, float]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from agents.motion import Route
-from protocol.mission import Leading
+from lfa.agents.leading.path_follower import Route
+from lfa.protocol.mission import Leading
 
 GAIN_PER_S = 0.5
 LAG_M_MAX = 5.0

@@ -13,11 +13,11 @@ from math import isfinite
 
 from msgspec import Struct
 
-from agents.clocks import ClockOffset
-from agents.covariance import Covariance
-from agents.observer import plausible
-from protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, wrap
-from protocol.messages import Localization, Sensors
+from lfa.agents.localization.clock_offset import ClockOffset
+from lfa.agents.localization.covariance import Covariance
+from lfa.agents.localization.plausibility import plausible
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, wrap
+from lfa.protocol.messages.robot import Localization, Sensors
 
 ODOMETRY_KEPT = 64
 GATE_SIGMA = 5.0

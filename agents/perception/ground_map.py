@@ -1,24 +1,21 @@
-"""The floor ahead: over what can be crossed the robot goes straight and slowly; the rest bars the way.
+"""The floor ahead: what can be crossed, and what bars the way.
 
 What cannot be crossed is remembered as points in `map`, so that a detour treats its edge like an obstacle's. What a
-single look shows is `profile.py`.
+single look shows is `ground_profile.py`.
 """
 
 from __future__ import annotations
 
-from math import ceil, cos, floor, inf, pi, sin, sqrt
+from math import ceil, cos, floor, inf, pi, sin
 from typing import Literal
 
 from msgspec.structs import replace
 
-from agents.decisions import Situation, decide
-from agents.motion import in_base
-from agents.perception import Point
-from agents.profile import GroundFeature, at, bridged_lines, is_ditch, readings_of, runs
-from agents.strategy import Decision
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import GroundProfile
-from protocol.mission import Limits
+from lfa.agents.perception.ground_profile import GroundFeature, at, bridged_lines, is_ditch, readings_of, runs
+from lfa.agents.perception.scan import Point
+from lfa.protocol.geometry import Pose2D, in_base
+from lfa.protocol.messages.robot import GroundProfile
+from lfa.protocol.mission import Limits
 
 BarKind = Literal["pothole", "bump", "ditch", "wall"]
 
@@ -29,16 +26,9 @@ MOVED_M = 0.3
 NOWHERE = (inf, inf, 0.0)
 JUDGE_M = 0.5
 """Nearer than this, what has no visible end has none."""
-NEAR_M = 0.5
-CROSSING_MPS = 0.2
-"""Slow enough for the wheels, whatever they meet (control.md section 7)."""
 SEEN_MIN = 4
 AGAIN_S = 0.3
 """A cell counts when so many looks showed it, each within so long of the last: a bad reading or two are no hole."""
-BESIDE_M = 0.05
-"""What lies so far inside of a wheel's line is looked at before a bend brings the wheel there: the body's edge."""
-LATE_S = 0.1
-"""From a look at the floor until the robot brakes."""
 
 
 class Ground:
@@ -57,18 +47,16 @@ class Ground:
         """Class and width [m] of the floor that bars a cell."""
         self.ahead: GroundFeature | None = None
         """The nearest feature that can be crossed and lies ahead."""
-        self.decision: Decision | None = None
-        """While something is crossed, and on the way to it."""
-        self._crossing_until = 0.0
         self._doubtful: list[Point] = []
         """In `map`, where the newest profile shows what may be a hole and is none yet."""
-        self._looks = False
+        self.looked = False
+        """Whether a profile has come."""
 
     def profile(self, profile: GroundProfile, pose_map: Pose2D, now: float) -> None:
         """Take a profile that was made at `pose_map`."""
         features = [(line, feature) for line in range(len(profile.heights_m)) for feature in runs(profile, line)]
         ditch = is_ditch([feature for _, feature in features], len(profile.heights_m))
-        self.ahead, self._looks, self._doubtful = None, True, []
+        self.ahead, self.looked, self._doubtful = None, True, []
         bridged = bridged_lines(features, self._limits)
         for line, found in features:
             feature = replace(found, kind="ditch") if ditch and found.kind == "pothole" else found
@@ -85,32 +73,6 @@ class Ground:
                     self._free(profile, line, feature, pose_map)
                 if self.ahead is None or feature.near_m < self.ahead.near_m:
                     self.ahead = feature
-
-    def cross(self, wanted: Twist, radius_m: float, now: float) -> Twist:
-        """`wanted`, straight and slow over what can be crossed, until the whole robot is behind it; and at any time
-        slow enough in a bend to stop before what a look ahead shows there first."""
-        ahead, wanted = self.ahead, self._in_sight(wanted)
-        if ahead is not None and ahead.near_m < NEAR_M and wanted.linear_x > 0.0:
-            row = decide(Situation(ahead.kind, ahead.near_m, ahead.width_m, crossable=True))
-            if row is not None:
-                self._crossing_until = now + (ahead.near_m + ahead.width_m + 2.0 * radius_m) / CROSSING_MPS
-                self.decision = Decision(row.action, ahead.near_m, 0.0, ahead.kind, row.name, row.updates)
-        if now >= self._crossing_until:
-            self.decision = None
-            return wanted
-        if wanted.linear_x <= CROSSING_MPS:
-            return wanted
-        return Twist(CROSSING_MPS, wanted.angular_z * CROSSING_MPS / wanted.linear_x)
-
-    def _in_sight(self, wanted: Twist) -> Twist:
-        """The lines look straight ahead: on a bend of radius R the floor before the inner wheel is `BESIDE_M` off its
-        line in a distance of sqrt(2 R BESIDE_M), and was never seen from farther away."""
-        v, omega = wanted.linear_x, abs(wanted.angular_z)
-        if v <= 0.0 or omega == 0.0 or not self._looks:
-            return wanted
-        seen_m, a = sqrt(2.0 * BESIDE_M * v / omega), self._limits.a_max_mps2
-        v_max = sqrt(a * a * LATE_S * LATE_S + 2.0 * a * seen_m) - a * LATE_S
-        return wanted if v <= v_max else Twist(v_max, wanted.angular_z * v_max / v)
 
     def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind, now: float) -> None:
         """Nobody of this robot's size gets into the circle about (x, y) in `map` any more."""

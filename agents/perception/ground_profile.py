@@ -1,7 +1,7 @@
 """What one look at the floor shows: potholes, bumps and ditches, and which of them wheels can cross.
 
 Lengths in m; heights as in `GroundProfile`, relative to what the robot stands on. What is remembered of many looks is
-`ground.py`.
+`ground_map.py`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Literal
 
 from msgspec import Struct
 
-from agents.perception import Point
-from protocol.geometry import Pose2D
-from protocol.messages import GroundProfile
-from protocol.mission import Limits
+from lfa.agents.perception.scan import Point
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.robot import GroundProfile
+from lfa.protocol.mission import Limits
 
 GroundKind = Literal["pothole", "bump", "ditch"]
 

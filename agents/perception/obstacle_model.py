@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, hypot, inf, sin
 
-from agents.beliefs import Beliefs
-from agents.features import Feature, Tracker
-from agents.ground import Ground
-from agents.perception import Point, Surroundings
-from agents.strategy import Thing
-from protocol.geometry import Pose2D, Twist, along_arc
-from protocol.messages import GroundProfile, LaserScan
-from protocol.mission import Limits
+from lfa.agents.perception.ground_map import Ground
+from lfa.agents.perception.obstacle import Thing
+from lfa.agents.perception.obstacle_tracker import Feature, Tracker
+from lfa.agents.perception.scan import Point, Surroundings
+from lfa.agents.perception.shared_obstacles import SharedObstacles
+from lfa.protocol.geometry import Pose2D, Twist, along_arc
+from lfa.protocol.messages.robot import GroundProfile, LaserScan
+from lfa.protocol.mission import Limits
 
 LOOK_M = 2.0
 TRAP_M = 0.8
@@ -32,9 +32,9 @@ TURN_MPS = 0.05
 class Around:
     """Of one robot. `ground` is the floor as far as felt."""
 
-    def __init__(self, radius_m: float, limits: Limits, beliefs: Beliefs) -> None:
+    def __init__(self, radius_m: float, limits: Limits, shared: SharedObstacles) -> None:
         self._radius_m = radius_m
-        self._beliefs = beliefs
+        self._shared = shared
         self._scan = Surroundings()
         self._tracker = Tracker()
         self.ground = Ground(limits)
@@ -62,7 +62,7 @@ class Around:
 
     def moving(self, pose: Pose2D, now: float) -> list[Feature]:
         """What moves, as seen by this robot and as told by others."""
-        return self._beliefs.moving(self._tracker.moving(now), pose, now, self._tracker.shows)
+        return self._shared.moving(self._tracker.moving(now), pose, now, self._tracker.shows)
 
     def thing(self, pose: Pose2D, wanted: Twist, free_m: float, now: float) -> Thing:
         """What ends the way along `wanted` after `free_m`."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from agents.perception import SIGHT_M, Point
+from lfa.agents.perception.scan import SIGHT_M, Point
 
 Kind = Literal["stationary", "moving", "wall"]
 

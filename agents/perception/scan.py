@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import acos, atan2, cos, hypot, inf, pi, sin, sqrt
 
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import LaserScan
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.robot import LaserScan
 
 SIGHT_M = 2.5
 """Farther points do not matter to a robot that stops within half a metre."""

@@ -6,10 +6,9 @@ from collections import deque
 from collections.abc import Sequence
 from math import hypot
 
-from agents.motion import in_base
-from agents.perception import Point, free_along
-from agents.safety import SKIN_M
-from protocol.geometry import STILL, Pose2D, Twist
+from lfa.agents.avoidance.safety import SKIN_M
+from lfa.agents.perception.scan import Point, free_along
+from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
 
 STEP_M, TRAIL_M = 0.1, 6.0
 OUT_M = 1.6

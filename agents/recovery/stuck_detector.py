@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from math import floor, hypot
 
-from protocol.geometry import Pose2D, Twist, distance
+from lfa.protocol.geometry import Pose2D, Twist, distance
 
 STILL_S, STILL_M = 3.0, 0.10
 STANDS_S = 20.0

@@ -15,22 +15,15 @@ from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
-from msgspec import Struct
 
-from deploy.look.errors import Errors
-from deploy.look.trace import Trace
-from protocol.mission import Refused
-from world.spec import Assert
+from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.recording.mcap_reader import Trace
+from lfa.protocol.errors import Refused
+from lfa.world.description.scenario import Assert
 
 if TYPE_CHECKING:
-    from deploy.look.summary import Summary
-
-
-class Assertion(Struct):
-    name: str
-    ok: bool
-    text: str = ""
-    """What was found and what was asked for, with units."""
+    from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.analysis.summary import Assertion
 
 
 def judge(wanted: Assert, summary: Summary, seen: Trace, followed: Iterable[Errors]) -> list[Assertion]:

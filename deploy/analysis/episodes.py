@@ -14,10 +14,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from msgspec import Struct
 
-from deploy.look import chronicle
-from deploy.look.errors import RECOVERY_S_MAX, Errors, Mask
-from deploy.look.readings import Run
-from deploy.look.trace import Array
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.tracking_errors import RECOVERY_S_MAX, Errors, Mask
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.mcap_reader import Array
 
 APART_S = 1.0
 BASE_M, SPIKE_M = 0.02, 0.05
@@ -102,14 +102,14 @@ def episodes(run: Run) -> list[Episode]:
 
 def requests(run: Run) -> list[float]:
     """When the leader asked for another orientation [s]; not what an operator made it ask for."""
-    return [line["t"] for line in chronicle.of_kind(run.events, "formation") if chronicle.asked_by_leader(line)]
+    return [line["t"] for line in event_log.of_kind(run.events, "formation") if event_log.asked_by_leader(line)]
 
 
 def avoidances(run: Run, robot: int) -> list[tuple[float, float]]:
     """From the first decision to the `resume` that ends it, by the robot's own log [s]."""
     spans: list[tuple[float, float]] = []
     since: float | None = None
-    for line in chronicle.of_kind(run.events, "decision"):
+    for line in event_log.of_kind(run.events, "decision"):
         if line["robot"] != robot:
             continue
         if line["action"] != "resume":

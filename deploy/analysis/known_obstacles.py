@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import hypot
 from pathlib import Path
 
-from deploy.look import trace
-from protocol.mission import KNOWN_MAX, Refused
-from protocol.topics import TOPIC
+from lfa.deploy.recording import mcap_reader
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import KNOWN_MAX
+from lfa.protocol.topics import TOPIC
 
 STANDING = ("stationary", "pothole", "trap")
 STILL_MPS = 0.05
@@ -27,7 +28,7 @@ def known_obstacles(folder: Path) -> tuple[Circle, ...]:
         raise Refused(f"--map-from {folder}: no run folder, it has no recording.mcap")
     places: dict[str, tuple[float, float]] = {}
     found: list[list[Circle]] = []
-    for owner, topic, _, message in trace.messages(folder, frozenset({"pose", "obstacles"})):
+    for owner, topic, _, message in mcap_reader.messages(folder, frozenset({"pose", "obstacles"})):
         if topic == TOPIC["pose"].name:
             places[owner] = message.x, message.y
             continue

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from deploy.look.summary import RobotSummary, Summary
+from lfa.deploy.analysis.summary import RobotSummary, Summary
 
 HEADINGS = (
     "robot",

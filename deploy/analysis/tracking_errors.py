@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from deploy.look.trace import Array, Trace
+from lfa.deploy.recording.mcap_reader import Array, Trace
 
 Mask = NDArray[np.bool_]
 

@@ -17,17 +17,17 @@ from pathlib import Path
 import msgspec
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from deploy.bench import bare
-from deploy.bench.beside import cpu_s, pause, started
-from deploy.bench.rows import Quantity, Row, row, show
-from deploy.bench.team import Team
-from deploy.look.onlooker import listen
-from deploy.run import processes
-from protocol import clock
-from protocol.mission import robot_name
-from protocol.topics import HARDWARE, key
-from world.scenario import load
+from lfa.agents.agent import Agent
+from lfa.deploy.bench.harness import bare_process
+from lfa.deploy.bench.harness.child_process import cpu_s, pause, started
+from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.team import Team
+from lfa.deploy.client.session import listen
+from lfa.deploy.process import identity
+from lfa.protocol import clock
+from lfa.protocol.names import robot_name
+from lfa.protocol.topics import HARDWARE, key
+from lfa.world.description.load import load
 
 SCENARIO = "straight"
 LIKE = 3
@@ -49,7 +49,7 @@ def _rows() -> Iterator[list[Row]]:
         pause(team, SETTLE_S)
         task = _task(team)
         elsewhere = replace(team.fleet, name=_elsewhere(team))
-        words = [sys.executable, "-m", "deploy.bench.bare", msgspec.json.encode(task).decode()]
+        words = [sys.executable, "-P", "-m", "lfa.deploy.bench.harness.bare_process", msgspec.json.encode(task).decode()]
         with listen(elsewhere, frozenset({f"{robot_name(LIKE)}/**"})), started(words) as process:
             pause(team, SETTLE_S)
             agents = [team.process_of(robot_name(robot)) for robot in robots]
@@ -60,13 +60,13 @@ def _rows() -> Iterator[list[Row]]:
 
 
 def _shares(
-    team: Team, agents: Sequence[processes.Identity], process: subprocess.Popen[bytes]
+    team: Team, agents: Sequence[identity.Identity], process: subprocess.Popen[bytes]
 ) -> tuple[list[float], float]:
     """Of each agent and of the bare process, in percent of a core, over the same time."""
-    since, before, bare_before = clock.now(), [processes.cpu_s(agent) for agent in agents], cpu_s(process)
+    since, before, bare_before = clock.now(), [identity.cpu_s(agent) for agent in agents], cpu_s(process)
     pause(team, WATCHED_S)
     percent = 100.0 / (clock.now() - since)
-    used = [processes.cpu_s(agent) - was for agent, was in zip(agents, before, strict=True)]
+    used = [identity.cpu_s(agent) - was for agent, was in zip(agents, before, strict=True)]
     return [percent * used_s for used_s in used], percent * (cpu_s(process) - bare_before)
 
 
@@ -81,7 +81,7 @@ def _costs(shares: Sequence[float], bare_share: float) -> list[Row]:
     ]
 
 
-def _task(team: Team) -> bare.Task:
+def _task(team: Team) -> bare_process.Task:
     """What robot `LIKE` hears, and what it is heard to say, on keys of a fleet that nobody else is in."""
     fleet, name, ahead = team.fleet.name, robot_name(LIKE), robot_name(LIKE - 1)
     agent = Agent(LIKE, 1, fleet, 1, team.scenario.mission)
@@ -98,10 +98,12 @@ def _task(team: Team) -> bare.Task:
                 size[arrival.key] += len(arrival.payload)
         passed_s = clock.now() - since
     says = (
-        bare.Saying(where.replace(fleet, _elsewhere(team), 1), size[where] // count[where], count[where] / passed_s)
+        bare_process.Saying(
+            where.replace(fleet, _elsewhere(team), 1), size[where] // count[where], count[where] / passed_s
+        )
         for where in sorted(count)
     )
-    return bare.Task(team.fleet.endpoint, (*sorted(agent.interests), key(fleet, ahead, "pose")), tuple(says))
+    return bare_process.Task(team.fleet.endpoint, (*sorted(agent.interests), key(fleet, ahead, "pose")), tuple(says))
 
 
 def _of_agent(where: str) -> bool:
@@ -129,6 +131,6 @@ def _first_pose_s(team: Team, robot: int) -> float:
     return stamps[0] - at
 
 
-def _resident_mib(agent: processes.Identity) -> float:
+def _resident_mib(agent: identity.Identity) -> float:
     pages = int(Path(f"/proc/{agent.pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGESIZE") / MIB

@@ -13,8 +13,8 @@ from typing import Annotated, Any
 
 import typer
 
-import deploy.bench
-from protocol.mission import Refused
+import lfa.deploy.bench
+from lfa.protocol.errors import Refused
 
 
 def command(
@@ -37,7 +37,7 @@ def command(
     names = _names()
     if name not in names:
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
-    run = import_module(f"deploy.bench.{name}").run
+    run = import_module(f"lfa.deploy.bench.{name}").run
     given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None, "figures": figures}
     given |= {"kills": kills, "full": full or None, "minutes": minutes, "seeds": seeds}
     given = {option: value for option, value in given.items() if value is not None}
@@ -58,5 +58,5 @@ def command(
 
 def _names() -> list[str]:
     """The modules of this package that can be run; finding out imports them."""
-    modules = (module.name for module in iter_modules(deploy.bench.__path__) if module.name != "command")
-    return [name for name in modules if hasattr(import_module(f"deploy.bench.{name}"), "run")]
+    modules = (module.name for module in iter_modules(lfa.deploy.bench.__path__) if module.name != "command")
+    return [name for name in modules if hasattr(import_module(f"lfa.deploy.bench.{name}"), "run")]

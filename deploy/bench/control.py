@@ -5,13 +5,14 @@ from __future__ import annotations
 from itertools import chain
 from pathlib import Path
 
-from deploy.bench import control_agents, control_figures, control_string, control_table
-from deploy.bench.rows import Case, measured, select, show
+from lfa.deploy.bench.control_cases import agents, string_stability, table
+from lfa.deploy.bench.control_cases import figures as control_figures
+from lfa.deploy.bench.harness.rows import Case, measured, select, show
 
 
 def cases() -> list[Case]:
     """The longest first, so that two jobs end together."""
-    return [*control_string.cases(), *control_agents.cases(), *control_table.cases()]
+    return [*string_stability.cases(), *agents.cases(), *table.cases()]
 
 
 def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, figures: str | None = None) -> int:
@@ -19,7 +20,7 @@ def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, 
 
     `processes` adds real runs, one after the other and alone: beside a computation they would show its load.
     """
-    virtual, live = cases(), control_agents.process_cases() if processes else []
+    virtual, live = cases(), agents.process_cases() if processes else []
     chosen = select([*virtual, *live], rows)
     computed = [case for case in chosen if case not in live]
     alone = [case for case in chosen if case in live]

@@ -17,10 +17,10 @@ from random import Random
 
 from msgspec import Struct
 
-from deploy.bench.rows import Quantity, Row, row, show
-from deploy.bench.team import Broken, Team, endless
-from protocol import clock
-from protocol.timing import timing_of
+from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.team import Broken, Team, endless
+from lfa.protocol import clock
+from lfa.protocol.lease.timing import timing_of
 
 ROBOTS = 4
 ROUNDS = 30

@@ -15,10 +15,10 @@ from typing import Any
 
 import pymunk
 
-from protocol.geometry import TAU, Pose2D
-from protocol.mission import Mission
-from world.lidar import ANGLE_MIN, Scanner
-from world.scenario import Lidar, Obstacle, Scenario, WorldSpec
+from lfa.protocol.geometry import TAU, Pose2D
+from lfa.protocol.mission import Mission
+from lfa.world.description.load import Lidar, Obstacle, Scenario, WorldSpec
+from lfa.world.sensors.lidar import ANGLE_MIN, Scanner
 
 TEAMS = (4, 20, 100)
 BEAMS = 360

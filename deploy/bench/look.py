@@ -20,18 +20,18 @@ from socket import socket
 import msgspec
 from msgspec.structs import replace
 
-from deploy.bench.beside import cpu_s, pause, started
-from deploy.bench.rows import Quantity, Row, row, show
-from deploy.bench.team import Team, endless
-from deploy.look import report
-from deploy.look.onlooker import Ear, Fleet, listen
-from deploy.look.view import converted
-from deploy.run import simulate
-from deploy.run.folder import About, make
-from deploy.run.recorder import LastWord, Task
-from deploy.run.referee import Verdict
-from protocol import clock
-from protocol.messages import Status
+from lfa.deploy.bench.harness.child_process import cpu_s, pause, started
+from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.team import Team, endless
+from lfa.deploy.client.session import Ear, Fleet, listen
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.run_folder import About, make
+from lfa.deploy.run import simulate
+from lfa.deploy.run.recorder_process import LastWord, Task
+from lfa.deploy.view.report import command
+from lfa.deploy.view.rerun.command import converted
+from lfa.protocol import clock
+from lfa.protocol.messages.team import Status
 
 ROBOTS = 4
 SETTLE_S = 5.0
@@ -39,7 +39,7 @@ WATCHED_S = 20.0
 RUN_S = 120.0
 STARTS = 9
 MB = 1e6
-LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def run(as_json: bool) -> int:
@@ -85,7 +85,7 @@ def _recorder(team: Team, place: Path) -> list[Row]:
     """The process of `lfa run`, on this team."""
     folder = make(place / "run", team.scenario)
     task = Task(str(folder), About("endless", "bench", 0, team.fleet.name), team.fleet.endpoint, str(place / "none"))
-    words = [sys.executable, "-m", "deploy.run.recorder", msgspec.json.encode(task).decode()]
+    words = [sys.executable, "-P", "-m", "lfa.deploy.run.recorder_process", msgspec.json.encode(task).decode()]
     with started(words, stdin=subprocess.PIPE) as process:
         pause(team, SETTLE_S)
         before, since = cpu_s(process), clock.now()
@@ -128,7 +128,7 @@ def _files() -> Iterator[list[Row]]:
         folder = simulate.run(replace(endless(ROBOTS), time_limit_s=RUN_S), 1, place / "run").folder
         yield [row("two minutes", Quantity("mcap", "MB", 30.0), (folder / "recording.mcap").stat().st_size / MB)]
         since = clock.now()
-        page = report.html([folder])
+        page = command.html([folder])
         yield [
             row("two minutes", Quantity("report", "MB", 3.0), len(page.encode()) / MB),
             row("two minutes", Quantity("report made in", "s", 10.0), clock.now() - since),

@@ -20,9 +20,9 @@ from random import Random
 
 from msgspec import Struct
 
-from deploy.bench.rows import Case, Quantity, measured, select, show
-from deploy.look.summary import Summary
-from protocol.mission import Refused
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.bench.harness.rows import Case, Quantity, measured, select, show
+from lfa.protocol.errors import Refused
 
 SEEDS = 3
 TRIES_MAX = 4000
@@ -53,7 +53,7 @@ GROUNDS = (
 
 def cases(seeds: int | None) -> list[Case]:
     """`seeds` runs of each scenario, and so many pairs on each map that is there; None: as many as the bars ask for."""
-    from world.scenario import shipped
+    from lfa.world.description.load import shipped
 
     of_each = seeds or SEEDS
     all_good = Quantity("good", "runs", float(of_each), "at least")
@@ -68,7 +68,7 @@ def _unknown(ground: Ground, count: int) -> Case:
 
 def map_of(ground: Ground) -> Path | None:
     """The `map.yaml`; None where it is not there."""
-    from world.scenario import SCENARIOS
+    from lfa.world.description.load import SCENARIOS
 
     if ground.shipped:
         return SCENARIOS / "maps" / f"{ground.name}.yaml"
@@ -98,8 +98,8 @@ def pairs_good(ground: Ground, count: int) -> tuple[float]:
 
 def pairs(ground: Ground, count: int) -> list[tuple[str, ...]]:
     """So many pairs on free ground that a chain can be laid out at and reaches, each as `--set` takes it."""
-    from world import maps
-    from world.scenario import load
+    from lfa.world.description import maps
+    from lfa.world.description.load import load
 
     path = map_of(ground)
     assert path is not None, ground
@@ -127,9 +127,9 @@ def pairs(ground: Ground, count: int) -> list[tuple[str, ...]]:
 
 
 def _good(name: str, seed: int, sets: Sequence[str], robots: int | None = None) -> bool:
-    from deploy.run.faults import parse_all
-    from deploy.run.simulate import run as simulate
-    from world.scenario import load
+    from lfa.deploy.faults.script import parse_all
+    from lfa.deploy.run.simulate import run as simulate
+    from lfa.world.description.load import load
 
     scenario = load(name, sets, robots)
     folder = Path(tempfile.mkdtemp(prefix="lfa-motion-"))

@@ -15,11 +15,11 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from deploy.run.workers import workers
-from deploy.shapes import across
-from deploy.shapes.across import Kept
-from deploy.shapes.bars import Finding
-from deploy.shapes.table import PATHS
+from lfa.deploy.analysis.paper import across_seeds
+from lfa.deploy.analysis.paper.across_seeds import Kept
+from lfa.deploy.analysis.paper.checks import PATHS
+from lfa.deploy.analysis.paper.criteria import Finding
+from lfa.deploy.process.worker_pool import workers
 
 SEEDS = 20
 
@@ -49,10 +49,10 @@ def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1) -> int:
 
 def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
     """The findings on one run, what is kept of it and of its iteration 2; nothing is left behind on disk."""
-    from deploy.look.readings import Run
-    from deploy.run.chosen import choose_again
-    from deploy.run.simulate import run as simulate
-    from deploy.shapes.table import of_run
+    from lfa.deploy.analysis.paper.checks import of_run
+    from lfa.deploy.analysis.run_data import Run
+    from lfa.deploy.run.load import choose_again
+    from lfa.deploy.run.simulate import run as simulate
 
     folder = Path(tempfile.mkdtemp(prefix="lfa-paper-"))
     try:
@@ -60,7 +60,7 @@ def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
         first = Run(simulate(chosen, seed, folder / "first").folder)
         known, _ = choose_again(scenario, (), None, seed, first.folder)
         second = Run(simulate(known, seed, folder / "second").folder)
-        return scenario, seed, of_run(first), [across.keep(first), across.keep(second)]
+        return scenario, seed, of_run(first), [across_seeds.keep(first), across_seeds.keep(second)]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -79,7 +79,7 @@ def _rows(seeds: int, jobs: int) -> list[Row]:
             told = f"fails: {'; '.join(failed)}" if failed else "ok"
             print(f"{number} of {len(waiting)}: {scenario}, seed {seed}: {told}", file=sys.stderr, flush=True)
     rows = [_row(f"{path} {name}", several) for path in PATHS for name, several in found[path].items()]
-    return rows + [_row(f"both {finding.figure} {finding.name}", [finding]) for finding in across.across(kept)]
+    return rows + [_row(f"both {finding.figure} {finding.name}", [finding]) for finding in across_seeds.across(kept)]
 
 
 def _row(name: str, found: Sequence[Finding]) -> Row:

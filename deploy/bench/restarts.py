@@ -8,9 +8,9 @@ import sys
 from collections.abc import Iterator
 from random import Random
 
-from deploy.bench.rows import Quantity, Row, row, show
-from deploy.bench.team import Broken, Team, endless
-from protocol import clock
+from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.team import Broken, Team, endless
+from lfa.protocol import clock
 
 ROBOTS = 4
 RESTARTS = 100

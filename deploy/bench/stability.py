@@ -12,19 +12,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 
-from agents.agent import Agent
-from deploy.bench.rows import Quantity, Row, row, show
-from deploy.bench.team import Broken, Team, endless
-from protocol import clock
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Event, Message
-from protocol.node import Node
-from protocol.radio import WEATHER, Radio
-from protocol.witness import Witness
-from world.kinematic import Kinematic
-from world.scenario import Scenario
-from world.simulator import Simulator
-from world.world import World
+from lfa.agents.agent import Agent
+from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.team import Broken, Team, endless
+from lfa.protocol import clock
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.team import Event
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.transport.link_model import WEATHER, Radio
+from lfa.world.description.load import Scenario
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.simulator import Simulator
+from lfa.world.world import World
 
 ROBOTS = 4
 MINUTES = 10.0

@@ -11,20 +11,23 @@ from time import process_time
 
 from msgspec.structs import replace
 
-from deploy.bench.rows import Quantity, Row, row, show
-from deploy.bench.team import Team
-from deploy.run.processes import cpu_s
-from protocol import clock
-from protocol.geometry import Twist
-from protocol.host import Host
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import CmdVel, GatewayStamp, Header, Term, encode
-from protocol.mission import robot_name
-from protocol.timing import timing_of
-from protocol.topics import WORLD_NAME, key
-from world.scenario import Scenario, draw, load
-from world.spec import Lidar
-from world.world import World
+from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.team import Team
+from lfa.deploy.process.identity import cpu_s
+from lfa.protocol import clock
+from lfa.protocol.geometry import Twist
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.consensus import GatewayStamp, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.names import robot_name
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.topics import WORLD_NAME, key
+from lfa.world.description.load import Scenario, draw, load
+from lfa.world.description.scenario import Lidar
+from lfa.world.world import World
 
 BARS = {4: 15.0, 20: 60.0}
 """Percent of a core, by robots, with 180 beams at 10 Hz (issue: the world)."""

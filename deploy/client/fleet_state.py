@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from math import hypot
 
-from protocol.messages import Event, Message, Status, Tracking, Truth
-from protocol.mission import robot_id_of
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event, Status, Tracking
+from lfa.protocol.names import robot_id_of
 
 
 class Standing:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from protocol.messages import Event, Header, OperatorNote
-from protocol.topics import OPERATOR_NAME, key
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Event, OperatorNote
+from lfa.protocol.topics import OPERATOR_NAME, key
 
 
 class Operator:

@@ -8,17 +8,18 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from deploy.run.inject import Running, agents, one_fleet, option
-from deploy.run.processes import own_processes
-from protocol import clock
-from protocol.bus import Arrival, Inbox, Links, Wake
-from protocol.credentials import credentials
-from protocol.messages import BadMessage, Message, decode
-from protocol.mission import Refused
-from protocol.node import Local, PeerDown, PeerUp
-from protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key, fleet_name
-from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
-from world.scenario import Scenario, draw, load
+from lfa.deploy.client.discovery import Running, agents, one_fleet, option
+from lfa.deploy.process.identity import own_processes
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import BadMessage, Message, decode
+from lfa.protocol.node import Local, PeerDown, PeerUp
+from lfa.protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key, fleet_name
+from lfa.protocol.transport.bus import Arrival, Inbox, Links, Wake
+from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import RouterAbsent, default_endpoint
+from lfa.world.description.load import Scenario, draw, load
 
 INBOX_SIZE_MAX = 65536
 
@@ -131,7 +132,7 @@ def scenario_of_fleet(fleet: Fleet) -> Scenario | None:
     for identity in own_processes():
         words = list(identity.arguments)
         module = next(
-            (n for n, word in enumerate(words) if word.rpartition("/")[2] in ("world.cli", "lfa-world")), None
+            (n for n, word in enumerate(words) if word.rpartition("/")[2] in ("lfa.world.cli", "lfa-world")), None
         )
         if module is None or option(words, "--fleet", "fleet") != fleet.name:
             continue

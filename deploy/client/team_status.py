@@ -8,9 +8,11 @@ from typing import Any
 
 from msgspec import Struct
 
-from protocol.geometry import wrap
-from protocol.messages import Event, Message, PoseStamped, Role, Status, Tracking
-from protocol.mission import robot_id_of
+from lfa.protocol.geometry import wrap
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
+from lfa.protocol.names import robot_id_of
 
 STALE_S = 1.0  # an older pose is not a robot's present one
 LEADER_STEP_S = 1.0

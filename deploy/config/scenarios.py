@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from world.scenario import shipped
+from lfa.world.description.load import shipped
 
 
 def command(as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> int:

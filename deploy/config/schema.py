@@ -18,8 +18,8 @@ import typer
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo, fields
 
-from deploy.fleet.file import FleetFile
-from world.scenario import Scenario
+from lfa.deploy.fleet.plan.fleet_file import FleetFile
+from lfa.world.description.load import Scenario
 
 UNITS = {
     "m": "m", "s": "s", "ms": "ms", "rad": "rad", "mps": "m/s", "mps2": "m/s²", "radps": "rad/s", "radps2": "rad/s²",

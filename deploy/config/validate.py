@@ -8,12 +8,13 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.fleet.file import is_fleet_file, load
-from deploy.run.chosen import choose
-from deploy.run.faults import parse_all
-from deploy.run.folder import toml
-from protocol.mission import Refused, robot_name
-from world.scenario import draw
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.fleet.plan.fleet_file import is_fleet_file, load
+from lfa.deploy.recording.run_folder import toml
+from lfa.deploy.scenario_loading import choose
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import robot_name
+from lfa.world.description.load import draw
 
 
 def command(

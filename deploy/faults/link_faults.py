@@ -11,11 +11,12 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from deploy.run.operator import Operator
-from protocol.messages import OperatorNote
-from protocol.mission import Refused, robot_name, whole_number
-from protocol.radio import WEATHER, Link
-from protocol.topics import WORLD_NAME
+from lfa.deploy.client.operator import Operator
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.team import OperatorNote
+from lfa.protocol.names import robot_name, whole_number
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.link_model import WEATHER, Link
 
 WORLD_WORD = "w"
 SIDES = re.compile(r"(?P<one>[\dw,]+)(?:(?P<way>[->])(?P<other>[\dw,]+))?", re.ASCII)

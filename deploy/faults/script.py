@@ -13,8 +13,10 @@ from typing import Literal, cast
 
 from msgspec import Struct
 
-from deploy.run.weather import order
-from protocol.mission import Mission, Refused, whole_number
+from lfa.deploy.faults.link_faults import order
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import whole_number
 
 Deed = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
 

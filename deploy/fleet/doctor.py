@@ -14,18 +14,18 @@ import msgspec
 import typer
 from msgspec import Struct
 
-from deploy.fleet import part as parts
-from deploy.fleet import sight
-from deploy.fleet.bundle import operator
-from deploy.fleet.file import Machine, Plan, load
-from deploy.fleet.host import Found
-from deploy.fleet.hosts import CLOCK_S_MAX, ask
-from deploy.fleet.part import Part
-from deploy.fleet.remote import PYTHON_MIN, Probed, Shell, Unreachable, probe, python_of, reach
-from protocol import clock
-from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX
-from protocol.zenoh_bus import answers, default_endpoint
+from lfa.deploy.fleet import fleet_view
+from lfa.deploy.fleet.host.host import Found
+from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan.fleet_file import Machine, Plan, load
+from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.remote.hosts import CLOCK_S_MAX, ask
+from lfa.deploy.fleet.remote.key_distribution import operator
+from lfa.deploy.fleet.remote.ssh import PYTHON_MIN, Probed, Shell, Unreachable, probe, python_of, reach
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.topics import HOST_PREFIX
+from lfa.protocol.transport.zenoh_config import answers, default_endpoint
 
 EXTRAS = {"world": ("numpy", "pymunk"), "view": ("mcap", "matplotlib", "rerun"), "deploy": ("asyncssh", "rich")}
 KNOCK_S = 3.0
@@ -69,7 +69,7 @@ def this_machine() -> list[Finding]:
         absent = [module for module in modules if find_spec(module) is None]
         says = "there" if not absent else f"without {', '.join(absent)}: pip install 'lfa[{extra}]' where it is needed"
         found.append(Finding("here", f"[{extra}]", True, says))
-    running = sight.here()
+    running = fleet_view.here()
     for part in running:
         found += _own_part(part)
     if not running:

@@ -10,14 +10,15 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.fleet import host, journals
-from deploy.fleet.file import Plan
-from deploy.fleet.hosts import Fleet
-from deploy.fleet.part import parts
-from deploy.fleet.sight import Seen, Sight, find, first_word, sight
-from deploy.run.folder import JOURNALS
-from protocol import clock
-from protocol.mission import Refused
+from lfa.deploy.fleet.fleet_view import Seen, Sight, find, first_word, sight
+from lfa.deploy.fleet.host import host
+from lfa.deploy.fleet.plan.fleet_file import Plan
+from lfa.deploy.fleet.plan.host_plan import parts
+from lfa.deploy.fleet.remote import journals
+from lfa.deploy.fleet.remote.hosts import Fleet
+from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
 
 HEAR_S = 2.0
 GONE_S = 8.0

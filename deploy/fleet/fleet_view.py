@@ -8,16 +8,19 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from deploy.fleet import part as parts
-from deploy.fleet.file import Plan, load
-from deploy.fleet.part import Part
-from deploy.fleet.private import ISSUED
-from deploy.look.onlooker import Ear, Fleet, listen
-from deploy.run.processes import own_processes
-from protocol import clock
-from protocol.messages import Header, HostOrder, HostStatus, LogLines, Message, Status, encode
-from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX, OPERATOR_NAME, key
+from lfa.deploy.client.session import Ear, Fleet, listen
+from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan.fleet_file import Plan, load
+from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.security.private_files import ISSUED
+from lfa.deploy.process.identity import own_processes
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Status
+from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, key
 
 TOPICS = frozenset({"*/host", "*/log", "*/pose", "*/tracking", "*/status", "*/event"})
 SAY_S = 0.4
@@ -71,7 +74,7 @@ def here() -> list[Part]:
     found = []
     for identity in own_processes():
         words = identity.arguments
-        if "deploy.fleet.supervise" in words[:-1]:
+        if "lfa.deploy.fleet.host.supervisor" in words[:-1]:
             try:
                 found.append(parts.read(Path(words[-1])))
             except Refused:

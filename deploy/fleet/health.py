@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from protocol.messages import HostStatus, Message, PoseStamped, Role, Status, Tracking
-from protocol.mission import robot_id_of, robot_name
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.fleet import HostStatus
+from lfa.protocol.messages.team import PoseStamped, Status, Tracking
+from lfa.protocol.names import robot_id_of, robot_name
 
 FRESH_S = 1.0
 GIVEN_UP = ("failed", "refused", "ended")

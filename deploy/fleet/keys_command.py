@@ -10,16 +10,16 @@ from typing import Annotated, Literal
 import msgspec
 import typer
 
-from deploy.fleet import keys
-from deploy.fleet.access import Plan, host_name
-from deploy.fleet.bundle import push
-from deploy.fleet.file import Plan as FleetPlan
-from deploy.fleet.file import is_fleet_file, load
-from deploy.fleet.part import store
-from protocol import clock
-from protocol.mission import Refused
-from protocol.topics import fleet_name
-from world.checks import ROBOTS_MAX
+from lfa.deploy.fleet.plan.fleet_file import Plan as FleetPlan
+from lfa.deploy.fleet.plan.fleet_file import is_fleet_file, load
+from lfa.deploy.fleet.plan.host_plan import store
+from lfa.deploy.fleet.remote.key_distribution import push
+from lfa.deploy.fleet.security import keys
+from lfa.deploy.fleet.security.access_rules import Plan, host_name
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.topics import fleet_name
+from lfa.world.description.checks import ROBOTS_MAX
 
 DAYS_MAX = 36500.0
 

@@ -9,13 +9,14 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.fleet.sight import Sight, find, first_word, sight
-from deploy.fleet.tail import FOLLOW_S
-from deploy.run.interrupts import Interrupts
-from protocol import clock
-from protocol.messages import LogLines, Message
-from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX
+from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.deploy.fleet.host.log_tail import FOLLOW_S
+from lfa.deploy.process.signals import Interrupts
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.fleet import LogLines
+from lfa.protocol.topics import HOST_PREFIX
 
 HEAR_S = 2.0
 ANSWER_S = 5.0

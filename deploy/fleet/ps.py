@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
-from deploy.fleet.sight import Sight, find, first_word, sight
-from protocol import clock
-from protocol.mission import robot_id_of
+from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.protocol import clock
+from lfa.protocol.names import robot_id_of
 
 if TYPE_CHECKING:
     from rich.table import Table

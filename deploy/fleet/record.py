@@ -11,16 +11,16 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.fleet import journals
-from deploy.fleet.file import load
-from deploy.look.onlooker import Ear, Fleet, find, listen, scenario_of_fleet
-from deploy.run.folder import RUNS, About, make
-from deploy.run.interrupts import Interrupts
-from deploy.run.record import Recorder
-from deploy.run.worldtime import WorldTime
-from protocol import clock
-from protocol.messages import Truth
-from protocol.mission import Refused
+from lfa.deploy.client.session import Ear, Fleet, find, listen, scenario_of_fleet
+from lfa.deploy.fleet.plan.fleet_file import load
+from lfa.deploy.fleet.remote import journals
+from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.recording.recorder import Recorder
+from lfa.deploy.recording.run_folder import RUNS, About, make
+from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.simulation import Truth
 
 POLL_S = 0.05
 SPLIT_MB = 256.0

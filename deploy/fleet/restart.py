@@ -8,10 +8,10 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.fleet.sight import Sight, find, first_word, sight
-from protocol import clock
-from protocol.messages import ProcessReport
-from protocol.mission import Refused
+from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.fleet import ProcessReport
 
 HEAR_S = 2.0
 AGAIN_S = 10.0

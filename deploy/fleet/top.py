@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
-from deploy.fleet.ps import rows as processes
-from deploy.fleet.sight import Sight, find, first_word, sight
-from deploy.look.board import Board
-from deploy.run.interrupts import Interrupts
-from protocol import clock
-from protocol.mission import Refused, robot_name
+from lfa.deploy.client.team_status import Board
+from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.deploy.fleet.ps import rows as processes
+from lfa.deploy.process.signals import Interrupts
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import robot_name
 
 if TYPE_CHECKING:
     from rich.console import Group

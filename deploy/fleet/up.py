@@ -17,18 +17,18 @@ import msgspec
 import typer
 from msgspec.structs import replace
 
-from deploy.fleet import sight as sights
-from deploy.fleet.bundle import Bundle, bundles
-from deploy.fleet.file import Plan, load
-from deploy.fleet.health import Health
-from deploy.fleet.host import Found
-from deploy.fleet.hosts import Fleet
-from deploy.fleet.part import Part, parts, store
-from deploy.fleet.private import ISSUED
-from deploy.fleet.sight import Seen
-from deploy.run.interrupts import Interrupts
-from protocol import clock
-from protocol.mission import Refused
+from lfa.deploy.fleet import fleet_view as sights
+from lfa.deploy.fleet.fleet_view import Seen
+from lfa.deploy.fleet.health import Health
+from lfa.deploy.fleet.host.host import Found
+from lfa.deploy.fleet.plan.fleet_file import Plan, load
+from lfa.deploy.fleet.plan.host_plan import Part, parts, store
+from lfa.deploy.fleet.security.private_files import ISSUED
+from lfa.deploy.fleet.remote.hosts import Fleet
+from lfa.deploy.fleet.remote.key_distribution import Bundle, bundles
+from lfa.deploy.process.signals import Interrupts
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
 
 POLL_S = 0.05
 HEALTHY_S = 0.3

@@ -1,7 +1,7 @@
-"""Whole agents under a schedule of faults: what `arena.py` is for leases alone.
+"""Whole agents under a schedule of faults: what `lease_simulation.py` is for leases alone.
 
 Agents, witness and world are the real ones, in the simulator, with the codec of the real thing; bodies have no engine.
-It takes what `chaos.py` does to an arena. All gateways live and die with the one world, which goes on from where
+It takes what `fault_injector.py` does to an arena. All gateways live and die with the one world, which goes on from where
 it was; a robot and its gateway are on the robot, so a cut never parts them.
 """
 
@@ -13,28 +13,31 @@ from typing import Any
 
 from msgspec import Struct
 
-from agents.agent import Agent
-from deploy.look.checker import Checker, listeners
-from deploy.look.overheard import overhear, said, told
-from deploy.run import traced
-from deploy.run.network import Trace, Weather
-from deploy.run.operator import Operator
-from deploy.run.schedules import FAULTS_UNTIL_S, Schedule
-from protocol.effects import BecomeLeader, Effect
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.lease import Lease
-from protocol.messages import CmdVel, Fence, LeaseNote, Member, Message, Promise, encode
-from protocol.mission import WITNESS_ID, Leading, Mission, robot_id_of, robot_name
-from protocol.node import Envelope, Node, PeerDown, PeerUp, Received
-from protocol.radio import Air, Radio
-from protocol.timing import CONTROL_PERIOD_S, timing_of
-from protocol.topics import WORLD_NAME, address
-from protocol.witness import Witness
-from world.kinematic import Kinematic
-from world.memory import resumed
-from world.simulator import LocalClock, Simulator
-from world.spec import Lidar, Scenario, WorldSpec
-from world.world import World
+from lfa.agents.agent import Agent
+from lfa.deploy.analysis.verification.checker import Checker, listeners
+from lfa.deploy.analysis.verification.lease_observer import overhear, said, told
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.fuzz import network
+from lfa.deploy.fuzz.network import Trace, Weather
+from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
+from lfa.protocol.lease.effects import BecomeLeader, Effect
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Member, Promise
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.mission import Leading, Mission
+from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
+from lfa.protocol.node import Envelope, Node, PeerDown, PeerUp, Received
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.topics import WORLD_NAME, address
+from lfa.protocol.transport.link_model import Air, Radio
+from lfa.world.checkpoint import resumed
+from lfa.world.description.scenario import Lidar, Scenario, WorldSpec
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.simulator import LocalClock, Simulator
+from lfa.world.world import World
 
 FLEET = "whole"
 ROAD_M = 100.0
@@ -274,7 +277,7 @@ class Whole:
 
     def _done(self, life: Life, effects: Sequence[Effect]) -> None:
         for effect in effects:
-            self._say(life.id, traced.told(effect))
+            self._say(life.id, network.told(effect))
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, life.id, effect))
             for words in told(effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true):

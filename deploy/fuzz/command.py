@@ -16,12 +16,13 @@ from typing import Annotated
 import typer
 from msgspec import Struct
 
-from deploy.look.checker import Violation
-from deploy.run.chaos import Played, play, play_whole
-from deploy.run.network import Trace
-from deploy.run.schedules import KINDS, Schedule, draw, without
-from deploy.run.workers import workers
-from protocol.mission import Refused, whole_number
+from lfa.deploy.analysis.verification.checker import Violation
+from lfa.deploy.fuzz.fault_injector import Played, play, play_whole
+from lfa.deploy.fuzz.network import Trace
+from lfa.deploy.fuzz.schedules import KINDS, Schedule, draw, without
+from lfa.deploy.process.worker_pool import workers
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import whole_number
 
 Player = Callable[[Schedule, Trace | None], Played]
 

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Union
 
 from msgspec import Struct, structs
 
-from deploy.look.checker import Checker, Violation
-from deploy.look.checkers import SAFETY
-from deploy.look.liveness import AFTER_FAULTS, NextInChain, Steady, StopsWithoutQuorum
-from deploy.run.arena import Arena
-from deploy.run.network import Trace
-from deploy.run.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Fault, Schedule
-from protocol.messages import Member
-from protocol.mission import WITNESS_ID
-from protocol.quorum import is_quorum
+from lfa.deploy.analysis.verification.checker import Checker, Violation
+from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS, NextInChain, Steady, StopsWithoutQuorum
+from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.deploy.fuzz.network import Trace
+from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Fault, Schedule
+from lfa.protocol.lease.quorum import is_quorum
+from lfa.protocol.messages.consensus import Member
+from lfa.protocol.names import WITNESS_ID
 
 if TYPE_CHECKING:
-    from deploy.run.whole import Whole
+    from lfa.deploy.fuzz.agent_simulation import Whole
 
 Stage = Union["Arena", "Whole"]
 """Where a schedule is played: leases alone, or whole agents."""
@@ -170,7 +170,7 @@ def play(schedule: Schedule, trace: Trace | None = None) -> Played:
 
 def play_whole(schedule: Schedule, trace: Trace | None = None) -> Played:
     """The same with whole agents, witness and world."""
-    from deploy.run.whole import Whole
+    from lfa.deploy.fuzz.agent_simulation import Whole
 
     return _play(schedule, trace, Whole)
 

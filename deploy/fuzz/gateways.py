@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from deploy.run.network import Clock, Network, Weather
-from protocol.gateway import Gateway
-from protocol.messages import CmdVel, Fence, Fenced, GatewayStamp, LeaseBody, Member
-from protocol.timing import Timing
+from lfa.deploy.fuzz.network import Clock, Network, Weather
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Fence, Fenced, GatewayStamp, LeaseBody, Member
+from lfa.protocol.messages.robot import CmdVel
 
 
 class GatewayHost(Struct):

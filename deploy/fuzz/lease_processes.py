@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from deploy.run.motors import Motors
-from deploy.run.network import Clock
-from deploy.run.traced import told
-from protocol.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from protocol.geometry import Twist
-from protocol.lease import Lease
-from protocol.messages import (
+from lfa.deploy.fuzz.gateways import Motors
+from lfa.deploy.fuzz.network import Clock, told
+from lfa.protocol.geometry import Twist
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.timing import CONTROL_PERIOD_S
+from lfa.protocol.messages.consensus import (
     NO_TERM,
-    CmdVel,
     GatewayStamp,
     Grant,
-    Header,
     LeaseBody,
     Member,
     Promise,
@@ -24,8 +22,9 @@ from protocol.messages import (
     Role,
     Term,
 )
-from protocol.mission import robot_name
-from protocol.timing import CONTROL_PERIOD_S
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.names import robot_name
 
 FORWARD = Twist(0.5, 0.0)
 FOLLOW_PERIOD_S = 0.1

@@ -1,18 +1,19 @@
 """A small world for leases alone: processes with clocks of their own, gateways, a faulty network, virtual time.
 
-Directed tests and `lfa fuzz` drive it; checkers (`deploy/look/checkers.py`, `liveness.py`) are told what leaves
+Directed tests and `lfa fuzz` drive it; checkers (`deploy/analysis/verification/safety.py`, `liveness.py`) are told what leaves
 processes and gateways, in true time, which no process knows.
 """
 
 from __future__ import annotations
 
-from deploy.run.hosts import FOLLOW_PERIOD_S, Hosts, Process
-from deploy.run.network import Clock, Weather
-from protocol.gateway import Gateway
-from protocol.lease import Lease
-from protocol.messages import Member
-from protocol.mission import WITNESS_ID, Leading, Mission, Profile
-from protocol.timing import timing_of
+from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
+from lfa.deploy.fuzz.network import Clock, Weather
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import Member
+from lfa.protocol.mission import Leading, Mission, Profile
+from lfa.protocol.names import WITNESS_ID
 
 
 class Arena(Hosts):

@@ -13,8 +13,9 @@ from typing import Any, Self
 
 from msgspec import Struct
 
-from deploy.look.checker import Checker, listeners
-from protocol.messages import LeaseBody
+from lfa.deploy.analysis.verification.checker import Checker, listeners
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StepDown
+from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Term
 
 REORDER_S = 0.15
 """More than three heartbeats of the profile std."""
@@ -148,3 +149,26 @@ class Network:
         if self.cuts and (here, there) in self.cuts:
             return ()
         return self.weather.delays(self.random)
+
+
+def told(effect: Effect) -> str:
+    """An effect in the few words that a column has room for."""
+    match effect:
+        case Send(to=to, body=body):
+            detail = f" r{body.round}" if isinstance(body, Propose | Grant) else ""
+            return f"{type(body).__name__.lower()} {body_term(body)}{detail} > {to}"
+        case BecomeLeader(term=term):
+            return f"LEADS {short(term)}"
+        case StepDown(term=term, cause=cause):
+            return f"STOPS {short(term)} {cause}"
+        case AdoptChain(config=config):
+            return f"chain {[m.id for m in config.chain]} v{short(config.version.term)}.{config.version.seq}"
+    return "extends"
+
+
+def body_term(body: LeaseBody) -> str:
+    return "" if isinstance(body, Hello) else short(body.term)
+
+
+def short(term: Term) -> str:
+    return f"{term.n}.{term.issuer}"

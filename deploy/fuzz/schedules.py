@@ -10,9 +10,9 @@ from random import Random
 
 from msgspec import Struct, structs
 
-from deploy.run.network import Weather
-from protocol.mission import Profile
-from protocol.timing import CLOCK_RATE_ERROR
+from lfa.deploy.fuzz.network import Weather
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
+from lfa.protocol.mission import Profile
 
 FAULTS_UNTIL_S = 4.0
 DURATION_S = 8.0

@@ -8,43 +8,30 @@ to exactly the process that was found: same pid, start time, user and command li
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
 import typer
-from msgspec import Struct
 
-from deploy.run import processes
-from deploy.run.faults import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
-from deploy.run.operator import Operator
-from deploy.run.processes import Identity
-from deploy.run.weather import note
-from protocol import clock
-from protocol.bus import Arrival, Inbox
-from protocol.credentials import credentials
-from protocol.messages import BadMessage, Event, PoseStamped, Role, decode, encode
-from protocol.mission import Refused, robot_id_of, whole_number
-from protocol.topics import OPERATOR_NAME, key
-from protocol.zenoh_bus import RouterAbsent, ZenohBus, default_endpoint
+from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agents, one_fleet, option
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.faults.link_faults import note
+from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
+from lfa.deploy.process import identity as processes
+from lfa.deploy.process.identity import Identity
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import BadMessage, decode, encode
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.team import Event, PoseStamped
+from lfa.protocol.names import robot_id_of, whole_number
+from lfa.protocol.topics import OPERATOR_NAME, key
+from lfa.protocol.transport.bus import Arrival, Inbox
+from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import RouterAbsent
 
-LISTEN_S = 1.0  # 50 poses of a leader
 SENT_S = 0.05  # the word about a fault leaves before the fault
-
-
-DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7447")
-"""Where a router listens that was told nothing."""
-
-
-class Running(Struct, frozen=True):
-    """One agent's process."""
-
-    robot: int
-    fleet: str
-    endpoint: str
-    identity: Identity
-    keys: Path | None = None
-    """What it was told with --keys."""
 
 
 def command(
@@ -134,46 +121,6 @@ def _is_done(arrival: Arrival, robot: int) -> bool:
     return isinstance(event, Event) and event.data == event.data | {"deed": RESTART, "robot": robot}
 
 
-def agents() -> list[Running]:
-    """The agents of this user that run on this machine."""
-    found = (_agent(identity) for identity in processes.own_processes())
-    return [agent for agent in found if agent is not None]
-
-
-def _agent(identity: Identity) -> Running | None:
-    words = identity.arguments
-    names = {word.rpartition("/")[2] for word in words[:3]}
-    if not names & {"agents.cli", "lfa-agent"}:
-        return None
-    robot = whole_number(option(words, "--id", ""))
-    if robot is None:
-        return None
-    endpoint = option(words, "--connect", default_endpoint())
-    keys = option(words, "--keys", "")
-    return Running(robot, option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)
-
-
-def option(words: Sequence[str], name: str, default: str) -> str:
-    """The value of `--name value` or `--name=value`."""
-    for word, following in zip(words, [*words[1:], ""], strict=True):
-        if word == name:
-            return following
-        if word.startswith(f"{name}="):
-            return word.partition("=")[2]
-    return default
-
-
-def one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
-    fleets = sorted({agent.fleet for agent in running})
-    if not fleets:
-        raise Refused("no agent of yours runs on this machine: start one with lfa run, or lfa-agent")
-    if fleet is None and len(fleets) > 1:
-        raise Refused(f"several fleets run here: say --fleet {' or --fleet '.join(fleets)}")
-    if fleet is not None and fleet not in fleets:
-        raise Refused(f"--fleet {fleet}: no such fleet here, must be one of {', '.join(fleets)}")
-    return [agent for agent in running if agent.fleet == (fleet or fleets[0])]
-
-
 def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> tuple[int | str, Identity]:
     """The robot or the common process that is meant, and its process. Raises Refused."""
     if target not in COMMON:
@@ -189,9 +136,9 @@ def _is_common(name: str, words: Sequence[str], agent: Running) -> bool:
     """Whether a command line is that of the world, or of the router, of the agent's fleet."""
     called = {word.rpartition("/")[2] for word in words[:3]}
     if name == "world":
-        return bool(called & {"world.cli", "lfa-world"}) and option(words, "--fleet", "fleet") == agent.fleet
+        return bool(called & {"lfa.world.cli", "lfa-world"}) and option(words, "--fleet", "fleet") == agent.fleet
     listens = {word.removeprefix("--listen=") for word in words} if "--listen" in " ".join(words) else {*DEFAULT_LISTEN}
-    return bool(called & {"deploy.fleet.router", "lfa-router"}) and agent.endpoint in listens
+    return bool(called & {"lfa.deploy.fleet.host.router", "lfa-router"}) and agent.endpoint in listens
 
 
 def _victim(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> Running:

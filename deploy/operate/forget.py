@@ -8,12 +8,16 @@ from typing import Annotated
 import msgspec
 import typer
 
-from deploy.look.onlooker import Ear, find, listen
-from deploy.run.operator import Operator
-from protocol import clock
-from protocol.messages import Ask, Event, Header, MissionNote, PoseStamped, Role, Status, encode
-from protocol.mission import Refused, robot_id_of, robot_name
-from protocol.topics import OPERATOR_NAME, key
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.session import Ear, find, listen
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Ask, Event, MissionNote, PoseStamped, Status
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.topics import OPERATOR_NAME, key
 
 LISTEN_S = 1.2
 """Long enough to hear a leader's pose and everybody's status."""

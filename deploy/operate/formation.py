@@ -8,12 +8,13 @@ from typing import Annotated
 import msgspec
 import typer
 
-from agents.formation import named
-from deploy.look.onlooker import Ear, find, listen
-from deploy.run.operator import Operator
-from protocol import clock
-from protocol.messages import Event, encode
-from protocol.mission import FormationSpec
+from lfa.agents.formation.formation import named
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.session import Ear, find, listen
+from lfa.protocol import clock
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.team import Event
+from lfa.protocol.mission import FormationSpec
 
 ANSWER_S_MAX = 2.0
 JOINED_S = 0.2  # a subscription that was just declared hears what is said from here on

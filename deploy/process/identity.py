@@ -16,7 +16,7 @@ from typing import IO
 
 from msgspec import Struct
 
-TETHER = Path(__file__).with_name("tether.py")
+TETHER = Path(__file__).with_name("parent_death.py")
 
 
 class Identity(Struct, frozen=True):
@@ -78,7 +78,7 @@ def start(
     stdin: int = subprocess.DEVNULL,
     inside: Sequence[str] = (),
 ) -> subprocess.Popen[bytes]:
-    """`python -m ARGUMENTS` as a child that hears of our death, out of reach of the terminal's Ctrl-C.
+    """`python -P -m ARGUMENTS` as a child that hears of our death, out of reach of the terminal's Ctrl-C.
 
     `inside` is a command that becomes another in a place of its choice, such as `/sbin/ip netns exec NAME`.
 
@@ -86,5 +86,5 @@ def start(
     """
     python = sys.executable
     tether = [python, "-I", "-S", str(TETHER), str(os.getpid()), str(int(on_parent_death))]
-    command = [*tether, *inside, python, "-m", *arguments]
+    command = [*tether, *inside, python, "-P", "-m", *arguments]
     return subprocess.Popen(command, stdin=stdin, stdout=log, stderr=log, start_new_session=True)

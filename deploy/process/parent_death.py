@@ -1,4 +1,4 @@
-"""Run as a file: become a command that does not outlive its parent. `tether.py PARENT_PID SIGNAL COMMAND...`
+"""Run as a file: become a command that does not outlive its parent. `parent_death.py PARENT_PID SIGNAL COMMAND...`
 
 The kernel sends SIGNAL when the parent dies, however it dies, and also to a child that is stopped: a pipe that the
 child would have to watch cannot do that. Replaces itself by COMMAND, so the process table shows only that.

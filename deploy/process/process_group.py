@@ -9,12 +9,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from deploy.run import processes
-from deploy.run.folder import JOURNALS, LOGS, SCENARIO, About
-from deploy.run.processes import Identity
-from protocol import clock
-from protocol.mission import Mission, robot_name
-from protocol.topics import RECORDER_NAME, WORLD_NAME
+from lfa.deploy.process import identity as processes
+from lfa.deploy.process.identity import Identity
+from lfa.deploy.recording.run_folder import LOGS
+from lfa.protocol import clock
 
 ROUTER_NAME = "router"
 GRACE_S = 2.0  # between SIGTERM and SIGKILL
@@ -37,23 +35,6 @@ class Row(Struct, frozen=True):
         """An agent that starts again starts as a follower, and the others tell it the rest; a world resumes."""
         told = tuple("follower" if word == "leader" else word for word in self.arguments)
         return Row(self.name, (*told, *self.again), inside=self.inside)
-
-
-def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
-    """The table of processes of a run, in the order in which they are started."""
-    team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
-    world = ("world.cli", str(folder / SCENARIO), "--seed", str(about.seed), "--state", str(folder), *team)
-    return [
-        Row(ROUTER_NAME, ("deploy.fleet.router", "--listen", endpoint)),
-        Row(RECORDER_NAME, ("deploy.run.recorder", recorder_task), outlives_launcher=True),
-        Row(WORLD_NAME, world, again=("--resume", str(folder))),
-        *(Row(robot_name(i), ("agents.cli", "--role", _role(i, mission), "--id", str(i), *team))
-          for i in mission.robots),
-    ]  # fmt: skip
-
-
-def _role(robot_id: int, mission: Mission) -> str:
-    return "leader" if robot_id == mission.robots[0] else "follower"
 
 
 class Crew:

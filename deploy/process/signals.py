@@ -6,8 +6,6 @@ import signal
 from types import FrameType, TracebackType
 from typing import Any
 
-from deploy.run.referee import Verdict
-
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -26,10 +24,6 @@ class Interrupts:
     def __exit__(self, _t: type[BaseException] | None, _e: BaseException | None, _tb: TracebackType | None) -> None:
         for number, before in zip(ENDING_SIGNALS, self._before, strict=True):
             signal.signal(number, before)
-
-    @property
-    def verdict(self) -> Verdict | None:
-        return None if self.signal is None else Verdict("interrupted", self.signal.name)
 
     def _note(self, number: int, _frame: FrameType | None) -> None:
         self.signal = signal.Signals(number)

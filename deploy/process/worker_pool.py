@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
 
-from deploy.run.tether import tie
+from lfa.deploy.process.parent_death import tie
 
 
 @contextmanager

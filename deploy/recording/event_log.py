@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from deploy.run.record import EVENTS
+from lfa.deploy.recording.recorder import EVENTS
 
 ENDING_FAULTS = ("kill", "terminate", "stop", "cut")
 Line = dict[str, Any]

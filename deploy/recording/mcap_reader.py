@@ -26,10 +26,11 @@ from msgspec import Struct
 from numpy.typing import NDArray
 from zstandard import ZstdError
 
-from deploy.run import channels
-from deploy.run.record import RECORDING, parts
-from protocol.mission import Refused, robot_id_of
-from protocol.topics import TOPIC, TRUTH_OWNER
+from lfa.deploy.recording import mcap_channels
+from lfa.deploy.recording.recorder import RECORDING, parts
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import TOPIC, TRUTH_OWNER
 
 Array = NDArray[np.float64]
 Row = tuple[float, ...]
@@ -85,7 +86,7 @@ def read(folder: Path) -> Trace:
 
 def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, float, Any]]:
     """Owner, topic, time [s] and content (an object with the wire type's fields) of every message on `topics`."""
-    decoders = {t: msgspec.json.Decoder(channels.shape(TOPIC[t].type)) for t in topics}
+    decoders = {t: msgspec.json.Decoder(mcap_channels.shape(TOPIC[t].type)) for t in topics}
     for channel, t, body in recorded(folder, topics):
         _, owner, topic, *_ = channel.split("/")
         try:

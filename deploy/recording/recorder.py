@@ -1,7 +1,7 @@
 """What a run leaves behind: `recording.mcap` with every message, `events.jsonl` with one line for each event.
 
 One `Recorder` for both modes: the simulator feeds it in virtual time, the recorder process (`python -m
-deploy.run.record`) from the bus. It sits outside the control path: nobody waits for it.
+lfa.deploy.recording.recorder`) from the bus. It sits outside the control path: nobody waits for it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from typing import IO
 import msgspec
 from msgspec import Struct
 
-from deploy.run import channels
-from deploy.run.chunks import ChunkWriter
-from protocol.messages import Event, Message
-from protocol.mission import robot_id_of
-from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
+from lfa.deploy.recording import mcap_channels
+from lfa.deploy.recording.mcap_writer import ChunkWriter
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.team import Event
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
 
 RECORDING = "recording.mcap"
 PART = "recording-{}.mcap"
@@ -75,7 +76,7 @@ class Recorder:
         if channel is None:
             channel = self._channels[key] = self._open_channel(key, type(message))
         stamp_ns = round(t * 1e9)
-        self._writer.add_message(channel, stamp_ns, channels.encode(message), stamp_ns, message.header.seq)
+        self._writer.add_message(channel, stamp_ns, mcap_channels.encode(message), stamp_ns, message.header.seq)
         self._messages += 1
         if isinstance(message, Event):
             self._events.write(event_line(t, message))
@@ -118,7 +119,7 @@ class Recorder:
         """`lfa/<fleet>/robot1/pose` is recorded as `/robot1/pose`."""
         schema = self._schemas.get(kind)
         if schema is None:
-            schema = self._writer.register_schema(f"lfa.{kind.__name__}", "jsonschema", channels.schema(kind))
+            schema = self._writer.register_schema(f"lfa.{kind.__name__}", "jsonschema", mcap_channels.schema(kind))
             self._schemas[kind] = schema
         return self._writer.register_channel("/" + key.split("/", 2)[2], "json", schema)
 
@@ -128,7 +129,7 @@ def event_line(t: float, event: Event) -> bytes:
 
     World, operator and recorder speak about others, and may know when: they say `robot` and `t` themselves.
     """
-    data = channels.plain(event.data)
+    data = mcap_channels.plain(event.data)
     sender = event.header.sender
     said = data if sender in ONLOOKERS else {}
     head = {

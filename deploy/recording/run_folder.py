@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from protocol.mission import Refused
-from world.scenario import Scenario, load
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import Scenario, load
 
 SCENARIO = "scenario.toml"
 JOURNALS = "journal"
@@ -51,7 +51,7 @@ def scenario_of(folder: Path) -> Scenario:
 
 
 def toml(scenario: Scenario) -> str:
-    """`scenario` in TOML, every field said; `world.scenario.load` reads it back."""
+    """`scenario` in TOML, every field said; `lfa.world.description.load.load` reads it back."""
     fields: dict[str, Any] = msgspec.to_builtins(scenario)
     fields.pop("name")
     tables = {name: value for name, value in fields.items() if isinstance(value, dict)}

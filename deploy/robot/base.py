@@ -11,12 +11,12 @@ from typing import Protocol
 
 from msgspec import Struct
 
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, compose
-from protocol.mission import Limits
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, compose
+from lfa.protocol.mission import Limits
 
 
 class Scan(Struct, frozen=True):
-    """One turn of the scanner, as `protocol.messages.LaserScan`: beyond the range +inf, bad nan (REP-117)."""
+    """One turn of the scanner, as `lfa.protocol.messages.robot.LaserScan`: beyond the range +inf, bad nan (REP-117)."""
 
     angle_min: float
     angle_increment: float

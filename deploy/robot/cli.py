@@ -12,15 +12,16 @@ from math import isfinite
 from pathlib import Path
 from typing import NoReturn
 
-from deploy.robot.base import SimulatedBase
-from deploy.robot.driver import Driver
-from protocol import clock
-from protocol.credentials import credentials
-from protocol.geometry import Pose2D
-from protocol.mission import Limits, Refused
-from protocol.runtime import Options, run
-from protocol.topics import fleet_name
-from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint
+from lfa.deploy.robot.base import SimulatedBase
+from lfa.deploy.robot.driver import Driver
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.mission import Limits
+from lfa.protocol.runtime.node_runner import Options, run
+from lfa.protocol.topics import fleet_name
+from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 
 EXAMPLE = "example: lfa-driver --id 3 --at 0,-2.4,0 (beside lfa-world SCENARIO --set world.real_robots=[3])"
 

@@ -1,6 +1,6 @@
 """The Node between an agent and its robot's hardware: commands through the gateway, sensors out, fences answered.
 
-All that an agent needs of a robot, and all that a simulated world does for one (`world/robot.py`). It hears `cmd_vel`
+All that an agent needs of a robot, and all that a simulated world does for one (`world/robot_hardware.py`). It hears `cmd_vel`
 of its own robot, FENCE to its gateway, and its agent's liveliness; it says `sensors` (with the gateway's own moment,
 which commands must echo), `localization`, `scan` and `contact`. The gateway's deadman brakes when its agent, its
 router or the network is gone: that happens here, on this machine's clock, and needs nobody else.
@@ -12,28 +12,19 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
-from deploy.robot.base import Base, Reading
-from protocol.gateway import Gateway
-from protocol.geometry import STILL
-from protocol.messages import (
-    Ask,
-    CmdVel,
-    Contact,
-    Event,
-    Fence,
-    Header,
-    LaserScan,
-    LeaseNote,
-    Localization,
-    Message,
-    MissionNote,
-    Sensors,
-    Term,
-)
-from protocol.mission import Limits, robot_name
-from protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
-from protocol.timing import timing_of
-from protocol.topics import DRIVER_PREFIX, TO_ALL, TOPIC, alive_key, key
+from lfa.deploy.robot.base import Base, Reading
+from lfa.protocol.geometry import STILL
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, Sensors
+from lfa.protocol.messages.team import Ask, Event, MissionNote
+from lfa.protocol.mission import Limits
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from lfa.protocol.topics import DRIVER_PREFIX, TO_ALL, TOPIC, alive_key, key
 
 PERIOD_S = 1.0 / (TOPIC["sensors"].rate_hz or 50.0)
 ASK_S = 1.0

@@ -9,13 +9,15 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from deploy.look import assertions
-from deploy.look import summary as summaries
-from deploy.look.summary import Summary
-from deploy.look.table import text
-from deploy.run.folder import About
-from deploy.run.record import Recording
-from deploy.run.referee import Verdict
+from lfa.deploy.analysis import assertions
+from lfa.deploy.analysis import summary as summaries
+from lfa.deploy.analysis.summarize import summarize
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.analysis.summary_table import text
+from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.recorder import Recording
+from lfa.deploy.recording.run_folder import About
 
 
 class Ended(Struct, frozen=True):
@@ -29,6 +31,11 @@ class Ended(Struct, frozen=True):
     def exit_code(self) -> int:
         """128 + signal as shells count (130, 143), else what the summary says."""
         return self.summary.exit_code if self.signal is None else 128 + self.signal
+
+
+def verdict_of(interrupts: Interrupts) -> Verdict | None:
+    """Return the verdict `interrupted` once a signal has come, else None."""
+    return None if interrupts.signal is None else Verdict("interrupted", interrupts.signal.name)
 
 
 def reread(folder: Path, ended_by: signal.Signals | None) -> Ended:
@@ -46,7 +53,7 @@ def finish(
     recording: Recording | None = None,
 ) -> Ended:
     """Read the closed recording back and write `summary.json`."""
-    summary = summaries.summarize(folder, about, verdict, duration_s, faults_left)
+    summary = summarize(folder, about, verdict, duration_s, faults_left)
     summary.recording = recording
     summaries.write(folder, summary)
     return Ended(folder, summary, ended_by)
@@ -55,7 +62,7 @@ def finish(
 def report(ended: Ended, *, figures: bool, as_json: bool, junit: Path | None = None) -> int:
     """Draw, write the judgements as JUnit XML where wanted, print, and return the exit code. Raises Refused."""
     if figures:
-        from deploy.look.plots import draw
+        from lfa.deploy.view.figures.command import draw
 
         draw(ended.folder)
     if as_json:

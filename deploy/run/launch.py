@@ -1,7 +1,7 @@
 """`lfa run`: router, recorder, world and agents as processes of this machine, from start to verdict to nothing left.
 
 The launcher starts them, watches the bus as an onlooker, does the faults, and ends them all. Should it be killed
-itself, the kernel ends router, world and agents (`tether.py`), and the recorder closes the run folder.
+itself, the kernel ends router, world and agents (`parent_death.py`), and the recorder closes the run folder.
 """
 
 from __future__ import annotations
@@ -15,29 +15,34 @@ from random import Random
 
 import msgspec
 
-from deploy.look.assertions import check_junit
-from deploy.run.chosen import choose_again
-from deploy.run.crew import ROUTER_NAME, Crew, rows
-from deploy.run.ending import Ended, finish, report, reread
-from deploy.run.faults import ORDERS, RESTART, SIGNALS, Deed, Fault, Schedule, parse_all
-from deploy.run.folder import About, make
-from deploy.run.interrupts import Interrupts
-from deploy.run.operator import Operator
-from deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
-from deploy.run.progress import Progress, progress
-from deploy.run.recorder import LastWord, Task
-from deploy.run.referee import Referee, Verdict
-from deploy.run.standing import Standing
-from deploy.run.weather import note
-from deploy.run.worldtime import WorldTime
-from protocol import clock
-from protocol.bus import Inbox
-from protocol.messages import BadMessage, Event, Message, OperatorNote, Truth, decode, encode
-from protocol.mission import robot_id_of, robot_name
-from protocol.radio import CLEAR, WEATHER, Air
-from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
-from protocol.zenoh_bus import ZenohBus, answers
-from world.scenario import Scenario, draw
+from lfa.deploy.analysis.assertions import check_junit
+from lfa.deploy.client.fleet_state import Standing
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.faults.link_faults import note
+from lfa.deploy.faults.script import ORDERS, RESTART, SIGNALS, Deed, Fault, Schedule, parse_all
+from lfa.deploy.process.process_group import ROUTER_NAME, Crew
+from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.run_folder import About, make
+from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.deploy.run.finish import Ended, finish, report, reread, verdict_of
+from lfa.deploy.run.load import choose_again
+from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
+from lfa.deploy.run.process_table import rows
+from lfa.deploy.run.progress import Progress, progress
+from lfa.deploy.run.recorder_process import LastWord, Task
+from lfa.deploy.run.termination import Referee
+from lfa.protocol import clock
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event, OperatorNote
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.link_model import CLEAR, WEATHER, Air
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
+from lfa.world.description.load import Scenario, draw
 
 STEP_S = 0.01
 SHOW_EVERY_S = 0.2
@@ -149,7 +154,7 @@ class _Launch:
         try:
             self._start(interrupts)
             show_at = clock.now()
-            while interrupts.verdict is None and self._referee.verdict is None:
+            while verdict_of(interrupts) is None and self._referee.verdict is None:
                 self._listen()
                 self._check(view)
                 self._do_faults(view)
@@ -158,8 +163,8 @@ class _Launch:
                     view.show(self._standing, self._referee.leader)
                 clock.sleep(STEP_S)
         except _Aborted as aborted:
-            return interrupts.verdict or Verdict("aborted", str(aborted))
-        return interrupts.verdict or self._referee.verdict or Verdict("aborted")
+            return verdict_of(interrupts) or Verdict("aborted", str(aborted))
+        return verdict_of(interrupts) or self._referee.verdict or Verdict("aborted")
 
     def _start(self, interrupts: Interrupts) -> None:
         """Router first, then the recorder, so that nothing goes unheard; world and agents in no order."""
@@ -181,7 +186,7 @@ class _Launch:
         until = clock.now() + START_S_MAX
         while not ready():
             self._needs(name)
-            if interrupts.verdict is not None:
+            if verdict_of(interrupts) is not None:
                 raise _Aborted("interrupted")
             if clock.now() > until:
                 raise _Aborted(f"{name} was not ready within {START_S_MAX:g} s")

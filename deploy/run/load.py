@@ -7,10 +7,11 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from agents.following import follower_of
-from deploy.run.folder import SCENARIO
-from protocol.mission import Refused, check_mission
-from world.scenario import Scenario, load
+from lfa.deploy.recording.run_folder import SCENARIO
+from lfa.deploy.scenario_loading import choose
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission_checks import check_mission
+from lfa.world.description.load import Scenario
 
 
 def choose_again(
@@ -24,8 +25,8 @@ def choose_again(
     chosen = choose(scenario, overrides, robots)
     if map_from is None:
         return chosen, seed or 0
-    from deploy.look import summary  # both read recordings: numpy
-    from deploy.look.met import known_obstacles
+    from lfa.deploy.analysis import summary  # both read recordings: numpy
+    from lfa.deploy.analysis.known_obstacles import known_obstacles
 
     earlier = summary.read(map_from) if (map_from / summary.SUMMARY).is_file() else None
     if earlier is not None and chosen.name not in (earlier.scenario, Path(SCENARIO).stem):  # or the earlier run's own
@@ -37,16 +38,3 @@ def choose_again(
         raise Refused(f"{scenario} with --map-from {map_from}: {refused}") from None
     known_seed = 0 if earlier is None else earlier.seed
     return replace(chosen, mission=mission), known_seed if seed is None else seed
-
-
-def choose(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
-    """`scenario` by name or path, its values overridden; also what only a robot could refuse (gains, controller).
-
-    Raises Refused with one line.
-    """
-    chosen = load(scenario, overrides, robots)
-    try:
-        follower_of(chosen.mission)
-    except Refused as refused:
-        raise Refused(f"{scenario}: {refused}") from None
-    return chosen

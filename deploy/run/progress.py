@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Protocol
 
-from deploy.run.standing import Standing
+from lfa.deploy.client.fleet_state import Standing
 
 if TYPE_CHECKING:
     from rich.live import Live

@@ -2,7 +2,7 @@
 
 The launcher holds the other end of its standard input. One line of JSON there is the verdict; an end of file without
 one means that the launcher died: then the run is called aborted, and what the launcher would have cleaned up is
-cleaned up here. Start: `python -m deploy.run.recorder TASK`, with a `Task` as JSON.
+cleaned up here. Start: `python -m lfa.deploy.run.recorder_process TASK`, with a `Task` as JSON.
 """
 
 from __future__ import annotations
@@ -16,19 +16,22 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from deploy.run.ending import finish
-from deploy.run.folder import About
-from deploy.run.operator import Operator
-from deploy.run.record import Recorder, Recording
-from deploy.run.referee import Verdict
-from deploy.run.worldtime import WorldTime
-from protocol import clock
-from protocol.bus import Arrival, Inbox, Wake
-from protocol.messages import BadMessage, Event, Header, Message, Truth, decode
-from protocol.mission import robot_id_of
-from protocol.node import PeerDown, PeerUp
-from protocol.topics import RECORDER_NAME, TOPIC, address, alive_key, key
-from protocol.zenoh_bus import ZenohBus
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.recorder import Recorder, Recording
+from lfa.deploy.recording.run_folder import About
+from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.deploy.run.finish import finish
+from lfa.protocol import clock
+from lfa.protocol.messages.codec import BadMessage, Message, decode
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.node import PeerDown, PeerUp
+from lfa.protocol.topics import RECORDER_NAME, TOPIC, address, alive_key, key
+from lfa.protocol.transport.bus import Arrival, Inbox, Wake
+from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 INBOX_SIZE_MAX = 65536  # a minute of a fleet of four, should the disk be slow
 WAIT_S = 0.05

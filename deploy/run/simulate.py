@@ -6,28 +6,30 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from agents.agent import Agent
-from deploy.look.assertions import check_junit
-from deploy.run.chosen import choose_again
-from deploy.run.ending import Ended, finish, report
-from deploy.run.faults import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
-from deploy.run.folder import JOURNALS, About, make
-from deploy.run.interrupts import Interrupts
-from deploy.run.operator import Operator
-from deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
-from deploy.run.record import Recorder, Recording
-from deploy.run.referee import Referee, Verdict
-from deploy.run.weather import note
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Message, encode
-from protocol.mission import Refused, robot_name
-from protocol.node import Node
-from protocol.radio import WEATHER
-from protocol.topics import WORLD_NAME
-from protocol.witness import Witness
-from world.scenario import Scenario, draw
-from world.simulator import Simulator
-from world.world import World
+from lfa.agents.agent import Agent
+from lfa.deploy.analysis.assertions import check_junit
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.faults.link_faults import note
+from lfa.deploy.faults.script import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
+from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.recorder import Recorder, Recording
+from lfa.deploy.recording.run_folder import JOURNALS, About, make
+from lfa.deploy.run.finish import Ended, finish, report, verdict_of
+from lfa.deploy.run.load import choose_again
+from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
+from lfa.deploy.run.termination import Referee
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.link_model import WEATHER
+from lfa.world.description.load import Scenario, draw
+from lfa.world.simulator import Simulator
+from lfa.world.world import World
 
 FLEET = "sim"
 JOURNAL_FLUSH_S = 1.0
@@ -115,7 +117,7 @@ class _Run:
             next_s = schedule.pending[0].at_s if schedule.pending else silent_at
             until = max(next_s, simulator.now + LEADER_WAIT_S)
             simulator.run(until, over=lambda: referee.verdict is not None or interrupts.signal is not None)
-            verdict = interrupts.verdict or referee.verdict
+            verdict = verdict_of(interrupts) or referee.verdict
             if verdict is not None:
                 return verdict
         return Verdict("aborted", "the world fell silent")

@@ -9,19 +9,16 @@ from __future__ import annotations
 
 from math import hypot
 
-from msgspec import Struct
-
-from protocol.messages import NO_TERM, Event, Message, Term, TrueRobot, Truth
-from protocol.mission import robot_id_of
-from world.scenario import Outcome, Scenario
+from lfa.deploy.recording.outcome import Verdict
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import NO_TERM, Term
+from lfa.protocol.messages.simulation import TrueRobot, Truth
+from lfa.protocol.messages.team import Event
+from lfa.protocol.names import robot_id_of
+from lfa.world.description.load import Scenario
 
 REST_S = 0.5
 REST_SPEED = 1e-3  # [m/s] and [rad/s]
-
-
-class Verdict(Struct, frozen=True):
-    outcome: Outcome
-    reason: str | None = None
 
 
 class Referee:

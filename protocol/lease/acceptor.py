@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from protocol.membership import is_first
-from protocol.messages import Config, Grant, Grantee, Member, Nack, Prepare, Promise, Propose, Term
+from lfa.protocol.lease.membership import is_first
+from lfa.protocol.messages.consensus import Config, Grant, Grantee, Member, Nack, Prepare, Promise, Propose, Term
 
 
 class Bond(Struct, frozen=True):

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from protocol.holder import Holder
-from protocol.membership import ANY_LIFE
-from protocol.messages import NO_TERM, Config, Grantee, Member, Term
-from protocol.mission import WITNESS_ID
-from protocol.quorum import electors, is_quorum
-from protocol.timing import Timing
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.membership import ANY_LIFE
+from lfa.protocol.lease.quorum import electors, is_quorum
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import NO_TERM, Config, Grantee, Member, Term
+from lfa.protocol.names import WITNESS_ID
 
 PAUSE_GROWTH = 1.5
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from protocol.messages import Config, LeaseBody, Term
+from lfa.protocol.messages.consensus import Config, LeaseBody, Term
 
 Cause = Literal["expired", "released", "deposed", "handed_over"]
 

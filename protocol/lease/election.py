@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from protocol.candidate import Candidate
-from protocol.membership import is_first, rank, universe
-from protocol.messages import Config, Member
-from protocol.mission import Mission
-from protocol.peers import Peers
-from protocol.timing import Timing
+from lfa.protocol.lease.candidate import Candidate
+from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.membership import is_first, rank, universe
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Config, Member
+from lfa.protocol.mission import Mission
 
 NEVER = float("inf")
 COLD_START_S = 3.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from protocol.messages import Member
+from lfa.protocol.messages.consensus import Member
 
 NEVER_HEARD = -1
 LAST_WORDS_HEARTBEATS = 2.0

@@ -8,9 +8,10 @@ has believed since (rule E12). The world holds the gateways of the robots that i
 
 from __future__ import annotations
 
-from protocol.geometry import STILL, Twist
-from protocol.messages import NO_TERM, CmdVel, Fence, Fenced, GatewayStamp, Term
-from protocol.timing import Timing
+from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
+from lfa.protocol.messages.robot import CmdVel
 
 SHUT, OLD_INCARNATION, OLD_TERM, FOREIGN_HOLDER = "shut", "old_incarnation", "old_term", "foreign_holder"
 FOREIGN_STAMP, OLD_STAMP, LATCHED, TWO_HOLDERS = "foreign_stamp", "old_stamp", "latched", "two_holders"

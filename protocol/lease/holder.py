@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from protocol.messages import Config, Grant, Member, Propose, Term, Version
-from protocol.quorum import is_quorum, quorum_time
-from protocol.timing import Timing
+from lfa.protocol.lease.quorum import is_quorum, quorum_time
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Config, Grant, Member, Propose, Term, Version
 
 ROUNDS_KEPT = 64
 """Send times kept for late grants: more than the rounds of one T_act in any profile."""

@@ -7,20 +7,18 @@ monotonic time [s] in every call, and calls must not go back in time.
 
 from __future__ import annotations
 
-from protocol.acceptor import Acceptor
-from protocol.candidate import Candidate
-from protocol.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
-from protocol.election import Election
-from protocol.holder import Holder
-from protocol.membership import (
-    VOTERS_MAX,
-    first_config,
-    ids,
-    is_first,
-    led_by,
-    of_full_house,
-)
-from protocol.messages import (
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.candidate import Candidate
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.election import Election
+from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.membership import VOTERS_MAX, first_config, ids, is_first, led_by, of_full_house
+from lfa.protocol.lease.quorum import electors
+from lfa.protocol.lease.reconfiguration import Policy, reshaped
+from lfa.protocol.lease.step_down import SLOWEST, Stopping
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import (
     NO_TERM,
     Config,
     Fence,
@@ -37,12 +35,8 @@ from protocol.messages import (
     Role,
     Term,
 )
-from protocol.mission import WITNESS_ID, Mission, robot_name
-from protocol.peers import Peers
-from protocol.quorum import electors
-from protocol.reshape import Policy, reshaped
-from protocol.stopping import SLOWEST, Stopping
-from protocol.timing import Timing
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import WITNESS_ID, robot_name
 
 __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Send", "StepDown"]
 

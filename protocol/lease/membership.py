@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from protocol.messages import NO_TERM, Config, Electorate, Member, Term, Version
-from protocol.mission import WITNESS_ID, Mission
+from lfa.protocol.messages.consensus import NO_TERM, Config, Electorate, Member, Term, Version
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import WITNESS_ID
 
 VOTERS_MAX = 7
 """Lease traffic grows with the voters, not with the team: robots further back only learn."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 
-from protocol.messages import Config, Electorate, Member
+from lfa.protocol.messages.consensus import Config, Electorate, Member
 
 NEVER = float("-inf")
 

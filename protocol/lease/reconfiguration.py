@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from protocol.holder import Holder
-from protocol.membership import chosen, ids, rewritten
-from protocol.messages import Config, Member
-from protocol.mission import WITNESS_ID, Shrink, TieBreak
-from protocol.peers import Peers
-from protocol.timing import Timing
+from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.membership import chosen, ids, rewritten
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Config, Member
+from lfa.protocol.mission import Shrink, TieBreak
+from lfa.protocol.names import WITNESS_ID
 
 
 class Policy(Struct, frozen=True):

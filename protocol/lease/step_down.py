@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from protocol.messages import Propose, Term
-from protocol.timing import CLOCK_RATE_ERROR
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
+from lfa.protocol.messages.consensus import Propose, Term
 
 NEVER = float("inf")
 SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)

@@ -11,7 +11,7 @@ from math import ceil
 
 from msgspec import Struct
 
-from protocol.mission import Profile
+from lfa.protocol.mission import Profile
 
 CLOCK_RATE_ERROR = 1e-3
 """eps: a process's monotonic clock runs at a rate within 1 +- this; oscillators and NTP slewing stay below half."""

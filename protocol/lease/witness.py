@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import msgspec
 
-from protocol.effects import Effect, Send
-from protocol.lease import Lease
-from protocol.messages import (
-    NO_TERM,
-    Ask,
-    Header,
-    LeaseNote,
-    Level,
-    Member,
-    Message,
-    MissionNote,
-    Role,
-    Status,
-)
-from protocol.mission import WITNESS_ID, WITNESS_NAME, Mission, robot_id_of, robot_name
-from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop
-from protocol.timing import timing_of
-from protocol.topics import TO_ALL, alive_key, key
+from lfa.protocol.lease.effects import Effect, Send
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import NO_TERM, LeaseNote, Member, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Ask, Level, MissionNote, Status
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import WITNESS_ID, WITNESS_NAME, robot_id_of, robot_name
+from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop
+from lfa.protocol.topics import TO_ALL, alive_key, key
 
 ASK_S = 0.5
 STATUS_S = 1.0

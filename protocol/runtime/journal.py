@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 JOURNAL_VERSION = 1
 

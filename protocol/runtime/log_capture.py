@@ -13,7 +13,8 @@ from typing import Any
 
 import msgspec
 
-from protocol.messages import BadMessage, Event, decode
+from lfa.protocol.messages.codec import BadMessage, decode
+from lfa.protocol.messages.team import Event
 
 STDERR = 2
 LINE_BYTES_MAX = 1000

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import msgspec
 
-from protocol.journal import Journal
-from protocol.messages import BadMessage, Message, decode, encode
-from protocol.node import Envelope, Local, Node, Received
-from protocol.topics import TOPIC, address, may_sign
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.node import Envelope, Local, Node, Received
+from lfa.protocol.runtime.journal import Journal
+from lfa.protocol.topics import TOPIC, address, may_sign
 
 Sent = list[tuple[str, bytes]]
 

@@ -19,18 +19,22 @@ from types import FrameType
 
 from msgspec import Struct
 
-from protocol import clock, loglines
-from protocol.bus import Arrival, Inbox, Links, Tokens, Wake
-from protocol.credentials import Credentials
-from protocol.host import Host, Sent
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import BadMessage, OperatorNote, decode
-from protocol.mission import WITNESS_NAME, Refused, robot_id_of
-from protocol.node import Local, Node, Stop, Vitals
-from protocol.notify import Notify
-from protocol.radio import WEATHER, Reception
-from protocol.topics import OPERATOR_NAME, TOPIC, address, key, matches
-from protocol.zenoh_bus import LINK_LEASE_MS, RouterAbsent, ZenohBus
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import BadMessage, decode
+from lfa.protocol.messages.team import OperatorNote
+from lfa.protocol.names import WITNESS_NAME, robot_id_of
+from lfa.protocol.node import Local, Node, Stop, Vitals
+from lfa.protocol.runtime import log_capture
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.runtime.node_host import Host, Sent
+from lfa.protocol.runtime.systemd import Notify
+from lfa.protocol.topics import OPERATOR_NAME, TOPIC, address, key, matches
+from lfa.protocol.transport.bus import Arrival, Inbox, Links, Tokens, Wake
+from lfa.protocol.transport.credentials import Credentials
+from lfa.protocol.transport.link_model import WEATHER, Reception
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import LINK_LEASE_MS, RouterAbsent
 
 CONNECT_RETRY_S = 0.2
 STOP_GRACE_S = 0.7  # last words: a fence round trip or the residual motion, whatever the profile
@@ -149,8 +153,8 @@ class _Seat:
         for to, payload in sent:
             self.bus.publish(to, payload)
         for to, payload in sent:
-            if to.endswith(loglines.EVENT_ENDING):
-                loglines.tell(payload, clock.wall_ms())
+            if to.endswith(log_capture.EVENT_ENDING):
+                log_capture.tell(payload, clock.wall_ms())
 
 
 def run(nodes: Sequence[Node], options: Options, floor: int) -> int:

@@ -11,9 +11,9 @@ from typing import Protocol
 
 from msgspec import Struct, structs
 
-from protocol.messages import GRANT_MARK, HELLO_MARK
-from protocol.node import Local, PeerDown, PeerUp, RouterLost
-from protocol.topics import TOPIC, Address, Topic, address
+from lfa.protocol.messages.consensus import GRANT_MARK, HELLO_MARK
+from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
+from lfa.protocol.topics import TOPIC, Address, Topic, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
 ANEW_S = (1.5, 6.5)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 CA_FILE = "ca.pem"
 ACCESS_FILE = "access.json"

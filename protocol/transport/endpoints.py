@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 PORT_MAX = 65535
 _NETWORKED = re.compile(r"(tcp|udp|tls|quic|ws)/(\[[^\]/]+\]|[^:/\[\]]+):(\d+)([?#].*)?")

@@ -14,9 +14,9 @@ from typing import Any
 import msgspec
 from msgspec import Struct, structs
 
-from protocol.bus import Arrival
-from protocol.mission import WITNESS_NAME
-from protocol.topics import OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER, WORLD_NAME, address
+from lfa.protocol.names import WITNESS_NAME
+from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER, WORLD_NAME, address
+from lfa.protocol.transport.bus import Arrival
 
 Link = tuple[str, str]
 """From a place to a place."""

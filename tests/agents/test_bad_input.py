@@ -7,15 +7,17 @@ from math import isfinite, pi
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.config import DEFAULT
-from agents.controller import Controller, Law
-from agents.controllers.headway import Headway
-from agents.controllers.kanayama import Kanayama
-from agents.follower import Follower
-from agents.predecessor import Predecessor
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.messages import NO_TERM, Header, PoseStamped, Role, Slot
-from protocol.mission import Limits
+from lfa.agents.config import DEFAULT
+from lfa.agents.controllers.headway import Headway
+from lfa.agents.controllers.kanayama import Kanayama
+from lfa.agents.following.controller import Controller, Law
+from lfa.agents.following.follower import Follower
+from lfa.agents.following.predecessor import Predecessor
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.messages.consensus import NO_TERM, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import PoseStamped, Slot
+from lfa.protocol.mission import Limits
 
 LIMITS = Limits()
 DT = 0.02

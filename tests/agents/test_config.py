@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from agents.config import DEFAULT, SHARP, Gains, check_gains
-from agents.following import follower_of, gains_of
-from protocol.mission import Following, Limits, Mission, Refused
+from lfa.agents.config import DEFAULT, SHARP, Gains, check_gains
+from lfa.agents.following.factory import follower_of, gains_of
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Following, Limits, Mission
 
 
 def test_the_default_gains_obey_all_rules() -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from agents.agent import EASE_S, Agent
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Role
-from protocol.radio import Radio
-from protocol.witness import Witness
-from world.kinematic import Kinematic
-from world.scenario import draw, shipped
-from world.simulator import Simulator
-from world.world import World
+from lfa.agents.agent import EASE_S, Agent
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.transport.link_model import Radio
+from lfa.world.description.load import draw, shipped
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.simulator import Simulator
+from lfa.world.world import World
 
 
 def test_only_a_leader_with_time_left_is_at_ease() -> None:

@@ -3,10 +3,13 @@
 import pytest
 from msgspec.structs import replace
 
-from agents.beliefs import GLIMPSED_S, TOLD_S, Beliefs
-from agents.features import Feature
-from protocol.geometry import Pose2D
-from protocol.messages import Header, ObstacleNote, Role, TableRow
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.agents.perception.shared_obstacles import GLIMPSED_S, TOLD_S
+from lfa.agents.team_state import Beliefs
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import ObstacleNote, TableRow
 
 AWAY = Pose2D(-5.0, 0.0, 0.0)
 
@@ -46,30 +49,30 @@ def test_a_stale_row_is_no_place() -> None:
 
 def test_what_another_saw_moving_moves_on_and_is_forgotten() -> None:
     beliefs = Beliefs()
-    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
-    [feature] = beliefs.moving([], AWAY, 0.5)
+    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
+    [feature] = beliefs.obstacles.moving([], AWAY, 0.5)
     assert feature.x == 1.1
-    assert beliefs.moving([], AWAY, TOLD_S + 0.1) == []
+    assert beliefs.obstacles.moving([], AWAY, TOLD_S + 0.1) == []
 
 
 def test_what_one_sees_oneself_counts_once() -> None:
     beliefs = Beliefs()
-    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
+    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
     own = Feature("moving", 1.2, 0.1, 0.25, 0.2, 0.0)
-    assert beliefs.moving([own], AWAY, 0.0) == [own]
+    assert beliefs.obstacles.moving([own], AWAY, 0.0) == [own]
 
 
 def test_what_another_saw_standing_does_not_move() -> None:
     beliefs = Beliefs()
-    beliefs.hear_obstacle(2, told("stationary", 1.0), 0.0)
-    assert beliefs.moving([], AWAY, 0.1) == []
+    beliefs.obstacles.update(2, told("stationary", 1.0), 0.0)
+    assert beliefs.obstacles.moving([], AWAY, 0.1) == []
 
 
 def test_what_another_saw_moving_is_not_the_robot_itself() -> None:
     beliefs = Beliefs()
-    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
-    assert beliefs.moving([], Pose2D(1.0, 0.1, 0.0), 0.0) == []
-    assert len(beliefs.moving([], AWAY, 0.0)) == 1
+    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
+    assert beliefs.obstacles.moving([], Pose2D(1.0, 0.1, 0.0), 0.0) == []
+    assert len(beliefs.obstacles.moving([], AWAY, 0.0)) == 1
 
 
 def test_a_robot_is_stuck_as_long_as_it_says_so() -> None:
@@ -84,7 +87,7 @@ def test_a_robot_is_stuck_as_long_as_it_says_so() -> None:
 
 def test_what_another_saw_moving_is_believed_for_longer_where_something_is_seen() -> None:
     beliefs = Beliefs()
-    beliefs.hear_obstacle(2, told("moving", 1.0), 0.0)
+    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
     later = TOLD_S + 0.1
-    assert beliefs.moving([], AWAY, later, lambda x, y, within_m: abs(x - 1.0 - 0.2 * later) < within_m)
-    assert beliefs.moving([], AWAY, GLIMPSED_S + 0.1, lambda x, y, within_m: True) == []
+    assert beliefs.obstacles.moving([], AWAY, later, lambda x, y, within_m: abs(x - 1.0 - 0.2 * later) < within_m)
+    assert beliefs.obstacles.moving([], AWAY, GLIMPSED_S + 0.1, lambda x, y, within_m: True) == []

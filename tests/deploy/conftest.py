@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.acceptor import Acceptor
+from lfa.protocol.lease.acceptor import Acceptor
 
 
 @pytest.fixture

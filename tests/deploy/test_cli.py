@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from deploy import completion
-from deploy.cli import COMMANDS, overview
-from world.scenario import shipped
+from lfa.deploy import completion
+from lfa.deploy.cli import COMMANDS, overview
+from lfa.world.description.load import shipped
 
-LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def test_help_names_every_command() -> None:
@@ -37,7 +37,7 @@ def test_a_path_that_nothing_can_have_is_refused_in_one_line() -> None:
 
 
 def test_help_does_not_wait_for_the_parser() -> None:
-    code = "import sys; from deploy import cli; cli.overview(); print('typer' in sys.modules)"
+    code = "import sys; from lfa.deploy import cli; cli.overview(); print('typer' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
 
 

@@ -1,4 +1,4 @@
-"""A scenario from a notebook: `deploy.simulate.run`."""
+"""A scenario from a notebook: `lfa.deploy.simulate.run`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from deploy.simulate import run
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.deploy.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
 
 SHORT = ("mission.leading.route_m=[[3.0, 0.0]]",)
 

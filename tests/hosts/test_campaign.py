@@ -9,12 +9,12 @@ from random import Random
 
 import pytest
 
-from deploy.bench.team import Team
-from protocol.mission import robot_name
-from protocol.radio import WEATHER
-from protocol.topics import WORLD_NAME
-from tests.hosts.net import ROBOTS, WORLD_HOST, Net, missing, team_on_hosts
-from tests.processes.live import check_terms, pass_time
+from lfa.deploy.bench.harness.team import Team
+from lfa.protocol.names import robot_name
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.link_model import WEATHER
+from tests.rigs.live_team import check_terms, pass_time
+from tests.rigs.network_namespaces import ROBOTS, WORLD_HOST, Net, missing, team_on_hosts
 
 WHY_NOT = missing()
 pytestmark = [pytest.mark.campaign, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]

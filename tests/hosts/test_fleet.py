@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import pytest
 
-from deploy.bench.team import endless
-from deploy.run.folder import toml
-from protocol import clock
-from protocol.messages import Event
+from lfa.deploy.bench.harness.team import endless
+from lfa.deploy.recording.run_folder import toml
+from lfa.protocol import clock
+from lfa.protocol.messages.team import Event
 from tests.hosts.conftest import Figure
-from tests.hosts.machines import OPERATOR, Machines, machines, why_not
-from tests.hosts.onlooking import Onlooker, onlooker
+from tests.rigs.host_observer import Onlooker, onlooker
+from tests.rigs.machines import OPERATOR, Machines, machines, why_not
 
 WHY_NOT = why_not()
 pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]

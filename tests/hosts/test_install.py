@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.hosts.machines import machines, why_not
+from tests.rigs.machines import machines, why_not
 
 WHY_NOT = why_not()
 pytestmark = [
@@ -35,7 +35,7 @@ def test_a_machine_without_lfa_gets_it_and_drives_with_it() -> None:
         assert done.returncode == 0, done.stderr
         assert set(json.loads(done.stdout)["chain"]) == {1, 2}
         assert {one.arguments[0] for one in fleet.processes("a")} == {str(python)}
-        ask = [str(python), "-P", "-c", "import agents; print(agents.__file__)"]
+        ask = [str(python), "-P", "-c", "import lfa.agents; print(lfa.agents.__file__)"]
         where = subprocess.run(ask, capture_output=True, text=True, check=True).stdout.strip()
         assert Path(where).is_relative_to(site)
         assert fleet.lfa("down", str(file)).returncode == 0

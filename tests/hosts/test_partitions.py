@@ -11,14 +11,14 @@ from collections.abc import Iterator
 
 import pytest
 
-from deploy.bench.team import REST_MPS, Team
-from protocol import clock
-from protocol.mission import robot_name
-from protocol.radio import WEATHER
-from protocol.topics import WORLD_NAME
+from lfa.deploy.bench.harness.team import REST_MPS, Team
+from lfa.protocol import clock
+from lfa.protocol.names import robot_name
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.link_model import WEATHER
 from tests.hosts.conftest import Figure
-from tests.hosts.net import ROBOTS, WORLD_HOST, Net, missing, team_on_hosts
-from tests.processes.live import WHOLE_S, check_minority, check_terms, leads, pass_time
+from tests.rigs.live_team import WHOLE_S, check_minority, check_terms, leads, pass_time
+from tests.rigs.network_namespaces import ROBOTS, WORLD_HOST, Net, missing, team_on_hosts
 
 WHY_NOT = missing()
 pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]

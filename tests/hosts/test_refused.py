@@ -10,10 +10,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from deploy.fleet.supervise import living
-from deploy.run.processes import send
-from tests.hosts.machines import Machines, machines, why_not
-from tests.hosts.net import PORT
+from lfa.deploy.fleet.host.supervisor import living
+from lfa.deploy.process.identity import send
+from tests.rigs.machines import Machines, machines, why_not
+from tests.rigs.network_namespaces import PORT
 
 WHY_NOT = why_not()
 pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
@@ -116,7 +116,7 @@ def test_of_two_robots_of_one_name_on_two_machines_one_is_refused_and_named(clea
     fleet = clean
     file = fleet.write(TOP + 'links.transport = "tcp"\n', tail='[robots]\non = { 1 = "a" }')
     connect = ("--connect", f"tcp/{fleet.address('a')}:{PORT}")
-    agent = ("agents.cli", "--role", "leader", "--id", "1", "--fleet", "convoy", *connect)
+    agent = ("lfa.agents.cli", "--role", "leader", "--id", "1", "--fleet", "convoy", *connect)
     command = [*fleet.net.enter(fleet.host("b")), sys.executable, "-m", *agent]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as stranger:
         try:
@@ -140,7 +140,7 @@ def test_doctor_names_a_router_that_is_missing(six: Machines) -> None:
     fleet = six
     assert fleet.lfa("up", str(fleet.write(TOP))).returncode == 0
     try:
-        router = next(one for one in fleet.processes("b") if "deploy.fleet.router" in one.arguments)
+        router = next(one for one in fleet.processes("b") if "lfa.deploy.fleet.host.router" in one.arguments)
         assert send(router, signal.SIGSTOP)
         looked = fleet.lfa("doctor", "--json", str(fleet.fleet_file))
     finally:

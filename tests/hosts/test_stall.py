@@ -15,14 +15,18 @@ from pathlib import Path
 
 import pytest
 
-from protocol import clock
-from protocol.bus import Inbox
-from protocol.geometry import Twist
-from protocol.messages import NO_TERM, Header, PoseStamped, Role, encode
-from protocol.topics import key
-from protocol.zenoh_bus import ZenohBus, answers
+from lfa.protocol import clock
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.consensus import NO_TERM, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import PoseStamped
+from lfa.protocol.topics import key
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
 from tests.hosts.conftest import Figure
-from tests.hosts.net import PORT, Net, missing
+from tests.rigs.network_namespaces import PORT, Net, missing
 
 WHY_NOT = missing()
 pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
@@ -50,7 +54,7 @@ class Star:
         for host in self._net.hosts:
             words = ["--listen", self._socket(host), "--listen", f"tcp/{self._net.address(host)}:{PORT}"]
             words += [] if host == HUB else ["--connect", f"tcp/{self._net.address(HUB)}:{PORT}"]
-            command = [*self._net.enter(host), sys.executable, "-m", "deploy.fleet.router", *words]
+            command = [*self._net.enter(host), sys.executable, "-m", "lfa.deploy.fleet.host.router", *words]
             self._children.append(subprocess.Popen(command, env={**os.environ, **environment}))
         until = clock.now() + START_S
         while not all(answers(self._socket(host)) for host in self._net.hosts):

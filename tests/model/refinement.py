@@ -12,21 +12,21 @@ from copy import copy
 from itertools import chain, combinations, product
 from typing import NamedTuple
 
-from protocol.acceptor import Acceptor
-from protocol.candidate import Candidate
-from protocol.gateway import Gateway
-from protocol.geometry import STILL
-from protocol.holder import Holder
-from protocol.messages import (
+from lfa.protocol.geometry import STILL
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.candidate import Candidate
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.quorum import is_quorum
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import (
     NO_TERM,
-    CmdVel,
     Config,
     Electorate,
     Fence,
     GatewayStamp,
     Grant,
     Grantee,
-    Header,
     Member,
     Prepare,
     Promise,
@@ -34,8 +34,8 @@ from protocol.messages import (
     Term,
     Version,
 )
-from protocol.quorum import is_quorum
-from protocol.timing import timing_of
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
 from tests.model import register_state
 from tests.model.voter_rules import may_grant, may_promise
 

@@ -14,13 +14,15 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from deploy.fleet import authority, keys
-from protocol import clock
-from protocol.credentials import ACCESS_FILE
-from protocol.messages import MESSAGE_BYTES_MAX, Status, decode
-from protocol.topics import RECORDER_NAME, TOPIC
-from tests.processes.fleet import eventually
-from tests.processes.secured import ELSEWHERE, FLEET, REVOKED, TRAITOR, Attacked, attacked, forge, free_port, tls
+from lfa.deploy.fleet.security import authority, keys
+from lfa.protocol import clock
+from lfa.protocol.messages.codec import decode
+from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
+from lfa.protocol.messages.team import Status
+from lfa.protocol.topics import RECORDER_NAME, TOPIC
+from lfa.protocol.transport.credentials import ACCESS_FILE
+from tests.rigs.lfa_runs import eventually
+from tests.rigs.secured_fleet import ELSEWHERE, FLEET, REVOKED, TRAITOR, Attacked, attacked, forge, free_port, tls
 
 pytestmark = pytest.mark.processes
 
@@ -201,7 +203,16 @@ def test_a_neighbour_router_speaks_only_for_those_who_live_there(fleet: Attacked
     """Machine b is taken over whole: its router has no rules any more, and passes on whatever it is told."""
     endpoint, home = f"unixsock-stream/{fleet.folder / 'b.sock'}", keys.folder_of(fleet.keys, "b")
     (home / ACCESS_FILE).write_text('{"access_control": {"enabled": false}}')
-    command = [sys.executable, "-m", "deploy.fleet.router", "--keys", str(home), "--secure", "--listen", endpoint]
+    command = [
+        sys.executable,
+        "-m",
+        "lfa.deploy.fleet.host.router",
+        "--keys",
+        str(home),
+        "--secure",
+        "--listen",
+        endpoint,
+    ]
     taken = subprocess.Popen([*command, "--connect", fleet.tls], stdout=subprocess.PIPE, text=True)
     try:
         assert taken.stdout is not None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes.fleet import lfa
+from tests.rigs.lfa_runs import lfa
 
 pytestmark = pytest.mark.processes
 
@@ -56,11 +56,11 @@ def test_bad_input_is_refused_in_one_line(
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("deploy.fleet.router", "--listen", "carrier-pigeon"), "carrier-pigeon"),
-        (("deploy.fleet.router", "--listen", "tcp/203.0.113.7:7447"), "203.0.113.7"),
-        (("world.cli", "nowhere"), "nowhere"),
-        (("agents.cli", "--role", "boss", "--id", "1"), "boss"),
-        (("agents.cli", "--role", "follower", "--id", "0"), "--id 0"),
+        (("lfa.deploy.fleet.host.router", "--listen", "carrier-pigeon"), "carrier-pigeon"),
+        (("lfa.deploy.fleet.host.router", "--listen", "tcp/203.0.113.7:7447"), "203.0.113.7"),
+        (("lfa.world.cli", "nowhere"), "nowhere"),
+        (("lfa.agents.cli", "--role", "boss", "--id", "1"), "boss"),
+        (("lfa.agents.cli", "--role", "follower", "--id", "0"), "--id 0"),
     ],
 )
 def test_each_process_refuses_bad_input_in_one_line(arguments: tuple[str, ...], named: str) -> None:

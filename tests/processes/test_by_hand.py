@@ -13,11 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from protocol.bus import Inbox
-from protocol.messages import Message, Role, Status, Tracking, decode
-from protocol.topics import TOPIC, address, key
-from protocol.zenoh_bus import ZenohBus, answers
-from tests.processes.fleet import eventually
+from lfa.protocol.messages.codec import Message, decode
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.team import Status, Tracking
+from lfa.protocol.topics import TOPIC, address, key
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
+from tests.rigs.lfa_runs import eventually
 
 pytestmark = pytest.mark.processes
 
@@ -36,21 +39,21 @@ class Terminals:
         self._inbox = Inbox()
 
     def router(self) -> subprocess.Popen[str]:
-        child = self.start("deploy.fleet.router", "--listen", self.endpoint)
+        child = self.start("lfa.deploy.fleet.host.router", "--listen", self.endpoint)
         eventually(lambda: answers(self.endpoint), "the router does not answer")
         return child
 
     def world(self, robots: int = 2) -> subprocess.Popen[str]:
-        return self.start("world.cli", "straight", "--robots", str(robots), *self.team())
+        return self.start("lfa.world.cli", "straight", "--robots", str(robots), *self.team())
 
     def lfa(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", "from deploy.cli import main; main()", *arguments, *self.team()]
+        command = [sys.executable, "-c", "from lfa.deploy.cli import main; main()", *arguments, *self.team()]
         return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
     def agent(
         self, robot_id: int, role: str = "follower", environment: Mapping[str, str] | None = None
     ) -> subprocess.Popen[str]:
-        arguments = ("agents.cli", "--role", role, "--id", str(robot_id), *self.team())
+        arguments = ("lfa.agents.cli", "--role", role, "--id", str(robot_id), *self.team())
         return self.start(*arguments, environment=environment)
 
     def look_on(self) -> None:
@@ -140,7 +143,7 @@ def test_an_id_that_already_runs_is_refused_in_one_line(terminals: Terminals) ->
 
 def test_a_second_router_at_the_same_place_is_refused_in_one_line(terminals: Terminals) -> None:
     terminals.router()
-    command = [sys.executable, "-m", "deploy.fleet.router", "--listen", terminals.endpoint]
+    command = [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.router", "--listen", terminals.endpoint]
     second = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert second.returncode == 2
     assert second.stderr.count("\n") == 1

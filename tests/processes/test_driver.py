@@ -6,13 +6,16 @@ import subprocess
 
 import pytest
 
-from protocol.bus import Inbox
-from protocol.geometry import STILL
-from protocol.messages import Localization, Sensors, Tracking, Truth, decode
-from protocol.topics import TOPIC, address, key
-from protocol.zenoh_bus import ZenohBus
-from tests.processes.fleet import eventually
+from lfa.protocol.geometry import STILL
+from lfa.protocol.messages.codec import decode
+from lfa.protocol.messages.robot import Localization, Sensors
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Tracking
+from lfa.protocol.topics import TOPIC, address, key
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
 from tests.processes.test_by_hand import FLEET, Terminals, terminals
+from tests.rigs.lfa_runs import eventually
 
 __all__ = ["terminals"]
 
@@ -38,8 +41,8 @@ class Mixed:
         self._bus = ZenohBus(terminals.endpoint, self._inbox)
         wanted = {key(FLEET, "*", topic) for topic in ("sensors", "localization", "tracking", "truth")}
         self._bus.follow(frozenset(wanted))
-        terminals.start("world.cli", *SCENARIO, *terminals.team())
-        terminals.start("deploy.robot.cli", "--id", str(REAL), "--at=-1.2,0,0", *terminals.team())
+        terminals.start("lfa.world.cli", *SCENARIO, *terminals.team())
+        terminals.start("lfa.deploy.robot.cli", "--id", str(REAL), "--at=-1.2,0,0", *terminals.team())
         self.agents = {n: terminals.agent(n, "leader" if n == 1 else "follower") for n in (1, 2, 3)}
         self.sensors: Sensors | None = None
         self.fix: Localization | None = None

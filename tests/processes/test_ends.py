@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.look import trace
-from tests.processes.fleet import Running, eventually, running
+from lfa.deploy.recording import mcap_reader
+from tests.rigs.lfa_runs import Running, eventually, running
 
 pytestmark = pytest.mark.processes
 
@@ -24,7 +24,7 @@ def patience_s() -> float:
 
 def assert_nothing_is_left(run: Running) -> None:
     eventually(lambda: run.left() == [], lambda: f"still there: {run.left()}", patience_s())
-    assert trace.read(run.folder).end_s > 0.0, "the recording gives no ground truth"
+    assert mcap_reader.read(run.folder).end_s > 0.0, "the recording gives no ground truth"
     assert list((run.folder / "journal").glob("robot1-*.bin")), "robot 1 left no journal"
 
 
@@ -64,7 +64,7 @@ def test_a_killed_launcher_takes_all_with_it_also_what_is_stopped(tmp_path: Path
 def test_a_killed_recorder_aborts_the_run_and_leaves_all_but_its_last_second(tmp_path: Path) -> None:
     with running(tmp_path / "run", "straight") as run:
         run.wait_for("leader_command")
-        eventually(lambda: trace.read(run.folder).end_s > 1.0, "no whole second was written")
+        eventually(lambda: mcap_reader.read(run.folder).end_s > 1.0, "no whole second was written")
         os.kill(run.crew()["recorder"].pid, signal.SIGKILL)
         assert run.launcher.wait(patience_s()) == 1
         assert_nothing_is_left(run)

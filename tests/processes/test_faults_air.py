@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from deploy.bench.team import REST_MPS, Team
-from protocol.mission import robot_name
-from protocol.radio import WEATHER
-from protocol.topics import WORLD_NAME
-from tests.processes.live import ROBOTS, WHOLE_S, check_minority, check_terms, leads, pass_time, team
+from lfa.deploy.bench.harness.team import REST_MPS, Team
+from lfa.protocol.names import robot_name
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.link_model import WEATHER
+from tests.rigs.live_team import ROBOTS, WHOLE_S, check_minority, check_terms, leads, pass_time, team
 
 pytestmark = pytest.mark.processes
 

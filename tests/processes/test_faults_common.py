@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from deploy.look.verify import verify
-from deploy.run.inject import command as fault
-from protocol.mission import Refused
-from tests.processes.fleet import SHORT, eventually, lfa, running
-from world import memory
+from lfa.deploy.analysis.verification.journals import verify
+from lfa.deploy.operate.fault import command as fault
+from lfa.protocol.errors import Refused
+from lfa.world import checkpoint
+from tests.rigs.lfa_runs import SHORT, eventually, lfa, running
 
 pytestmark = pytest.mark.processes
 
@@ -25,10 +25,10 @@ def test_one_that_all_share_dies_and_starts_again_and_the_team_drives_on(tmp_pat
     restart = ("--set", f'restart={{{process} = "on-failure"}}', "--fault", f"kill {process} at {DIES_AT_S:g} s")
     with running(tmp_path / "run", "straight", "--robots", "2", *restart) as run:
         run.wait_for("restarted")
-        before = memory.read(run.folder)
+        before = checkpoint.read(run.folder)
         far_m = max(robot.pose.x for robot in before.robots) + ON_M
-        eventually(lambda: max(r.pose.x for r in memory.read(run.folder).robots) > far_m, "nobody drives on")
-        after = memory.read(run.folder)
+        eventually(lambda: max(r.pose.x for r in checkpoint.read(run.folder).robots) > far_m, "nobody drives on")
+        after = checkpoint.read(run.folder)
         run.launcher.send_signal(signal.SIGTERM)
         run.launcher.wait(30.0)
     assert after.step > before.step, "the world's time began anew"

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from deploy.bench.team import Team
-from protocol import clock
-from tests.processes.live import ROBOTS, WHOLE_S, check_terms, leads, team
+from lfa.deploy.bench.harness.team import Team
+from lfa.protocol import clock
+from tests.rigs.live_team import ROBOTS, WHOLE_S, check_terms, leads, team
 
 pytestmark = pytest.mark.processes
 

@@ -6,12 +6,14 @@ from random import Random
 
 import pytest
 
-from protocol.bus import Inbox
-from protocol.messages import BadMessage, Role, Status, Tracking, decode
-from protocol.topics import TOPIC, TOPICS, address, key
-from protocol.zenoh_bus import ZenohBus
-from tests.processes.fleet import eventually
+from lfa.protocol.messages.codec import BadMessage, decode
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.team import Status, Tracking
+from lfa.protocol.topics import TOPIC, TOPICS, address, key
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
 from tests.processes.test_by_hand import FLEET, Terminals, terminals
+from tests.rigs.lfa_runs import eventually
 
 __all__ = ["terminals"]
 

@@ -11,16 +11,16 @@ from pathlib import Path
 from socket import socket
 from urllib.request import urlopen
 
-from deploy.look import trace
-from deploy.run.record import parts
-from protocol.zenoh_bus import answers
-from tests.deploy.agreement import differing
-from tests.processes.fleet import LFA, eventually, lfa, running
+from lfa.deploy.recording import mcap_reader
+from lfa.deploy.recording.recorder import parts
+from lfa.protocol.transport.zenoh_config import answers
+from tests.rigs.lfa_runs import LFA, eventually, lfa, running
+from tests.rigs.recording_agreement import differing
 
 
 @contextmanager
 def router(endpoint: str) -> Iterator[None]:
-    process = subprocess.Popen([sys.executable, "-m", "deploy.fleet.router", "--listen", endpoint])
+    process = subprocess.Popen([sys.executable, "-P", "-m", "lfa.deploy.fleet.host.router", "--listen", endpoint])
     try:
         eventually(lambda: answers(endpoint), "no router came up")
         yield
@@ -89,8 +89,8 @@ def test_a_viewer_comes_and_goes_and_the_run_goes_on(tmp_path: Path) -> None:
             assert viewer.stdout.readline().startswith(f"http://127.0.0.1:{web_port}?url=")
             with urlopen(f"http://127.0.0.1:{web_port}/") as page:
                 assert b"rerun" in page.read().lower()
-            seen = trace.read(run.folder).end_s
-            eventually(lambda: trace.read(run.folder).end_s > seen + 0.5, "the run stands")
+            seen = mcap_reader.read(run.folder).end_s
+            eventually(lambda: mcap_reader.read(run.folder).end_s > seen + 0.5, "the run stands")
         finally:
             viewer.kill()
             viewer.wait()
@@ -124,17 +124,17 @@ def test_a_running_fleet_can_be_recorded_from_outside(tmp_path: Path) -> None:
         recorder = subprocess.Popen([*LFA, "record", "--fleet", fleet, "--out", str(cut)], stdout=subprocess.DEVNULL)
         split = ("--split-mb", "0.02", "--out", str(out))
         done = lfa("record", "--fleet", fleet, "--seconds", "3", *split)
-        eventually(lambda: cut.is_dir() and trace.read(cut).end_s > 0.0, "nothing was recorded")
-        killed_at = trace.read(run.folder).end_s
-        eventually(lambda: trace.read(run.folder).end_s > killed_at, "the run stands")
+        eventually(lambda: cut.is_dir() and mcap_reader.read(cut).end_s > 0.0, "nothing was recorded")
+        killed_at = mcap_reader.read(run.folder).end_s
+        eventually(lambda: mcap_reader.read(run.folder).end_s > killed_at, "the run stands")
         recorder.kill()
         recorder.wait()
     assert done.returncode == 0, done.stdout + done.stderr
     assert ", 0 lost, " in done.stdout
     assert len(parts(out)) > 1
-    assert set(trace.read(out).truth) == {1, 2}
+    assert set(mcap_reader.read(out).truth) == {1, 2}
     assert (out / "scenario.toml").is_file()
-    assert trace.read(cut).end_s > killed_at - 1.1, "SIGKILL may cost the last second, no more"
+    assert mcap_reader.read(cut).end_s > killed_at - 1.1, "SIGKILL may cost the last second, no more"
     again = lfa("replay", str(out), "--robot", "all")
     assert again.returncode == 0, again.stdout + again.stderr
     assert {line.split("-")[0] for line in again.stdout.splitlines()} == {"robot1", "robot2", "witness", "world"}

@@ -10,13 +10,15 @@ from random import Random
 
 import pytest
 
-from deploy.look import chronicle, trace
-from deploy.look.summary import read
-from protocol.bus import Inbox
-from protocol.messages import Clock, Header, encode
-from protocol.topics import TOPICS
-from protocol.zenoh_bus import ZenohBus
-from tests.processes.fleet import SHORT, eventually, lfa, running
+from lfa.deploy.analysis.summary import read
+from lfa.deploy.recording import event_log, mcap_reader
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.simulation import Clock
+from lfa.protocol.topics import TOPICS
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from tests.rigs.lfa_runs import SHORT, eventually, lfa, running
 
 pytestmark = pytest.mark.processes
 
@@ -48,11 +50,13 @@ def test_the_run_folder_is_whole(tmp_path: Path) -> None:
     assert " robot1 role " in (folder / "logs" / "robot1.log").read_text()
     journals = sorted(path.name.split("-")[0] for path in (folder / "journal").iterdir())
     assert journals == ["robot1", "robot2", "witness", "world"]
-    assert set(trace.read(folder).truth) == {1, 2}
+    assert set(mcap_reader.read(folder).truth) == {1, 2}
     assert read(folder).robots[1].distance_error_rms_m is not None
-    ticks = [said.counters.get("tick_p99_ms", 0.0) for _, _, _, said in trace.messages(folder, frozenset({"status"}))]
+    ticks = [
+        said.counters.get("tick_p99_ms", 0.0) for _, _, _, said in mcap_reader.messages(folder, frozenset({"status"}))
+    ]
     assert max(ticks) > 0.0
-    first = {line["kind"]: line["t"] for line in reversed(chronicle.lines(folder))}
+    first = {line["kind"]: line["t"] for line in reversed(event_log.lines(folder))}
     assert 0.0 < first["over"] < first["peer_down"], "what counts is how it was before all were told to stop"
 
 

@@ -5,7 +5,7 @@ from math import cos, isclose, pi, sin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.geometry import Pose2D, Twist, along_arc, between, compose, distance, inverse, wrap
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, distance, inverse, wrap
 
 angle = st.floats(-50.0, 50.0)
 place = st.floats(-100.0, 100.0)

@@ -3,7 +3,9 @@
 import msgspec
 import pytest
 
-from protocol.mission import FormationSpec, Leading, Limits, Mission, Refused, check_mission
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import FormationSpec, Leading, Limits, Mission
+from lfa.protocol.mission_checks import check_mission
 
 GOOD = Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0))))
 

@@ -2,9 +2,10 @@
 
 import pytest
 
-from agents.agent import Agent
-from protocol.mission import Leading, Mission, robot_id_of, robot_name
-from protocol.topics import HARDWARE, TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches
+from lfa.agents.agent import Agent
+from lfa.protocol.mission import Leading, Mission
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.topics import HARDWARE, TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches
 
 
 def test_each_topic_is_named_once_and_has_its_own_type() -> None:

@@ -7,15 +7,15 @@ from contextlib import contextmanager
 
 import pytest
 
-from deploy.fleet.health import Health
-from deploy.look.onlooker import Ear, Fleet, listen
-from protocol import clock
-from protocol.messages import Event, PoseStamped
-from protocol.mission import robot_id_of
-from protocol.topics import HOST_PREFIX
-from protocol.zenoh_bus import answers
-from tests.hosts.machines import Machines
-from tests.processes.fleet import eventually
+from lfa.deploy.client.session import Ear, Fleet, listen
+from lfa.deploy.fleet.health import Health
+from lfa.protocol import clock
+from lfa.protocol.messages.team import Event, PoseStamped
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import HOST_PREFIX
+from lfa.protocol.transport.zenoh_config import answers
+from tests.rigs.lfa_runs import eventually
+from tests.rigs.machines import Machines
 
 POLL_S = 0.005
 TOPICS = frozenset({"*/pose", "*/tracking", "*/host", "*/event", "*/status"})

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from deploy.look.checker import Checker
-from deploy.look.checkers import SAFETY
-from deploy.run.arena import Arena
-from protocol.acceptor import Acceptor
-from protocol.effects import BecomeLeader, Effect, Send
-from protocol.lease import Lease
-from protocol.messages import (
+from lfa.deploy.analysis.verification.checker import Checker
+from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.effects import BecomeLeader, Effect, Send
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import (
     Config,
     Grant,
     Hello,
@@ -21,8 +22,7 @@ from protocol.messages import (
     Term,
     Version,
 )
-from protocol.mission import Leading, Mission
-from protocol.timing import timing_of
+from lfa.protocol.mission import Leading, Mission
 
 STD = timing_of("std")
 TEAM = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))

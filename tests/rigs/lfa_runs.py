@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
-from deploy.run.processes import Identity, identify, own_processes
-from protocol import clock
+from lfa.deploy.process.identity import Identity, identify, own_processes
+from lfa.protocol import clock
 
 SHORT = ("--set", "mission.leading.route_m=[[2.0, 0.0]]")
 PATIENCE_S = 30.0
 POLL_S = 0.02
-LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def lfa(*arguments: str, timeout_s: float = 90.0) -> subprocess.CompletedProcess[str]:
@@ -103,6 +103,6 @@ def _parent(pid: int) -> int:
 
 def _name(arguments: tuple[str, ...]) -> str:
     module = arguments[arguments.index("-m") + 1]
-    if module == "agents.cli":
+    if module == "lfa.agents.cli":
         return f"robot{arguments[arguments.index('--id') + 1]}"
-    return module.split(".")[0] if module == "world.cli" else module.split(".")[-1]
+    return module.split(".")[0] if module == "lfa.world.cli" else module.split(".")[-1]

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from deploy.bench.team import REST_MPS, Team, endless
-from deploy.look.verify import obeyed
-from protocol import clock, journal
-from protocol.messages import Event, Term
-from protocol.mission import robot_name
-from protocol.timing import timing_of
-from protocol.topics import address
+from lfa.deploy.analysis.verification.journals import obeyed
+from lfa.deploy.bench.harness.team import REST_MPS, Team, endless
+from lfa.protocol import clock
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.team import Event
+from lfa.protocol.names import robot_name
+from lfa.protocol.runtime import journal
+from lfa.protocol.topics import address
 
 ROBOTS = 4
 WHOLE_S = 30.0

@@ -15,18 +15,18 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.fleet import part as parts
-from deploy.fleet.part import Part
-from deploy.run import processes
-from deploy.run.processes import Identity
-from protocol import clock
-from tests.hosts.net import Net, missing
+from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.process import identity
+from lfa.deploy.process.identity import Identity
+from lfa.protocol import clock
+from tests.rigs.network_namespaces import Net, missing
 
 OPERATOR = 0
 """The host that `lfa up` is run on; machine n of the fleet is host n."""
 NAMES = "abcdefgh"
 SSHD = "/usr/sbin/sshd"
-LFA = (sys.executable, "-c", "from deploy.cli import main; main()")
+LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def why_not() -> str | None:
@@ -141,7 +141,7 @@ class Machines:
         mark = str(self.state(name))
         found = [
             one
-            for one in processes.own_processes()
+            for one in identity.own_processes()
             if any(word.startswith((f"unixsock-stream/{mark}/", f"{mark}/")) for word in one.arguments)
         ]
         self._known.update(found)
@@ -168,14 +168,14 @@ class Machines:
         """All processes of that machine at once, its supervisor first; the moment just before."""
         at = clock.now()
         found = self.processes(name)
-        for one in sorted(found, key=lambda one: "deploy.fleet.supervise" not in one.arguments):
-            processes.send(one, signal.SIGKILL)
+        for one in sorted(found, key=lambda one: "lfa.deploy.fleet.host.supervisor" not in one.arguments):
+            identity.send(one, signal.SIGKILL)
         return at
 
     def kill_router(self, name: str) -> float:
         at = clock.now()
-        router = next(one for one in self.processes(name) if "deploy.fleet.router" in one.arguments)
-        assert processes.send(router, signal.SIGKILL)
+        router = next(one for one in self.processes(name) if "lfa.deploy.fleet.host.router" in one.arguments)
+        assert identity.send(router, signal.SIGKILL)
         return at
 
     def host(self, name: str) -> int:

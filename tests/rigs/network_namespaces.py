@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.bench.team import Team, endless
-from deploy.run.crew import ROUTER_NAME, Row
-from protocol.mission import robot_id_of
-from protocol.topics import RECORDER_NAME, WORLD_NAME
+from lfa.deploy.bench.harness.team import Team, endless
+from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
 
 PORT = 7447
 ROBOTS = 4
@@ -152,7 +152,7 @@ def _router(host: int, sockets: Path) -> Row:
     listen = ("--listen", _socket(host, sockets), "--listen", f"tcp/{_ip(host)}:{PORT}")
     others = (word for far in range(host) for word in ("--connect", f"tcp/{_ip(far)}:{PORT}"))
     name = ROUTER_NAME if host == WORLD_HOST else f"{ROUTER_NAME}{host}"
-    return Row(name, ("deploy.fleet.router", *listen, *others), inside=_enter(host))
+    return Row(name, ("lfa.deploy.fleet.host.router", *listen, *others), inside=_enter(host))
 
 
 def _socket(host: int, sockets: Path) -> str:

@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 from mcap.reader import make_reader
 
-from deploy.look import again
-from deploy.run import channels
-from deploy.run.record import parts
-from protocol import journal
-from protocol.host import Host
-from protocol.journal import Journal
-from protocol.messages import decode
-from protocol.topics import TOPIC, address
+from lfa.deploy.analysis.verification import reexecution
+from lfa.deploy.recording import mcap_channels
+from lfa.deploy.recording.recorder import parts
+from lfa.protocol.messages.codec import decode
+from lfa.protocol.runtime import journal
+from lfa.protocol.runtime.journal import Journal
+from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.topics import TOPIC, address
 
 Stream = tuple[str, str, int]
 """A channel, and one life of one sender on it."""
@@ -43,12 +43,12 @@ def journalled_ends(folder: Path) -> Ends:
     ends: Ends = {}
     for path in sorted((folder / "journal").glob("*.bin")):
         heading, entries = journal.read(path)
-        host = Host(again.node_of(path, heading), Journal(None, heading))
+        host = Host(reexecution.node_of(path, heading), Journal(None, heading))
         for entry in entries:
-            for to, payload in again.call(host, entry):
+            for to, payload in reexecution.call(host, entry):
                 where = address(to)
                 assert where is not None
-                _noted(ends, "/" + to.split("/", 2)[2], channels.encode(decode(payload, TOPIC[where.topic].type)))
+                _noted(ends, "/" + to.split("/", 2)[2], mcap_channels.encode(decode(payload, TOPIC[where.topic].type)))
     return ends
 
 

@@ -13,12 +13,12 @@ from typing import Any
 
 import zenoh
 
-from deploy.bench.team import Team, endless
-from deploy.fleet import authority, keys
-from deploy.run.crew import ROUTER_NAME, Row
-from protocol import clock
-from protocol.credentials import Credentials, credentials
-from protocol.topics import RECORDER_NAME
+from lfa.deploy.bench.harness.team import Team, endless
+from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.protocol import clock
+from lfa.protocol.topics import RECORDER_NAME
+from lfa.protocol.transport.credentials import Credentials, credentials
 
 FLEET, ROBOTS = "secured", 3
 WHOLE_S, HEARD_S = 20.0, 5.0
@@ -50,7 +50,7 @@ class Attacked:
     def _table(self, usual: Sequence[Row], sockets: Path) -> list[Row]:
         """Robot 2 joins over tls with its certificate, everybody else over the unix socket by password."""
         self.unix = usual[0].arguments[-1]
-        listen = ("deploy.fleet.router", "--listen", self.unix, "--listen", self.tls, *self._keys(True))
+        listen = ("lfa.deploy.fleet.host.router", "--listen", self.unix, "--listen", self.tls, *self._keys(True))
         rows = [Row(ROUTER_NAME, listen)]
         for row in usual:
             if row.name not in (ROUTER_NAME, RECORDER_NAME):

@@ -6,19 +6,16 @@ from typing import Any
 
 import msgspec
 
-from protocol.geometry import Twist
-from protocol.messages import (
-    CmdVel,
-    Event,
-    GatewayStamp,
-    Header,
-    Term,
-    Truth,
-)
-from protocol.node import Envelope, Received
-from protocol.timing import timing_of
-from world.scenario import draw, load
-from world.world import World
+from lfa.protocol.geometry import Twist
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import GatewayStamp, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event
+from lfa.protocol.node import Envelope, Received
+from lfa.world.description.load import draw, load
+from lfa.world.world import World
 
 FLEET = "test"
 T0 = 1000.0

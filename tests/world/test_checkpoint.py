@@ -7,12 +7,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from protocol.messages import Truth
-from protocol.mission import Refused
-from world import memory
-from world.scenario import draw, load
-from world.spec import STATE
-from world.world import World
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.simulation import Truth
+from lfa.world import checkpoint
+from lfa.world.description.load import draw, load
+from lfa.world.description.scenario import STATE
+from lfa.world.world import World
 
 SCENARIO = draw(load("paper_path1"), 7)
 
@@ -29,8 +29,8 @@ def last_truth(world: World, since: float, until: float) -> Truth:
 def test_time_robots_and_obstacles_go_on_from_the_state() -> None:
     first = World("f", SCENARIO, 7, 1, start_at=10.0)
     before = last_truth(first, 10.0, 12.0)
-    known = msgspec.json.decode(msgspec.json.encode(first.memory()), type=memory.Memory)
-    second = World("f", memory.resumed(SCENARIO, known), 7, 2, start_at=50.0, memory=known)
+    known = msgspec.json.decode(msgspec.json.encode(first.memory()), type=checkpoint.Memory)
+    second = World("f", checkpoint.resumed(SCENARIO, known), 7, 2, start_at=50.0, memory=known)
     after = last_truth(second, 50.0, 50.015)
     assert after.robots == before.robots
     assert 0.0 < after.time_s - before.time_s < 0.03
@@ -43,22 +43,22 @@ def test_the_state_of_another_team_is_refused() -> None:
     last_truth(known, 0.0, 0.1)
     other = draw(load("paper_path1", robots=2), 7)
     with pytest.raises(Refused, match="--resume"):
-        memory.resumed(other, known.memory())
+        checkpoint.resumed(other, known.memory())
 
 
 def test_a_folder_without_a_state_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="--resume"):
-        memory.read(tmp_path)
+        checkpoint.read(tmp_path)
     (tmp_path / STATE).write_text("{")
     with pytest.raises(Refused, match="no state of a world"):
-        memory.read(tmp_path)
+        checkpoint.read(tmp_path)
 
 
 def test_on_a_full_disk_the_world_goes_on_and_says_so_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / STATE
     path.write_bytes(b"as last kept")
     path.with_suffix(".new").symlink_to("/dev/full")
-    world = memory.Remembering(World("f", SCENARIO, 7, 1, start_at=0.0), tmp_path)
+    world = checkpoint.Remembering(World("f", SCENARIO, 7, 1, start_at=0.0), tmp_path)
     for _ in range(30):
         world.tick(world.next_deadline())
     assert capsys.readouterr().err == f"{path}: No space left on device: the state is kept no more\n"

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import NO_TERM, GatewayStamp, Header, Localization, Sensors, Truth
-from protocol.mission import Refused
-from protocol.node import Envelope, Received
-from world.kinematic import Kinematic
-from world.physics import Physics
-from world.scenario import draw, load
-from world.world import World
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import Localization, Sensors
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.node import Envelope, Received
+from lfa.world.description.load import draw, load
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.physics.rigid_bodies import Physics
+from lfa.world.world import World
 
 SETTINGS = ["mission.cold_start=full_house", "world.real_robots=[2]"]
 

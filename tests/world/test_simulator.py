@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.geometry import Twist
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Ask, Header, Message, PoseStamped, Role, Term
-from protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
-from protocol.radio import Radio
-from protocol.topics import alive_key, key
-from world.simulator import HINT_DELAY_S, LocalClock, Simulator
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Role, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Ask, PoseStamped
+from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.topics import alive_key, key
+from lfa.protocol.transport.link_model import Radio
+from lfa.world.simulator import HINT_DELAY_S, LocalClock, Simulator
 
 
 class Talker:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from world import cli
+from lfa.world import cli
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
 
 @pytest.mark.parametrize("module", ["numpy", "pymunk"])
 def test_a_missing_extra_is_named_with_the_command_that_installs_it(module: str) -> None:
-    code = f"import sys; sys.modules[{module!r}] = None; from world.cli import main; main()"
+    code = f"import sys; sys.modules[{module!r}] = None; from lfa.world.cli import main; main()"
     done = subprocess.run([sys.executable, "-c", code, "straight"], capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert done.stderr == f"lfa-world: needs {module}: install with: pip install 'lfa[world]'\n"

@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.geometry import Twist
-from protocol.messages import (
-    Ask,
-    CmdVel,
-    Fence,
-    Fenced,
-    GatewayStamp,
-    Header,
-    LeaseNote,
-    MissionNote,
-    Sensors,
-    Term,
-)
-from protocol.node import PeerDown, PeerUp, RouterLost, Stop
-from tests.world.rig import FLEET, STD, T0, TERM, Rig, events, last, of
-from world.scenario import load
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.consensus import Fence, Fenced, GatewayStamp, LeaseNote, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel, Sensors
+from lfa.protocol.messages.team import Ask, MissionNote
+from lfa.protocol.node import PeerDown, PeerUp, RouterLost, Stop
+from lfa.world.description.load import load
+from tests.rigs.world_rig import FLEET, STD, T0, TERM, Rig, events, last, of
 
 
 def test_robots_go_where_they_are_commanded() -> None:

@@ -9,16 +9,13 @@ from random import Random
 
 import pytest
 
-from protocol.geometry import Twist
-from protocol.messages import (
-    Message,
-    encode,
-)
-from protocol.node import Envelope
-from protocol.topics import TOPIC, address
-from tests.world.rig import CHECKED_S, Rig, events
-from world import sensors as sensors_module
-from world.scenario import shipped
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.node import Envelope
+from lfa.protocol.topics import TOPIC, address
+from lfa.world.description.load import shipped
+from lfa.world.sensors import noise as sensors_module
+from tests.rigs.world_rig import CHECKED_S, Rig, events
 
 
 def everything(seed: int, scenario: str = "paper_path1") -> list[bytes]:

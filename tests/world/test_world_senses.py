@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.geometry import Pose2D, Twist, distance
-from protocol.messages import (
-    Clock,
-    Contact,
-    GroundProfile,
-    LaserScan,
-    Localization,
-    Sensors,
-    Truth,
-)
-from tests.world.rig import MOVER, Rig, events, last, of
-from world.kinematic import Kinematic
+from lfa.protocol.geometry import Pose2D, Twist, distance
+from lfa.protocol.messages.robot import Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.simulation import Clock, Truth
+from lfa.world.physics.kinematics import Kinematic
+from tests.rigs.world_rig import MOVER, Rig, events, last, of
 
 
 def test_a_wall_is_felt_once_and_odometry_runs_on_while_the_wheels_slip() -> None:

@@ -8,17 +8,12 @@ from random import Random
 
 import pytest
 
-from protocol.geometry import Twist, along_arc, distance
-from protocol.messages import (
-    Clock,
-    GroundProfile,
-    LaserScan,
-    Sensors,
-    Truth,
-)
-from tests.world.rig import FAR_BUMP, FLEET, MOVER, NOISE, T0, Rig, events, of
-from world.scenario import load
-from world.world import CATCH_UP_STEPS_MAX, World
+from lfa.protocol.geometry import Twist, along_arc, distance
+from lfa.protocol.messages.robot import GroundProfile, LaserScan, Sensors
+from lfa.protocol.messages.simulation import Clock, Truth
+from lfa.world.description.load import load
+from lfa.world.world import CATCH_UP_STEPS_MAX, World
+from tests.rigs.world_rig import FAR_BUMP, FLEET, MOVER, NOISE, T0, Rig, events, of
 
 
 def test_every_topic_comes_at_its_rate_for_every_robot() -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from math import atan2, hypot, pi
 
-from protocol.geometry import TAU
-from protocol.mission import Refused, check_mission, robot_name
-from world.spec import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Point, Scenario
-from world.terrain import check_feature, features
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import TAU
+from lfa.protocol.mission_checks import check_mission
+from lfa.protocol.names import robot_name
+from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Point, Scenario
+from lfa.world.description.terrain import check_feature, features
 
 ROBOTS_MAX = 500
 LENGTH_M_MIN = 0.001

@@ -11,8 +11,8 @@ from typing import Any
 
 import msgspec
 
-from protocol.mission import Refused
-from world.spec import Scenario
+from lfa.protocol.errors import Refused
+from lfa.world.description.scenario import Scenario
 
 SHOWN_MAX = 60
 _PARTS = re.compile(r"\w+|\[\d*\]")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 CELLS_MAX = 64_000_000
 BYTES_MAX = 5 * CELLS_MAX

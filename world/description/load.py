@@ -16,23 +16,14 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from protocol.mission import Refused, whole_number
-from protocol.radio import Radio
-from world.checks import ROBOTS_MAX, check_scenario
-from world.course import check_course, draw, starts_of
-from world.fields import converted, structs_in, value_at
-from world.spec import (
-    Body,
-    Lidar,
-    Noise,
-    Obstacle,
-    Outcome,
-    Point,
-    Scenario,
-    Vary,
-    WorldSpec,
-)
-from world.toml_file import read_toml
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import whole_number
+from lfa.protocol.transport.link_model import Radio
+from lfa.world.description.checks import ROBOTS_MAX, check_scenario
+from lfa.world.description.fields import converted, structs_in, value_at
+from lfa.world.description.placement import check_course, draw, starts_of
+from lfa.world.description.scenario import Body, Lidar, Noise, Obstacle, Outcome, Point, Scenario, Vary, WorldSpec
+from lfa.world.description.toml_file import read_toml
 
 __all__ = [
     "Body",
@@ -51,7 +42,7 @@ __all__ = [
     "starts_of",
 ]
 
-SCENARIOS = Path(__file__).parent / "scenarios"
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SHORT_FORMS = {
     "map": "world.map",
     "keepout": "world.keepout",
@@ -95,7 +86,7 @@ def _on_map(scenario: Scenario, folder: Path) -> Scenario:
     """Only a scenario with a map needs what reads images."""
     if scenario.world.map is None and scenario.world.keepout is None and scenario.world.start is None:
         return scenario
-    from world.mapped import on_map
+    from lfa.world.description.map_scenario import on_map
 
     return on_map(scenario, folder)
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from protocol.geometry import TAU, Pose2D, wrap
-from protocol.mission import Mission, Refused
-from world import maps
-from world.course import slot_bearing
-from world.maps import Map, Room
-from world.spec import Scenario
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import TAU, Pose2D, wrap
+from lfa.protocol.mission import Mission
+from lfa.world.description import maps
+from lfa.world.description.maps import Map, Room
+from lfa.world.description.placement import slot_bearing
+from lfa.world.description.scenario import Scenario
 
 MARGIN_M = 0.10
 """Kept from walls where the chain is laid out."""

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from protocol.mission import Refused
-from world.images import Shades, shades_of
+from lfa.protocol.errors import Refused
+from lfa.world.description.images import Shades, shades_of
 
 UNKNOWN = -1
 OCCUPIED = 100

@@ -11,8 +11,8 @@ from math import cos, hypot, sin
 from random import Random
 from typing import Protocol
 
-from protocol.geometry import TAU
-from world.spec import Obstacle, Point
+from lfa.protocol.geometry import TAU
+from lfa.world.description.scenario import Obstacle, Point
 
 WALK_LEG_S = 1.0
 """A random walk takes a new direction so often."""

@@ -8,12 +8,13 @@ from random import Random
 
 from msgspec.structs import replace
 
-from protocol.geometry import TAU, Pose2D, compose
-from protocol.mission import Mission, Refused
-from world.reach import parted
-from world.spec import SPEED_MPS_MAX, SPEED_MPS_MIN, Obstacle, Point, Scenario
-from world.terrain import Ditch, Feature, features, patch_of, patches_of
-from world.ways import way_of
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import TAU, Pose2D, compose
+from lfa.protocol.mission import Mission
+from lfa.world.description.obstacle_motion import way_of
+from lfa.world.description.reachability import parted
+from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Obstacle, Point, Scenario
+from lfa.world.description.terrain import Ditch, Feature, features, patch_of, patches_of
 
 DRAW_MARGIN_M = 0.5
 """What is drawn stays this far from the robots' starts and from the goal."""

@@ -1,7 +1,7 @@
 """The scenario type: a mission, a world, radio weather, faults and a time limit.
 
-Names carry their units. `world/scenario.py` reads it from TOML, `world/checks.py` says what no
-world can be built from, `world/course.py` what a seed draws of it.
+Names carry their units. `world/description/load.py` reads it from TOML, `world/description/checks.py` says what no
+world can be built from, `world/description/placement.py` what a seed draws of it.
 Nothing here imports the engine: a launcher, a test or an editor reads a scenario in milliseconds.
 """
 
@@ -11,15 +11,15 @@ from typing import Literal
 
 from msgspec import Struct, field
 
-from protocol.mission import Mission
-from protocol.radio import Radio
-from world.terrain import Bump, Ditch, Pothole
+from lfa.protocol.mission import Mission
+from lfa.protocol.transport.link_model import Radio
+from lfa.world.description.terrain import Bump, Ditch, Pothole
 
 Point = tuple[float, float]
 SPEED_MPS_MIN, SPEED_MPS_MAX = 0.001, 10.0
 """Of an obstacle that moves."""
 STATE = "state.json"
-"""Where a world keeps in its run folder what it remembers over its own death (`memory.py`)."""
+"""Where a world keeps in its run folder what it remembers over its own death (`checkpoint.py`)."""
 
 
 class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,7 +1,7 @@
 """The ground: potholes, bumps and ditches as a scenario gives them, and as patches of floor at another height.
 
 The floor is at 0 and flat. A patch lies lower or higher, with an upright edge all round: what that does to wheels
-is `wheels.py`, how it looks from above `ground.py`. Where patches overlap the deepest counts, then the highest.
+is `wheel_contact.py`, how it looks from above `ground_sensor.py`. Where patches overlap the deepest counts, then the highest.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Protocol
 
 from msgspec import Struct
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 Point = tuple[float, float]
 PATCH_WIDTH_M_MIN = 0.02

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 FILE_BYTES_MAX = 4 * 1024 * 1024
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 from msgspec import Struct
 
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.mission import Limits
-from world.course import starts_of
-from world.spec import Scenario
-from world.ways import way_of
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.mission import Limits
+from lfa.world.description.obstacle_motion import way_of
+from lfa.world.description.placement import starts_of
+from lfa.world.description.scenario import Scenario
 
 
 class Touch(Struct, frozen=True, gc=False):

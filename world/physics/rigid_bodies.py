@@ -3,7 +3,7 @@
 A robot that touches nothing follows equation (1) exactly: the engine moves a body along a straight line for one
 step, so it is given the chord of the arc, which has the arc's ends. A robot in touch with something is driven by
 what its wheels can push at most; where that is not enough the wheels slip, and odometry goes astray as it should.
-Terrain lets a wheel over its edges or not (`wheels.py`), and holds as hard as it needs to.
+Terrain lets a wheel over its edges or not (`wheel_contact.py`), and holds as hard as it needs to.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from math import cos, hypot, sin
 
 import pymunk
 
-from protocol.geometry import STILL, Pose2D, Twist, sinc, wrap
-from protocol.mission import robot_name
-from world.course import reach_of, starts_of
-from world.kinematic import Drive, Touch
-from world.spec import Obstacle, Scenario
-from world.ways import Way, way_of
-from world.wheels import Floor
+from lfa.protocol.geometry import STILL, Pose2D, Twist, sinc, wrap
+from lfa.protocol.names import robot_name
+from lfa.world.description.obstacle_motion import Way, way_of
+from lfa.world.description.placement import reach_of, starts_of
+from lfa.world.description.scenario import Obstacle, Scenario
+from lfa.world.physics.kinematics import Drive, Touch
+from lfa.world.physics.wheel_contact import Floor
 
 GRAVITY_MPS2 = 9.81
 GROUND_FRICTION = 0.4

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 from math import acos, atan, cos, inf, sin, sqrt
 
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from world.course import starts_of
-from world.spec import Scenario
-from world.terrain import Patch, patches_of
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.world.description.placement import starts_of
+from lfa.world.description.scenario import Scenario
+from lfa.world.description.terrain import Patch, patches_of
 
 GRAVITY_MPS2 = 9.81
 WHEEL_SIDE = 0.8

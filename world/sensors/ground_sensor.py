@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from protocol.geometry import Pose2D
-from world.spec import Scenario
-from world.terrain import patches_of
-from world.wheels import WHEEL_SIDE
+from lfa.protocol.geometry import Pose2D
+from lfa.world.description.scenario import Scenario
+from lfa.world.description.terrain import patches_of
+from lfa.world.physics.wheel_contact import WHEEL_SIDE
 
 Floats = npt.NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from math import cos, pi, sin
 import numpy as np
 import numpy.typing as npt
 
-from protocol.geometry import TAU, Pose2D
-from world.spec import Lidar, Obstacle, Scenario
+from lfa.protocol.geometry import TAU, Pose2D
+from lfa.world.description.scenario import Lidar, Obstacle, Scenario
 
 OVERLAP_SEEN = 0.9
 """Of two radii: a robot with its centre nearer than this is not seen."""

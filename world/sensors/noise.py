@@ -11,9 +11,9 @@ from random import Random
 
 import numpy as np
 
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
-from world.lidar import Floats
-from world.spec import Lidar, Noise
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.world.description.scenario import Lidar, Noise
+from lfa.world.sensors.lidar import Floats
 
 HEIGHT_OUTLIER_M = 0.1
 """A bad height is off by up to this much."""

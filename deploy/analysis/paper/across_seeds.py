@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from deploy.look.readings import Run
-from deploy.shapes import spikes
-from deploy.shapes.bars import Bar, Finding, Measured
-from deploy.shapes.subject import Subject, duration_s, on_course
-from deploy.shapes.table import PATHS
+from lfa.deploy.analysis import episodes
+from lfa.deploy.analysis.paper.checks import PATHS
+from lfa.deploy.analysis.paper.criteria import Bar, Finding, Measured
+from lfa.deploy.analysis.paper.experiment import Subject, duration_s, on_course
+from lfa.deploy.analysis.run_data import Run
 
 SPIKES_MIN = 20
 """Fewer pooled spikes say nothing about a rank correlation."""
@@ -46,7 +46,7 @@ def keep(run: Run) -> Kept:
         iteration=2 if run.scenario.mission.leading.known_m else 1,
         duration_s=run.summary.sim_duration_s,
         way_m=sum(float(np.hypot(*np.diff(rows[:, 1:3], axis=0).T).sum()) for rows in run.truth.values()),
-        requests=len(spikes.requests(run)),
+        requests=len(episodes.requests(run)),
         switches=sum(a.robot_id != b.robot_id for a, b in pairwise(run.reigns)),
         spikes=tuple((spike.width_s, spike.peak, lasted_s) for spike, lasted_s in pooled if lasted_s > 0.0),
     )
@@ -72,7 +72,7 @@ def _ranked(runs: Sequence[Kept], other: int) -> Measured | None:
     pooled = [spike for run in runs for spike in run.spikes]
     if len(runs) < 2 or len(pooled) < SPIKES_MIN:
         return None
-    value = spikes.rank_correlation([spike[0] for spike in pooled], [spike[other] for spike in pooled])
+    value = episodes.rank_correlation([spike[0] for spike in pooled], [spike[other] for spike in pooled])
     return Measured(value, f"{len(pooled)} spikes")
 
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from msgspec import Struct
 
-from deploy.look.readings import Run
-from deploy.shapes import ending, figure7, figure8, figure9, figure11
-from deploy.shapes.bars import Bar, Finding, Measured
-from deploy.shapes.subject import BASELINE_M, REST_MPS, Subject
+from lfa.deploy.analysis.paper import figure7, figure8, figure9, figure11, final_state
+from lfa.deploy.analysis.paper.criteria import Bar, Finding, Measured
+from lfa.deploy.analysis.paper.experiment import BASELINE_M, REST_MPS, Subject
+from lfa.deploy.analysis.run_data import Run
 
 PATHS = ("paper_path1", "paper_path2")
 START = ("paper_fig11",)
@@ -38,9 +38,9 @@ def of_run(run: Run) -> list[Finding]:
 
 
 PROPERTIES: tuple[Property, ...] = (
-    Property(Bar("run", "goal reached", "=", 1.0), PAPER, ending.goal),
-    Property(Bar("run", "contacts", "=", 0.0), PAPER, ending.contacts),
-    Property(Bar("run", "robots left behind", "=", 0.0), PAPER, ending.left_behind),
+    Property(Bar("run", "goal reached", "=", 1.0), PAPER, final_state.goal),
+    Property(Bar("run", "contacts", "=", 0.0), PAPER, final_state.contacts),
+    Property(Bar("run", "robots left behind", "=", 0.0), PAPER, final_state.left_behind),
     Property(Bar("7", "distance error outside of events", "<", BASELINE_M, "m"), PATHS, figure7.baseline),
     Property(Bar("7", "spikes with an event", ">=", MATCHED_MIN), PATHS, figure7.spikes_explained),
     Property(Bar("7", "avoidances with a spike", ">=", MATCHED_MIN), PATHS, figure7.episodes_felt),

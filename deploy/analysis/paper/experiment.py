@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from functools import cached_property
 from math import nan
 
-from deploy.look import chronicle
-from deploy.look.readings import Run
-from deploy.shapes import spikes
-from deploy.shapes.bars import Measured
-from deploy.shapes.spikes import Episode, Spike
+from lfa.deploy.analysis import episodes as spikes
+from lfa.deploy.analysis.episodes import Episode, Spike
+from lfa.deploy.analysis.paper.criteria import Measured
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.recording import event_log
 
 BASELINE_M = spikes.BASE_M
 REST_MPS = 0.01
@@ -41,7 +41,7 @@ class Subject:
 
     def alive(self) -> list[int]:
         """Followers that stood in the chain at the end."""
-        chain = chronicle.last_chain(self.run.events)[1:]
+        chain = event_log.last_chain(self.run.events)[1:]
         return [robot for robot in chain if robot in self.run.errors]
 
 

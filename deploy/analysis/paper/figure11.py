@@ -7,11 +7,11 @@ from math import isfinite, nan
 
 import numpy as np
 
-from deploy.look import chronicle
-from deploy.look.trace import Array
-from deploy.shapes import spikes
-from deploy.shapes.bars import Measured
-from deploy.shapes.subject import REST_MPS, STRAIGHT_RADPS, Subject, share
+from lfa.deploy.analysis import episodes
+from lfa.deploy.analysis.paper.criteria import Measured
+from lfa.deploy.analysis.paper.experiment import REST_MPS, STRAIGHT_RADPS, Subject, share
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.mcap_reader import Array
 
 DIP, DIP_S_MIN = 0.95, 0.5
 START_M = -1.2
@@ -53,7 +53,7 @@ def dips(s: Subject) -> Measured:
     t, v = _leader_speed(s)
     cruise = s.run.scenario.mission.leading.cruise_mps
     leader = s.run.reigns[0].robot_id if s.run.reigns else 0
-    spans = [span for span in spikes.avoidances(s.run, leader) if span[1] - span[0] >= DIP_S_MIN]
+    spans = [span for span in episodes.avoidances(s.run, leader) if span[1] - span[0] >= DIP_S_MIN]
     dipped = sum(bool((v[(t >= a) & (t <= b)] < DIP * cruise).any()) for a, b in spans)
     return Measured(share(dipped, len(spans)), f"{dipped} of {len(spans)} avoidances of the leader")
 
@@ -78,7 +78,7 @@ def same_speed(s: Subject) -> Measured:
 
 
 def final_speed(s: Subject) -> Measured:
-    chain = chronicle.last_chain(s.run.events)
+    chain = event_log.last_chain(s.run.events)
     return Measured(
         max((float(abs(s.run.truth[robot][-1, 4])) for robot in chain if robot in s.run.truth), default=nan)
     )
@@ -86,7 +86,7 @@ def final_speed(s: Subject) -> Measured:
 
 def stops(s: Subject) -> Measured:
     """How long after the leader each follower came to rest, for each hop."""
-    chain = [robot for robot in chronicle.last_chain(s.run.events) if robot in s.run.truth]
+    chain = [robot for robot in event_log.last_chain(s.run.events) if robot in s.run.truth]
     if len(chain) < 2:
         return Measured(nan)
     rest = [_rest_s(s.run.truth[robot]) for robot in chain]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from deploy.shapes import spikes
-from deploy.shapes.bars import Measured
-from deploy.shapes.subject import Subject, explained, on_course, share, where
+from lfa.deploy.analysis import episodes
+from lfa.deploy.analysis.paper.criteria import Measured
+from lfa.deploy.analysis.paper.experiment import Subject, explained, on_course, share, where
 
 LATE_SHARE = 0.1
 
@@ -14,7 +14,7 @@ LATE_SHARE = 0.1
 def baseline(s: Subject) -> Measured:
     worst, who = 0.0, ""
     for robot, e in s.run.errors.items():
-        calm = spikes.quiet(s.run, robot, e, s.episodes)
+        calm = episodes.quiet(s.run, robot, e, s.episodes)
         if calm.any():
             at = int(np.argmax(np.where(calm, np.abs(e.distance), 0.0)))
             worst, who = max((worst, who), (float(abs(e.distance[at])), f"robot {robot} at {e.t[at]:.1f} s"))
@@ -27,7 +27,7 @@ def spikes_explained(s: Subject) -> Measured:
 
 def episodes_felt(s: Subject) -> Measured:
     told = [one for one in s.episodes if one.kind == "avoidance"]
-    mute = [one for one in told if not spikes.felt(s.run, one, s.distance)]
+    mute = [one for one in told if not episodes.felt(s.run, one, s.distance)]
     named = [f"robot {one.robot} at {one.from_s:.1f} s" for one in mute]
     return Measured(share(len(told) - len(mute), len(told)), ", ".join(named))
 

@@ -8,10 +8,10 @@ from math import nan
 
 import numpy as np
 
-from deploy.look import chronicle
-from deploy.shapes import spikes
-from deploy.shapes.bars import Measured
-from deploy.shapes.subject import Subject, explained, share
+from lfa.deploy.analysis import episodes
+from lfa.deploy.analysis.paper.criteria import Measured
+from lfa.deploy.analysis.paper.experiment import Subject, explained, share
+from lfa.deploy.recording import event_log
 
 REQUEST_S = 3.0
 SAID_S = 0.1
@@ -20,14 +20,14 @@ SAID_S = 0.1
 
 def requests_seen(s: Subject) -> Measured:
     """The first follower's bearing against what it is asked for goes up at once; a request may ask nothing of it."""
-    asked, mute = spikes.requests(s.run), []
+    asked, mute = episodes.requests(s.run), []
     for at_s in asked:
         first = next((robot for robot, e in s.run.errors.items() if _second_in_chain(s, robot, at_s)), None)
         e = s.run.errors.get(first or 0)
         window = None if e is None else (e.t >= at_s) & (e.t <= at_s + REQUEST_S)
         if e is None or window is None or not window.any() or not _asked_anew(s, first or 0, at_s):
             continue
-        if np.abs(e.bearing_asked[window]).max() <= spikes.SPIKE_RAD:
+        if np.abs(e.bearing_asked[window]).max() <= episodes.SPIKE_RAD:
             mute.append(at_s)
     note = ", ".join(f"none after {at_s:.1f} s" for at_s in mute) if asked else "no request in this run"
     return Measured(share(len(asked) - len(mute), len(asked)), note)
@@ -54,7 +54,7 @@ def after_switch(s: Subject) -> Measured:
             if robot == before.robot_id:  # it comes back at the tail when it can: a rejoin
                 continue
             after = (e.t >= reign.from_s) & (e.t <= _undisturbed_until(s, robot, reign.from_s))
-            off = after & (np.abs(e.bearing) >= spikes.BASE_RAD)
+            off = after & (np.abs(e.bearing) >= episodes.BASE_RAD)
             if not after.any():
                 continue
             took = float(e.t[np.flatnonzero(off)[-1]]) - reign.from_s if off.any() else 0.0
@@ -68,7 +68,7 @@ def chain_kept(s: Subject) -> Measured:
     before: list[int] = []
     newest: tuple[object, ...] = ()
     wrong = []
-    for line in chronicle.of_kind(s.run.events, "chain"):
+    for line in event_log.of_kind(s.run.events, "chain"):
         version, chain = (tuple(line["term"] or ()), line.get("seq", 0)), list(line.get("chain", []))
         if newest and version <= newest:
             continue
@@ -80,7 +80,7 @@ def chain_kept(s: Subject) -> Measured:
 
 
 def _second_in_chain(s: Subject, robot: int, at_s: float) -> bool:
-    return len(spikes.upstream(s.run, robot, at_s)) == 2
+    return len(episodes.upstream(s.run, robot, at_s)) == 2
 
 
 def _undisturbed_until(s: Subject, robot: int, after_s: float) -> float:
@@ -88,7 +88,7 @@ def _undisturbed_until(s: Subject, robot: int, after_s: float) -> float:
         one.from_s
         for one in s.episodes
         if one.kind in ("avoidance", "switch") and one.from_s > after_s
-        and (one.robot is None or one.robot in spikes.upstream(s.run, robot, one.from_s))
+        and (one.robot is None or one.robot in episodes.upstream(s.run, robot, one.from_s))
     ]  # fmt: skip
     return min(later, default=s.end_s)
 

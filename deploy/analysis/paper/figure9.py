@@ -6,11 +6,11 @@ from math import isfinite, nan
 
 import numpy as np
 
-from deploy.look import chronicle
-from deploy.look.trace import Array
-from deploy.shapes.bars import Measured
-from deploy.shapes.crossed import outside_m, overlap_m
-from deploy.shapes.subject import BASELINE_M, STRAIGHT_RADPS, Subject
+from lfa.deploy.analysis.paper.criteria import Measured
+from lfa.deploy.analysis.paper.experiment import BASELINE_M, STRAIGHT_RADPS, Subject
+from lfa.deploy.analysis.paper.footprints import outside_m, overlap_m
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.mcap_reader import Array
 
 SWITCH_S = 8.0
 
@@ -22,7 +22,7 @@ def bounded(s: Subject) -> Measured:
 def ends_at_goal(s: Subject) -> Measured:
     """How much farther from the goal than its place in the chain allows the farthest robot ended."""
     mission = s.run.scenario.mission
-    chain = chronicle.last_chain(s.run.events)
+    chain = event_log.last_chain(s.run.events)
     away, note = nan, ""
     for place, robot in enumerate(chain):
         rows = s.run.truth.get(robot)

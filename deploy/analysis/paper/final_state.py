@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from deploy.shapes.bars import Measured
-from deploy.shapes.subject import Subject
+from lfa.deploy.analysis.paper.criteria import Measured
+from lfa.deploy.analysis.paper.experiment import Subject
 
 
 def goal(s: Subject) -> Measured:

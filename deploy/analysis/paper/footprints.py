@@ -7,10 +7,10 @@ from math import inf
 import numpy as np
 from msgspec.structs import replace
 
-from deploy.look.errors import Mask
-from deploy.look.readings import Run
-from deploy.look.trace import Array
-from world.course import gap_to, reach_of
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.tracking_errors import Mask
+from lfa.deploy.recording.mcap_reader import Array
+from lfa.world.description.placement import gap_to, reach_of
 
 EVERY = 3
 """Records of ground truth between two looks: a robot goes 6 cm at most in that time."""

@@ -10,8 +10,9 @@ from collections.abc import Callable, Sequence, Set
 
 from msgspec import Struct
 
-from protocol.messages import CmdVel, Config, Grant, Member, Promise, Propose, Term
-from protocol.timing import Timing
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Config, Grant, Member, Promise, Propose, Term
+from lfa.protocol.messages.robot import CmdVel
 
 EARLY_S = 1e-6
 """Rounding of clock conversions."""

@@ -12,16 +12,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from agents.agent import Agent
-from agents.mapping import CELL_M, OCCUPIED, Grid
-from deploy.look import again, chronicle
-from deploy.run.folder import JOURNALS
-from protocol import journal
-from protocol.host import Host
-from protocol.journal import Journal
-from protocol.mission import Refused, robot_name
-from world import maps
-from world.maps import Map
+from lfa.agents.agent import Agent
+from lfa.agents.exploration.occupancy_grid import CELL_M, OCCUPIED, Grid
+from lfa.deploy.analysis.verification import reexecution
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import robot_name
+from lfa.protocol.runtime import journal
+from lfa.protocol.runtime.journal import Journal
+from lfa.protocol.runtime.node_host import Host
+from lfa.world.description import maps
+from lfa.world.description.maps import Map
 
 RIM_CELLS = 2
 """Of unknown ground, kept around what is known."""
@@ -49,7 +51,7 @@ def command(
 
 def map_of(run: Path, robot: int | None = None) -> Map:
     """The map of `robot`, or of who led last, at the end of the run. Raises Refused when there is none."""
-    reigns = chronicle.reigns(chronicle.lines(run))
+    reigns = event_log.reigns(event_log.lines(run))
     robot = robot if robot is not None else reigns[-1].robot_id if reigns else 1
     lives = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
     if not lives:
@@ -58,10 +60,10 @@ def map_of(run: Path, robot: int | None = None) -> Map:
         heading, entries = journal.read(lives[-1])
     except (OSError, ValueError) as error:
         raise Refused(f"{lives[-1]}: cannot be read ({error})") from None
-    node = again.node_of(lives[-1], heading)
+    node = reexecution.node_of(lives[-1], heading)
     host = Host(node, Journal(None, heading))
     for entry in entries:
-        again.call(host, entry)
+        reexecution.call(host, entry)
     grid = node.grid if isinstance(node, Agent) else None
     if grid is None:
         raise Refused(f"{run}: {robot_name(robot)} kept no map: must be a run with mission.leading.motion = explore")

@@ -15,24 +15,28 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from agents.agent import Agent
-from deploy.look import chronicle
-from deploy.look.again import call, node_of
-from deploy.look.checker import Violation, listeners
-from deploy.look.checkers import SAFETY
-from deploy.look.overheard import Words, overhear, said, told
-from deploy.run.folder import JOURNALS, scenario_of
-from protocol import journal
-from protocol.effects import Effect
-from protocol.gateway import Gateway
-from protocol.host import Host
-from protocol.journal import Entry, Heading, Journal, digest
-from protocol.messages import BadMessage, CmdVel, Fence, LeaseNote, Member, decode
-from protocol.mission import Mission, Refused, robot_id_of, robot_name
-from protocol.node import Local, PeerDown, PeerUp, RouterLost
-from protocol.timing import Timing, timing_of
-from protocol.topics import TOPIC, WORLD_NAME, address
-from protocol.witness import Witness
+from lfa.agents.agent import Agent
+from lfa.deploy.analysis.verification.checker import Violation, listeners
+from lfa.deploy.analysis.verification.lease_observer import Words, overhear, said, told
+from lfa.deploy.analysis.verification.reexecution import call, node_of
+from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.run_folder import JOURNALS, scenario_of
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.effects import Effect
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.timing import Timing, timing_of
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import BadMessage, decode
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Member
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
+from lfa.protocol.runtime import journal
+from lfa.protocol.runtime.journal import Entry, Heading, Journal, digest
+from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.topics import TOPIC, WORLD_NAME, address
 
 _local_decoder = msgspec.msgpack.Decoder(Local)
 
@@ -73,7 +77,7 @@ def verify(folder: Path) -> Verdict:
 def _refuse_lost(journalled: set[str], folder: Path, mission: Mission) -> None:
     """What one did that took part and left no journal would look like what the others made up."""
     team = {WORLD_NAME, *map(robot_name, mission.robots)}
-    for event in chronicle.lines(folder):
+    for event in event_log.lines(folder):
         came = event["kind"] == "peer_up"  # who only speaks is one of the team, and not anybody in its name
         name = str(event.get("name" if came else "from"))
         took_part = name in team or (came and robot_id_of(name) is not None)

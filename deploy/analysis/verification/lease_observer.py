@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from agents.agent import Agent
-from protocol.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from protocol.messages import Grant, LeaseNote, Member, Promise, Propose, Release
-from protocol.mission import robot_id_of
-from protocol.witness import Witness
+from lfa.agents.agent import Agent
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.consensus import Grant, LeaseNote, Member, Promise, Propose, Release
+from lfa.protocol.names import robot_id_of
 
 Words = tuple[Any, ...]
 """The name of a method of `Checker`, and what it is called with."""

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from deploy.look.checker import EARLY_S, LONG_AGO, Checker
-from deploy.look.checker import member_text as _m
-from deploy.look.checker import term_text as _t
-from protocol.messages import CmdVel, Config, Member, Term, Version
-from protocol.mission import WITNESS_ID
-from protocol.quorum import electors, is_quorum, quorum_time
-from protocol.timing import CLOCK_RATE_ERROR, Timing
+from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker
+from lfa.deploy.analysis.verification.checker import member_text as _m
+from lfa.deploy.analysis.verification.checker import term_text as _t
+from lfa.protocol.lease.quorum import electors, is_quorum, quorum_time
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
+from lfa.protocol.messages.consensus import Config, Member, Term, Version
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.names import WITNESS_ID
 
 NEVER = float("inf")
 SETTLED_S = 1.0

@@ -8,14 +8,16 @@ from pathlib import Path
 
 from msgspec import DecodeError
 
-from deploy.look.trace import look_into, recorded
-from deploy.run import channels
-from protocol import clock
-from protocol.bus import Inbox
-from protocol.messages import encode
-from protocol.mission import Refused
-from protocol.topics import TOPIC, fleet_name
-from protocol.zenoh_bus import ZenohBus, answers, default_endpoint, open_router
+from lfa.deploy.recording import mcap_channels
+from lfa.deploy.recording.mcap_reader import look_into, recorded
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.topics import TOPIC, fleet_name
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers, default_endpoint
+from lfa.protocol.transport.zenoh_router import open_router
 
 AHEAD_S_MIN = 0.002
 """Shorter waits are not worth a sleep."""
@@ -35,7 +37,7 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
             if ahead_s > AHEAD_S_MIN:
                 clock.sleep(ahead_s)
             try:
-                message = channels.restore(body, TOPIC[channel.split("/")[2]].type)
+                message = mcap_channels.restore(body, TOPIC[channel.split("/")[2]].type)
             except DecodeError as error:
                 raise Refused(f"{folder}: recorded by another program or version, {channel}: {error}") from None
             bus.publish(f"lfa/{fleet}{channel}", encode(message))

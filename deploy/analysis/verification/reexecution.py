@@ -11,19 +11,20 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from agents.agent import Agent
-from protocol import journal
-from protocol.host import Host, Sent
-from protocol.journal import JOURNAL_VERSION, Entry, Heading, Journal, digest
-from protocol.messages import BadMessage, decode
-from protocol.mission import Mission, Refused
-from protocol.node import Local, Node
-from protocol.topics import TOPIC, address
-from protocol.witness import Witness
-from world.kinematic import Kinematic
-from world.physics import Physics
-from world.spec import Scenario
-from world.world import Memory, World
+from lfa.agents.agent import Agent
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import BadMessage, decode
+from lfa.protocol.mission import Mission
+from lfa.protocol.node import Local, Node
+from lfa.protocol.runtime import journal
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Entry, Heading, Journal, digest
+from lfa.protocol.runtime.node_host import Host, Sent
+from lfa.protocol.topics import TOPIC, address
+from lfa.world.description.scenario import Scenario
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.physics.rigid_bodies import Physics
+from lfa.world.world import Memory, World
 
 BODIES: dict[str, type[Physics] | type[Kinematic]] = {"Physics": Physics, "Kinematic": Kinematic}
 _local_decoder = msgspec.msgpack.Decoder(Local)

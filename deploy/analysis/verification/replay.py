@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
-from protocol.mission import Refused, robot_name, whole_number
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import robot_name, whole_number
 
 if TYPE_CHECKING:
-    from deploy.look.again import Comparison
+    from lfa.deploy.analysis.verification.reexecution import Comparison
 
 PLAYBACK_FLEET = "replay"
 
@@ -26,7 +27,7 @@ def command(
 ) -> int:
     if robot is not None:
         return _compare(folder, robot, as_json)
-    from deploy.look.playback import play
+    from lfa.deploy.analysis.verification.playback import play
 
     return play(folder, speed, fleet, connect)
 
@@ -47,7 +48,7 @@ def journals(folder: Path, robot: str) -> list[Path]:
 
 def _compare(folder: Path, robot: str, as_json: bool) -> int:
     """0 when all returned the same."""
-    from deploy.look.again import compare
+    from lfa.deploy.analysis.verification.reexecution import compare
 
     found = [compare(path) for path in journals(folder, robot)]
     if as_json:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from deploy.look.checker import EARLY_S, LONG_AGO, Checker, WithFences
-from deploy.look.checker import member_text as _m
-from deploy.look.checker import term_text as _t
-from protocol.messages import CmdVel, Config, Electorate, Grant, Member, Promise, Propose, Term, Version
-from protocol.quorum import is_quorum
-from protocol.timing import CLOCK_RATE_ERROR, Timing
+from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, WithFences
+from lfa.deploy.analysis.verification.checker import member_text as _m
+from lfa.deploy.analysis.verification.checker import term_text as _t
+from lfa.protocol.lease.quorum import is_quorum
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
+from lfa.protocol.messages.consensus import Config, Electorate, Grant, Member, Promise, Propose, Term, Version
+from lfa.protocol.messages.robot import CmdVel
 
 
 class LeaseExclusivity(WithFences):

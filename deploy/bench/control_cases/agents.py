@@ -17,22 +17,31 @@ from itertools import pairwise
 from math import hypot, pi, sin, sqrt
 from pathlib import Path
 
-from agents.agent import Agent
-from agents.motion import Lead
-from deploy.bench.control_string import CRUISE_MPS, RAMP_MPS2, SCHEMES, SEPARATION_M, Scheme, speed_wave
-from deploy.bench.control_table import DEGREES
-from deploy.bench.rows import Case, Quantity
-from protocol.geometry import Pose2D, Twist
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Message, Slot, Truth
-from protocol.mission import Following, FormationSpec, Leading, Mission
-from protocol.node import Node
-from protocol.radio import Radio
-from protocol.witness import Witness
-from world.kinematic import Kinematic
-from world.scenario import Lidar, Scenario, WorldSpec, load
-from world.simulator import LocalClock, Simulator
-from world.world import World
+from lfa.agents.agent import Agent
+from lfa.agents.leading.path_follower import Lead
+from lfa.deploy.bench.control_cases.string_stability import (
+    CRUISE_MPS,
+    RAMP_MPS2,
+    SCHEMES,
+    SEPARATION_M,
+    Scheme,
+    speed_wave,
+)
+from lfa.deploy.bench.control_cases.table import DEGREES
+from lfa.deploy.bench.harness.rows import Case, Quantity
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Following, FormationSpec, Leading, Mission
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.transport.link_model import Radio
+from lfa.world.description.load import Lidar, Scenario, WorldSpec, load
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.simulator import LocalClock, Simulator
+from lfa.world.world import World
 
 FLEET = "bench"
 FOLLOWERS = 10
@@ -185,7 +194,7 @@ def scenario_errors(command: str, name: str) -> tuple[float, ...]:
     """Of `lfa sim NAME` or `lfa run NAME`: rms of the worst follower, from summary.json; nan for a failed run."""
     with tempfile.TemporaryDirectory(prefix="lfa-bench-") as folder:
         out = Path(folder) / "run"
-        argv = [sys.executable, "-c", "from deploy.cli import main; main()", command, name]
+        argv = [sys.executable, "-c", "from lfa.deploy.cli import main; main()", command, name]
         subprocess.run(
             [*argv, "--out", str(out), "--no-figures", "--json"],
             stdout=subprocess.DEVNULL,

@@ -8,11 +8,11 @@ from __future__ import annotations
 from math import hypot, pi
 from pathlib import Path
 
-from agents.config import CONTROL_PERIOD_S
-from deploy.bench.chain import Chain
-from deploy.bench.control_string import SCHEMES, speed_wave
-from deploy.bench.control_table import DEGREES, PATHS, astray, setup_of
-from deploy.bench.leaders import Leader
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.deploy.bench.control_cases.string_stability import SCHEMES, speed_wave
+from lfa.deploy.bench.control_cases.table import DEGREES, PATHS, astray, setup_of
+from lfa.deploy.bench.harness.chain import Chain
+from lfa.deploy.bench.harness.leader_trajectories import Leader
 
 RUN_S = 60.0
 FREQUENCIES_RADPS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)

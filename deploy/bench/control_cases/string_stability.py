@@ -14,15 +14,15 @@ from math import ceil, cos, hypot, pi, sin, sqrt
 
 from msgspec import Struct
 
-from agents.config import CONTROL_PERIOD_S, Gains
-from agents.formation import slots_of
-from agents.trace import Trace
-from deploy.bench.chain import Chain, Setup, Weather
-from deploy.bench.leaders import Leader, figure_eight
-from deploy.bench.rows import Case, Quantity, Rule
-from protocol.geometry import Twist
-from protocol.messages import Slot
-from protocol.mission import FormationSpec, Side
+from lfa.agents.config import CONTROL_PERIOD_S, Gains
+from lfa.agents.formation.formation import slots_of
+from lfa.agents.formation.pose_history import Trace
+from lfa.deploy.bench.harness.chain import Chain, Setup, Weather
+from lfa.deploy.bench.harness.leader_trajectories import Leader, figure_eight
+from lfa.deploy.bench.harness.rows import Case, Quantity, Rule
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import FormationSpec, Side
 
 PLACES = (3, 10, 50, 100)
 SLOW_RADPS, FAST_RADPS = (0.2, 0.5), (1.0, 2.0, 4.0, 8.0)

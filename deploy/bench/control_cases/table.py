@@ -7,14 +7,16 @@ from math import cos, pi, sin, sqrt
 from random import Random
 from time import process_time
 
-from agents.config import CONTROL_PERIOD_S, SHARP, Gains
-from agents.formation import slots_of
-from deploy.bench.chain import Blur, Chain, Setup, Weather, in_slots
-from deploy.bench.leaders import Curvature, Leader, circle, figure_eight, straight
-from deploy.bench.rows import Case, Quantity
-from protocol.geometry import Pose2D, Twist, along_arc, distance
-from protocol.messages import NO_TERM, Header, PoseStamped, Role, Slot
-from protocol.mission import FormationSpec, Limits, Side
+from lfa.agents.config import CONTROL_PERIOD_S, SHARP, Gains
+from lfa.agents.formation.formation import slots_of
+from lfa.deploy.bench.harness.chain import Blur, Chain, Setup, Weather, in_slots
+from lfa.deploy.bench.harness.leader_trajectories import Curvature, Leader, circle, figure_eight, straight
+from lfa.deploy.bench.harness.rows import Case, Quantity
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, distance
+from lfa.protocol.messages.consensus import NO_TERM, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import PoseStamped, Slot
+from lfa.protocol.mission import FormationSpec, Limits, Side
 
 FOLLOWERS = (2, 3, 4)
 RUN_S = 120.0

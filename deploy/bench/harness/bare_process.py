@@ -11,9 +11,9 @@ from typing import NoReturn
 import msgspec
 from msgspec import Struct
 
-from protocol import clock
-from protocol.bus import Inbox, Wake
-from protocol.zenoh_bus import ZenohBus
+from lfa.protocol import clock
+from lfa.protocol.transport.bus import Inbox, Wake
+from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 PERIOD_S = 0.02
 

@@ -13,16 +13,19 @@ from random import Random
 
 from msgspec import Struct
 
-from agents.config import CONTROL_PERIOD_S, Gains
-from agents.controller import find_controller
-from agents.estimator import Estimator
-from agents.follower import Follower
-from agents.formation import SlotMotion
-from agents.predecessor import Predecessor
-from agents.trace import Trace
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, bearing, wrap
-from protocol.messages import NO_TERM, GatewayStamp, Header, Localization, PoseStamped, Role, Sensors, Slot
-from protocol.mission import Limits
+from lfa.agents.config import CONTROL_PERIOD_S, Gains
+from lfa.agents.following.controller import find_controller
+from lfa.agents.following.follower import Follower
+from lfa.agents.following.predecessor import Predecessor
+from lfa.agents.formation.formation import SlotMotion
+from lfa.agents.formation.pose_history import Trace
+from lfa.agents.localization.estimator import Estimator
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, bearing, wrap
+from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import Localization, Sensors
+from lfa.protocol.messages.team import PoseStamped, Slot
+from lfa.protocol.mission import Limits
 
 FIX_EVERY = 5
 """Control periods between two localisation fixes: 10 Hz."""

@@ -7,9 +7,9 @@ import signal
 import subprocess
 from collections.abc import Iterator, Sequence
 
-from deploy.bench.team import Team
-from deploy.run import processes
-from protocol import clock
+from lfa.deploy.bench.harness.team import Team
+from lfa.deploy.process import identity as processes
+from lfa.protocol import clock
 
 
 @contextlib.contextmanager

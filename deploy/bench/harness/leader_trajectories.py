@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import pi, sin, sqrt
 
-from agents.formation import PLANNED_MARGIN, leader_speed_cap
-from protocol.geometry import Twist
-from protocol.messages import Slot
-from protocol.mission import Limits
+from lfa.agents.formation.formation import PLANNED_MARGIN, leader_speed_cap
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Limits
 
 CRUISE_MPS = 0.5
 ACCELERATION_MPS2 = 0.5

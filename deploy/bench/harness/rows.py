@@ -10,8 +10,8 @@ from typing import Literal
 
 from msgspec import Struct, structs
 
-from deploy.run.workers import workers
-from protocol.mission import Refused
+from lfa.deploy.process.worker_pool import workers
+from lfa.protocol.errors import Refused
 
 NEAR = 0.10
 SAME = 0.01

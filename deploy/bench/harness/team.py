@@ -1,6 +1,6 @@
 """A live team kept running under a bench or a test: real processes, faults at its hand, and what it says heard.
 
-All processes of one machine read one clock (`protocol.clock`), and every header carries its sender's: moments of
+All processes of one machine read one clock (`lfa.protocol.clock`), and every header carries its sender's: moments of
 different processes can be subtracted here, and only here.
 """
 
@@ -17,21 +17,27 @@ from typing import Any
 
 from msgspec import structs
 
-from deploy.look.onlooker import Fleet
-from deploy.look.verify import Verdict, verify
-from deploy.run.crew import ROUTER_NAME, Crew, Row, rows
-from deploy.run.folder import About, make
-from deploy.run.operator import Operator
-from deploy.run.processes import Identity
-from protocol import clock
-from protocol.bus import Inbox
-from protocol.credentials import Credentials
-from protocol.messages import BadMessage, Event, Message, PoseStamped, Role, Status, Tracking, Truth, decode, encode
-from protocol.mission import FormationSpec, Leading, Mission, Profile, robot_id_of, robot_name
-from protocol.radio import WEATHER
-from protocol.topics import RECORDER_NAME, TOPIC, WORLD_NAME, address, key
-from protocol.zenoh_bus import ZenohBus, answers
-from world.scenario import Scenario
+from lfa.deploy.analysis.verification.journals import Verdict, verify
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.session import Fleet
+from lfa.deploy.process.identity import Identity
+from lfa.deploy.process.process_group import ROUTER_NAME, Crew, Row
+from lfa.deploy.recording.run_folder import About, make
+from lfa.deploy.run.process_table import rows
+from lfa.protocol import clock
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
+from lfa.protocol.mission import FormationSpec, Leading, Mission, Profile
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.topics import RECORDER_NAME, TOPIC, WORLD_NAME, address, key
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.credentials import Credentials
+from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
+from lfa.world.description.load import Scenario
 
 POLL_S = 0.001
 START_S_MAX = 20.0

@@ -1,4 +1,4 @@
-"""`python -m deploy.fleet.host check|start|stop|listen|rekey`: what the operator's commands run on each machine.
+"""`python -m lfa.deploy.fleet.host.host check|start|stop|listen|rekey`: what the operator's commands run on each machine.
 
 A part comes on standard input, one JSON object goes out; what is wrong is one line on standard error and exit code 2.
 """
@@ -18,19 +18,20 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from deploy.fleet import part as parts
-from deploy.fleet.part import Part
-from deploy.fleet.private import unpack
-from deploy.fleet.router import LISTENS
-from deploy.fleet.supervise import Ledger, end_orphans, living, sweep
-from deploy.run import processes
-from deploy.run.crew import ROUTER_NAME
-from deploy.run.folder import LOGS, SCENARIO
-from protocol import clock
-from protocol.credentials import check_valid
-from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX
-from protocol.zenoh_bus import UNIX_PATH_BYTES_MAX, answers, socket_path
+from lfa.deploy.fleet.host.router import LISTENS
+from lfa.deploy.fleet.host.supervisor import Ledger, end_orphans, living, sweep
+from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.security.private_files import unpack
+from lfa.deploy.process import identity as processes
+from lfa.deploy.process.process_group import ROUTER_NAME
+from lfa.deploy.recording.run_folder import LOGS, SCENARIO
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.topics import HOST_PREFIX
+from lfa.protocol.transport.credentials import check_valid
+from lfa.protocol.transport.zenoh_config import answers, socket_path
+from lfa.protocol.transport.zenoh_router import UNIX_PATH_BYTES_MAX
 
 READY_S = 15.0
 STOP_S = 8.0
@@ -168,14 +169,14 @@ def _check_port(part: Part) -> None:
 
 def _check_world() -> None:
     try:
-        import world.world  # noqa: F401 (numpy and pymunk come with it)
+        import lfa.world.world  # noqa: F401 (numpy and pymunk come with it)
     except ImportError as error:
         raise Refused(f"the world needs what is not installed ({error.name}): pip install 'lfa[world]'") from None
 
 
 def _spawn(part: Part, path: Path, log: Path) -> subprocess.Popen[bytes]:
     """The supervisor, under systemd where it runs here, else in a session of its own."""
-    command = [sys.executable, "-m", "deploy.fleet.supervise", str(path)]
+    command = [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.supervisor", str(path)]
     with log.open("ab") as out:
         for runner in _runners(part):
             asked = subprocess.run([*runner, *command], stdout=out, stderr=out, stdin=subprocess.DEVNULL, check=False)
@@ -237,7 +238,7 @@ def rekey(part: Part) -> Found:
     unpack(part.folder / parts.KEYS, part.bundle)
     log = own.run_folder / LOGS / f"{ROUTER_NAME}.log"
     before = log.read_text(errors="replace").count(LISTENS)
-    for router in (child for child in running.children if "deploy.fleet.router" in child.arguments):
+    for router in (child for child in running.children if "lfa.deploy.fleet.host.router" in child.arguments):
         processes.send(router, signal.SIGHUP)
     until = clock.now() + READY_S
     while log.read_text(errors="replace").count(LISTENS) == before:

@@ -6,7 +6,7 @@ from collections import deque
 
 from msgspec import Struct
 
-from deploy.fleet.file import Policy, Restart
+from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
 
 REFUSED_CODE = 2
 ROUTER = Restart(policy="always", delay_s=0.05, delay_max_s=2.0, window_s=60.0, starts_max=1_000_000)

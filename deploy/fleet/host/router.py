@@ -10,12 +10,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from deploy.cli import command_app, run_cli
-from protocol import clock
-from protocol.credentials import Credentials, credentials
-from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX
-from protocol.zenoh_bus import LINK_LEASES_MS, default_endpoint, open_router
+from lfa.deploy.command_line import command_app, run_cli
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.topics import HOST_PREFIX
+from lfa.protocol.transport.credentials import Credentials, credentials
+from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
+from lfa.protocol.transport.zenoh_router import open_router
 
 DEFAULT_TCP, DEFAULT_TLS = "tcp/127.0.0.1:7447", "tls/127.0.0.1:7447"
 LISTENS = "router listens at"

@@ -1,7 +1,7 @@
-"""`python -m deploy.fleet.supervise PART`: one machine's processes, kept running without anybody's help.
+"""`python -m lfa.deploy.fleet.host.supervisor PART`: one machine's processes, kept running without anybody's help.
 
 It needs neither the machine that ran `lfa up` nor any other: it starts its own router, its robots and what else lives
-here, starts again what ends (`policy.py`), says once a second how all of it stands (topic `host`) and hears an
+here, starts again what ends (`restart_policy.py`), says once a second how all of it stands (topic `host`) and hears an
 operator's orders (topic `order`). SIGTERM ends everything in order, also when no router is left to be asked through.
 Its children do not outlive it (`tether.py`); what an earlier life may have left all the same is ended first.
 """
@@ -19,30 +19,23 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from deploy.fleet import part as parts
-from deploy.fleet.part import Part
-from deploy.fleet.policy import REFUSED_CODE, ROUTER, Lives
-from deploy.fleet.tail import Tail
-from deploy.run import processes
-from deploy.run.crew import ROUTER_NAME, Crew, Row
-from deploy.run.processes import Identity
-from protocol import clock
-from protocol.bus import Inbox, Links
-from protocol.messages import (
-    BadMessage,
-    Header,
-    HostOrder,
-    HostStatus,
-    LogLines,
-    Message,
-    ProcessReport,
-    decode,
-    encode,
-)
-from protocol.mission import Refused
-from protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
-from protocol.zenoh_bus import LINK_LEASES_MS, RouterAbsent, ZenohBus
-from world.spec import STATE
+from lfa.deploy.fleet.host.log_tail import Tail
+from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE, ROUTER, Lives
+from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.process import identity
+from lfa.deploy.process.identity import Identity
+from lfa.deploy.process.process_group import ROUTER_NAME, Crew, Row
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
+from lfa.protocol.messages.header import Header
+from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
+from lfa.protocol.transport.bus import Inbox, Links
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
+from lfa.world.description.scenario import STATE
 
 LEDGER = "processes.json"
 """Beside the part: who supervises, and whom; what a later life, `lfa down` and `lfa doctor` go by."""
@@ -78,7 +71,7 @@ def ledger(folder: Path) -> Ledger | None:
 def living(folder: Path) -> Ledger | None:
     """The ledger of a supervisor that runs at the moment."""
     written = ledger(folder)
-    alive = written is not None and processes.identify(written.supervisor.pid) == written.supervisor
+    alive = written is not None and identity.identify(written.supervisor.pid) == written.supervisor
     return written if alive else None
 
 
@@ -87,7 +80,7 @@ def end_orphans(folder: Path) -> list[str]:
     written = ledger(folder)
     if written is None or living(folder) is not None:
         return []
-    return [" ".join(child.arguments) for child in written.children if processes.send(child, signal.SIGKILL)]
+    return [" ".join(child.arguments) for child in written.children if identity.send(child, signal.SIGKILL)]
 
 
 def sweep(folder: Path) -> None:
@@ -228,7 +221,7 @@ class Supervisor:
         return not ward.row.again or (self._part.run_folder / STATE).exists()
 
     def _write_ledger(self) -> None:
-        me = processes.identify(os.getpid())
+        me = identity.identify(os.getpid())
         assert me is not None
         children = [self._crew.identity(name) for name in self._wards]
         book = Ledger(self._part.run, self._part.digest, me, tuple(child for child in children if child is not None))

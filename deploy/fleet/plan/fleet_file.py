@@ -9,11 +9,12 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from deploy.fleet import tables
-from deploy.run.chosen import choose
-from protocol.mission import Profile, Refused
-from world.scenario import Scenario, draw
-from world.toml_file import read_toml
+from lfa.deploy.fleet.plan import tables
+from lfa.deploy.scenario_loading import choose
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Profile
+from lfa.world.description.load import Scenario, draw
+from lfa.world.description.toml_file import read_toml
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,30}")
 LOCAL = ("localhost", "127.0.0.1", "::1")

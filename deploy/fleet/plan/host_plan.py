@@ -9,14 +9,16 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from deploy.fleet.file import Machine, Plan, Restart
-from deploy.run.crew import ROUTER_NAME, Row
-from deploy.run.folder import JOURNALS, SCENARIO, toml
-from protocol import clock
-from protocol.credentials import Credentials, credentials
-from protocol.mission import WITNESS_NAME, Profile, Refused, robot_name
-from protocol.topics import WORLD_NAME
-from world.spec import STATE
+from lfa.deploy.fleet.plan.fleet_file import Machine, Plan, Restart
+from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, toml
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Profile
+from lfa.protocol.names import WITNESS_NAME, robot_name
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.credentials import Credentials, credentials
+from lfa.world.description.scenario import STATE
 
 PART = "part.json"
 SOCKET = "router.sock"
@@ -172,16 +174,25 @@ def rows(part: Part) -> list[Row]:
     guarded = (*keys, *link, "--secure") if part.secure else (*keys, *link)
     listen = (word for where in (part.socket, *part.listen) for word in ("--listen", where))
     connect = (word for where in part.connect for word in ("--connect", where))
-    made = [Row(ROUTER_NAME, ("deploy.fleet.router", *listen, *connect, *guarded))]
+    made = [Row(ROUTER_NAME, ("lfa.deploy.fleet.host.router", *listen, *connect, *guarded))]
     if part.world:
         witness = () if part.world_witness else ("--no-witness",)
-        world = ("world.cli", str(folder / SCENARIO), "--seed", str(part.seed), "--state", str(folder), *team, *witness)
+        world = (
+            "lfa.world.cli",
+            str(folder / SCENARIO),
+            "--seed",
+            str(part.seed),
+            "--state",
+            str(folder),
+            *team,
+            *witness,
+        )
         row = Row(WORLD_NAME, world, again=("--resume", str(folder)))
         made.append(row.restarted() if (folder / STATE).exists() else row)
     if part.witness:
-        made.append(Row(WITNESS_NAME, ("agents.cli", "--role", "witness", "--id", "w", *team)))
+        made.append(Row(WITNESS_NAME, ("lfa.agents.cli", "--role", "witness", "--id", "w", *team)))
     for robot in part.robots:
-        made.append(Row(robot_name(robot), ("agents.cli", "--role", "follower", "--id", str(robot), *team)))
+        made.append(Row(robot_name(robot), ("lfa.agents.cli", "--role", "follower", "--id", str(robot), *team)))
     return made
 
 

@@ -8,14 +8,14 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
 
-from deploy.fleet.file import Machine, Plan
-from deploy.fleet.host import Found
-from deploy.fleet.part import Part
-from deploy.fleet.policy import REFUSED_CODE
-from deploy.fleet.remote import Shell, Unreachable, probe, python_of, reach
-from deploy.fleet.wheel import install
-from protocol import clock
-from protocol.mission import Refused
+from lfa.deploy.fleet.host.host import Found
+from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE
+from lfa.deploy.fleet.plan.fleet_file import Machine, Plan
+from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, reach
+from lfa.deploy.fleet.remote.wheel import install
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
 
 CLOCK_S_MAX = 60.0
 """Beyond it certificates begin or end at the wrong time."""
@@ -88,7 +88,7 @@ class Fleet:
 async def ask(shell: Shell, machine: Machine, deed: str, part: Part) -> Found:
     """What `host.py` there answers. Raises Refused, with the cause when it is Python or another `lfa`."""
     python = python_of(machine)
-    done = await shell.run((python, "-m", "deploy.fleet.host", deed), msgspec.json.encode(part))
+    done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", deed), msgspec.json.encode(part))
     if done.code == 0:
         with contextlib.suppress(msgspec.DecodeError):  # no Python of ours: the probe tells what it is
             return msgspec.json.decode(done.out, type=Found)

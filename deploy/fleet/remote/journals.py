@@ -8,13 +8,13 @@ import shutil
 import tarfile
 from pathlib import Path
 
-from deploy.fleet.file import Plan
-from deploy.fleet.part import Part, parts
-from deploy.fleet.remote import Unreachable, python_of, reach
-from deploy.run.folder import JOURNALS
-from deploy.run.inject import option
-from deploy.run.processes import own_processes
-from protocol.mission import Refused
+from lfa.deploy.client.discovery import option
+from lfa.deploy.fleet.plan.fleet_file import Plan
+from lfa.deploy.fleet.plan.host_plan import Part, parts
+from lfa.deploy.fleet.remote.ssh import Unreachable, python_of, reach
+from lfa.deploy.process.identity import own_processes
+from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.protocol.errors import Refused
 
 PACK = (
     "import pathlib, sys, tarfile\n"

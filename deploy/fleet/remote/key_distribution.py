@@ -5,17 +5,17 @@ They lie in `~/.local/state/lfa/<fleet>.keys`, or where the file's `keys` says; 
 
 from __future__ import annotations
 
-from deploy.fleet import keys
-from deploy.fleet.access import Plan as KeyPlan
-from deploy.fleet.access import host_name
-from deploy.fleet.file import Plan
-from deploy.fleet.hosts import Fleet
-from deploy.fleet.part import parts, store
-from deploy.fleet.private import ISSUED
-from protocol import clock
-from protocol.credentials import Credentials, credentials
-from protocol.mission import WITNESS_NAME, robot_name
-from protocol.topics import OPERATOR_NAME, WORLD_NAME
+from lfa.deploy.fleet.plan.fleet_file import Plan
+from lfa.deploy.fleet.plan.host_plan import parts, store
+from lfa.deploy.fleet.security.private_files import ISSUED
+from lfa.deploy.fleet.remote.hosts import Fleet
+from lfa.deploy.fleet.security import keys
+from lfa.deploy.fleet.security.access_rules import Plan as KeyPlan
+from lfa.deploy.fleet.security.access_rules import host_name
+from lfa.protocol import clock
+from lfa.protocol.names import WITNESS_NAME, robot_name
+from lfa.protocol.topics import OPERATOR_NAME, WORLD_NAME
+from lfa.protocol.transport.credentials import Credentials, credentials
 
 Bundle = dict[str, str]
 """File name to text: all small, all text."""

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 import msgspec
 from msgspec import Struct
 
-from deploy.fleet.file import Machine
-from protocol.mission import Refused
+from lfa.deploy.fleet.plan.fleet_file import Machine
+from lfa.protocol.errors import Refused
 
 CONNECT_S = 6.0
 COMMAND_S = 40.0

@@ -9,10 +9,10 @@ import zipfile
 from importlib.metadata import distribution
 from pathlib import Path
 
-import deploy
-from deploy.fleet.file import Machine
-from deploy.fleet.remote import Shell, python_of
-from protocol.mission import Refused
+import lfa.deploy
+from lfa.deploy.fleet.plan.fleet_file import Machine
+from lfa.deploy.fleet.remote.ssh import Shell, python_of
+from lfa.protocol.errors import Refused
 
 PACKAGES = ("agents", "world", "protocol", "deploy")
 WHEEL = "Wheel-Version: 1.0\nGenerator: lfa\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
@@ -24,9 +24,9 @@ def pack() -> tuple[str, bytes]:
     """Name and content of the wheel of the packages as they are here."""
     dist = distribution("lfa")
     name = f"lfa-{dist.version}"
-    root = Path(deploy.__file__).parent.parent
+    root = Path(lfa.deploy.__file__).parent.parent
     files = {
-        str(path.relative_to(root)): path.read_bytes()
+        f"lfa/{path.relative_to(root)}": path.read_bytes()
         for package in PACKAGES
         for path in sorted((root / package).rglob("*"))
         if path.is_file() and "__pycache__" not in path.parts

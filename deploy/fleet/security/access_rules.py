@@ -12,9 +12,9 @@ from typing import Any
 
 from msgspec import Struct
 
-from protocol.messages import MESSAGE_BYTES_MAX
-from protocol.mission import WITNESS_NAME, robot_id_of
-from protocol.topics import (
+from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
+from lfa.protocol.names import WITNESS_NAME, robot_id_of
+from lfa.protocol.topics import (
     DRIVER_PREFIX,
     HOST_PREFIX,
     OPERATOR_NAME,

@@ -19,7 +19,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from msgspec import Struct
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 CA_DAYS = 3650.0
 BACKDATED = timedelta(hours=1)

@@ -15,7 +15,7 @@ For `lfa up` and others who call it:
     folder_of(folder, "a")                   # to be copied to machine a, and given to its processes as --keys
     revoke(folder, ["robot3"]); rotate(folder, ["robot4"])
 
-A process there takes `--keys /etc/lfa/keys` and is who its name says (`protocol/credentials.py`); `lfa-router --keys
+A process there takes `--keys /etc/lfa/keys` and is who its name says (`protocol/transport/credentials.py`); `lfa-router --keys
 DIR` serves `tls/` and `quic/`, with `--secure` under the rules. Files are 0600, folders 0700.
 """
 
@@ -28,12 +28,13 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct, structs
 
-from deploy.fleet import authority
-from deploy.fleet.access import Plan, driver_of, host_name, rules, sayable
-from deploy.fleet.private import ISSUED, private_folder, write_private
-from protocol.credentials import ACCESS_FILE, CA_FILE, USERS_FILE, validity
-from protocol.mission import WITNESS_NAME, Refused, robot_name
-from protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
+from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
+from lfa.deploy.fleet.security import authority
+from lfa.deploy.fleet.security.access_rules import Plan, driver_of, host_name, rules, sayable
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import WITNESS_NAME, robot_name
+from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
+from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, USERS_FILE, validity
 
 REGISTRY, HOSTS, CA_KEY = "fleet.json", "hosts", "ca.key"
 DAYS = 365.0

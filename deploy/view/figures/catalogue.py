@@ -15,12 +15,13 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure, FigureBase
 
-from deploy.look import chronicle, timeline
-from deploy.look.lines import finish
-from deploy.look.marks import COLOURS, LEGEND_MAX, label, look
-from deploy.look.paper_figures import distance_error, orientation_error, tracking
-from deploy.look.plan import path_flow
-from deploy.look.readings import Run
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.recording import event_log
+from lfa.deploy.view.figures import timeline
+from lfa.deploy.view.figures.paper_figures import distance_error, orientation_error, tracking
+from lfa.deploy.view.figures.path_plot import path_flow
+from lfa.deploy.view.figures.style import COLOURS, LEGEND_MAX, label, look
+from lfa.deploy.view.figures.time_panels import finish
 
 if TYPE_CHECKING:
     pass
@@ -72,7 +73,7 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
         if lasted_s > TERM_SHARE_MIN * end_s:
             axes.annotate(f"term {reign.term[0]}", (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
                           textcoords="offset points", color="white")  # fmt: skip
-    for failover in chronicle.failovers(run.events, run.reigns):
+    for failover in event_log.failovers(run.events, run.reigns):
         if failover.leader is not None and failover.first_command_ms is not None:
             axes.annotate(f"first command after {failover.first_command_ms:.0f} ms", (failover.at_s, failover.leader),
                           xytext=(4, 14), textcoords="offset points", fontsize=8)  # fmt: skip

@@ -1,4 +1,4 @@
-"""The paper's figures 7, 8 and 11; its figure 9 is `plan.py`'s."""
+"""The paper's figures 7, 8 and 11; its figure 9 is `path_plot.py`'s."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import FigureBase
 
-from deploy.look.errors import Errors
-from deploy.look.lines import POINTS_MAX, finish, plot, strip, thin
-from deploy.look.marks import look
-from deploy.look.readings import Run
-from deploy.look.trace import Array
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.recording.mcap_reader import Array
+from lfa.deploy.view.figures.style import look
+from lfa.deploy.view.figures.time_panels import POINTS_MAX, finish, plot, strip, thin
 
 
 def distance_error(figure: FigureBase, run: Run) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import FigureBase
 from matplotlib.patches import Circle, Polygon
 
-from deploy.look import errors
-from deploy.look.lines import POINTS_MAX
-from deploy.look.marks import label, look
-from deploy.look.readings import Run
-from world.terrain import patches_of
+from lfa.deploy.analysis import tracking_errors
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.view.figures.style import label, look
+from lfa.deploy.view.figures.time_panels import POINTS_MAX
+from lfa.world.description.terrain import patches_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ def _stance(axes: Axes, run: Run, t: float) -> None:
     for robot, row in at.items():
         followed = run.errors.get(robot)
         i = -1 if followed is None else int(np.searchsorted(followed.t, t, side="right")) - 1
-        stale = followed is None or i < 0 or t - followed.t[i] > errors.TRACKING_AGE_MAX_S
+        stale = followed is None or i < 0 or t - followed.t[i] > tracking_errors.TRACKING_AGE_MAX_S
         ahead = None if followed is None or stale else at.get(int(followed.predecessor[i]))
         if ahead is not None:
             axes.plot([row[1], ahead[1]], [row[2], ahead[2]], color="#666666", linewidth=0.7, zorder=3)

@@ -11,7 +11,7 @@ from typing import Any
 
 from matplotlib import colormaps
 
-from deploy.look.readings import Run
+from lfa.deploy.analysis.run_data import Run
 
 # Okabe and Ito's palette.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from deploy.look import chronicle
-from deploy.look.marks import LEGEND_MAX, label, look
-from deploy.look.readings import Run
-from deploy.look.trace import Array
-from deploy.shapes import spikes
+from lfa.deploy.analysis import episodes
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.mcap_reader import Array
+from lfa.deploy.view.figures.style import LEGEND_MAX, label, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def strip(axes: Axes, run: Run) -> None:
     """When each robot avoided something, by its own log: a bar an avoidance, in the robot's colour."""
     shown = [robot for robot in run.robots if label(run, robot)][:LEGEND_MAX]
     for place, robot in enumerate(shown):
-        spans = [(a, max(b - a, 0.1)) for a, b in spikes.avoidances(run, robot)]
+        spans = [(a, max(b - a, 0.1)) for a, b in episodes.avoidances(run, robot)]
         axes.broken_barh(
             spans, (place - 0.35, 0.7), facecolors=look(run, robot)["color"], edgecolor=STRIP, linewidth=0.4
         )
@@ -80,7 +80,7 @@ def _unwrapped(t: Array, y: Array) -> tuple[Array, Array]:
 
 def _marks(run: Run) -> list[tuple[float, str, str]]:
     """When [s], what, and with which line."""
-    found = [(fault.at_s, f"{fault.kind} {fault.target}", ":") for fault in chronicle.faults(run.events)]
+    found = [(fault.at_s, f"{fault.kind} {fault.target}", ":") for fault in event_log.faults(run.events)]
     found += [(reign.from_s, f"robot {reign.robot_id} leads", "-") for reign in run.reigns[1:]]
-    asked = (line for line in chronicle.of_kind(run.events, "formation") if chronicle.asked_by_leader(line))
+    asked = (line for line in event_log.of_kind(run.events, "formation") if event_log.asked_by_leader(line))
     return found + [(float(line["t"]), f"to {line.get('side', '')}", "--") for line in asked]

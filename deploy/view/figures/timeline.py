@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import FigureBase
 
-from deploy.look import chronicle
-from deploy.look.marks import LEGEND_MAX, levels, look
-from deploy.look.readings import Run
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.recording import event_log
+from lfa.deploy.view.figures.style import LEGEND_MAX, levels, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ def draw(figure: FigureBase, run: Run) -> None:
     below.set(xlim=(0.0, end_s), xlabel="time [s]")
     for axes in (above, below):
         axes.grid(visible=False)
-        for fault in chronicle.faults(run.events):
+        for fault in event_log.faults(run.events):
             axes.axvline(fault.at_s, color="black", linewidth=0.8, linestyle=":", zorder=3)
 
 
@@ -43,7 +43,7 @@ def _holders(axes: Axes, run: Run, end_s: float) -> None:
         _cell(axes, 0.0, reign.from_s, until_s, run, reign.robot_id, end_s)
     began = [(reign.from_s, f"{_said(reign.cause)}, term +{reign.term[0] - first}") for reign in run.reigns]
     _labels(axes, began, 0.55, end_s)
-    done = [(fault.at_s, f"{fault.kind} {fault.target}") for fault in chronicle.faults(run.events)]
+    done = [(fault.at_s, f"{fault.kind} {fault.target}") for fault in event_log.faults(run.events)]
     top = 0.65 + LINE * LINES
     _labels(axes, done, top, end_s, weight="bold")
     axes.set(ylim=(-0.5, top + LINE * LINES), yticks=[0.0, 0.65 + LINE * LINES / 2.5, top + LINE * LINES / 2.5])
@@ -54,7 +54,7 @@ def _holders(axes: Axes, run: Run, end_s: float) -> None:
 
 def _chain(axes: Axes, run: Run, end_s: float) -> None:
     """A row a place; in it who had that place when."""
-    for robot, steps in chronicle.places(run.events, run.robots, end_s).items():
+    for robot, steps in event_log.places(run.events, run.robots, end_s).items():
         for from_s, until_s, place in _stretches(steps):
             _cell(axes, place, from_s, until_s, run, robot, end_s)
     last = len(run.robots) - 1

@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
 
 REPORT = "report.html"
 
@@ -32,9 +32,9 @@ def command(
 
 def html(folders: list[Path]) -> str:
     """The page about these runs (one or two). Raises Refused for what is no finished run folder."""
-    from deploy.look import page
-    from deploy.look.readings import Run
-    from deploy.look.trace import look_into
+    from lfa.deploy.analysis.run_data import Run
+    from lfa.deploy.recording.mcap_reader import look_into
+    from lfa.deploy.view.report import page
 
     for folder in folders:
         for needed in ("summary.json", "recording.mcap", "scenario.toml"):

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from deploy.look.readings import Run
-from deploy.look.summary import Summary
-from deploy.look.trace import messages
-from deploy.look.words import NONE, in_ms, table
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.recording.mcap_reader import messages
+from lfa.deploy.view.report.html import NONE, in_ms, table
 
 
 def processes(run: Run, s: Summary) -> str:

@@ -7,12 +7,15 @@ from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
 
-from deploy.look import chronicle, figures, health, summary
-from deploy.look.figures import FIGURES
-from deploy.look.readings import Run
-from deploy.look.summary import RobotSummary, Summary
-from deploy.look.words import NONE, Cells, in_deg, in_mm, in_ms, in_s, short, table
-from deploy.run.folder import SCENARIO
+from lfa.deploy.analysis import summary
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.summary import RobotSummary, Summary
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.run_folder import SCENARIO
+from lfa.deploy.view.figures import catalogue
+from lfa.deploy.view.figures.catalogue import FIGURES
+from lfa.deploy.view.report import health
+from lfa.deploy.view.report.html import NONE, Cells, in_deg, in_mm, in_ms, in_s, short, table
 
 CSS = Path(__file__).with_name("report.css")
 ROWS_MAX = 150
@@ -91,7 +94,7 @@ def _robot(r: RobotSummary) -> Cells:
 
 def _figure(name: str) -> Callable[[Run, Summary], str]:
     def draw(run: Run, _s: Summary) -> str:
-        data = b64encode(figures.svg(figures.drawn(name, run))).decode()
+        data = b64encode(catalogue.svg(catalogue.drawn(name, run))).decode()
         title = next(title for known, _, title, _ in FIGURES if known == name)
         return f'<figure><img alt="{escape(title)}" src="data:image/svg+xml;base64,{data}"></figure>'
 
@@ -130,10 +133,10 @@ def _faults(run: Run, s: Summary) -> str:
     return table(("at", "what", "robot", "chain without it after", "back in the chain after"), rows, text=(1,))
 
 
-def _recovery(run: Run, fault: chronicle.FaultDone) -> tuple[str, str]:
+def _recovery(run: Run, fault: event_log.FaultDone) -> tuple[str, str]:
     """When a chain without the victim was first spoken of, and when one with it again; from the fault on."""
     without: float | None = None
-    for line in chronicle.of_kind([e for e in run.events if e["t"] >= fault.at_s], "chain"):
+    for line in event_log.of_kind([e for e in run.events if e["t"] >= fault.at_s], "chain"):
         member = fault.target in line.get("chain", [])
         if without is None and not member:
             without = line["t"] - fault.at_s
@@ -151,7 +154,7 @@ def _decisions(run: Run, _s: Summary) -> str:
     return f"{opened}{table(('at', 'robot', 'kind', 'what'), rows, text=(2, 3))}{rest}</details>"
 
 
-def _details(line: chronicle.Line) -> str:
+def _details(line: event_log.Line) -> str:
     left_out = ("t", "robot", "term", "kind", "from")
     return ", ".join(f"{name} {short(value)}" for name, value in line.items() if name not in left_out)
 

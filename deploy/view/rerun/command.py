@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import socket
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -13,18 +9,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from deploy.look.onlooker import Fleet, find, listen, scenario_of_fleet
-from deploy.run.record import parts
-from deploy.run.worldtime import WorldTime
-from protocol import clock
-from protocol.messages import Ask, Header, Truth, encode
-from protocol.mission import Refused
-from protocol.topics import OPERATOR_NAME, address, key
+from lfa.deploy.client.session import Fleet, find, listen, scenario_of_fleet
+from lfa.deploy.recording.recorder import parts
+from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Ask
+from lfa.protocol.topics import OPERATOR_NAME, address, key
 
 if TYPE_CHECKING:
     import rerun
 
-    from world.spec import Scenario
+    from lfa.world.description.scenario import Scenario
+from lfa.deploy.view.rerun.viewer import _display, _free, _need_rerun, _viewer
 
 RRD = "recording.rrd"
 PICTURE = "view.png"
@@ -54,7 +54,7 @@ def command(
         print("no display here: a picture instead (--serve-web shows it in a browser)", file=sys.stderr, flush=True)
         screenshot = folder / PICTURE
     if screenshot is not None:
-        from deploy.look.shot import take
+        from lfa.deploy.view.rerun.screenshot import take
 
         print(take(rrd, screenshot, folder))
         return 0
@@ -68,10 +68,10 @@ def converted(folder: Path) -> Path:
     """`recording.rrd` of a run, made anew when it is older than the recording. Raises Refused."""
     import rerun as rr
 
-    from deploy.look.layout import layout
-    from deploy.look.scene import APPLICATION, TOPICS, Scene
-    from deploy.look.trace import look_into, messages
-    from deploy.run.folder import scenario_of
+    from lfa.deploy.recording.mcap_reader import look_into, messages
+    from lfa.deploy.recording.run_folder import scenario_of
+    from lfa.deploy.view.rerun.layout import layout
+    from lfa.deploy.view.rerun.scene import APPLICATION, TOPICS, Scene
 
     rrd = folder / RRD
     look_into(folder)
@@ -100,14 +100,14 @@ def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web
     """Draw a running fleet until Ctrl-C; viewers may come and go."""
     import rerun as rr
 
-    from deploy.look.layout import layout
-    from deploy.look.scene import APPLICATION
+    from lfa.deploy.view.rerun.layout import layout
+    from lfa.deploy.view.rerun.scene import APPLICATION
 
     scenario = scenario_of_fleet(fleet)
     stream = rr.RecordingStream(APPLICATION)
     plan = layout(scenario, len(fleet.team) or 4)
     if screenshot is not None:
-        from deploy.look.shot import take
+        from lfa.deploy.view.rerun.screenshot import take
 
         with tempfile.TemporaryDirectory() as place:
             rrd = Path(place) / RRD
@@ -130,7 +130,7 @@ def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web
 
 
 def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None, until: float | None) -> None:
-    from deploy.look.scene import TOPICS, Scene
+    from lfa.deploy.view.rerun.scene import TOPICS, Scene
 
     scene, time, lost = Scene(stream), WorldTime(), 0
     if scenario is not None:
@@ -151,42 +151,3 @@ def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None
             if ear.dropped > lost:
                 lost = ear.dropped
                 print(f"{lost} messages lost: this machine is too busy to draw them", file=sys.stderr, flush=True)
-
-
-def _viewer(*arguments: str) -> int:
-    """The viewer as a child, until it is closed; Ctrl-C and SIGTERM end it and us."""
-    child = subprocess.Popen(["rerun", *arguments], executable=viewer_path(), env=quiet())
-    try:
-        return child.wait()
-    except (KeyboardInterrupt, SystemExit):
-        child.send_signal(signal.SIGTERM)
-        child.wait()
-        raise
-
-
-def viewer_path() -> str:
-    """The rerun binary that came with the SDK."""
-    return str(Path(sys.executable).with_name("rerun"))
-
-
-def quiet() -> dict[str, str]:
-    return {"RUST_LOG": "error", **os.environ}
-
-
-def _display() -> bool:
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _need_rerun() -> None:
-    try:
-        import rerun  # noqa: F401
-    except ImportError:
-        raise Refused("view needs rerun: install with: pip install 'lfa[view]'") from None
-
-
-def _free(port: int, option: str) -> None:
-    with socket.socket() as probe:
-        try:
-            probe.bind(("127.0.0.1", port))
-        except (OSError, OverflowError):
-            raise Refused(f"{option} {port}: taken, or no port of yours: give another") from None

@@ -6,8 +6,8 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 
-from deploy.look.scene import NAMED_MAX, TIMELINE
-from world.scenario import Scenario, starts_of
+from lfa.deploy.view.rerun.scene import NAMED_MAX, TIMELINE
+from lfa.world.description.load import Scenario, starts_of
 
 MARGIN_M = 1.0
 LIVE_S = 60.0

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from deploy.look import stage
-from deploy.look.board import told
-from protocol.geometry import wrap
-from protocol.mission import Mission, robot_id_of
-from world.spec import WorldSpec
+from lfa.deploy.client.team_status import told
+from lfa.deploy.view.rerun import static_scene
+from lfa.protocol.geometry import wrap
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import robot_id_of
+from lfa.world.description.scenario import WorldSpec
 
 APPLICATION = "lfa"
 TIMELINE = "time"
@@ -63,10 +64,10 @@ class Scene:
 
     def ground(self, world: WorldSpec) -> None:
         """Walls, terrain and obstacles."""
-        for entity, what in stage.standing(world):
+        for entity, what in static_scene.standing(world):
             self._always(entity, what)
         for index, obstacle in enumerate(world.obstacles):
-            if stage.moves(obstacle):
+            if static_scene.moves(obstacle):
                 self._row("transform", f"world/obstacles/{index}", 0.0, (*obstacle.center_m, 0.0))
 
     def mission(self, mission: Any) -> None:
@@ -200,8 +201,8 @@ class Scene:
         route = [(float(px), -float(py)) for px, py in message.route_map]
         self._say(t, "world/planned", rr.LineStrips2D([route], colors=PLANNED, radii=0.03))
         entity = f"world/map/tiles/{owner}/{x:.1f}_{y:.1f}"
-        self._say(t, entity, stage.placed((x, y), cell_m, len(cells) // message.columns))
-        self._say(t, entity, stage.tile(message.columns, cells))
+        self._say(t, entity, static_scene.placed((x, y), cell_m, len(cells) // message.columns))
+        self._say(t, entity, static_scene.tile(message.columns, cells))
 
     def _event(self, t: float, owner: str, message: Any) -> None:
         data, kind = message.data, message.kind
@@ -224,7 +225,7 @@ class Scene:
             for entity in (f"world/slots/robot{robot}", f"world/links/robot{robot}"):
                 self._say(t, entity, rr.Clear(recursive=False))
         r, colour = self._radius_m, ROLE_COLOURS.get(role, WAITS)
-        circle = stage.circle(r)
+        circle = static_scene.circle(r)
         nose = [(-0.5 * r, 0.7 * r), (r, 0.0), (-0.5 * r, -0.7 * r), (-0.5 * r, 0.7 * r)]
         body = rr.LineStrips2D([[*circle, circle[0]], nose], colors=colour, radii=OUTLINE)
         self._say(t, f"world/robot{robot}/body", body)

@@ -1,4 +1,4 @@
-"""A picture of a recording without a display: by rerun's own viewer on a virtual screen, or drawn by `figures.py`.
+"""A picture of a recording without a display: by rerun's own viewer on a virtual screen, or drawn by `catalogue.py`.
 
 The viewer needs a screen (Xvfb will do) and Vulkan (Mesa's software driver will do). Where they are missing, the same
 layout is drawn without it, and the line that names the file says so.
@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from deploy.look.view import quiet, viewer_path
-from protocol.mission import Refused
+from lfa.deploy.view.rerun.viewer import quiet, viewer_path
+from lfa.protocol.errors import Refused
 
 SIZE, SCALE = "1600x1000", "2"
 """Of the window in the toolkit's points, and how many pixels each has: what a screen's density would decide else."""
@@ -32,10 +32,10 @@ def take(rrd: Path, picture: Path, folder: Path | None) -> str:
         return f"{picture} (rerun's viewer)"
     if folder is None:
         raise Refused(f"--screenshot {picture}: {complaint}")
-    from deploy.look import figures
-    from deploy.look.readings import Run
+    from lfa.deploy.analysis.run_data import Run
+    from lfa.deploy.view.figures import catalogue
 
-    picture.write_bytes(figures.png(figures.overview(Run(folder))))
+    picture.write_bytes(catalogue.png(catalogue.overview(Run(folder))))
     return f"{picture} (drawn without the viewer: {complaint})"
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from world.spec import Obstacle, WorldSpec
-from world.terrain import Patch, patches_of
+from lfa.world.description.scenario import Obstacle, WorldSpec
+from lfa.world.description.terrain import Patch, patches_of
 
 INK = (60, 60, 60)
 HOLE, RISE = (86, 130, 180), (190, 140, 60)

@@ -12,11 +12,20 @@ import msgspec
 import typer
 from msgspec import Struct
 
-from deploy.look.onlooker import Fleet, find, listen
-from deploy.run import channels
-from protocol import clock
-from protocol.mission import WITNESS_NAME, Refused, robot_id_of
-from protocol.topics import DRIVER_PREFIX, HOST_PREFIX, OPERATOR_NAME, RECORDER_NAME, TOPIC, TRUTH_OWNER, WORLD_NAME
+from lfa.deploy.client.session import Fleet, find, listen
+from lfa.deploy.recording import mcap_channels
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import WITNESS_NAME, robot_id_of
+from lfa.protocol.topics import (
+    DRIVER_PREFIX,
+    HOST_PREFIX,
+    OPERATOR_NAME,
+    RECORDER_NAME,
+    TOPIC,
+    TRUTH_OWNER,
+    WORLD_NAME,
+)
 
 POLL_S = 0.1
 SILENCE_S = 3.0
@@ -80,7 +89,7 @@ def _echo(fleet: Fleet, wanted: frozenset[str], count: int, what: str) -> int:
                 silent_at = inf
             for arrival, message in ear.take():
                 channel = msgspec.json.encode(arrival.key.split("/", 2)[2]).decode()
-                print(f'{{"channel":{channel},"message":{channels.encode(message).decode()}}}', flush=True)
+                print(f'{{"channel":{channel},"message":{mcap_channels.encode(message).decode()}}}', flush=True)
                 left -= 1
                 if left == 0:
                     return 0

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
-from deploy.look.board import Board, Row
-from deploy.look.onlooker import Ear, find, listen
-from deploy.run import formation, inject
-from protocol import clock
-from protocol.mission import Refused
+from lfa.deploy.client.session import Ear, find, listen
+from lfa.deploy.client.team_status import Board, Row
+from lfa.deploy.operate import fault, formation
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
 
 if TYPE_CHECKING:
     from rich.console import Group, RenderableType
@@ -132,7 +132,7 @@ class Hand:
         told = io.StringIO()
         try:
             with contextlib.redirect_stdout(told):
-                inject.command(deed, target, fleet=self._ear.fleet.name, as_json=False)
+                fault.command(deed, target, fleet=self._ear.fleet.name, as_json=False)
         except Refused as refused:
             self.said = str(refused)
         else:

@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from agents.decisions import TABLE, Situation, decide
+from lfa.agents.avoidance.decision import TABLE, Situation, decide
 
 S = Situation
 CASES = [

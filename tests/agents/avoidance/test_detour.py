@@ -4,11 +4,13 @@ from math import atan2, cos, hypot, inf, pi, sin
 
 import pytest
 
-from agents.perception import Surroundings
-from agents.safety import safe
-from agents.strategy import NARROW_M, Detour, Thing
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.mission import Limits
+from lfa.agents.avoidance.detour import Detour
+from lfa.agents.avoidance.openings import NARROW_M
+from lfa.agents.avoidance.safety import safe
+from lfa.agents.perception.obstacle import Thing
+from lfa.agents.perception.scan import Surroundings
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.mission import Limits
 
 LIMITS = Limits()
 RADIUS_M = 0.15

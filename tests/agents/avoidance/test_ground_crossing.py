@@ -4,11 +4,13 @@ from math import inf, nan
 
 import pytest
 
-from agents.ground import BESIDE_M, CROSSING_MPS, LATE_S, SEEN_MIN, Ground
-from agents.safety import safe
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import GroundProfile, Header
-from protocol.mission import Limits
+from lfa.agents.avoidance.ground_crossing import BESIDE_M, CROSSING_MPS, LATE_S, GroundCrossing
+from lfa.agents.avoidance.safety import safe
+from lfa.agents.perception.ground_map import SEEN_MIN, Ground
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import GroundProfile
+from lfa.protocol.mission import Limits
 
 HEADER = Header("world", 1, 0, 0.0)
 LIMITS = Limits()
@@ -36,6 +38,10 @@ def looked_at(seen: GroundProfile, times: int = SEEN_MIN) -> Ground:
     for n in range(times):
         ground.profile(seen, Pose2D(), 0.05 * n)
     return ground
+
+
+def crossing(ground: Ground) -> GroundCrossing:
+    return GroundCrossing(ground, LIMITS, 0.15)
 
 
 @pytest.mark.parametrize(
@@ -116,13 +122,14 @@ def test_barred_floor_stays_where_it_is() -> None:
 
 def test_crossing_is_slow_until_the_robot_is_behind_it() -> None:
     ground = looked_at(profile((0.4, 0.45, -0.2)))
-    assert ground.cross(Twist(0.5, 0.1), 0.15, 0.0) == Twist(CROSSING_MPS, 0.1 * CROSSING_MPS / 0.5)
-    assert ground.decision is not None
-    assert ground.decision.action == "overcome"
+    over = crossing(ground)
+    assert over.cross(Twist(0.5, 0.1), 0.0) == Twist(CROSSING_MPS, 0.1 * CROSSING_MPS / 0.5)
+    assert over.decision is not None
+    assert over.decision.action == "overcome"
     ground.profile(profile(), Pose2D(), 0.9)
-    assert ground.cross(Twist(0.5, 0.0), 0.15, 1.0).linear_x == CROSSING_MPS
-    assert ground.cross(Twist(0.5, 0.0), 0.15, 6.0) == Twist(0.5, 0.0)
-    assert ground.decision is None
+    assert over.cross(Twist(0.5, 0.0), 1.0).linear_x == CROSSING_MPS
+    assert over.cross(Twist(0.5, 0.0), 6.0) == Twist(0.5, 0.0)
+    assert over.decision is None
 
 
 def looking(near_m: float, width_m: float, lines: tuple[int, ...] = (0, 1, 2)) -> GroundProfile:
@@ -160,7 +167,7 @@ def test_one_bad_reading_is_not_braked_for() -> None:
 
 @pytest.mark.parametrize("wanted", [Twist(1.0, 1.7), Twist(0.8, -1.6)])
 def test_in_a_bend_the_robot_stops_before_what_a_look_ahead_shows_there_first(wanted: Twist) -> None:
-    slower = looked_at(profile(), times=1).cross(wanted, 0.15, 0.0)
+    slower = crossing(looked_at(profile(), times=1)).cross(wanted, 0.0)
     v, radius_m = slower.linear_x, abs(slower.linear_x / slower.angular_z)
     assert v / slower.angular_z == pytest.approx(wanted.linear_x / wanted.angular_z)
     assert LATE_S * v + v * v / (2.0 * LIMITS.a_max_mps2) <= (2.0 * radius_m * BESIDE_M) ** 0.5 + 1e-9
@@ -168,11 +175,11 @@ def test_in_a_bend_the_robot_stops_before_what_a_look_ahead_shows_there_first(wa
 
 @pytest.mark.parametrize("wanted", [Twist(1.0, 0.0), Twist(0.3, 0.6), Twist(0.0, 2.0), Twist(-0.3, 1.5)])
 def test_straight_on_and_in_slow_bends_nothing_is_slowed(wanted: Twist) -> None:
-    assert looked_at(profile(), times=1).cross(wanted, 0.15, 0.0) == wanted
+    assert crossing(looked_at(profile(), times=1)).cross(wanted, 0.0) == wanted
 
 
 def test_a_robot_that_does_not_look_at_the_floor_is_not_slowed_in_a_bend() -> None:
-    assert Ground(LIMITS).cross(Twist(1.0, 1.7), 0.15, 0.0) == Twist(1.0, 1.7)
+    assert crossing(Ground(LIMITS)).cross(Twist(1.0, 1.7), 0.0) == Twist(1.0, 1.7)
 
 
 def test_a_gap_that_seemed_too_wide_askew_bars_nothing_once_it_is_seen_straight_on() -> None:

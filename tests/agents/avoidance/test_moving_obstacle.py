@@ -1,8 +1,8 @@
 """What moves across the way is given way to, for a bounded time."""
 
-from agents.crossing import HOLD_S, WAIT_S_MAX, Crossing
-from agents.features import Feature
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.agents.avoidance.moving_obstacle import HOLD_S, WAIT_S_MAX, Crossing
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
 AHEAD = Twist(0.5, 0.0)
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.safety import BRAKING_SHARE, SKIN_M, safe, sharing, within
-from protocol.geometry import STILL, Twist
-from protocol.mission import Limits
+from lfa.agents.avoidance.safety import BRAKING_SHARE, SKIN_M, safe, sharing, within
+from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.mission import Limits
 
 LIMITS = Limits()
 DT = 0.02

@@ -10,13 +10,13 @@ from types import ModuleType
 
 import pytest
 
-import agents.controllers
-from agents.controller import find_controller
-from deploy.bench.chain import Chain, Setup
-from protocol.geometry import Twist
-from protocol.messages import Slot
+import lfa.agents.controllers
+from lfa.agents.following.controller import find_controller
+from lfa.deploy.bench.harness.chain import Chain, Setup
+from lfa.protocol.geometry import Twist
+from lfa.protocol.messages.team import Slot
 
-README = Path(agents.controllers.__file__).parent / "README.md"
+README = Path(lfa.agents.controllers.__file__).parent / "README.md"
 
 
 def test_the_readmes_controller_follows_a_bend(monkeypatch: pytest.MonkeyPatch) -> None:

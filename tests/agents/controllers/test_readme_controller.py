@@ -4,15 +4,15 @@ import re
 from math import cos, hypot, pi, sin
 from pathlib import Path
 
-from agents.config import DEFAULT
-from agents.follower import Follower
-from agents.predecessor import Sighting
-from agents.trace import Trace
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.messages import Slot
-from protocol.mission import Limits
+from lfa.agents.config import DEFAULT
+from lfa.agents.following.follower import Follower
+from lfa.agents.following.predecessor import Sighting
+from lfa.agents.formation.pose_history import Trace
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Limits
 
-README = Path(__file__).parents[2] / "README.md"
+README = Path(__file__).parents[3] / "README.md"
 DT = 0.02
 
 

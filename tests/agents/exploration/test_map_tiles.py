@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from agents.mapping import CELL_M, OCCUPIED, Grid
-from agents.tiles import TILE_CELLS, Shown, Tiles
+from lfa.agents.exploration.map_tiles import TILE_CELLS, Shown, Tiles
+from lfa.agents.exploration.occupancy_grid import CELL_M, OCCUPIED, Grid
 
 SIDE_M = TILE_CELLS * CELL_M
 SEEN = 3

@@ -6,9 +6,10 @@ from math import cos, floor, hypot, inf, pi, sin
 
 import pytest
 
-from agents.mapping import CELL_M, NEAR_PER_CELL, REACH, Grid, Mapping, Point
-from protocol.geometry import Pose2D
-from protocol.messages import Header, LaserScan
+from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, REACH, Grid, Mapping, Point
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import LaserScan
 
 BEAMS = 180
 HALF_M = 2.03

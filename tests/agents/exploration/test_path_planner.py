@@ -7,9 +7,9 @@ from math import atan2, hypot
 
 import pytest
 
-from agents.mapping import CELL_M, NEAR_PER_CELL, OCCUPIED, REACH, Grid, Point
-from agents.planner import Planner
-from protocol.geometry import Pose2D, wrap
+from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, OCCUPIED, REACH, Grid, Point
+from lfa.agents.exploration.path_planner import Planner
+from lfa.protocol.geometry import Pose2D, wrap
 
 RADIUS_M = 0.15
 Box = tuple[float, float, float, float]

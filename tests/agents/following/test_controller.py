@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.config import DEFAULT, Gains
-from agents.controller import Law, Reference
-from agents.formation import SlotMotion
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
-from protocol.messages import Slot
-from protocol.mission import Limits
+from lfa.agents.config import DEFAULT, Gains
+from lfa.agents.following.controller import Law, Reference
+from lfa.agents.formation.formation import SlotMotion
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Limits
 
 LIMITS = Limits()
 DT = 0.0005

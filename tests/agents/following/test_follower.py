@@ -7,15 +7,15 @@ from math import cos, hypot, pi, sin
 
 import pytest
 
-from agents.config import DEFAULT, SHARP, Gains
-from agents.controller import Law
-from agents.follower import Follower, State
-from agents.predecessor import Sighting
-from agents.trace import Trace
-from deploy.bench.chain import Chain, Setup, in_slots
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, distance
-from protocol.messages import Slot
-from protocol.mission import Limits
+from lfa.agents.config import DEFAULT, SHARP, Gains
+from lfa.agents.following.controller import Law
+from lfa.agents.following.follower import Follower, State
+from lfa.agents.following.predecessor import Sighting
+from lfa.agents.formation.pose_history import Trace
+from lfa.deploy.bench.harness.chain import Chain, Setup, in_slots
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, distance
+from lfa.protocol.messages.team import Slot
+from lfa.protocol.mission import Limits
 
 DT = 0.02
 LEFT = Slot(2, 1.2, 2 * pi / 3)

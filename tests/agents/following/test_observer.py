@@ -7,8 +7,8 @@ from random import Random
 
 import pytest
 
-from agents.observer import IMAGINARY, REAL, L, Observer, SlotVelocityObserver
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.agents.following.observer import IMAGINARY, REAL, L, Observer, SlotVelocityObserver
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 
 
 def test_the_matrix_of_the_paper_has_the_poles_that_form_B_is_given() -> None:

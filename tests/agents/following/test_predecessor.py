@@ -7,10 +7,12 @@ from random import Random
 
 import pytest
 
-from agents.predecessor import Predecessor, Sighting
-from agents.trace import SPACING_M, Trace, arc_length
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.messages import NO_TERM, Header, PoseStamped, Role
+from lfa.agents.following.predecessor import Predecessor, Sighting
+from lfa.agents.formation.pose_history import SPACING_M, Trace, arc_length
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.messages.consensus import NO_TERM, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import PoseStamped
 
 DT = 0.02
 ARC = Twist(0.5, 0.4)

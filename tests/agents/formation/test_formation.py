@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.config import DEFAULT
-from agents.formation import (
+from lfa.agents.config import DEFAULT
+from lfa.agents.formation.formation import (
     Formation,
     SlotMotion,
     check_slot,
@@ -23,9 +23,12 @@ from agents.formation import (
     slots_of,
     speed_factors,
 )
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
-from protocol.messages import FormationNote, Header, Slot, Term
-from protocol.mission import FormationSpec, Limits, Refused
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import FormationNote, Slot
+from lfa.protocol.mission import FormationSpec, Limits
 
 DT = 0.02
 LIMITS = Limits()

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.model import error_rates, feasible_heading, look_ahead_error, slot, slot_velocity
-from protocol.geometry import Pose2D, Twist, along_arc, wrap
+from lfa.agents.formation.kinematics import error_rates, feasible_heading, look_ahead_error, slot, slot_velocity
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, wrap
 
 K, B = 1.2, 0.3
 H = 1e-5

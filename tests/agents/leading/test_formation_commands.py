@@ -6,13 +6,14 @@ from math import pi
 
 import pytest
 
-from agents.formation import Formation
-from agents.motion import Lead
-from agents.orders import FOLD_S, Orders
-from agents.voice import Voice
-from protocol.geometry import Pose2D
-from protocol.messages import Event, FormationNote, Term
-from protocol.mission import FormationSpec, Leading, Limits, Mission, Orientation
+from lfa.agents.formation.formation import Formation
+from lfa.agents.leading.formation_commands import FOLD_S, Orders
+from lfa.agents.leading.path_follower import Lead
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.team import Event, FormationNote
+from lfa.protocol.mission import FormationSpec, Leading, Limits, Mission, Orientation
+from lfa.protocol.outbox import Voice
 
 FOLLOWERS = (2, 3, 4)
 LEFT = 2.0 * pi / 3.0

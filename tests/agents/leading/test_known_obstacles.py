@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.known import ROOM_M, past_known
-from agents.motion import Lead, Route
-from protocol.geometry import Pose2D, wrap
-from protocol.mission import Leading, Limits, Mission, Refused, check_mission
+from lfa.agents.leading.known_obstacles import ROOM_M, past_known
+from lfa.agents.leading.path_follower import Lead, Route
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D, wrap
+from lfa.protocol.mission import Leading, Limits, Mission
+from lfa.protocol.mission_checks import check_mission
 
 RADIUS_M = 0.15
 STRAIGHT = [(0.0, 0.0), (20.0, 0.0)]

@@ -2,13 +2,15 @@
 
 import pytest
 
-from agents.beliefs import Beliefs
-from agents.formation import Formation
-from agents.leading import GAP_WAIT_S_MAX, Leadership
-from protocol.geometry import STILL, Pose2D
-from protocol.messages import Header, Role, TableRow
-from protocol.mission import Mission
-from world.scenario import load
+from lfa.agents.formation.formation import Formation
+from lfa.agents.leading.leader import GAP_WAIT_S_MAX, Leadership
+from lfa.agents.team_state import Beliefs
+from lfa.protocol.geometry import STILL, Pose2D
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import TableRow
+from lfa.protocol.mission import Mission
+from lfa.world.description.load import load
 
 HERE = Pose2D(5.0, 0.0, 0.0)
 

@@ -4,11 +4,11 @@ from math import atan2, hypot, pi
 
 import pytest
 
-from agents.formation import slots_of
-from agents.motion import CORNER_RADIUS_M, Lead, Route
-from agents.timetable import Timetable
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
-from protocol.mission import FormationSpec, Leading, Limits
+from lfa.agents.formation.formation import slots_of
+from lfa.agents.leading.path_follower import CORNER_RADIUS_M, Lead, Route
+from lfa.agents.leading.timed_route import Timetable
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.mission import FormationSpec, Leading, Limits
 
 LIMITS = Limits()
 DT = 0.02

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from agents.clocks import FUTURES_TO_RESET, ClockOffset
+from lfa.agents.localization.clock_offset import FUTURES_TO_RESET, ClockOffset
 
 DAY = 86400.0
 OFFSETS = (0.0, 3.0, -3.0, 10 * DAY, -10 * DAY)

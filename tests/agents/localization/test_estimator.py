@@ -7,9 +7,11 @@ from random import Random
 
 import pytest
 
-from agents.estimator import OUTLIERS_TO_RELOCATE, Estimator
-from protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
-from protocol.messages import NO_TERM, GatewayStamp, Header, Localization, Sensors
+from lfa.agents.localization.estimator import OUTLIERS_TO_RELOCATE, Estimator
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import Localization, Sensors
 
 DT = 0.02
 

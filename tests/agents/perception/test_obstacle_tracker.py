@@ -4,8 +4,8 @@ from math import atan2, cos, hypot, pi, sin
 
 import pytest
 
-from agents.features import Tracker
-from agents.perception import SIGHT_M, Point
+from lfa.agents.perception.obstacle_tracker import Tracker
+from lfa.agents.perception.scan import SIGHT_M, Point
 
 
 def arc(x: float, y: float, r: float, eye: Point) -> list[Point]:

@@ -5,9 +5,10 @@ from math import hypot, inf, nan, pi
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.perception import SIGHT_M, Surroundings, free_along, without
-from protocol.geometry import Pose2D, Twist, along_arc
-from protocol.messages import Header, LaserScan
+from lfa.agents.perception.scan import SIGHT_M, Surroundings, free_along, without
+from lfa.protocol.geometry import Pose2D, Twist, along_arc
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import LaserScan
 
 HEADER = Header("robot1", 1, 0, 0.0)
 

@@ -2,8 +2,8 @@
 
 from math import hypot
 
-from agents.retreat import OUT_M, Retreat
-from protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.agents.recovery.back_up import OUT_M, Retreat
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
 DT = 0.02
 AHEAD = Twist(0.4, 0.2)

@@ -1,7 +1,17 @@
 """S1 to S5: when a robot is stuck, and when it only waits."""
 
-from agents.stuck import CALM_S, CELL_ENTRIES, FREED_M, STANDS_S, STILL_S, TURNS, WAITING_S, Plight, Stuck
-from protocol.geometry import STILL, Pose2D, Twist
+from lfa.agents.recovery.stuck_detector import (
+    CALM_S,
+    CELL_ENTRIES,
+    FREED_M,
+    STANDS_S,
+    STILL_S,
+    TURNS,
+    WAITING_S,
+    Plight,
+    Stuck,
+)
+from lfa.protocol.geometry import STILL, Pose2D, Twist
 
 AHEAD = Twist(0.4, 0.0)
 

@@ -7,13 +7,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from deploy.look.assertions import junit
-from deploy.look.summary import Summary
-from deploy.run.faults import parse_all
-from deploy.run.simulate import run
-from protocol.mission import Refused
-from world.scenario import load
-from world.spec import Assert
+from lfa.deploy.analysis.assertions import junit
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
+from lfa.world.description.scenario import Assert
 
 FOUND = (
     #  key                      holds   does not (None: no bound is too narrow for a good run)

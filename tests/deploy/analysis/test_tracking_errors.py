@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from deploy.look.errors import RECOVERY_S_MAX, Errors, Mask, of_follower
-from deploy.look.trace import Array, Trace
+from lfa.deploy.analysis.tracking_errors import RECOVERY_S_MAX, Errors, Mask, of_follower
+from lfa.deploy.recording.mcap_reader import Array, Trace
 
 K, PHI = 1.2, 2.0 * pi / 3.0
 T = np.arange(0.0, 20.0, 0.02)

@@ -1,6 +1,6 @@
 """`lfa bench agent`: shares of a core beside a bare process that does the same on the wire."""
 
-from deploy.bench import agent
+from lfa.deploy.bench import agent
 
 
 def test_an_agents_share_is_judged_and_a_bare_processs_only_told() -> None:

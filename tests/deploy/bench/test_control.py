@@ -7,11 +7,12 @@ from math import nan
 
 import pytest
 
-import agents.formation
-from deploy.bench import control, control_string
-from deploy.bench.control_table import steady
-from deploy.bench.rows import Quantity, row, select
-from protocol.mission import Refused
+import lfa.agents.formation.formation
+from lfa.deploy.bench import control
+from lfa.deploy.bench.control_cases import string_stability
+from lfa.deploy.bench.control_cases.table import steady
+from lfa.deploy.bench.harness.rows import Quantity, row, select
+from lfa.protocol.errors import Refused
 
 
 @pytest.mark.parametrize(
@@ -62,8 +63,10 @@ def test_a_wrong_sign_of_k_omega_in_the_slot_velocity_makes_the_bench_fail(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """(21)/(22) in the opposite bearing convention, as printed."""
-    right = agents.formation.slot_velocity
-    monkeypatch.setattr(agents.formation, "slot_velocity", lambda theta, v, w, dx, dy: right(theta, v, -w, dx, dy))
+    right = lfa.agents.formation.formation.slot_velocity
+    monkeypatch.setattr(
+        lfa.agents.formation.formation, "slot_velocity", lambda theta, v, w, dx, dy: right(theta, v, -w, dx, dy)
+    )
     assert control.run(True, "clean/circle/left/*", 1) == 1
     failed = {r["name"] for r in json.loads(capsys.readouterr().out)["rows"] if not r["ok"]}
     assert "clean/circle/left/distance rms" in failed
@@ -75,8 +78,8 @@ def test_a_seed_gives_the_same_values_again() -> None:
 
 def test_dead_reckoning_amplifies_by_1_plus_K_tau_at_most_and_a_buffer_does_not() -> None:
     """Control.md 5.1: sup |G| = 1 + K tau = 1.03 at 20 ms; delayed tracking is exactly 1."""
-    schemes = {scheme.name: scheme for scheme in control_string.SCHEMES}
+    schemes = {scheme.name: scheme for scheme in string_stability.SCHEMES}
     for name, low, high in (("vel, DR, 20 ms", 1.02, 1.031), ("vel, 40 ms", 0.999, 1.001)):
-        deviations = control_string.speed_wave(schemes[name], 4.0, 3)
+        deviations = string_stability.speed_wave(schemes[name], 4.0, 3)
         hop = (deviations[3] / deviations[0]) ** (1.0 / 3.0)
         assert low < hop < high, name

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from deploy.bench import motion
-from deploy.run.simulate import run
-from protocol.mission import Refused
-from world import maps
-from world.scenario import load, shipped
+from lfa.deploy.bench import motion
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.world.description import maps
+from lfa.world.description.load import load, shipped
 
 
 def test_every_shipped_scenario_is_a_case() -> None:

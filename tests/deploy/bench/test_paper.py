@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from deploy.bench import paper, world
-from deploy.shapes.bars import Bar, Finding, Measured
+from lfa.deploy.analysis.paper.criteria import Bar, Finding, Measured
+from lfa.deploy.bench import paper, world
 
 LESS = Bar("7", "distance error outside of events", "<", 0.02, "m")
 MORE = Bar("7", "spikes with an event", ">=", 0.9)

@@ -8,12 +8,15 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from deploy.look.board import Board, Row
-from deploy.look.topic import expressions
-from deploy.look.watch import _table
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import Event, Header, Level, Message, PoseStamped, Role, Status, Term, Tracking
-from protocol.mission import Refused
+from lfa.deploy.client.team_status import Board, Row
+from lfa.deploy.view.terminal.topic import expressions
+from lfa.deploy.view.terminal.watch import _table
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Role, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Event, Level, PoseStamped, Status, Tracking
 
 LEADING, FOLLOWING = Role.LEADER, Role.FOLLOWER
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from deploy.look import schema
-from world.scenario import SCENARIOS, load
+from lfa.deploy.config import schema
+from lfa.world.description.load import SCENARIOS, load
 
 PATHS = {key.path: key for key in schema.documented()}
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.run.faults import Fault, Schedule, parse, parse_all
-from deploy.run.weather import links
-from protocol.mission import Mission, Refused
+from lfa.deploy.faults.link_faults import links
+from lfa.deploy.faults.script import Fault, Schedule, parse, parse_all
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Mission
 
 MISSION = Mission()
 

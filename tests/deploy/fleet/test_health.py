@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from deploy.fleet.health import Health
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import Header, HostStatus, PoseStamped, ProcessReport, Role, Term, Tracking
+from lfa.deploy.fleet.health import Health
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.consensus import Role, Term
+from lfa.protocol.messages.fleet import HostStatus, ProcessReport
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import PoseStamped, Tracking
 
 TERM = Term(7, 1, 1)
 

@@ -14,15 +14,15 @@ import pytest
 import yaml
 import zenoh
 
-from agents import cli as agent_cli
-from deploy.fleet import keys
-from deploy.robot import cli as driver_cli
-from protocol.bus import Inbox
-from protocol.zenoh_bus import ZenohBus
-from tests.processes.fleet import eventually
-from tests.processes.secured import free_port
+from lfa.agents import cli as agent_cli
+from lfa.deploy.fleet.security import keys
+from lfa.deploy.robot import cli as driver_cli
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from tests.rigs.lfa_runs import eventually
+from tests.rigs.secured_fleet import free_port
 
-ROOT = Path(keys.__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 TEMPLATES = ROOT / "deploy" / "fleet" / "templates"
 UNITS = sorted((TEMPLATES / "systemd").glob("*.service"))
 
@@ -192,7 +192,7 @@ def test_the_wheel_ships_the_templates() -> None:
     import io
     import zipfile
 
-    from deploy.fleet.wheel import pack
+    from lfa.deploy.fleet.remote.wheel import pack
 
     names = set(zipfile.ZipFile(io.BytesIO(pack()[1])).namelist())
     for path in TEMPLATES.rglob("*"):

@@ -9,10 +9,10 @@ import sys
 import pytest
 from msgspec.structs import replace
 
-from deploy.run.chaos import play_whole
-from deploy.run.fuzz import shrink
-from deploy.run.schedules import KINDS, LEADER, Fault, draw
-from protocol.gateway import Gateway
+from lfa.deploy.fuzz.command import shrink
+from lfa.deploy.fuzz.fault_injector import play_whole
+from lfa.deploy.fuzz.schedules import KINDS, LEADER, Fault, draw
+from lfa.protocol.lease.gateway import Gateway
 
 SEEDS = (2, 3, 4, 7, 8, 14, 15, 18, 19)
 """Small teams, which are quick; between them every kind of fault."""
@@ -28,7 +28,7 @@ def test_whole_agents_keep_every_invariant_and_every_kind_of_fault_takes_effect(
 
 
 def test_one_seed_is_one_run_under_any_hash_seed() -> None:
-    command = [sys.executable, "-c", "from deploy.cli import main; main()", "fuzz", "--whole", "--seed", "14", "-v"]
+    command = [sys.executable, "-c", "from lfa.deploy.cli import main; main()", "fuzz", "--whole", "--seed", "14", "-v"]
     told = [
         subprocess.run(command, env={**os.environ, "PYTHONHASHSEED": number}, capture_output=True, check=True).stdout
         for number in ("1", "2")

@@ -8,14 +8,15 @@ import sys
 
 import pytest
 
-from deploy.look.checkers import OneBond
-from deploy.run.chaos import play
-from deploy.run.fuzz import Tally, parse_seeds, shrink, so_far
-from deploy.run.schedules import Fault, draw, without
-from protocol.membership import first_config
-from protocol.messages import Grant, Member, Propose, Term, Version
-from protocol.mission import Mission, Refused
-from protocol.timing import timing_of
+from lfa.deploy.analysis.verification.safety import OneBond
+from lfa.deploy.fuzz.command import Tally, parse_seeds, shrink, so_far
+from lfa.deploy.fuzz.fault_injector import play
+from lfa.deploy.fuzz.schedules import Fault, draw, without
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.membership import first_config
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import Grant, Member, Propose, Term, Version
+from lfa.protocol.mission import Mission
 
 
 @pytest.mark.parametrize("start", range(0, 60, 20))
@@ -27,7 +28,7 @@ def test_schedules_keep_every_invariant(start: int) -> None:
 def test_one_seed_is_one_run_under_any_hash_seed() -> None:
     told = [
         subprocess.run(
-            [sys.executable, "-c", "from deploy.run.fuzz import _one; _one(5, True)"],
+            [sys.executable, "-c", "from lfa.deploy.fuzz.command import _one; _one(5, True)"],
             env={**os.environ, "PYTHONHASHSEED": number},
             capture_output=True,
             check=True,

@@ -1,4 +1,4 @@
-"""`deploy.run.workers`: nothing of a campaign outlives it."""
+"""`lfa.deploy.process.worker_pool`: nothing of a campaign outlives it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import pytest
 WITHIN_MS = 20_000
 CAMPAIGN = """
 import os, sys, tempfile, time
-from deploy import cli
-from deploy.run.workers import workers
+from lfa.deploy import cli
+from lfa.deploy.process.worker_pool import workers
 
 def campaign() -> None:
     with workers(1) as pool:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from deploy.run.faults import parse_all
-from deploy.run.simulate import run
-from tests.deploy.agreement import differing, recorded_ends
-from world.scenario import load
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run.simulate import run
+from lfa.world.description.load import load
+from tests.rigs.recording_agreement import differing, recorded_ends
 
 FAULTS = ("kill leader at 2 s", "restart 1 at 2.5 s")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from deploy.look import chronicle
-from deploy.look.chronicle import Failover, Line
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.event_log import Failover, Line
 
 
 def _line(t: float, robot: int, kind: str, term: tuple[int, int, int] | None = None, **data: Any) -> Line:
@@ -24,63 +24,63 @@ KILLED = [
 
 
 def test_a_reign_ends_when_its_holder_is_killed() -> None:
-    first, second = chronicle.reigns(KILLED)
+    first, second = event_log.reigns(KILLED)
     assert (first.robot_id, first.from_s, first.until_s, first.cause) == (1, 0.3, 8.0, "start")
     assert (second.robot_id, second.from_s, second.until_s, second.cause) == (2, 8.12, None, "kill")
 
 
 def test_a_failover_counts_from_the_fault() -> None:
-    (failover,) = chronicle.failovers(KILLED, chronicle.reigns(KILLED))
+    (failover,) = event_log.failovers(KILLED, event_log.reigns(KILLED))
     assert failover == Failover("kill", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
 
 
 def test_a_chain_that_not_all_have_closed_is_not_closed() -> None:
-    (failover,) = chronicle.failovers(KILLED[:-1], chronicle.reigns(KILLED[:-1]))
+    (failover,) = event_log.failovers(KILLED[:-1], event_log.reigns(KILLED[:-1]))
     assert failover.chain_ms is None
 
 
 def test_a_failover_that_never_came_is_told_as_such() -> None:
-    (failover,) = chronicle.failovers(KILLED[:2], chronicle.reigns(KILLED[:2]))
+    (failover,) = event_log.failovers(KILLED[:2], event_log.reigns(KILLED[:2]))
     assert (failover.leader, failover.first_command_ms) == (None, None)
 
 
 def test_a_fault_on_a_follower_is_no_failover() -> None:
     events = [KILLED[0], _line(5.0, 3, "fault", deed="kill")]
-    assert chronicle.failovers(events, chronicle.reigns(events)) == []
+    assert event_log.failovers(events, event_log.reigns(events)) == []
 
 
 def test_a_hand_over_is_no_failover() -> None:
     events = [KILLED[0], _line(6.0, 2, "leader_command", SECOND)]
-    reigns = chronicle.reigns(events)
+    reigns = event_log.reigns(events)
     assert [reign.cause for reign in reigns] == ["start", "handover"]
     assert reigns[0].until_s == 6.0
-    assert chronicle.failovers(events, reigns) == []
+    assert event_log.failovers(events, reigns) == []
 
 
 def test_a_lease_that_ran_out_is_named_as_the_cause() -> None:
     expired = _line(5.9, 1, "lease", FIRST, change="expired")
     events = [KILLED[0], expired, _line(6.0, 2, "leader_command", SECOND)]
-    assert chronicle.reigns(events)[1].cause == "expired"
+    assert event_log.reigns(events)[1].cause == "expired"
 
 
 def test_the_same_robot_elected_again_is_no_hand_over() -> None:
     events = [KILLED[0], _line(6.0, 1, "leader_command", (3, 1, 1))]
-    assert [reign.cause for reign in chronicle.reigns(events)] == ["start", "reelection"]
+    assert [reign.cause for reign in event_log.reigns(events)] == ["start", "reelection"]
 
 
 def test_I2_an_older_leader_command_after_a_newer_one_is_a_violation() -> None:
     events = [_line(1.0, 1, "leader_command", SECOND), _line(1.1, 2, "leader_command", FIRST)]
-    (violation,) = chronicle.terms_that_went_back(events)
+    (violation,) = event_log.terms_that_went_back(events)
     assert (violation.invariant, violation.at_s) == ("I2", 1.1)
-    assert chronicle.terms_that_went_back(KILLED) == []
+    assert event_log.terms_that_went_back(KILLED) == []
 
 
 def test_the_last_chain_is_the_newest_configs() -> None:
     late = [_line(9.0, 3, "chain", SECOND, chain=[2, 3, 1], seq=1), _line(9.1, 2, "chain", SECOND, chain=[2, 3], seq=0)]
-    assert chronicle.last_chain([*KILLED, *late]) == [2, 3, 1]
-    assert chronicle.last_chain([]) == []
+    assert event_log.last_chain([*KILLED, *late]) == [2, 3, 1]
+    assert event_log.last_chain([]) == []
 
 
 def test_what_becomes_of_the_chain_when_all_are_told_to_stop_is_not_the_runs() -> None:
     stopping = [_line(9.0, 0, "over"), _line(9.01, 2, "chain", SECOND, chain=[2], seq=1)]
-    assert chronicle.last_chain([*KILLED, *stopping]) == [2, 3]
+    assert event_log.last_chain([*KILLED, *stopping]) == [2, 3]

@@ -14,27 +14,18 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from deploy.look import chronicle, trace
-from deploy.run import channels
-from deploy.run.chunks import ChunkWriter
-from deploy.run.record import EVENTS, RECORDING, Recorder, parts
-from protocol.membership import first_config
-from protocol.messages import (
-    Event,
-    Header,
-    LaserScan,
-    LeaseNote,
-    Member,
-    Message,
-    MissionNote,
-    Nack,
-    OperatorNote,
-    Term,
-    TrueRobot,
-    Truth,
-)
-from protocol.topics import TOPICS, key
-from world.scenario import shipped
+from lfa.deploy.recording import event_log, mcap_channels, mcap_reader
+from lfa.deploy.recording.mcap_writer import ChunkWriter
+from lfa.deploy.recording.recorder import EVENTS, RECORDING, Recorder, parts
+from lfa.protocol.lease.membership import first_config
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import LeaseNote, Member, Nack, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.messages.simulation import TrueRobot, Truth
+from lfa.protocol.messages.team import Event, MissionNote, OperatorNote
+from lfa.protocol.topics import TOPICS, key
+from lfa.world.description.load import shipped
 
 HEADER = Header("robot2", 7, 3, 12.5)
 
@@ -51,7 +42,7 @@ def test_a_scans_beams_out_of_range_are_recorded(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, {})
     recorder.record(0.1, key("f", "robot2", "scan"), _scan((1.5, inf, -inf, nan)))
     recorder.close()
-    ((owner, topic, t, scan),) = trace.messages(tmp_path, frozenset({"scan"}))
+    ((owner, topic, t, scan),) = mcap_reader.messages(tmp_path, frozenset({"scan"}))
     assert (owner, topic, t) == ("robot2", "scan", 0.1)
     ranges = [float(r) for r in scan.ranges_m]
     assert ranges[:3] == [1.5, inf, -inf]
@@ -59,7 +50,7 @@ def test_a_scans_beams_out_of_range_are_recorded(tmp_path: Path) -> None:
 
 
 def test_the_schema_says_that_a_range_may_be_a_word(tmp_path: Path) -> None:
-    schema = json.loads(channels.schema(LaserScan))
+    schema = json.loads(mcap_channels.schema(LaserScan))
     items = schema["$defs"]["LaserScan"]["properties"]["ranges_m"]["items"]
     assert {"type": "number"} in items["anyOf"]
     assert {"enum": ["-inf", "inf", "nan"]} in items["anyOf"]
@@ -67,14 +58,14 @@ def test_the_schema_says_that_a_range_may_be_a_word(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("topic", TOPICS, ids=[topic.name for topic in TOPICS])
 def test_every_topic_has_a_schema_with_names(topic: object) -> None:
-    schema = json.loads(channels.schema(topic.type))  # type: ignore[attr-defined]
+    schema = json.loads(mcap_channels.schema(topic.type))  # type: ignore[attr-defined]
     assert "header" in schema["$defs"][topic.type.__name__]["properties"]  # type: ignore[attr-defined]
 
 
 def test_what_a_union_holds_keeps_its_tag() -> None:
     config = first_config(shipped()["straight"].mission)
     note = LeaseNote(HEADER, Nack(Term(1, 2, 3), Term(2, 1, 1), Member(1, 5), inf, config))
-    body = json.loads(channels.encode(note))["body"]
+    body = json.loads(mcap_channels.encode(note))["body"]
     assert body["type"] == "nack"
     assert body["remaining_s"] == "inf"
     assert body["holder"] == {"id": 1, "incarnation": 5}
@@ -82,7 +73,7 @@ def test_what_a_union_holds_keeps_its_tag() -> None:
 
 @given(ranges=st.lists(st.floats(allow_nan=False), max_size=20))
 def test_every_number_survives(ranges: list[float]) -> None:
-    read = msgspec.json.decode(channels.encode(_scan(tuple(ranges))), type=channels.shape(LaserScan))
+    read = msgspec.json.decode(mcap_channels.encode(_scan(tuple(ranges))), type=mcap_channels.shape(LaserScan))
     assert [float(r) for r in read.ranges_m] == ranges  # type: ignore[attr-defined]
 
 
@@ -96,7 +87,7 @@ def test_a_recording_cut_off_anywhere_can_be_read(part: float, tmp_path_factory:
     recorder.close()
     whole = (folder / RECORDING).read_bytes()
     (folder / RECORDING).write_bytes(whole[: int(part * len(whole))])
-    seen = trace.read(folder)
+    seen = mcap_reader.read(folder)
     for rows in seen.truth.values():
         assert (rows[:, 1] == rows[:, 0]).all()
 
@@ -121,7 +112,7 @@ def test_a_killed_recorder_loses_no_more_than_a_second(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, {})
     for step in range(226):
         recorder.record(step * 0.02, key("f", "sim", "truth"), _truth(step * 0.02))
-    assert trace.read(tmp_path).end_s > 4.5 - 1.1  # never closed
+    assert mcap_reader.read(tmp_path).end_s > 4.5 - 1.1  # never closed
 
 
 def _record_many(folder: Path, **options: int) -> Recorder:
@@ -137,7 +128,7 @@ def test_a_recording_in_several_files_is_read_as_one(tmp_path: Path) -> None:
     assert recording.files == len(parts(tmp_path)) > 2
     assert recording.messages == 3000
     assert recording.bytes == sum(path.stat().st_size for path in parts(tmp_path))
-    rows = trace.read(tmp_path).truth[1]
+    rows = mcap_reader.read(tmp_path).truth[1]
     assert rows.shape[0] == 3000
     assert (rows[1:, 0] > rows[:-1, 0]).all()
 
@@ -155,13 +146,13 @@ def test_of_several_files_the_first_and_the_newest_are_kept(tmp_path: Path) -> N
     recorder.close()
     first, newest = parts(tmp_path)
     assert first.name == RECORDING
-    assert trace.read(tmp_path).end_s > 59.0
+    assert mcap_reader.read(tmp_path).end_s > 59.0
     assert newest.name > "recording-0002.mcap"
 
 
 def test_a_killed_recorder_of_several_files_loses_no_more_than_a_second(tmp_path: Path) -> None:
     _record_many(tmp_path, split_bytes=20_000)  # never closed
-    assert trace.read(tmp_path).end_s > 59.98 - 1.1
+    assert mcap_reader.read(tmp_path).end_s > 59.98 - 1.1
 
 
 def test_an_event_is_a_line_about_the_robot_that_it_is_about(tmp_path: Path) -> None:
@@ -178,7 +169,7 @@ def test_an_event_is_a_line_about_the_robot_that_it_is_about(tmp_path: Path) -> 
 
 def test_a_last_line_cut_off_by_a_kill_is_left_out(tmp_path: Path) -> None:
     (tmp_path / EVENTS).write_bytes(b'{"t":1.0,"robot":1,"term":null,"kind":"role","from":"robot1"}\n{"t":2.0,"rob')
-    assert [line["t"] for line in chronicle.lines(tmp_path)] == [1.0]
+    assert [line["t"] for line in event_log.lines(tmp_path)] == [1.0]
 
 
 ANYTHING = st.dictionaries(st.text(), st.recursive(st.none() | st.floats() | st.text(), st.lists, max_leaves=4))
@@ -193,6 +184,6 @@ MESSAGES = [
 @settings(max_examples=200)
 @given(message=st.one_of(*MESSAGES))
 def test_every_message_becomes_an_object_of_its_schemas_type(message: Message) -> None:
-    written = channels.encode(message)
-    assert json.loads(written) == json.loads(msgspec.json.encode(channels.plain(message)))
-    msgspec.json.decode(written, type=channels.shape(type(message)))
+    written = mcap_channels.encode(message)
+    assert json.loads(written) == json.loads(msgspec.json.encode(mcap_channels.plain(message)))
+    msgspec.json.decode(written, type=mcap_channels.shape(type(message)))

@@ -8,27 +8,17 @@ from math import inf, isclose
 
 import pytest
 
-from deploy.robot.base import SimulatedBase
-from deploy.robot.driver import PERIOD_S, Driver
-from protocol.geometry import STILL, Pose2D, Twist
-from protocol.messages import (
-    Ask,
-    CmdVel,
-    Event,
-    Fence,
-    Fenced,
-    Header,
-    LaserScan,
-    LeaseNote,
-    Localization,
-    Message,
-    MissionNote,
-    Sensors,
-    Term,
-)
-from protocol.mission import Leading, Limits, Mission
-from protocol.node import PeerDown, Received, RouterLost, Stop
-from protocol.timing import timing_of
+from lfa.deploy.robot.base import SimulatedBase
+from lfa.deploy.robot.driver import PERIOD_S, Driver
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Fence, Fenced, LeaseNote, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel, LaserScan, Localization, Sensors
+from lfa.protocol.messages.team import Ask, Event, MissionNote
+from lfa.protocol.mission import Leading, Limits, Mission
+from lfa.protocol.node import PeerDown, Received, RouterLost, Stop
 from tests.test_imports import NEVER_ON_A_ROBOT
 
 MISSION = Mission(robots=(1, 2, 3), leading=Leading(route_m=((5.0, 0.0),)))
@@ -181,13 +171,13 @@ def test_told_to_stop_it_brakes_and_is_done() -> None:
 
 def test_a_driver_needs_the_base_install_only() -> None:
     unwanted = tuple(name for name in NEVER_ON_A_ROBOT if name != "deploy")
-    code = f"import deploy.robot.cli, sys; print([name for name in {unwanted} if name in sys.modules])"
+    code = f"import lfa.deploy.robot.cli, sys; print([name for name in {unwanted} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=True)
     assert done.stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize("at", ["1,2", "a,b,c", "", "nan,0,0"])
 def test_a_place_that_is_none_is_refused_in_one_line(at: str) -> None:
-    command = [sys.executable, "-m", "deploy.robot.cli", "--id", "2", f"--at={at}"]
+    command = [sys.executable, "-P", "-m", "lfa.deploy.robot.cli", "--id", "2", f"--at={at}"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and "must be x,y,theta" in done.stderr

@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from deploy.look import errors, trace
-from deploy.look.summary import Summary, read
-from deploy.run.faults import parse_all
-from deploy.run.folder import make, scenario_of
-from deploy.run.simulate import run
-from protocol import journal
-from protocol.mission import Refused
-from world.scenario import draw, load
+from lfa.deploy.analysis import tracking_errors
+from lfa.deploy.analysis.summary import Summary, read
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.recording import mcap_reader
+from lfa.deploy.recording.run_folder import make, scenario_of
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.protocol.runtime import journal
+from lfa.world.description.load import draw, load
 
 SHORT = ("mission.leading.route_m=[[2.0, 0.0]]",)
 
@@ -32,7 +33,7 @@ def _summary(folder: Path, name: str = "straight", *overrides: str, seed: int = 
 def _bytes(folder: Path, hash_seed: str) -> tuple[bytes, bytes]:
     """events.jsonl and recording.mcap of one run in a process with that hash seed."""
     code = (
-        "import sys; from pathlib import Path; from deploy.run.simulate import run; from world.scenario import load;"
+        "import sys; from pathlib import Path; from lfa.deploy.run.simulate import run; from lfa.world.description.load import load;"
         f"run(load('leader_killed', {list(SHORT)!r}), 5, Path(sys.argv[1]))"
     )
     environment = os.environ | {"PYTHONHASHSEED": hash_seed}
@@ -66,9 +67,9 @@ def test_two_seeds_differ_where_there_is_noise(tmp_path: Path) -> None:
 def test_without_noise_followers_keep_a_tenth_of_a_millimetre_at_steady_speed(tmp_path: Path) -> None:
     summary = _summary(tmp_path / "run", "straight", "mission.leading.route_m=[[10.0, 0.0]]")
     assert summary.outcome == "goal_reached"
-    seen = trace.read(tmp_path / "run")
+    seen = mcap_reader.read(tmp_path / "run")
     for robot in (2, 3, 4):
-        followed = errors.of_follower(seen, robot)
+        followed = tracking_errors.of_follower(seen, robot)
         assert followed is not None
         steady = (followed.t > 10.0) & (followed.t < 18.0)
         assert np.sqrt(np.mean(followed.distance[steady] ** 2)) < 1e-4, f"robot {robot}: lfa sim straight"
@@ -131,7 +132,7 @@ def test_every_node_has_a_journal_and_every_robot_a_trace(tmp_path: Path) -> Non
     heading, entries = journal.read(names["robot2-1.bin"])
     assert heading.node == "robot2"
     assert sum(1 for _ in entries) > 100
-    assert set(trace.read(tmp_path / "run").truth) == {1, 2, 3, 4}
+    assert set(mcap_reader.read(tmp_path / "run").truth) == {1, 2, 3, 4}
 
 
 def test_a_run_does_not_write_over_another(tmp_path: Path) -> None:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from deploy.run.referee import REST_S, Referee
-from protocol.messages import Event, Header, Message, Term, TrueRobot, Truth
-from world.scenario import Scenario, load
+from lfa.deploy.run.termination import REST_S, Referee
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.simulation import TrueRobot, Truth
+from lfa.protocol.messages.team import Event
+from lfa.world.description.load import Scenario, load
 
 
 def _scenario() -> Scenario:

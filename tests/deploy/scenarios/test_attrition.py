@@ -7,10 +7,11 @@ from itertools import permutations
 import pytest
 from msgspec import structs
 
-from deploy.run.network import Weather
-from deploy.run.schedules import draw
-from deploy.run.whole import Whole
-from protocol.messages import Event, Message
+from lfa.deploy.fuzz.agent_simulation import Whole
+from lfa.deploy.fuzz.network import Weather
+from lfa.deploy.fuzz.schedules import draw
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.team import Event
 
 ROBOTS = (1, 2, 3, 4)
 ROAD_M = 4.0

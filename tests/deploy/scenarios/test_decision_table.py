@@ -11,16 +11,18 @@ from typing import Any
 import pytest
 from msgspec import Struct
 
-from agents.agent import Agent
-from agents.decisions import TABLE
-from protocol.geometry import Pose2D
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Event, Message, Truth
-from protocol.node import Node
-from protocol.witness import Witness
-from world.scenario import load
-from world.simulator import Simulator
-from world.world import World
+from lfa.agents.agent import Agent
+from lfa.agents.avoidance.decision import TABLE
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.world.description.load import load
+from lfa.world.simulator import Simulator
+from lfa.world.world import World
 
 GOAL_X = 5.0
 CORRIDOR = "world.walls_m=[[-1.5,0.55,7.0,0.55],[-1.5,-0.55,7.0,-0.55]]"

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from deploy.look.mapped import map_of
-from deploy.run.simulate import run
-from protocol.mission import Refused
-from world import maps
-from world.scenario import load
+from lfa.deploy.analysis.verification.explored_map import map_of
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.world.description import maps
+from lfa.world.description.load import load
 
 DEPOT = next(
     (path for up in Path(__file__).resolve().parents if (path := up / "shared/data/maps/depot.yaml").is_file()), None

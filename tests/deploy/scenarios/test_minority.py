@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 from msgspec import structs
 
-from deploy.run.network import Weather
-from deploy.run.schedules import draw
-from deploy.run.whole import Whole
-from protocol.messages import Message, Truth
-from protocol.mission import robot_id_of
-from protocol.timing import CONTROL_PERIOD_S
+from lfa.deploy.fuzz.agent_simulation import Whole
+from lfa.deploy.fuzz.network import Weather
+from lfa.deploy.fuzz.schedules import draw
+from lfa.protocol.lease.timing import CONTROL_PERIOD_S
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.names import robot_id_of
 
 CUT_S = 4.0
 """All four drive at cruising speed by then."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.run.simulate import run
-from world.scenario import load
+from lfa.deploy.run.simulate import run
+from lfa.world.description.load import load
 
 SIGHT = ("world.ground.reach_m=1.0", "world.ground.increment_m=0.02")
 

@@ -8,35 +8,38 @@ from typing import Any, ClassVar
 
 import pytest
 
-from agents.agent import Agent
-from agents.around import TRAP_M
-from deploy.look import chronicle
-from deploy.look.summary import Summary
-from deploy.run.simulate import run
-from protocol.geometry import Pose2D
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.messages import Header, Message, ObstacleNote, Truth
-from protocol.node import Envelope, Node, Received
-from protocol.topics import key
-from protocol.witness import Witness
-from world.scenario import load
-from world.simulator import Simulator
-from world.world import World
+from lfa.agents.agent import Agent
+from lfa.agents.perception.obstacle_model import TRAP_M
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.recording import event_log
+from lfa.deploy.run.simulate import run
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import ObstacleNote
+from lfa.protocol.node import Envelope, Node, Received
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.topics import key
+from lfa.world.description.load import load
+from lfa.world.simulator import Simulator
+from lfa.world.world import World
 
 HANDOVER_S = 10.0
-Trapped = tuple[Summary, list[chronicle.Line]]
+Trapped = tuple[Summary, list[event_log.Line]]
 
 
 @pytest.fixture(scope="module")
 def trapped(tmp_path_factory: pytest.TempPathFactory) -> Trapped:
     ended = run(load("dead_end"), 1, tmp_path_factory.mktemp("trapped") / "run")
-    return ended.summary, chronicle.lines(ended.folder)
+    return ended.summary, event_log.lines(ended.folder)
 
 
 def test_the_trapped_leader_hands_over_within_ten_seconds(trapped: Trapped) -> None:
     summary, events = trapped
-    met = next(e["t"] for e in chronicle.of_kind(events, "decision") if e["robot"] == 1)
-    stuck = next(e for e in chronicle.of_kind(events, "stuck") if e["robot"] == 1)
+    met = next(e["t"] for e in event_log.of_kind(events, "decision") if e["robot"] == 1)
+    stuck = next(e for e in event_log.of_kind(events, "stuck") if e["robot"] == 1)
     assert stuck["reason"].startswith("S2"), "lfa sim dead_end --seed 1"
     assert [(reign.robot_id, reign.cause) for reign in summary.leaders] == [(1, "start"), (2, "handed_over")]
     assert summary.leaders[1].from_s - met <= HANDOVER_S
@@ -44,9 +47,9 @@ def test_the_trapped_leader_hands_over_within_ten_seconds(trapped: Trapped) -> N
 
 def test_it_is_left_out_while_it_is_stuck_and_comes_in_again_at_the_tail(trapped: Trapped) -> None:
     _, events = trapped
-    chains = [e["chain"] for e in chronicle.of_kind(events, "chain") if e["robot"] == 2]
+    chains = [e["chain"] for e in event_log.of_kind(events, "chain") if e["robot"] == 2]
     assert [2, 3, 4] in chains
-    assert chronicle.last_chain(events) == [2, 3, 4, 1]
+    assert event_log.last_chain(events) == [2, 3, 4, 1]
 
 
 def test_all_four_reach_the_goal_without_contact(trapped: Trapped) -> None:

@@ -13,14 +13,19 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-from deploy.look import page, playback, report, summary, trace, view
-from deploy.look.onlooker import Fleet, listen
-from deploy.look.readings import Run
-from deploy.run.simulate import run
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.deploy.analysis import summary
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.verification import playback
+from lfa.deploy.client.session import Fleet, listen
+from lfa.deploy.recording import mcap_reader
+from lfa.deploy.run.simulate import run
+from lfa.deploy.view.report import command as report
+from lfa.deploy.view.report import page
+from lfa.deploy.view.rerun import command as view
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
 
-LFA = "from deploy.cli import main; main()"
+LFA = "from lfa.deploy.cli import main; main()"
 WITHOUT = "import sys; sys.modules[{0!r}] = None; sys.argv = ['lfa', *sys.argv[1:]]; "
 
 
@@ -36,7 +41,7 @@ def copied(folder: Path, tmp_path: Path) -> Path:
 
 def test_a_foreign_recording_is_refused_by_every_view(copied: Path) -> None:
     (copied / "recording.mcap").write_bytes(b"RIFF, and much more of another kind")
-    for look in (view.converted, trace.read, lambda where: report.html([where])):
+    for look in (view.converted, mcap_reader.read, lambda where: report.html([where])):
         with pytest.raises(Refused, match="no recording: must be an MCAP file that lfa wrote"):
             look(copied)
     with pytest.raises(Refused, match="no recording"):
@@ -128,7 +133,7 @@ def test_without_a_display_a_picture_is_made_beside_the_recording(
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(shutil, "which", lambda _name: None)  # no Xvfb either: drawn without the viewer
-    assert view.command(copied) == 0
+    assert report.command(copied) == 0
     said = capsys.readouterr()
     assert str(copied / "view.png") in said.out
     assert said.err.startswith("no display here")

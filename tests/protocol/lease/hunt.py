@@ -1,4 +1,4 @@
-"""After how many schedules of `lfa fuzz` each planted bug is noticed: `python -m tests.protocol.hunt [--seeds 100]`.
+"""After how many schedules of `lfa fuzz` each planted bug is noticed: `python -m tests.protocol.lease.hunt [--seeds 100]`.
 
 Prints a row a bug, as Markdown, as they come. Random schedules alone miss what a directed test sees at once: that is
 what the table is for.
@@ -14,9 +14,9 @@ from types import FrameType
 
 import pytest
 
-from deploy.run.chaos import play
-from deploy.run.schedules import draw
-from tests.protocol.planted import PLANTED, Bug
+from lfa.deploy.fuzz.fault_injector import play
+from lfa.deploy.fuzz.schedules import draw
+from tests.protocol.lease.planted import PLANTED, Bug
 
 SEEDS = 100
 SCHEDULE_S_MAX = 60

@@ -1,5 +1,5 @@
 """Planted bugs: each rule broken on purpose, as a switch that exists in tests only, with the directed test that must
-notice. `python -m tests.protocol.hunt` tells after how many schedules of `lfa fuzz` each is noticed as well.
+notice. `python -m tests.protocol.lease.hunt` tells after how many schedules of `lfa fuzz` each is noticed as well.
 
 The usual bugs are those of the design's section 8, the mutants those of its section 7, the wordings those that failed
 at the end of its section 10.
@@ -10,9 +10,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from tests.protocol import plants_of_team as team
-from tests.protocol import plants_of_time as time
-from tests.protocol.plants_of_time import Plant
+from tests.protocol.lease import plants_of_team as team
+from tests.protocol.lease import plants_of_time as time
+from tests.protocol.lease.plants_of_time import Plant
 
 
 class Bug(NamedTuple):
@@ -28,7 +28,7 @@ class Bug(NamedTuple):
     def directed(self) -> None:
         """Run the directed test. Raises AssertionError when it notices something."""
         module, _, name = self.caught_by.partition("::")
-        getattr(import_module(f"tests.protocol.test_{module}"), name)(*self.case)
+        getattr(import_module(f"tests.protocol.lease.test_{module}"), name)(*self.case)
 
 
 # fmt: off

@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
-import protocol.holder
-import protocol.lease
-import protocol.membership
-import protocol.quorum
-import protocol.reshape
-from protocol.acceptor import Acceptor
-from protocol.candidate import Candidate
-from protocol.election import Election
-from protocol.holder import Holder
-from protocol.lease import Lease
-from protocol.messages import Config, Member, Propose, Term
-from protocol.peers import Peers
+import lfa.protocol.lease.holder
+import lfa.protocol.lease.lease
+import lfa.protocol.lease.membership
+import lfa.protocol.lease.quorum
+import lfa.protocol.lease.reconfiguration
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.candidate import Candidate
+from lfa.protocol.lease.election import Election
+from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.messages.consensus import Config, Member, Propose, Term
 
 
 def hint_taken_as_proof(patch: pytest.MonkeyPatch) -> None:
@@ -32,7 +32,7 @@ def hint_taken_as_proof(patch: pytest.MonkeyPatch) -> None:
 
 
 def announced_with_the_first_grant(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(protocol.holder, "quorum_time", lambda config, times: max(times.values()))
+    patch.setattr(lfa.protocol.lease.holder, "quorum_time", lambda config, times: max(times.values()))
 
 
 def amnesiac_votes(patch: pytest.MonkeyPatch) -> None:
@@ -45,17 +45,17 @@ def amnesiac_votes(patch: pytest.MonkeyPatch) -> None:
         count = sum(v.id in here for v in voters)
         return 2 * count > len(voters) or (2 * count == len(voters) and tie is not None and tie.id in here)
 
-    patch.setattr(protocol.quorum, "is_half", is_half)
+    patch.setattr(lfa.protocol.lease.quorum, "is_half", is_half)
 
 
 def voters_change_without_a_joint_config(patch: pytest.MonkeyPatch) -> None:
-    honest = protocol.membership.rewritten
+    honest = lfa.protocol.lease.membership.rewritten
 
     def rewritten(config: Config, *arguments: Any) -> Config:
         newer = honest(config, *arguments)
         return Config(newer.version, newer.voters, newer.tie, None, newer.chain)
 
-    patch.setattr(protocol.reshape, "rewritten", rewritten)
+    patch.setattr(lfa.protocol.lease.reconfiguration, "rewritten", rewritten)
 
 
 def full_house_of_a_majority(patch: pytest.MonkeyPatch) -> None:
@@ -67,14 +67,14 @@ def full_house_of_a_majority(patch: pytest.MonkeyPatch) -> None:
 
 
 def chain_forgets_its_order(patch: pytest.MonkeyPatch) -> None:
-    honest = protocol.membership.led_by
+    honest = lfa.protocol.lease.membership.led_by
 
     def led_by(*arguments: Any, **named: Any) -> Config:
         config = honest(*arguments, **named)
         head, *rest = config.chain
         return Config(config.version, config.voters, config.tie, config.previous, (head, *reversed(rest)))
 
-    patch.setattr(protocol.lease, "led_by", led_by)
+    patch.setattr(lfa.protocol.lease.lease, "led_by", led_by)
 
 
 def restart_votes_at_once(patch: pytest.MonkeyPatch) -> None:
@@ -110,20 +110,22 @@ def hand_over_writes_a_config(patch: pytest.MonkeyPatch) -> None:
         honest(self, holder, now, effects)
         gift = self._stopping.gift
         if gift is not None:
-            written = protocol.membership.led_by(self.config, gift.holder, gift.term, lambda m: False, keep_leader=True)
+            written = lfa.protocol.lease.membership.led_by(
+                self.config, gift.holder, gift.term, lambda m: False, keep_leader=True
+            )
             self._stopping.gift = Propose(gift.term, written, gift.round, gift.holder, nonce=gift.nonce)
 
     patch.setattr(Lease, "_hand_over", hand_over)
 
 
 def full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
-    honest = protocol.membership.of_full_house
+    honest = lfa.protocol.lease.membership.of_full_house
 
     def of_full_house(*arguments: Any) -> Config:
         config = honest(*arguments)
         return Config(config.version, config.voters, config.tie, None, config.chain)
 
-    patch.setattr(protocol.lease, "of_full_house", of_full_house)
+    patch.setattr(lfa.protocol.lease.lease, "of_full_house", of_full_house)
 
 
 def replaced_lives_make_a_full_house(patch: pytest.MonkeyPatch) -> None:
@@ -135,7 +137,7 @@ def given_up_restamp_is_released(patch: pytest.MonkeyPatch) -> None:
         candidate, self._candidate = self._candidate, None
         if candidate is not None and candidate.holder is not None:
             self._acceptor.release(candidate.term)
-            effects.append(protocol.lease.Send("all", protocol.lease.Release(candidate.term)))
+            effects.append(lfa.protocol.lease.lease.Send("all", lfa.protocol.lease.lease.Release(candidate.term)))
 
     patch.setattr(Lease, "_drop_candidate", drop)
 

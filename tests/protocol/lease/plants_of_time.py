@@ -8,19 +8,19 @@ from typing import Any
 import pytest
 from msgspec import structs
 
-import protocol.holder
-from deploy.run import schedules
-from deploy.run.arena import Arena
-from deploy.run.network import Clock
-from protocol.acceptor import Acceptor
-from protocol.effects import StepDown
-from protocol.gateway import Gateway
-from protocol.holder import Holder
-from protocol.lease import Lease
-from protocol.messages import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
-from protocol.stopping import Stopping
-from protocol.timing import Timing
-from tests.protocol import test_usual_bugs
+import lfa.protocol.lease.holder
+from lfa.deploy.fuzz import schedules
+from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.deploy.fuzz.network import Clock
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.effects import StepDown
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.step_down import Stopping
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
+from tests.protocol.lease import test_usual_bugs
 
 Plant = Callable[[pytest.MonkeyPatch], None]
 
@@ -165,7 +165,7 @@ def promises_up_to_a_released_term(patch: pytest.MonkeyPatch) -> None:
 
 
 def one_try_a_heartbeat(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(protocol.holder, "RETRY_HEARTBEATS", 1.0)
+    patch.setattr(lfa.protocol.lease.holder, "RETRY_HEARTBEATS", 1.0)
 
 
 def needs_fence_without_the_holder(patch: pytest.MonkeyPatch) -> None:

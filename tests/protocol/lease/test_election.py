@@ -4,26 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.run.arena import Arena
-from protocol.effects import BecomeLeader
-from protocol.election import COLD_START_S
-from protocol.lease import Lease
-from protocol.messages import (
-    Config,
-    Hello,
-    Member,
-    Prepare,
-    Propose,
-    Release,
-    Term,
-    Version,
-)
-from protocol.mission import Leading, Mission
-from tests.protocol.scenes import (
-    STD,
-    Team,
-    sent,
-)
+from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.protocol.lease.effects import BecomeLeader
+from lfa.protocol.lease.election import COLD_START_S
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.messages.consensus import Config, Hello, Member, Prepare, Propose, Release, Term, Version
+from lfa.protocol.mission import Leading, Mission
+from tests.rigs.lease_scenes import STD, Team, sent
 
 
 def test_e5_whatever_the_order_of_starting_the_head_of_the_chain_leads_first() -> None:

@@ -4,23 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.messages import (
-    Nack,
-    Prepare,
-    Promise,
-    Version,
-)
-from tests.protocol.scenes import (
-    HIGH,
-    LOW,
-    STD,
-    A,
-    B,
-    Team,
-    ask,
-    config_of,
-    voter,
-)
+from lfa.protocol.messages.consensus import Nack, Prepare, Promise, Version
+from tests.rigs.lease_scenes import HIGH, LOW, STD, A, B, Team, ask, config_of, voter
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from protocol.mission import Leading, Mission
-from tests.protocol.scenes import (
-    TEAM,
-    Team,
-)
+from lfa.protocol.mission import Leading, Mission
+from tests.rigs.lease_scenes import TEAM, Team
 
 
 def blacked_out(*remembering: int, off: tuple[int, ...] = (4,)) -> Team:

@@ -2,10 +2,12 @@
 
 import pytest
 
-from protocol.gateway import Gateway
-from protocol.geometry import STILL, Twist
-from protocol.messages import CmdVel, Fence, GatewayStamp, Header, Term
-from protocol.timing import timing_of
+from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import Fence, GatewayStamp, Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
 
 STD = timing_of("std")
 GO = Twist(0.5, 0.1)

@@ -6,32 +6,14 @@ from itertools import pairwise
 
 import pytest
 
-from deploy.look.liveness import Steady
-from deploy.run.arena import Arena
-from deploy.run.chaos import play
-from deploy.run.network import Weather
-from deploy.run.schedules import Schedule
-from protocol.effects import BecomeLeader, LeaseExtended, StepDown
-from protocol.messages import (
-    Grant,
-    Hello,
-    Member,
-    Propose,
-    Role,
-    Term,
-    Version,
-)
-from tests.protocol.scenes import (
-    LOW,
-    OTHERS,
-    STD,
-    Team,
-    alone,
-    elected,
-    proposed,
-    sent,
-    voter,
-)
+from lfa.deploy.analysis.verification.liveness import Steady
+from lfa.deploy.fuzz.fault_injector import play
+from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.deploy.fuzz.network import Weather
+from lfa.deploy.fuzz.schedules import Schedule
+from lfa.protocol.lease.effects import BecomeLeader, LeaseExtended, StepDown
+from lfa.protocol.messages.consensus import Grant, Hello, Member, Propose, Role, Term, Version
+from tests.rigs.lease_scenes import LOW, OTHERS, STD, Team, alone, elected, proposed, sent, voter
 
 
 def test_e2_bug_1_the_lease_runs_from_when_it_was_asked_for_not_from_the_grant() -> None:

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.mission import Leading, Mission
-from tests.protocol.scenes import (
-    STD,
-    Team,
-)
+from lfa.protocol.mission import Leading, Mission
+from tests.rigs.lease_scenes import STD, Team
 
 
 def test_e8_a_silent_follower_leaves_the_chain_after_t_chain_and_the_order_stays() -> None:

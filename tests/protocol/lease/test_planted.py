@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.protocol.planted import PLANTED, Bug
+from tests.protocol.lease.planted import PLANTED, Bug
 
-PAGE = Path(__file__).parents[2] / "protocol" / "README.md"
+PAGE = Path(__file__).parents[3] / "protocol" / "README.md"
 TESTS = "".join(path.read_text() for path in sorted(Path(__file__).parent.glob("test_*.py")))
 USUAL_BUGS, WORDINGS = 15, 10
 

@@ -5,8 +5,8 @@ from random import Random
 
 import pytest
 
-from protocol.messages import NO_TERM, Config, Electorate, Member, Version
-from protocol.quorum import electors, is_half, is_quorum, quorum_time
+from lfa.protocol.lease.quorum import electors, is_half, is_quorum, quorum_time
+from lfa.protocol.messages.consensus import NO_TERM, Config, Electorate, Member, Version
 
 
 def members(*ids: int) -> tuple[Member, ...]:

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from protocol.acceptor import Acceptor
-from protocol.holder import Holder
-from protocol.lease import Lease
-from protocol.messages import Grant, Hello, LeaseBody, Member, Nack, Prepare, Promise, Propose, Release, Term, Version
-from protocol.timing import CLOCK_RATE_ERROR
-from tests.protocol.scenes import (
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.holder import Holder
+from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
+from lfa.protocol.messages.consensus import (
+    Grant,
+    Hello,
+    LeaseBody,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Release,
+    Term,
+    Version,
+)
+from tests.rigs.lease_scenes import (
     HIGH,
     LOW,
     OLD,

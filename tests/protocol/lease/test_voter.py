@@ -4,29 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.acceptor import Acceptor
-from protocol.membership import first_config
-from protocol.messages import (
-    Grant,
-    Nack,
-    Prepare,
-    Promise,
-    Propose,
-    Term,
-    Version,
-)
-from tests.protocol.scenes import (
-    HIGH,
-    LOW,
-    OLD,
-    STD,
-    TEAM,
-    A,
-    B,
-    ask,
-    config_of,
-    voter,
-)
+from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.membership import first_config
+from lfa.protocol.messages.consensus import Grant, Nack, Prepare, Promise, Propose, Term, Version
+from tests.rigs.lease_scenes import HIGH, LOW, OLD, STD, TEAM, A, B, ask, config_of, voter
 
 
 def test_e1_a_process_that_starts_promises_nothing_for_the_longest_bond() -> None:

@@ -6,47 +6,64 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol import messages as m
-from protocol.geometry import Pose2D, Twist
-from protocol.messages import BadMessage, Header, Term, decode, encode
-from protocol.topics import TOPICS
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.consensus import (
+    Config,
+    GatewayStamp,
+    Grant,
+    Grantee,
+    Hello,
+    LeaseNote,
+    Member,
+    Prepare,
+    Promise,
+    Propose,
+    Role,
+    Term,
+    Version,
+)
+from lfa.protocol.messages.header import MESSAGE_BYTES_MAX, Header
+from lfa.protocol.messages.robot import CmdVel, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.team import Delay, Event, FormationNote, PlanNote, PoseStamped, Slot, TableRow
+from lfa.protocol.topics import TOPICS
 
 HEADER = Header("robot1", 5, 7, 12.5)
 TERM = Term(3, 1, 5)
-GATEWAY = m.GatewayStamp(9, 12.48)
-CONFIG = m.Config(m.Version(TERM, 1), (m.Member(1, 5), m.Member(0, 2)), m.Member(0, 2), None, (m.Member(1, 5),))
+GATEWAY = GatewayStamp(9, 12.48)
+CONFIG = Config(Version(TERM, 1), (Member(1, 5), Member(0, 2)), Member(0, 2), None, (Member(1, 5),))
 
-SAMPLES: list[m.Message] = [
-    m.PoseStamped(HEADER, 1.0, 2.0, 0.0, 0.5, Twist(0.5, 0.1), 12.0, m.Role.LEADER, TERM),
-    m.CmdVel(HEADER, Twist(0.5, -0.2), TERM, 1, True, GATEWAY),
-    m.Sensors(HEADER, Pose2D(1.0, 2.0, 3.0), Twist(0.1, 0.2), 4.0, GATEWAY, TERM),
-    m.LeaseNote(HEADER, m.Prepare(TERM, CONFIG.version)),
-    m.LeaseNote(HEADER, m.Promise(TERM, CONFIG, m.Grantee(TERM, m.Member(1, 5)), False)),
-    m.LeaseNote(HEADER, m.Propose(TERM, CONFIG, 4, m.Member(1, 5), (TERM,), 1.5)),
-    m.LeaseNote(HEADER, m.Hello(None)),
-    m.TableRow(HEADER, 1.0, 2.0, 0.0, 0.5, 3.0, m.Role.FOLLOWER, (m.Delay(2, 0.001),)),
-    m.PlanNote(HEADER, ((0.0, 1.0), (2.0, 1.5)), 0.1, (-1.0, -2.0), 2, bytes([0, 1, 2, 1])),
-    m.Event(HEADER, "decision", None, {"action": "left", "free_m": 0.5}),
+SAMPLES: list[Message] = [
+    PoseStamped(HEADER, 1.0, 2.0, 0.0, 0.5, Twist(0.5, 0.1), 12.0, Role.LEADER, TERM),
+    CmdVel(HEADER, Twist(0.5, -0.2), TERM, 1, True, GATEWAY),
+    Sensors(HEADER, Pose2D(1.0, 2.0, 3.0), Twist(0.1, 0.2), 4.0, GATEWAY, TERM),
+    LeaseNote(HEADER, Prepare(TERM, CONFIG.version)),
+    LeaseNote(HEADER, Promise(TERM, CONFIG, Grantee(TERM, Member(1, 5)), False)),
+    LeaseNote(HEADER, Propose(TERM, CONFIG, 4, Member(1, 5), (TERM,), 1.5)),
+    LeaseNote(HEADER, Hello(None)),
+    TableRow(HEADER, 1.0, 2.0, 0.0, 0.5, 3.0, Role.FOLLOWER, (Delay(2, 0.001),)),
+    PlanNote(HEADER, ((0.0, 1.0), (2.0, 1.5)), 0.1, (-1.0, -2.0), 2, bytes([0, 1, 2, 1])),
+    Event(HEADER, "decision", None, {"action": "left", "free_m": 0.5}),
 ]
 
 
 @pytest.mark.parametrize("message", SAMPLES, ids=lambda message: type(message).__name__)
-def test_what_is_said_arrives_as_it_was_said(message: m.Message) -> None:
+def test_what_is_said_arrives_as_it_was_said(message: Message) -> None:
     assert decode(encode(message), type(message)) == message
 
 
 def test_heights_without_a_reading_arrive_as_such_and_the_lines_places_are_finite() -> None:
     heights = ((0.0, math.nan, -math.inf), (0.01, -0.02, 0.0))
-    ground = m.GroundProfile(HEADER, 0.1, 0.05, (0.12, -0.12), heights)
-    read = decode(encode(ground), m.GroundProfile)
+    ground = GroundProfile(HEADER, 0.1, 0.05, (0.12, -0.12), heights)
+    read = decode(encode(ground), GroundProfile)
     assert str(read) == str(ground)  # nan differs from itself, its name does not
     with pytest.raises(BadMessage, match="float"):
-        decode(encode(m.GroundProfile(HEADER, 0.1, 0.05, (math.nan, 0.0), heights)), m.GroundProfile)
+        decode(encode(GroundProfile(HEADER, 0.1, 0.05, (math.nan, 0.0), heights)), GroundProfile)
 
 
 def test_out_of_range_beams_arrive_as_infinities_and_bad_ones_as_nan() -> None:
-    scan = m.LaserScan(HEADER, 0.0, 0.1, 0.05, 8.0, (math.inf, -math.inf, math.nan, 1.5))
-    ranges = decode(encode(scan), m.LaserScan).ranges_m  # type: ignore[union-attr]
+    scan = LaserScan(HEADER, 0.0, 0.1, 0.05, 8.0, (math.inf, -math.inf, math.nan, 1.5))
+    ranges = decode(encode(scan), LaserScan).ranges_m  # type: ignore[union-attr]
     assert ranges[:2] == (math.inf, -math.inf)
     assert math.isnan(ranges[2])
     assert ranges[3] == 1.5
@@ -60,7 +77,7 @@ def test_random_bytes_are_refused_on_every_topic(payload: bytes) -> None:
 
 
 @given(st.sampled_from(SAMPLES), st.data())
-def test_truncated_messages_are_refused(message: m.Message, data: st.DataObject) -> None:
+def test_truncated_messages_are_refused(message: Message, data: st.DataObject) -> None:
     payload = encode(message)
     cut = data.draw(st.integers(0, len(payload) - 1))
     with pytest.raises(BadMessage):
@@ -68,7 +85,7 @@ def test_truncated_messages_are_refused(message: m.Message, data: st.DataObject)
 
 
 @given(st.sampled_from(SAMPLES), st.data())
-def test_one_flipped_byte_is_refused_or_decodes_to_a_finite_message(message: m.Message, data: st.DataObject) -> None:
+def test_one_flipped_byte_is_refused_or_decodes_to_a_finite_message(message: Message, data: st.DataObject) -> None:
     payload = bytearray(encode(message))
     payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
     try:
@@ -80,14 +97,14 @@ def test_one_flipped_byte_is_refused_or_decodes_to_a_finite_message(message: m.M
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_numbers_that_a_core_would_compute_with_are_finite(bad: float) -> None:
-    wrong: list[m.Message] = [
-        m.PoseStamped(HEADER, bad, 2.0, 0.0, 0.5, Twist(), 12.0, m.Role.LEADER, TERM),
-        m.CmdVel(HEADER, Twist(bad, 0.0), TERM, 1, True, GATEWAY),
-        m.CmdVel(HEADER, Twist(), TERM, 1, True, m.GatewayStamp(1, bad)),
-        m.Localization(Header("robot1", 1, 1, bad), Pose2D()),
-        m.LeaseNote(HEADER, m.Grant(TERM, 1, CONFIG.version, bad)),
-        m.FormationNote(HEADER, TERM, 1, (m.Slot(2, bad, 3.0),)),
-        m.PlanNote(HEADER, ((0.0, bad),), 0.1, (0.0, 0.0), 1, b"1"),
+    wrong: list[Message] = [
+        PoseStamped(HEADER, bad, 2.0, 0.0, 0.5, Twist(), 12.0, Role.LEADER, TERM),
+        CmdVel(HEADER, Twist(bad, 0.0), TERM, 1, True, GATEWAY),
+        CmdVel(HEADER, Twist(), TERM, 1, True, GatewayStamp(1, bad)),
+        Localization(Header("robot1", 1, 1, bad), Pose2D()),
+        LeaseNote(HEADER, Grant(TERM, 1, CONFIG.version, bad)),
+        FormationNote(HEADER, TERM, 1, (Slot(2, bad, 3.0),)),
+        PlanNote(HEADER, ((0.0, bad),), 0.1, (0.0, 0.0), 1, b"1"),
     ]
     for message in wrong:
         with pytest.raises(BadMessage):
@@ -96,12 +113,12 @@ def test_numbers_that_a_core_would_compute_with_are_finite(bad: float) -> None:
 
 @pytest.mark.parametrize("n", [-1, 2**53 + 1, 2**63, 2**64 - 1])
 def test_a_count_that_none_could_add_to_and_say_is_refused(n: int) -> None:
-    wrong: list[m.Message] = [
-        m.LeaseNote(HEADER, m.Prepare(Term(n, 1, 5), CONFIG.version)),
-        m.LeaseNote(HEADER, m.Propose(TERM, CONFIG, n, m.Member(1, 5))),
-        m.LeaseNote(Header("robot1", n, 7, 12.5), m.Hello(None)),
-        m.FormationNote(HEADER, TERM, n, ()),
-        m.CmdVel(HEADER, Twist(), Term(3, n, 5), 1, True, GATEWAY),
+    wrong: list[Message] = [
+        LeaseNote(HEADER, Prepare(Term(n, 1, 5), CONFIG.version)),
+        LeaseNote(HEADER, Propose(TERM, CONFIG, n, Member(1, 5))),
+        LeaseNote(Header("robot1", n, 7, 12.5), Hello(None)),
+        FormationNote(HEADER, TERM, n, ()),
+        CmdVel(HEADER, Twist(), Term(3, n, 5), 1, True, GATEWAY),
     ]
     for message in wrong:
         with pytest.raises(BadMessage, match="int"):
@@ -111,37 +128,37 @@ def test_a_count_that_none_could_add_to_and_say_is_refused(n: int) -> None:
 @pytest.mark.parametrize("step_m", [0.0, -0.02, 1e-300, math.nan])
 def test_the_floor_is_looked_at_in_steps_that_come_to_an_end(step_m: float) -> None:
     with pytest.raises(BadMessage):
-        decode(encode(m.GroundProfile(HEADER, 0.1, step_m, (0.0,), ((-0.2, 0.0),))), m.GroundProfile)
+        decode(encode(GroundProfile(HEADER, 0.1, step_m, (0.0,), ((-0.2, 0.0),))), GroundProfile)
 
 
 @pytest.mark.parametrize("offsets_m", [(), (0.0,), (0.0, 0.1, 0.2)])
 def test_each_line_of_the_floor_has_its_place(offsets_m: tuple[float, ...]) -> None:
     with pytest.raises(BadMessage, match="fit together"):
-        decode(encode(m.GroundProfile(HEADER, 0.1, 0.05, offsets_m, ((0.0,), (0.0,)))), m.GroundProfile)
+        decode(encode(GroundProfile(HEADER, 0.1, 0.05, offsets_m, ((0.0,), (0.0,)))), GroundProfile)
 
 
 @pytest.mark.parametrize("far_m", [1e300, -1e10])
 def test_a_place_so_far_off_that_sums_of_it_have_no_end_is_refused(far_m: float) -> None:
     with pytest.raises(BadMessage):
-        decode(encode(m.Localization(HEADER, Pose2D(far_m, 0.0, 0.0))), m.Localization)
+        decode(encode(Localization(HEADER, Pose2D(far_m, 0.0, 0.0))), Localization)
 
 
 def test_a_stamp_may_count_from_1970() -> None:
-    fix = m.Localization(Header("robot1", 5, 7, 1.8e9), Pose2D())
-    assert decode(encode(fix), m.Localization) == fix
+    fix = Localization(Header("robot1", 5, 7, 1.8e9), Pose2D())
+    assert decode(encode(fix), Localization) == fix
 
 
 @pytest.mark.parametrize("columns", [0, -2, 3])
 def test_a_tile_of_a_map_is_a_whole_rectangle(columns: int) -> None:
     with pytest.raises(BadMessage):
-        decode(encode(m.PlanNote(HEADER, (), 0.1, (0.0, 0.0), columns, bytes(4))), m.PlanNote)
+        decode(encode(PlanNote(HEADER, (), 0.1, (0.0, 0.0), columns, bytes(4))), PlanNote)
 
 
 def test_a_message_of_another_topic_is_refused() -> None:
     with pytest.raises(BadMessage, match="CmdVel belongs"):
-        decode(encode(SAMPLES[0]), m.CmdVel)
+        decode(encode(SAMPLES[0]), CmdVel)
 
 
 def test_an_oversized_message_is_refused_unread() -> None:
     with pytest.raises(BadMessage, match="bytes"):
-        decode(bytes(m.MESSAGE_BYTES_MAX + 1), m.LaserScan)
+        decode(bytes(MESSAGE_BYTES_MAX + 1), LaserScan)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from protocol.bus import Inbox
-from protocol.journal import JOURNAL_VERSION, Heading, Journal, digest, read
-from protocol.mission import Refused
-from protocol.runtime import _Seat
-from protocol.witness import Witness
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
+from lfa.protocol.runtime.node_runner import _Seat
+from lfa.protocol.transport.bus import Inbox
 
 HEADING = Heading(JOURNAL_VERSION, "robot2", 17, 3, {"fleet": "f"})
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 
-from protocol.loglines import line, tell
-from protocol.messages import Event, Header, Term, encode
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Event
+from lfa.protocol.runtime.log_capture import line, tell
 
 EVENT = Event(Header("robot2", 17, 1, 12.5), "role", Term(5, 2, 17), {"role": "leader", "chain": [2, 3], "at_m": 1 / 3})
 

@@ -6,14 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.geometry import STILL
-from protocol.host import Host
-from protocol.journal import JOURNAL_VERSION, Heading, Journal, digest, read
-from protocol.messages import NO_TERM, Ask, Header, Hello, LeaseNote, MissionNote, PoseStamped, Role, encode
-from protocol.mission import Leading, Mission
-from protocol.node import Stop
-from protocol.topics import TOPIC, TOPICS, key
-from protocol.witness import Witness
+from lfa.protocol.geometry import STILL
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.consensus import NO_TERM, Hello, LeaseNote, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Ask, MissionNote, PoseStamped
+from lfa.protocol.mission import Leading, Mission
+from lfa.protocol.node import Stop
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
+from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.topics import TOPIC, TOPICS, key
 
 MISSION = Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0))))
 

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from protocol.bus import Inbox
-from protocol.journal import JOURNAL_VERSION, Heading, Journal
-from protocol.runtime import _Seat
-from protocol.topics import address
-from protocol.witness import Witness
+from lfa.protocol.lease.witness import Witness
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.runtime.node_runner import _Seat
+from lfa.protocol.topics import address
+from lfa.protocol.transport.bus import Inbox
 
 
 class Order:

@@ -6,7 +6,11 @@ from random import Random
 
 import pytest
 
-from protocol.bus import (
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.consensus import Grant, Hello, LeaseNote, Release, Term, Version
+from lfa.protocol.messages.header import Header
+from lfa.protocol.node import PeerDown, PeerUp, RouterLost
+from lfa.protocol.transport.bus import (
     ANEW_S,
     OWNER_BURST_MAX,
     OWNER_RATE_MAX_HZ,
@@ -18,8 +22,6 @@ from protocol.bus import (
     Tokens,
     Wake,
 )
-from protocol.messages import Grant, Header, Hello, LeaseNote, Release, Term, Version, encode
-from protocol.node import PeerDown, PeerUp, RouterLost
 
 
 def arrival(at: float, topic: str) -> Arrival:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from protocol.endpoints import check_endpoints
-from protocol.mission import Refused
+from lfa.protocol.errors import Refused
+from lfa.protocol.transport.endpoints import check_endpoints
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from random import Random
 
 import pytest
 
-from protocol.bus import Arrival
-from protocol.radio import Air, Radio, Reception, link_of
+from lfa.protocol.transport.bus import Arrival
+from lfa.protocol.transport.link_model import Air, Radio, Reception, link_of
 
 
 def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:

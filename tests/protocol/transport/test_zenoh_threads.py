@@ -17,7 +17,7 @@ def _router() -> Iterator[str]:
     with tempfile.TemporaryDirectory(prefix="lfa-", dir="/tmp") as folder:
         endpoint = f"unixsock-stream/{Path(folder) / 'router.sock'}"
         router = subprocess.Popen(
-            [sys.executable, "-m", "deploy.fleet.router", "--listen", endpoint], stdout=subprocess.DEVNULL
+            [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.router", "--listen", endpoint], stdout=subprocess.DEVNULL
         )
         try:
             yield endpoint
@@ -36,8 +36,8 @@ def _printed(script: str) -> str:
 
 SCRIPT = """
 import os, sys
-from protocol.bus import Inbox
-from protocol.zenoh_bus import ZenohBus, answers
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus, answers
 while not answers(sys.argv[1]):
     pass
 ZenohBus(sys.argv[1], Inbox()).close()
@@ -52,10 +52,10 @@ def test_what_a_client_asks_of_zenoh_is_not_inherited_by_its_children() -> None:
 
 HEARD = """
 import sys
-from protocol import clock
-from protocol.bus import Inbox
-from protocol.topics import address
-from protocol.zenoh_bus import ZenohBus, answers
+from lfa.protocol import clock
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.topics import address
+from lfa.protocol.transport.zenoh_bus import ZenohBus, answers
 while not answers(sys.argv[1]):
     pass
 inboxes = Inbox(every=True), Inbox(every=True)
@@ -83,9 +83,9 @@ def test_who_says_what_all_say_is_not_given_its_own_word() -> None:
 THREADS = """
 import sys, threading
 from pathlib import Path
-from protocol import clock
-from protocol.bus import Inbox
-from protocol.zenoh_bus import ZenohBus, answers
+from lfa.protocol import clock
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus, answers
 here = threading.local()
 class Remembering(Inbox):
     most = 0

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from protocol.geometry import distance
-from protocol.mission import Refused
-from world.course import gap_to, reach_of, starts_of
-from world.scenario import SCENARIOS, Obstacle, Scenario, draw, load, shipped
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import distance
+from lfa.world.description.load import SCENARIOS, Obstacle, Scenario, draw, load, shipped
+from lfa.world.description.placement import gap_to, reach_of, starts_of
 
 NAMES = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 GAP_M_MIN = 1.2
@@ -150,7 +150,7 @@ def test_set_reaches_into_lists() -> None:
 
 def test_a_scenario_is_read_without_the_engine() -> None:
     heavy = "print(sorted({'pymunk', 'numpy'} & sys.modules.keys()))"
-    code = f"import sys, world.scenario as s; s.load('paper_path1'); {heavy}; s.shipped(); {heavy}"
+    code = f"import sys, lfa.world.description.load as s; s.load('paper_path1'); {heavy}; s.shipped(); {heavy}"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert said == "[]\n['numpy']\n", "only a scenario with a map needs numpy"
 
@@ -170,7 +170,7 @@ def test_a_zigzag_alternates() -> None:
 
 
 def test_the_same_seed_draws_the_same_course_under_any_hash_seed() -> None:
-    code = "from world.scenario import *; print(draw(load('paper_path1'), 7))"
+    code = "from lfa.world.description.load import *; print(draw(load('paper_path1'), 7))"
     printed = {
         subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": seed}

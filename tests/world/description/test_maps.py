@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from protocol.mission import Refused
-from world import maps
-from world.reach import parted
-from world.scenario import load, starts_of
+from lfa.protocol.errors import Refused
+from lfa.world.description import maps
+from lfa.world.description.load import load, starts_of
+from lfa.world.description.reachability import parted
 
 ROWS = ((0, 0, 0, 0), (0, 254, 205, 0), (0, 254, 254, 0))
 """Shades, the top row first: 4 columns, 3 rows."""

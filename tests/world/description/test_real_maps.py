@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from protocol.mission import Refused
-from world import maps
-from world.scenario import load, starts_of
+from lfa.protocol.errors import Refused
+from lfa.world.description import maps
+from lfa.world.description.load import load, starts_of
 
 HERE = Path(__file__).resolve()
 FOUND = next((p / "shared/data/maps" for p in HERE.parents if (p / "shared/data/maps").is_dir()), None)

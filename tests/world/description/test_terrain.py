@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.geometry import Pose2D
-from protocol.mission import Refused
-from world.course import draw
-from world.ground import Profiler
-from world.scenario import Scenario, load
-from world.sensors import HeightNoise, RangeNoise
-from world.spec import Lidar, Noise, Obstacle
-from world.terrain import Bump, Ditch, Pothole, features, patch_of
-from world.ways import WALK_LEG_S, way_of
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D
+from lfa.world.description.load import Scenario, load
+from lfa.world.description.obstacle_motion import WALK_LEG_S, way_of
+from lfa.world.description.placement import draw
+from lfa.world.description.scenario import Lidar, Noise, Obstacle
+from lfa.world.description.terrain import Bump, Ditch, Pothole, features, patch_of
+from lfa.world.sensors.ground_sensor import Profiler
+from lfa.world.sensors.noise import HeightNoise, RangeNoise
 
 ROUND = Pothole(center_m=(2.0, 1.0), width_m=0.6, depth_m=0.1)
 SHAPES = {

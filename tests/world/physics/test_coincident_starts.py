@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.geometry import STILL, Twist
-from protocol.mission import Refused
-from world.physics import Physics
-from world.scenario import draw, load
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import STILL, Twist
+from lfa.world.description.load import draw, load
+from lfa.world.physics.rigid_bodies import Physics
 
 ORIGIN = "world.starts=[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]"
 AHEAD, BACK = Twist(0.5, 0.0), Twist(-0.3, 0.0)

@@ -9,11 +9,11 @@ from random import Random
 
 import pytest
 
-from protocol.geometry import STILL, Pose2D, Twist, distance, wrap
-from world.kinematic import Kinematic, Touch
-from world.physics import Physics
-from world.scenario import Obstacle, load
-from world.ways import ToAndFro
+from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, wrap
+from lfa.world.description.load import Obstacle, load
+from lfa.world.description.obstacle_motion import ToAndFro
+from lfa.world.physics.kinematics import Kinematic, Touch
+from lfa.world.physics.rigid_bodies import Physics
 
 HZ = 100
 ALONE = ["mission.robots=[1]"]
@@ -190,9 +190,9 @@ def test_a_touch_that_flickers_is_one_touch() -> None:
 
 CROWD = """
 from random import Random
-from protocol.geometry import Twist
-from world.physics import Physics
-from world.scenario import load
+from lfa.protocol.geometry import Twist
+from lfa.world.physics.rigid_bodies import Physics
+from lfa.world.description.load import load
 overrides = ["world.walls_m=[[-2,-2,4,-2],[4,-2,4,4],[4,4,-2,4],[-2,4,-2,-2]]", "mission.formation.separation_m=0.6",
     "mission.leading.route_m=[[3.0, 3.0]]",
     "world.obstacles=[{center_m=[1,0.3],radius_m=0.2,mass_kg=4},{center_m=[2,1],corners_m=[[0,0],[0.3,0],[0,0.3]],mass_kg=2}]"]

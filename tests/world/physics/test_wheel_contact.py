@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from protocol.geometry import STILL, Twist
-from world import wheels
-from world.kinematic import Kinematic
-from world.physics import Physics
-from world.scenario import load
-from world.wheels import dip_m, gap_m_max, speed_after_step, step_m_max
+from lfa.protocol.geometry import STILL, Twist
+from lfa.world.description.load import load
+from lfa.world.physics import wheel_contact
+from lfa.world.physics.kinematics import Kinematic
+from lfa.world.physics.rigid_bodies import Physics
+from lfa.world.physics.wheel_contact import dip_m, gap_m_max, speed_after_step, step_m_max
 
 HZ = 100
 RADIUS_M = 0.05
@@ -233,7 +233,7 @@ def test_kinematic_bodies_go_over_everything() -> None:
 
 def test_a_floor_that_lets_everything_pass_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     """The planted bug: were the rule not asked, the ditch would stop nobody."""
-    monkeypatch.setattr(wheels, "speed_after_step", lambda speed, *_: speed)
+    monkeypatch.setattr(wheel_contact, "speed_after_step", lambda speed, *_: speed)
     world = bodies(ditch(0.3))
     drive(world, Twist(0.1, 0.0), 30.0)
     assert world.poses[0].x > 2.5

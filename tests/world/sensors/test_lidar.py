@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from deploy.bench import lidar as bench
-from protocol.geometry import TAU, Pose2D
-from world.course import to_segment
-from world.lidar import ANGLE_MIN, Scanner, cast
-from world.scenario import Lidar, load
-from world.spec import Scenario
+from lfa.deploy.bench import lidar as bench
+from lfa.protocol.geometry import TAU, Pose2D
+from lfa.world.description.load import Lidar, load
+from lfa.world.description.placement import to_segment
+from lfa.world.description.scenario import Scenario
+from lfa.world.sensors.lidar import ANGLE_MIN, Scanner, cast
 
 BEAMS = 72
 AHEAD, LEFT, BEHIND, RIGHT = BEAMS // 2, BEAMS * 3 // 4, 0, BEAMS // 4

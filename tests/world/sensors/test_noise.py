@@ -11,10 +11,10 @@ from statistics import stdev
 import numpy as np
 import pytest
 
-from protocol.geometry import Pose2D, Twist, along_arc, distance
-from world import sensors
-from world.sensors import Localizer, RangeNoise, WheelOdometry
-from world.spec import Lidar, Noise
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, distance
+from lfa.world.description.scenario import Lidar, Noise
+from lfa.world.sensors import noise as sensors
+from lfa.world.sensors.noise import Localizer, RangeNoise, WheelOdometry
 
 NOISY = Noise(
     localization_m=0.005,
@@ -53,7 +53,7 @@ def test_noise_from_an_unseeded_generator_is_caught(monkeypatch: pytest.MonkeyPa
 
 
 def test_noise_is_the_same_under_any_hash_seed() -> None:
-    code = "from tests.world.test_sensors import readings; print(readings(7, 2))"
+    code = "from tests.world.sensors.test_noise import readings; print(readings(7, 2))"
     code = f"import sys; sys.path.insert(0, '.'); {code}"
     printed = {
         subprocess.run(

@@ -10,21 +10,22 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from agents.crossing import Crossing
-from agents.strategy import Detour
-from deploy.look.errors import Errors
-from deploy.look.met import known_obstacles
-from deploy.look.readings import Run
-from deploy.run.chosen import choose_again
-from deploy.run.simulate import run
-from deploy.shapes import across, spikes
-from deploy.shapes.across import Kept
-from deploy.shapes.bars import Bar, Measured
-from deploy.shapes.command import command
-from deploy.shapes.subject import Subject, duration_s
-from deploy.shapes.table import PROPERTIES, of_run
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.agents.avoidance.detour import Detour
+from lfa.agents.avoidance.moving_obstacle import Crossing
+from lfa.deploy.analysis import episodes
+from lfa.deploy.analysis.known_obstacles import known_obstacles
+from lfa.deploy.analysis.paper import across_seeds
+from lfa.deploy.analysis.paper.across_seeds import Kept
+from lfa.deploy.analysis.paper.checks import PROPERTIES, of_run
+from lfa.deploy.analysis.paper.criteria import Bar, Measured
+from lfa.deploy.analysis.paper.experiment import Subject, duration_s
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.analysis.verification.command import command
+from lfa.deploy.run.load import choose_again
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
 
 T = np.arange(0.0, 10.0, 0.02)
 
@@ -38,17 +39,17 @@ def bump(from_s: float, until_s: float, height: float) -> np.ndarray:
 
 
 def test_a_spike_lasts_from_the_baseline_to_the_baseline_and_has_the_peak_of_its_magnitude() -> None:
-    (found,) = spikes.spikes(2, T, bump(2.0, 5.0, -0.3), spikes.BASE_M, spikes.SPIKE_M)
+    (found,) = episodes.spikes(2, T, bump(2.0, 5.0, -0.3), episodes.BASE_M, episodes.SPIKE_M)
     assert (found.from_s, found.until_s) == pytest.approx((2.06, 4.94), abs=0.03)
     assert found.peak == pytest.approx(0.3, abs=1e-3)
 
 
 def test_what_stays_under_the_bar_is_no_spike_and_a_swing_through_zero_is_one() -> None:
-    assert spikes.spikes(2, T, bump(2.0, 5.0, 0.049), spikes.BASE_M, spikes.SPIKE_M) == []
+    assert episodes.spikes(2, T, bump(2.0, 5.0, 0.049), episodes.BASE_M, episodes.SPIKE_M) == []
     both = bump(2.0, 3.0, 0.2) + bump(3.5, 4.5, -0.2)
-    assert len(spikes.spikes(2, T, both, spikes.BASE_M, spikes.SPIKE_M)) == 1
+    assert len(episodes.spikes(2, T, both, episodes.BASE_M, episodes.SPIKE_M)) == 1
     apart = bump(2.0, 3.0, 0.2) + bump(4.5, 5.5, -0.2)
-    assert len(spikes.spikes(2, T, apart, spikes.BASE_M, spikes.SPIKE_M)) == 2
+    assert len(episodes.spikes(2, T, apart, episodes.BASE_M, episodes.SPIKE_M)) == 2
 
 
 class Seen:
@@ -64,18 +65,18 @@ class Seen:
 def test_an_avoidance_counts_for_a_spike_as_far_as_it_can_have_made_it(
     from_s: float, until_s: float, counts_s: float
 ) -> None:
-    spike = spikes.Spike(2, 20.0, 30.0, 0.3)
+    spike = episodes.Spike(2, 20.0, 30.0, 0.3)
     subject = Subject(Seen())  # type: ignore[arg-type]
-    subject.episodes = [spikes.Episode(2, "avoidance", from_s, until_s), spikes.Episode(3, "avoidance", 19.0, 30.0)]
+    subject.episodes = [episodes.Episode(2, "avoidance", from_s, until_s), episodes.Episode(3, "avoidance", 19.0, 30.0)]
     assert duration_s(subject, spike) == pytest.approx(counts_s)
 
 
 def test_rank_correlation_is_spearmans() -> None:
-    assert spikes.rank_correlation([1, 2, 3, 4], [1, 4, 9, 100]) == pytest.approx(1.0)
-    assert spikes.rank_correlation([1, 2, 3, 4], [9, 5, 2, 1]) == pytest.approx(-1.0)
+    assert episodes.rank_correlation([1, 2, 3, 4], [1, 4, 9, 100]) == pytest.approx(1.0)
+    assert episodes.rank_correlation([1, 2, 3, 4], [9, 5, 2, 1]) == pytest.approx(-1.0)
     # By hand: ranks 1, 2.5, 2.5, 4 and 2, 1, 3, 4.
-    assert spikes.rank_correlation([1, 2, 2, 3], [2, 1, 3, 4]) == pytest.approx(3.0 / (4.5 * 5.0) ** 0.5)
-    assert isnan(spikes.rank_correlation([1, 2], [1, 2]))
+    assert episodes.rank_correlation([1, 2, 2, 3], [2, 1, 3, 4]) == pytest.approx(3.0 / (4.5 * 5.0) ** 0.5)
+    assert isnan(episodes.rank_correlation([1, 2], [1, 2]))
 
 
 # --- bars and comparisons -------------------------------------------------------------------------------------------
@@ -93,7 +94,7 @@ def kept(scenario: str, seed: int, duration_s: float, requests: int = 0, switche
 
 
 def statuses(runs: list[Kept]) -> dict[str, str]:
-    return {one.name: one.status for one in across.across(runs)}
+    return {one.name: one.status for one in across_seeds.across(runs)}
 
 
 def test_one_run_is_too_few_for_every_comparison() -> None:
@@ -139,7 +140,7 @@ def test_iteration_2_with_known_obstacles_is_shorter_and_takes_less_time(second_
     chosen, seed = choose_again("paper_path2", (), None, None, second_path)
     assert seed == 1
     again = run(chosen, seed, tmp_path / "again").folder
-    first, second = across.keep(Run(second_path)), across.keep(Run(again))
+    first, second = across_seeds.keep(Run(second_path)), across_seeds.keep(Run(again))
     assert second.iteration == 2
     assert second.way_m <= first.way_m, "reproduce: lfa sim paper_path2 --seed 1, then again with --map-from RUN"
     assert second.duration_s <= first.duration_s
@@ -164,7 +165,7 @@ def test_with_obstacle_avoidance_switched_off_the_verdict_is_1(
 ) -> None:
     monkeypatch.setattr(Detour, "steer", lambda *_: None)
     monkeypatch.setattr(Crossing, "give_way", lambda _self, _moving, _pose, wanted, _now: wanted)
-    monkeypatch.setattr("agents.driver.safe", lambda wanted, *_: wanted)
+    monkeypatch.setattr("lfa.agents.navigator.safe", lambda wanted, *_: wanted)
     folder = run(load("paper_path2", ["time_limit_s=25"]), 1, tmp_path / "run").folder
     assert command([folder], as_json=True) == 1
     said = json.loads(capsys.readouterr().out)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from deploy.look.liveness import CHANGE_HEARTBEATS, OneVersion
-from protocol.messages import Config, Member, Term, Version
-from protocol.timing import timing_of
+from lfa.deploy.analysis.verification.liveness import CHANGE_HEARTBEATS, OneVersion
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import Config, Member, Term, Version
 
 STD = timing_of("std")
 TEAM = (Member(1, 1), Member(2, 1))

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from agents import following
-from deploy.look.again import Comparison, compare
-from deploy.look.replay import command, journals
-from deploy.run.faults import parse_all
-from deploy.run.simulate import run
-from protocol import journal
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.agents.following import factory
+from lfa.deploy.analysis.verification.reexecution import Comparison, compare
+from lfa.deploy.analysis.verification.replay import command, journals
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.protocol.runtime import journal
+from lfa.world.description.load import load
 
 FAULTS = ("stop 3 at 1 s for 0.5 s", "kill leader at 2 s", "restart 1 at 3 s")
 REPRODUCE = "lfa sim paper_path1 --seed 3 --set time_limit_s=6.0, then lfa replay RUN --robot all"
@@ -37,8 +37,8 @@ def test_every_life_of_every_node_returns_what_it_returned(folder: Path) -> None
 
 
 def test_a_changed_gain_is_seen(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told = following.gains_of
-    monkeypatch.setattr(following, "gains_of", lambda mission: replace(told(mission), k_per_s=1.49))
+    told = factory.gains_of
+    monkeypatch.setattr(factory, "gains_of", lambda mission: replace(told(mission), k_per_s=1.49))
     found = compare(folder / "journal" / "robot2-1.bin")
     assert found.difference is not None, REPRODUCE
     assert any("cmd_vel" in said for said in found.difference.now_returns)

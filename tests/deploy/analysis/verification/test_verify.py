@@ -9,14 +9,15 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from deploy.look import verify
-from deploy.run.faults import parse_all
-from deploy.run.simulate import run
-from protocol import journal
-from protocol.gateway import Gateway
-from protocol.messages import CmdVel, decode
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.deploy.analysis.verification import journals
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run.simulate import run
+from lfa.protocol.errors import Refused
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.messages.codec import decode
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.runtime import journal
+from lfa.world.description.load import load
 
 SHORT = ("mission.leading.route_m=[[2.0, 0.0]]", "faults=[]")
 FAULTS = ("kill leader at 2 s", "stop leader at 3 s for 1 s")
@@ -31,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_sound_run_has_no_violation(folder: Path) -> None:
-    verdict = verify.verify(folder)
+    verdict = journals.verify(folder)
     assert verdict.broken == (), f"reproduce: lfa verify {folder}"
     assert verdict.journals == 6
     assert verdict.happenings > 1000
@@ -42,7 +43,7 @@ def test_a_run_without_the_journal_of_one_that_took_part_is_refused(folder: Path
     part = Path(shutil.copytree(folder, tmp_path / "part"))
     (part / "journal" / f"{lost}-1.bin").unlink()
     with pytest.raises(Refused, match=f"no journal of {lost}"):
-        verify.verify(part)
+        journals.verify(part)
 
 
 def test_so_is_one_without_the_journal_of_one_that_came_and_said_nothing(folder: Path, tmp_path: Path) -> None:
@@ -52,7 +53,7 @@ def test_so_is_one_without_the_journal_of_one_that_came_and_said_nothing(folder:
             '{"t":0.0,"robot":7,"term":null,"kind":"peer_up","from":"recorder","name":"robot7","incarnation":1}\n'
         )
     with pytest.raises(Refused, match="no journal of robot7"):
-        verify.verify(part)
+        journals.verify(part)
 
 
 def test_an_old_leaders_command_is_harmless_unless_a_gateway_obeys_it(
@@ -61,9 +62,9 @@ def test_an_old_leaders_command_is_harmless_unless_a_gateway_obeys_it(
     late = tmp_path / "late"
     shutil.copytree(folder, late)
     _come_again(next((late / "journal").glob("world-*.bin")))
-    assert verify.verify(late).broken == ()
+    assert journals.verify(late).broken == ()
     monkeypatch.setattr(Gateway, "_objection", lambda *_: None)
-    assert {"I2"} <= {violation.name for violation in verify.verify(late).broken}
+    assert {"I2"} <= {violation.name for violation in journals.verify(late).broken}
 
 
 def _come_again(world: Path) -> None:
@@ -78,4 +79,4 @@ def _come_again(world: Path) -> None:
 
 def test_a_folder_without_journals_is_refused(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="no journals"):
-        verify.verify(tmp_path)
+        journals.verify(tmp_path)

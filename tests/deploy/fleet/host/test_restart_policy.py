@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.fleet.file import Policy, Restart
-from deploy.fleet.policy import ROUTER, Lives
+from lfa.deploy.fleet.host.restart_policy import ROUTER, Lives
+from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
 
 
 @pytest.mark.parametrize(

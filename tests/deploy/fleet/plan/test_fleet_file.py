@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from deploy.fleet.file import FleetFile, Mistaken, is_fleet_file, load
-from deploy.look import schema
-from protocol.mission import Refused
+from lfa.deploy.config import schema
+from lfa.deploy.fleet.plan.fleet_file import FleetFile, Mistaken, is_fleet_file, load
+from lfa.protocol.errors import Refused
 
 EXAMPLE = Path("deploy/fleet.example.toml")
 TWO = """

@@ -8,8 +8,8 @@ import sys
 import tarfile
 from pathlib import Path
 
-from deploy.fleet import journals
-from deploy.fleet.file import load
+from lfa.deploy.fleet.plan.fleet_file import load
+from lfa.deploy.fleet.remote import journals
 
 
 def _state(tmp_path: Path) -> Path:

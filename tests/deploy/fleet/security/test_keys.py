@@ -11,14 +11,14 @@ from typing import Any
 
 import pytest
 
-from deploy.fleet import authority, keys
-from deploy.fleet.access import Plan, rules, sayable
-from deploy.fleet.keyring import command, planned
-from protocol.credentials import check_valid, credentials, validity
-from protocol.mission import Refused
-from protocol.topics import TOPICS, Topic, matches
-from protocol.zenoh_bus import _check_listen
-from tests.processes.fleet import lfa
+from lfa.deploy.fleet.keys_command import command, planned
+from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.fleet.security.access_rules import Plan, rules, sayable
+from lfa.protocol.errors import Refused
+from lfa.protocol.topics import TOPICS, Topic, matches
+from lfa.protocol.transport.credentials import check_valid, credentials, validity
+from lfa.protocol.transport.zenoh_router import _check_listen
+from tests.rigs.lfa_runs import lfa
 
 DAY_MS = 86_400_000
 SPEAKS = {

@@ -14,14 +14,14 @@ from typing import Any
 
 import pytest
 
-from deploy.fleet import authority
-from deploy.run import processes
-from deploy.run.processes import own_processes
-from protocol import clock
-from protocol.credentials import credentials
-from protocol.zenoh_bus import answers
-from tests.processes.fleet import LFA, eventually
-from tests.processes.secured import free_port
+from lfa.deploy.fleet.security import authority
+from lfa.deploy.process import identity
+from lfa.deploy.process.identity import own_processes
+from lfa.protocol import clock
+from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_config import answers
+from tests.rigs.lfa_runs import LFA, eventually
+from tests.rigs.secured_fleet import free_port
 
 pytestmark = pytest.mark.processes
 
@@ -69,7 +69,7 @@ def home() -> Iterator[Home]:
         made.lfa("down", str(made.file))
         for one in own_processes():
             if any(str(made.folder) in word for word in one.arguments):
-                processes.send(one, signal.SIGKILL)
+                identity.send(one, signal.SIGKILL)
         shutil.rmtree(made.folder, ignore_errors=True)
 
 

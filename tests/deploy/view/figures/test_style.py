@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.look.marks import levels
+from lfa.deploy.view.figures.style import levels
 
 
 def test_labels_that_would_cover_each_other_go_to_the_next_line_and_come_down_again() -> None:

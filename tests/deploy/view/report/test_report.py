@@ -11,14 +11,14 @@ from xml.etree import ElementTree
 
 import pytest
 
-from deploy.look import page, report
-from deploy.look.figures import FIGURES
-from deploy.look.marks import label
-from deploy.look.readings import Run
-from deploy.run.faults import parse_all
-from deploy.run.simulate import run
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run.simulate import run
+from lfa.deploy.view.figures.catalogue import FIGURES
+from lfa.deploy.view.figures.style import label
+from lfa.deploy.view.report import command, page
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
 
 BYTES_MAX = 3_000_000
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -40,7 +40,7 @@ def _images(html: str) -> list[str]:
 
 
 def test_every_section_and_figure_is_on_the_page(folder: Path) -> None:
-    html = report.html([folder])
+    html = command.html([folder])
     assert [name for name in SECTIONS if f">{name}</h2>" not in html] == []
     images = _images(html)
     assert len(images) == len(FIGURES)
@@ -49,26 +49,26 @@ def test_every_section_and_figure_is_on_the_page(folder: Path) -> None:
 
 
 def test_the_failover_and_the_fault_are_told(folder: Path) -> None:
-    html = report.html([folder])
+    html = command.html([folder])
     assert "first command after" in html
     assert re.search(r"<td>3\.00 s</td><td class=\"text\">kill</td><td>1</td>", html)
 
 
 def test_the_page_asks_for_nothing_from_elsewhere(folder: Path) -> None:
-    html = report.html([folder])
+    html = command.html([folder])
     assert not re.search(r'(src|href)="(?!data:|#)', html)
     assert "<script" not in html
     assert "url(" not in html
 
 
 def test_two_runs_stand_side_by_side_and_are_subtracted(folder: Path, tmp_path: Path) -> None:
-    html = report.html([folder, _ran(tmp_path / "two", 2)])
+    html = command.html([folder, _ran(tmp_path / "two", 2)])
     assert "second − first" in html
     assert len(_images(html)) == 2 * len(FIGURES)
 
 
 def test_a_large_team_stays_small_on_the_page(tmp_path: Path) -> None:
-    html = report.html([_ran(tmp_path / "many", 1, robots=20)])
+    html = command.html([_ran(tmp_path / "many", 1, robots=20)])
     assert len(html.encode()) < BYTES_MAX
     run = Run(tmp_path / "many")
     assert sum(label(run, robot) is not None for robot in run.robots) <= 12
@@ -76,13 +76,13 @@ def test_a_large_team_stays_small_on_the_page(tmp_path: Path) -> None:
 
 def test_what_is_no_finished_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(Refused, match=r"no finished run, it has no summary\.json"):
-        report.html([tmp_path])
+        command.html([tmp_path])
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
 def test_a_browser_shows_it_without_a_complaint(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    path.write_text(report.html([folder]), encoding="utf-8")
+    path.write_text(command.html([folder]), encoding="utf-8")
     assert BROWSER is not None
     quiet = (
         "--headless",

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from deploy.look import view
-from deploy.look.shot import take
-from deploy.look.trace import messages
-from deploy.run.faults import parse_all
-from deploy.run.simulate import run
-from protocol.mission import Refused
-from world.scenario import load
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.recording.mcap_reader import messages
+from lfa.deploy.run.simulate import run
+from lfa.deploy.view.rerun import command
+from lfa.deploy.view.rerun.screenshot import take
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
 
 RRD_BYTES_A_SECOND_MAX = 250_000  # 30 MB for two minutes
 PNG = b"\x89PNG"
@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _rows(rrd: Path) -> Counter[str]:
     """Rows of each entity that change with time, as rerun itself counts them."""
-    told = subprocess.run([view.viewer_path(), "rrd", "print", str(rrd)], capture_output=True, text=True, check=True)
+    told = subprocess.run([command.viewer_path(), "rrd", "print", str(rrd)], capture_output=True, text=True, check=True)
     found: Counter[str] = Counter()
     for line in told.stdout.splitlines():
         chunk = re.search(r"with (\d+) rows .* - /(world/\S+) - data columns: \[(.*)\]", line)
@@ -43,7 +43,7 @@ def _rows(rrd: Path) -> Counter[str]:
 
 
 def test_each_robot_has_as_many_poses_scans_and_slots_as_were_recorded(folder: Path) -> None:
-    rrd = view.converted(folder)
+    rrd = command.converted(folder)
     topics = frozenset({"pose", "scan", "tracking"})
     rows, said = _rows(rrd), Counter((owner, topic) for owner, topic, *_ in messages(folder, topics))
     for robot in ("robot1", "robot2", "robot3", "robot4"):
@@ -59,7 +59,7 @@ def test_without_a_screen_the_picture_is_drawn_and_says_so(
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(shutil, "which", lambda _name: None)
     picture = tmp_path / "run.png"
-    said = take(view.converted(folder), picture, folder)
+    said = take(command.converted(folder), picture, folder)
     assert "drawn without the viewer: no display, and no Xvfb" in said
     assert picture.read_bytes().startswith(PNG)
 
@@ -67,34 +67,37 @@ def test_without_a_screen_the_picture_is_drawn_and_says_so(
 @pytest.mark.skipif(not (os.environ.get("DISPLAY") or shutil.which("Xvfb")), reason="neither display nor Xvfb here")
 def test_with_a_virtual_screen_the_picture_is_the_viewers_or_says_why_not(folder: Path, tmp_path: Path) -> None:
     picture = tmp_path / "run.png"
-    said = take(view.converted(folder), picture, folder)
+    said = take(command.converted(folder), picture, folder)
     assert "(rerun's viewer)" in said or "the viewer" in said
     assert picture.read_bytes().startswith(PNG)
 
 
 def test_bad_input_is_refused_in_one_line(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(Refused, match=r"no run folder, it has no recording\.mcap"):
-        view.converted(tmp_path)
+        command.converted(tmp_path)
     with pytest.raises(Refused, match=r"must be a \.png in a folder that exists"):
         take(folder / "recording.rrd", tmp_path / "none" / "a.png", folder)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         with pytest.raises(Refused, match="taken"):
-            view.command(folder, serve_web=True, port=taken.getsockname()[1])
+            command.command(folder, serve_web=True, port=taken.getsockname()[1])
 
 
 def test_a_recording_that_was_cut_off_is_shown_as_far_as_it_goes(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "scenario.toml").write_text((folder / "scenario.toml").read_text())
     recorded = (folder / "recording.mcap").read_bytes()
     (tmp_path / "recording.mcap").write_bytes(recorded[: len(recorded) // 2])
-    assert view.converted(tmp_path).is_file(), "a recording cut off is read up to its last whole chunk"
+    assert command.converted(tmp_path).is_file(), "a recording cut off is read up to its last whole chunk"
 
 
 def test_map_and_route_of_who_explores_are_in_the_view(tmp_path: Path) -> None:
     scenario = load("explore", ["time_limit_s=4.0"], 2)
     folder = run(scenario, 1, tmp_path / "run").folder
     told = subprocess.run(
-        [view.viewer_path(), "rrd", "print", str(view.converted(folder))], capture_output=True, text=True, check=True
+        [command.viewer_path(), "rrd", "print", str(command.converted(folder))],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert " - /world/planned - " in told.stdout
     assert len(set(re.findall(r"/world/map/tiles/robot1/\S+", told.stdout))) > 1
@@ -104,7 +107,10 @@ def test_terrain_and_the_share_of_lost_rows_are_in_the_view(tmp_path: Path) -> N
     scenario = load("terrain", ["time_limit_s=4.0", "radio.loss=0.3"], 2)
     folder = run(scenario, 1, tmp_path / "run").folder
     told = subprocess.run(
-        [view.viewer_path(), "rrd", "print", str(view.converted(folder))], capture_output=True, text=True, check=True
+        [command.viewer_path(), "rrd", "print", str(command.converted(folder))],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert "/world/terrain/0" in told.stdout
     assert "/radio/robot2" in told.stdout

@@ -10,16 +10,16 @@ import msgspec
 import typer
 from msgspec import Struct
 
-from deploy.look.checker import Violation
-from deploy.look.checkers import SAFETY
-from deploy.look.readings import Run
-from deploy.look.summary import SUMMARY
-from deploy.look.verify import verify
-from deploy.shapes import across, bars
-from deploy.shapes.across import Kept
-from deploy.shapes.bars import Finding
-from deploy.shapes.table import PAPER, PATHS, of_run
-from protocol.mission import Refused
+from lfa.deploy.analysis.paper import across_seeds, criteria
+from lfa.deploy.analysis.paper.across_seeds import Kept
+from lfa.deploy.analysis.paper.checks import PAPER, PATHS, of_run
+from lfa.deploy.analysis.paper.criteria import Finding
+from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.analysis.summary import SUMMARY
+from lfa.deploy.analysis.verification.checker import Violation
+from lfa.deploy.analysis.verification.journals import verify
+from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.protocol.errors import Refused
 
 
 class Checked(Struct, frozen=True):
@@ -55,12 +55,12 @@ def command(
         kept += [of_it] if of_it.scenario in PATHS else []
         if not as_json:
             _print(one)
-    compared = tuple(across.across(kept)) if kept else ()
+    compared = tuple(across_seeds.across(kept)) if kept else ()
     verdict = Verdict(not any(map(_faulty, checked)) and not _fails(compared), tuple(checked), compared)
     if as_json:
         print(msgspec.json.encode(verdict).decode())
     elif compared:
-        print(f"across {len(kept)} of the paper's paths\n" + "\n".join(map(bars.line, compared)))
+        print(f"across {len(kept)} of the paper's paths\n" + "\n".join(map(criteria.line, compared)))
     return 0 if verdict.ok else 1
 
 
@@ -74,7 +74,7 @@ def check(folder: Path) -> tuple[Checked, Kept]:
     known = Checked(
         str(folder), summary.scenario, summary.seed, lease.journals, lease.happenings, lease.broken, tuple(of_run(run))
     )
-    return known, across.keep(run)
+    return known, across_seeds.keep(run)
 
 
 def _faulty(one: Checked) -> bool:
@@ -97,5 +97,5 @@ def _print(one: Checked) -> None:
         print(f"no scenario of the paper ({', '.join(PAPER)}): the shapes of its figures do not apply")
         return
     failed = [finding.name for finding in one.shapes if finding.status == "fails"]
-    print("\n".join(map(bars.line, one.shapes)))
+    print("\n".join(map(criteria.line, one.shapes)))
     print(f"{len(one.shapes)} properties of figures 7, 8, 9 and 11: {len(failed)} fail")

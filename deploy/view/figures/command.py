@@ -16,7 +16,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures' files as JSON.")] = False,
 ) -> int:
     """Draw the figures of a run folder anew."""
-    from deploy.look.trace import look_into
+    from lfa.deploy.recording.mcap_reader import look_into
 
     look_into(folder)
     drawn = [str(path) for path in draw(folder)]
@@ -26,13 +26,13 @@ def command(
 
 def draw(folder: Path) -> list[Path]:
     """Draw all figures of the run in `folder`; their files."""
-    from deploy.look import figures
-    from deploy.look.readings import Run
+    from lfa.deploy.analysis.run_data import Run
+    from lfa.deploy.view.figures import catalogue
 
     run = Run(folder)
     (folder / FIGURES).mkdir(exist_ok=True)
     paths = []
-    for name, *_ in figures.FIGURES:
+    for name, *_ in catalogue.FIGURES:
         paths.append(folder / FIGURES / f"{name}.png")
-        paths[-1].write_bytes(figures.png(figures.drawn(name, run)))
+        paths[-1].write_bytes(catalogue.png(catalogue.drawn(name, run)))
     return paths

@@ -1,0 +1,22 @@
+"""Plausibility bounds for poses and twists received from other robots."""
+
+from __future__ import annotations
+
+from lfa.protocol.geometry import Pose2D, Twist
+
+POSITION_MAX_M = 1e6
+
+
+SPEED_MAX = 50.0
+"""[m/s, rad/s] More is no robot of ours."""
+
+
+def plausible(pose: Pose2D, twist: Twist) -> bool:
+    """Whether a robot of ours can be there and so fast. Anything that is not finite is not (nan compares false)."""
+    return (
+        abs(pose.x) < POSITION_MAX_M
+        and abs(pose.y) < POSITION_MAX_M
+        and abs(pose.theta) < POSITION_MAX_M
+        and abs(twist.linear_x) < SPEED_MAX
+        and abs(twist.angular_z) < SPEED_MAX
+    )

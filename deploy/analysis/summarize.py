@@ -1,0 +1,131 @@
+"""Compute the summary of a run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lfa.deploy.analysis import tracking_errors
+from lfa.deploy.analysis.assertions import judge
+from lfa.deploy.analysis.summary import Assertion, RobotSummary, Summary
+from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.recording import event_log, mcap_reader
+from lfa.deploy.recording.event_log import Line
+from lfa.deploy.recording.mcap_reader import Array, Trace
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.run_folder import About, scenario_of
+
+LEFT_BEHIND_M = 0.5
+
+
+OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
+
+
+def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, faults_left: Sequence[str]) -> Summary:
+    """Read the run in `folder` back and say what it came to. `faults_left`: those that the run ended before."""
+    seen, events, scenario = mcap_reader.read(folder), event_log.lines(folder), scenario_of(folder)
+    robots = [_robot(robot, seen, events) for robot in scenario.mission.robots]
+    chain = event_log.last_chain(events)
+    reigns = event_log.reigns(events)
+    violations = event_log.terms_that_went_back(events)
+    summary = Summary(
+        scenario=about.scenario,
+        mode=about.mode,
+        seed=about.seed,
+        outcome=verdict.outcome,
+        reason=verdict.reason,
+        duration_s=round(duration_s, 3),
+        sim_duration_s=round(seen.end_s, 3),
+        real_time_factor=round(seen.end_s / duration_s, 2) if duration_s > 0.0 else 0.0,
+        robots=robots,
+        left_behind=[robot.id for robot in robots if robot.alive and _left_behind(robot, chain)],
+        leaders=reigns,
+        failovers=event_log.failovers(events, reigns),
+        faults=event_log.faults(events),
+        assertions=[
+            Assertion("no_violations", not violations),
+            Assertion("all_faults_done", not faults_left, ", ".join(faults_left)),
+        ],
+        violations=violations,
+    )
+    wanted = scenario.asserted
+    if wanted.goal_reached:
+        reached = Assertion("goal_reached", verdict.outcome == "goal_reached", verdict.reason or "")
+        summary.assertions.insert(0, reached)
+    followed = (tracking_errors.of_follower(seen, robot.id) for robot in robots if robot.alive)
+    summary.assertions += judge(wanted, summary, seen, [e for e in followed if e is not None])
+    return summary
+
+
+def _robot(robot: int, seen: Trace, events: Sequence[Line]) -> RobotSummary:
+    own = [line for line in events if line["robot"] == robot]
+    last = seen.truth[robot][-1] if robot in seen.truth else None
+    summary = RobotSummary(
+        id=robot,
+        alive=_alive(own),
+        role_at_end=next((line["role"] for line in reversed(own) if line["kind"] == "role"), "waiting"),
+        final_pose=None if last is None else (float(last[1]), float(last[2]), 0.0, float(last[3])),
+        final_speed_mps=None if last is None else abs(float(last[4])),
+        contacts=sum(1 for _ in event_log.of_kind(own, "contact")),
+        obstacles_met=_obstacles_met(own),
+        orientation_requests=sum(map(event_log.asked_by_leader, event_log.of_kind(own, "formation"))),
+    )
+    followed = tracking_errors.of_follower(seen, robot)
+    if followed is not None:
+        _fill_errors(summary, followed)
+    return summary
+
+
+def _left_behind(robot: RobotSummary, chain: Sequence[int]) -> bool:
+    follows = robot.id in chain[1:] and robot.final_distance_error_m is not None
+    out_of_place = follows and abs(robot.final_distance_error_m or 0.0) > LEFT_BEHIND_M
+    return robot.id not in chain or out_of_place
+
+
+def _fill_errors(summary: RobotSummary, e: Errors) -> None:
+    steady = e.steady
+    settled = e.settled_after_s
+    period_s = float(np.median(np.diff(e.t))) if e.t.size > 1 else 0.0
+    summary.settled_after_s = settled
+    summary.avoidances = tracking_errors.runs(e.avoiding)
+    summary.formation_changes = tracking_errors.runs(e.changing)
+    summary.excused_s = round(float(np.count_nonzero(e.excused)) * period_s, 3)
+    summary.final_distance_error_m = float(e.distance[-1])
+    summary.final_bearing_error_rad = float(e.bearing[-1])
+    summary.distance_error_rms_m = _rms(e.distance[steady])
+    summary.bearing_error_rms_rad = _rms(e.bearing[steady])
+    summary.bearing_error_body_rms_rad = _rms(e.bearing_body[steady])
+    summary.heading_error_rms_rad = _rms(e.heading[steady])
+    if settled is not None:
+        summary.distance_error_max_m = float(np.max(np.abs(e.distance[e.t >= settled])))
+
+
+def _rms(values: Array) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if values.size else None
+
+
+def _alive(own: Sequence[Line]) -> bool:
+    """False when it was last seen to die, by a fault or by itself, and not started again."""
+    alive = True
+    for line in own:
+        if line["kind"] == "died" or (line["kind"] == "fault" and line["deed"] in ("kill", "terminate")):
+            alive = False
+        elif line["kind"] == "fault" and line["deed"] == "restart":
+            alive = True
+    return alive
+
+
+def _obstacles_met(own: Sequence[Line]) -> dict[str, int]:
+    """Encounters by class: from a decision to the `resume` that ends it is one, whatever is decided in between."""
+    met = dict.fromkeys(OBSTACLE_CLASSES, 0)
+    busy: set[str] = set()
+    for line in event_log.of_kind(own, "decision"):
+        kind = str(line.get("class"))
+        if line.get("action") == "resume":
+            busy.clear()
+        elif kind not in busy:
+            busy.add(kind)
+            met[kind] = met.get(kind, 0) + 1
+    return met

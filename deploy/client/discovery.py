@@ -1,0 +1,71 @@
+"""Find the agents, worlds and routers that run on this machine, by their command lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from msgspec import Struct
+
+from lfa.deploy.process import identity as processes
+from lfa.deploy.process.identity import Identity
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import whole_number
+from lfa.protocol.transport.zenoh_config import default_endpoint
+
+LISTEN_S = 1.0  # 50 poses of a leader
+
+
+DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7447")
+"""Where a router listens that was told nothing."""
+
+
+class Running(Struct, frozen=True):
+    """One agent's process."""
+
+    robot: int
+    fleet: str
+    endpoint: str
+    identity: Identity
+    keys: Path | None = None
+    """What it was told with --keys."""
+
+
+def agents() -> list[Running]:
+    """The agents of this user that run on this machine."""
+    found = (_agent(identity) for identity in processes.own_processes())
+    return [agent for agent in found if agent is not None]
+
+
+def _agent(identity: Identity) -> Running | None:
+    words = identity.arguments
+    names = {word.rpartition("/")[2] for word in words[:3]}
+    if not names & {"lfa.agents.cli", "lfa-agent"}:
+        return None
+    robot = whole_number(option(words, "--id", ""))
+    if robot is None:
+        return None
+    endpoint = option(words, "--connect", default_endpoint())
+    keys = option(words, "--keys", "")
+    return Running(robot, option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)
+
+
+def option(words: Sequence[str], name: str, default: str) -> str:
+    """The value of `--name value` or `--name=value`."""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == name:
+            return following
+        if word.startswith(f"{name}="):
+            return word.partition("=")[2]
+    return default
+
+
+def one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
+    fleets = sorted({agent.fleet for agent in running})
+    if not fleets:
+        raise Refused("no agent of yours runs on this machine: start one with lfa run, or lfa-agent")
+    if fleet is None and len(fleets) > 1:
+        raise Refused(f"several fleets run here: say --fleet {' or --fleet '.join(fleets)}")
+    if fleet is not None and fleet not in fleets:
+        raise Refused(f"--fleet {fleet}: no such fleet here, must be one of {', '.join(fleets)}")
+    return [agent for agent in running if agent.fleet == (fleet or fleets[0])]

@@ -1,0 +1,22 @@
+"""Load a scenario with overrides from the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lfa.agents.following.factory import follower_of
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import Scenario, load
+
+
+def choose(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
+    """`scenario` by name or path, its values overridden; also what only a robot could refuse (gains, controller).
+
+    Raises Refused with one line.
+    """
+    chosen = load(scenario, overrides, robots)
+    try:
+        follower_of(chosen.mission)
+    except Refused as refused:
+        raise Refused(f"{scenario}: {refused}") from None
+    return chosen

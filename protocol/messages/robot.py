@@ -1,0 +1,73 @@
+"""Messages between a robot's hardware, or its simulation, and its agent."""
+
+from __future__ import annotations
+
+from msgspec import Struct
+
+from lfa.protocol.geometry import Number, Pose2D, Twist
+from lfa.protocol.messages.consensus import GatewayStamp, Term
+from lfa.protocol.messages.header import Count, Header, Step
+
+
+class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
+    """Wheel odometry and the gateway's state, as of `header.stamp` on the driver's clock."""
+
+    header: Header
+    pose_odom: Pose2D
+    twist: Twist
+    odometer_m: Number
+    gateway: GatewayStamp
+    term_max: Term
+    latched: bool = False
+    refused: int = 0
+
+
+class Localization(Struct, frozen=True, array_like=True, tag="localization"):
+    header: Header
+    pose_map: Pose2D
+
+
+class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):
+    """REP-117: beyond `range_max_m` is +inf, below `range_min_m` is -inf, a bad reading is nan."""
+
+    header: Header
+    angle_min: Number
+    angle_increment: Number
+    range_min_m: Number
+    range_max_m: Number
+    ranges_m: tuple[float, ...]
+
+
+class GroundProfile(Struct, frozen=True, array_like=True, tag="ground"):
+    """The floor ahead, looked down upon: heights along three lines parallel to the direction of travel.
+
+    The lines are those of the left wheel, the centre and the right wheel: what lies beside all three is not in the
+    way. Point j of line i is at x = `first_m` + j `increment_m`, y = `offsets_m[i]` in `base_link`; its height [m] is
+    relative to what the wheels stand on now, negative for a hole. In the spirit of REP-117: a bad or missing reading
+    is nan, a floor deeper than the sensor sees is -inf. Walls and bodies are no floor and do not show.
+    """
+
+    header: Header
+    first_m: Number
+    increment_m: Step
+    offsets_m: tuple[Number, ...]
+    heights_m: tuple[tuple[float, ...], ...]
+    """One row a line."""
+
+
+class Contact(Struct, frozen=True, array_like=True, tag="contact"):
+    """The bumper: direction of the touch in `base_link` [rad]."""
+
+    header: Header
+    bearing: Number
+
+
+class CmdVel(Struct, frozen=True, array_like=True, tag="cmd_vel"):
+    """A velocity command. `as_leader` tells whether it is one of the lease's holder."""
+
+    header: Header
+    twist: Twist
+    term: Term
+    holder: Count
+    as_leader: bool
+    gateway: GatewayStamp

@@ -1,0 +1,104 @@
+"""Opens a Zenoh router session that listens on given endpoints."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import zenoh
+
+from lfa.protocol.errors import Refused
+from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
+from lfa.protocol.transport.endpoints import check_endpoints
+from lfa.protocol.transport.zenoh_config import (
+    LINK_LEASE_MS,
+    SECURE_PROTOCOLS,
+    _config,
+    _insert,
+    _login,
+    _reason,
+    answers,
+    socket_path,
+)
+
+ROUTER_RX_THREADS = 32  # more than the tcp links that can die at once: each blocks one for 10 s (zenoh.md section 2)
+
+
+UNIX_PATH_BYTES_MAX = 107
+
+
+def open_router(
+    listen: Sequence[str],
+    connect: Sequence[str] = (),
+    lease_ms: int = LINK_LEASE_MS,
+    credentials: Credentials | None = None,
+    secure: bool = False,
+) -> Callable[[], None]:
+    """Start a router in this process; the returned function closes it.
+
+    `credentials` serve its `tls/` and `quic/` links, both ends of which prove who they are. `secure`: whoever it is,
+    only what the rules in their folder let it say and hear passes, and a unix socket asks for name and password.
+    Raises Refused when an endpoint cannot be listened on: taken, not permitted, not secure, or too long a path.
+    """
+    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {ROUTER_RX_THREADS}))")
+    for endpoint in listen:
+        check_endpoints(endpoint, "listen")
+        _check_listen(endpoint, credentials, secure)
+    for endpoint in connect:
+        check_endpoints(endpoint, "connect")
+    config = _config("router", listen, connect, lease_ms, credentials)
+    if secure:
+        assert credentials is not None
+        _insert(config, _guard(credentials))
+    mask = os.umask(0o077)  # for the unix socket: 0600
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise Refused(f"listen {' '.join(listen)}: {_reason(error)}") from None
+    finally:
+        os.umask(mask)
+
+    def close() -> None:
+        session.close()  # type: ignore[no-untyped-call]
+        for endpoint in listen:
+            path = socket_path(endpoint)
+            if path is not None:
+                path.unlink(missing_ok=True)
+                Path(f"{path}.lock").unlink(missing_ok=True)
+
+    return close
+
+
+def _check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:
+    protocol = endpoint.partition("/")[0]
+    if secure and protocol not in SECURE_PROTOCOLS:
+        raise Refused(f"listen {endpoint}: not with --secure, must begin with {', '.join(SECURE_PROTOCOLS)}")
+    if credentials is None and protocol in ("tls", "quic"):
+        raise Refused(f"listen {endpoint}: needs a certificate, give --keys")
+    path = socket_path(endpoint)
+    if path is None:
+        return
+    if len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
+        raise Refused(f"listen {endpoint}: the path has more than {UNIX_PATH_BYTES_MAX} bytes, give a shorter one")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    except OSError as error:
+        raise Refused(f"listen {endpoint}: {error.strerror}") from None
+    if path.exists() and answers(endpoint):
+        raise Refused(f"listen {endpoint}: another router answers there, stop it or give another --listen")
+
+
+def _guard(credentials: Credentials) -> dict[str, Any]:
+    """What a secure router adds: passwords, and the rules of who may say and hear what. Raises Refused."""
+    folder = credentials.certificate.parent
+    users, access = folder / USERS_FILE, folder / ACCESS_FILE
+    check_private(users)
+    try:
+        rules = msgspec.json.decode(access.read_bytes(), type=dict[str, Any])
+    except (OSError, msgspec.DecodeError) as error:
+        raise Refused(f"{access}: {error}, must be the rules that `lfa keys` wrote") from None
+    users_file = {"transport/auth/usrpwd/dictionary_file": str(users)}
+    return _login(credentials) | users_file | {"transport/link/protocols": SECURE_PROTOCOLS} | rules
