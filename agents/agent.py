@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from lfa.agents.config import CONTROL_PERIOD_S
-from lfa.agents.leading.formation_commands import Orders
-from lfa.agents.navigator import Driver
-from lfa.agents.stuck_policy import Distress
-from lfa.agents.team_state import Beliefs
+from lfa.agents.leading.formation_commands import FormationCommands
+from lfa.agents.navigator import Navigator
+from lfa.agents.stuck_policy import StuckPolicy
+from lfa.agents.team_state import TeamState
 from lfa.agents.telemetry import Reports, status
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Twist
@@ -35,7 +35,7 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
-from lfa.protocol.outbox import Voice
+from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TOPIC, alive_key
 
 if TYPE_CHECKING:
@@ -51,23 +51,23 @@ class Agent:
 
     def __init__(self, robot_id: int, incarnation: int, fleet: str, floor: int, mission: Mission | None = None) -> None:
         self._id = robot_id
-        self._voice = Voice(fleet, robot_id, incarnation)
+        self._outbox = Outbox(fleet, robot_id, incarnation)
         self._floor = floor
         self._given = mission
         self._mission: Mission | None = None
-        self._beliefs = Beliefs()
+        self._team = TeamState()
         self._lease: Lease | None = None
         self._config: Config | None = None
         self._chain_ids: tuple[int, ...] = ()
-        self._driver: Driver | None = None
-        self._orders: Orders | None = None
+        self._driver: Navigator | None = None
+        self._orders: FormationCommands | None = None
         self._reports: Reports | None = None
-        self._distress: Distress | None = None
+        self._stuck_policy: StuckPolicy | None = None
         self._next_ask = 0.0
         self._next_control = 0.0
         self._arrived = False
-        self._stopping = False
-        self.at_ease = False
+        self._pending_release = False
+        self.defer_grants = False
         """Grants can wait for the next control step: the lease lasts well beyond it."""
         self._interests = self._wanted()
         self.refusal: str | None = None
@@ -76,11 +76,11 @@ class Agent:
 
     @property
     def name(self) -> str:
-        return self._voice.name
+        return self._outbox.name
 
     @property
     def incarnation(self) -> int:
-        return self._voice.incarnation
+        return self._outbox.incarnation
 
     @property
     def started_with(self) -> dict[str, Any]:
@@ -103,7 +103,7 @@ class Agent:
 
     @property
     def finished(self) -> bool:
-        return self._stopping and (self._lease is None or self._lease.released)
+        return self._pending_release and (self._lease is None or self._lease.released)
 
     def next_deadline(self) -> float:
         if self._lease is None:
@@ -116,8 +116,8 @@ class Agent:
                 self._begin(self._given, now)
             elif now >= self._next_ask:
                 self._next_ask = now + ASK_S
-                self._voice.say("ask", Ask(self._voice.header("ask", now), "mission"))
-            return self._voice.spoken()
+                self._outbox.publish("ask", Ask(self._outbox.header("ask", now), "mission"))
+            return self._outbox.drain()
         step = now >= self._next_control
         if step:
             self._next_control = _next_on_grid(self._next_control, now, CONTROL_PERIOD_S)
@@ -125,7 +125,7 @@ class Agent:
             self._apply(self._lease.tick(now, self._next_control), now)
         if step:
             self._control(now)
-        return self._voice.spoken()
+        return self._outbox.drain()
 
     def receive(self, received: Received) -> list[Envelope]:
         now, message = received.at, received.message
@@ -138,19 +138,19 @@ class Agent:
                 role, term = (Role.WAITING, NO_TERM) if lease is None else (self._role(lease), lease.term)
                 missing = () if lease is None else lease.missing
                 version = None if lease is None else lease.config.version
-                status(self._voice, message, self._beliefs, self._driver, missing, role, term, version, now)
+                status(self._outbox, message, self._team, self._driver, missing, role, term, version, now)
             case Stop():
                 self._stop(now)
             case _ if self._lease is not None and self._driver is not None:
                 self._hear(message, now, self._lease, self._driver)
-        return self._voice.spoken()
+        return self._outbox.drain()
 
     # --- inputs ---------------------------------------------------------------------------------------------------
 
-    def _hear(self, message: object, now: float, lease: Lease, driver: Driver) -> None:
+    def _hear(self, message: object, now: float, lease: Lease, driver: Navigator) -> None:
         match message:
             case Sensors():
-                self._beliefs.hear_sensors(message, now)
+                self._team.hear_sensors(message, now)
                 driver.estimator.sensors(message, now)
                 self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
             case Localization():
@@ -158,7 +158,7 @@ class Agent:
             case LaserScan():
                 driver.see(message, now)
             case GroundProfile():
-                driver.feel(message, now)
+                driver.update_ground(message, now)
             case LeaseNote():
                 source = robot_id_of(message.header.sender)
                 if source is not None:
@@ -176,7 +176,7 @@ class Agent:
                 self._obey(message, now, lease)
 
     def _hear_robot(
-        self, robot: int, message: PoseStamped | TableRow | ObstacleNote | FormationNote, now: float, driver: Driver
+        self, robot: int, message: PoseStamped | TableRow | ObstacleNote | FormationNote, now: float, driver: Navigator
     ) -> None:
         """What another robot tells the team."""
         ahead = driver.predecessor if driver.predecessor is not None and driver.predecessor.robot == robot else None
@@ -185,14 +185,14 @@ class Agent:
                 if ahead is not None:
                     ahead.heard(message, now)
             case TableRow():
-                self._beliefs.hear_row(robot, message, now)
+                self._team.hear_row(robot, message, now)
                 least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
                 if ahead is not None and least_s is not None:
                     ahead.clock.reported(least_s, now)
             case ObstacleNote(kind="trap"):
                 driver.avoid_trap(message, now)
             case ObstacleNote():
-                self._beliefs.obstacles.update(robot, message, now)
+                self._team.obstacles.update(robot, message, now)
             case FormationNote():
                 if driver.formation.request(message):
                     self._event("formation", now, {"number": message.number, "trace": message.trace})
@@ -226,14 +226,14 @@ class Agent:
             check_mission(mission)
             if self._id not in mission.robots:
                 raise Refused(f"id {self._id}: not in the mission, which has robots {list(mission.robots)}")
-            self._driver = Driver(self._id, mission, self._beliefs)
+            self._driver = Navigator(self._id, mission, self._team)
         except Refused as refused:
             self.refusal = str(refused)
             return
         self._mission = mission
-        self._orders = Orders(self._voice, mission, self._driver.formation)
-        self._reports = Reports(self._voice, len(mission.robots))
-        self._distress = Distress(self._id, mission, self._voice, self._beliefs)
+        self._orders = FormationCommands(self._outbox, mission, self._driver.formation)
+        self._reports = Reports(self._outbox, len(mission.robots))
+        self._stuck_policy = StuckPolicy(self._id, mission, self._outbox, self._team)
         me = Member(self._id, self.incarnation)
         self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor)
         self._next_control = now
@@ -242,9 +242,9 @@ class Agent:
 
     def _stop(self, now: float) -> None:
         """Brake, give the lease back, and be done when its last words are out."""
-        if self._stopping:
+        if self._pending_release:
             return
-        self._stopping = True
+        self._pending_release = True
         if self._lease is not None:
             self._command(STILL, Role.FOLLOWER, now)
             self._apply(self._lease.request_release(now), now)
@@ -255,7 +255,7 @@ class Agent:
         for effect in effects:
             match effect:
                 case Send(to, body):
-                    self._voice.say("lease", LeaseNote(self._voice.header("lease", now), body), to)
+                    self._outbox.publish("lease", LeaseNote(self._outbox.header("lease", now), body), to)
                 case BecomeLeader(term, _):
                     self._event("lease", now, {"change": "acquired"}, term)
                     self._event("role", now, {"role": Role.LEADER.value, "leader": self._id}, term)
@@ -263,7 +263,7 @@ class Agent:
                     self._orders.begin(self._driver.lead.progress_m, now)
                     self._control(now)
                 case StepDown(term, cause):
-                    self.at_ease = False
+                    self.defer_grants = False
                     self._event("lease", now, {"change": cause}, term)
                 case AdoptChain(config):
                     self._adopt(now)
@@ -292,25 +292,25 @@ class Agent:
     def _control(self, now: float) -> None:
         """One control step: where am I, what am I, where to, and say it."""
         assert self._lease is not None and self._driver is not None
-        assert self._reports is not None and self._orders is not None and self._distress is not None
+        assert self._reports is not None and self._orders is not None and self._stuck_policy is not None
         lease, driver = self._lease, self._driver
-        self.at_ease = lease.may_command(now + EASE_S) and lease.config.previous is None
+        self.defer_grants = lease.may_command(now + EASE_S) and lease.config.previous is None
         known = driver.estimator.pose_at(now)
         if known is None:
             return
         pose, twist = known
         role = self._role(lease)
-        if self._stopping:
+        if self._pending_release:
             role = Role.WAITING
         command = driver.drive(role, self._chain(lease), pose, twist, now)
         self._command(command, role, now)
         told = driver.published(twist)
-        self._reports.place(driver, self._beliefs, self._neighbours(), role, lease.term, pose, told, now)
+        self._reports.place(driver, self._team, self._neighbours(), role, lease.term, pose, told, now)
         self._reports.decision(driver.decision, lease.term, now)
         self._reports.obstacle(driver, pose, now)
         if role is Role.LEADER and driver.explore is not None:
             self._reports.plan(driver.explore, pose, now)
-        if self._distress.step(role, pose, lease, driver, now):
+        if self._stuck_policy.step(role, pose, lease, driver, now):
             self._hand_over(lease, now)
             return
         if role is Role.LEADER:
@@ -337,7 +337,7 @@ class Agent:
 
     def _command(self, twist: Twist, role: Role, now: float) -> None:
         """The gateway's stamp is read before the lease is checked (lease.md section 5): no stamp, no command."""
-        sensors = self._beliefs.fresh_sensors(now)
+        sensors = self._team.fresh_sensors(now)
         if sensors is None or self._lease is None:
             return
         as_leader = role is Role.LEADER
@@ -347,24 +347,24 @@ class Agent:
             self._lease.commanded(now)
         term = self._lease.term if as_leader else self._lease.config.version.term
         holder = self._id if as_leader else (self._chain(self._lease) or (0,))[0]
-        header = self._voice.header("cmd_vel", now)
-        self._voice.say("cmd_vel", CmdVel(header, twist, term, holder, as_leader, sensors.gateway))
+        header = self._outbox.header("cmd_vel", now)
+        self._outbox.publish("cmd_vel", CmdVel(header, twist, term, holder, as_leader, sensors.gateway))
 
     def _event(self, kind: str, now: float, data: dict[str, Any], term: Term | None = None) -> None:
         if term is None and self._lease is not None:
             term = self._lease.term
-        self._voice.event(kind, now, term, data)
+        self._outbox.event(kind, now, term, data)
 
     # --- whom it hears ------------------------------------------------------------------------------------------------
 
     def _wanted(self) -> frozenset[str]:
-        fleet, own = self._voice.fleet, self._voice.name
+        fleet, own = self._outbox.fleet, self._outbox.name
         common = {f"lfa/{fleet}/*/mission", f"lfa/{fleet}/*/operator"}
         if self._lease is None or self._driver is None:
             return frozenset(common)
         others = {f"lfa/{fleet}/*/{topic}" for topic in ("table", "formation", "obstacles")}
         lease = {f"lfa/{fleet}/*/lease/all", f"lfa/{fleet}/*/lease/{own}", alive_key(fleet, "*", "*")}
-        hardware = {self._voice.key(topic) for topic in ("sensors", "localization", "scan", "ground")}
+        hardware = {self._outbox.key(topic) for topic in ("sensors", "localization", "scan", "ground")}
         ahead = self._driver.predecessor
         pose = set() if ahead is None else {f"lfa/{fleet}/{robot_name(ahead.robot)}/{TOPIC['pose'].name}"}
         return frozenset(common | others | lease | hardware | pose)

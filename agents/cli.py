@@ -53,14 +53,14 @@ def start(arguments: argparse.Namespace) -> int:
     return run([node], options, wall_ms)
 
 
-class _Parser(argparse.ArgumentParser):
+class _AgentParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """One line instead of usage and a line."""
         raise Refused(f"{message} ({EXAMPLE})")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="lfa-agent", description="Run one robot of a fleet until it is stopped.", epilog=EXAMPLE)
+    parser = _AgentParser(prog="lfa-agent", description="Run one robot of a fleet until it is stopped.", epilog=EXAMPLE)
     add = parser.add_argument
     # fmt: off
     add("--role", required=True, help="place it starts in: leader, follower or witness; roles change at run time")

@@ -19,14 +19,14 @@ from lfa.agents.following.factory import follower_of, predecessor_of
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
-from lfa.agents.leading.path_follower import Lead
+from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.localization.estimator import Estimator
-from lfa.agents.perception.obstacle_model import Around, resting
+from lfa.agents.perception.obstacle_model import ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, without
-from lfa.agents.recovery.back_up import Retreat
-from lfa.agents.recovery.stuck_detector import Plight
-from lfa.agents.team_state import Beliefs
+from lfa.agents.recovery.back_up import BackUp
+from lfa.agents.recovery.stuck_detector import StuckMonitor
+from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
@@ -50,32 +50,32 @@ ON_TRACE_M = 0.3
 FRESH_S = 0.5
 
 
-class Driver:
+class Navigator:
     """Of one robot with one mission."""
 
-    def __init__(self, robot_id: int, mission: Mission, beliefs: Beliefs) -> None:
+    def __init__(self, robot_id: int, mission: Mission, team: TeamState) -> None:
         """Raises `Refused` when the mission's gains or controller cannot be had."""
         self._id = robot_id
         self._mission = mission
-        self._beliefs = beliefs
+        self._team = team
         self.estimator = Estimator()
         self.formation = Formation.of(mission)
         self.follower = follower_of(mission)
-        self.leading = Leadership(mission, self.formation, beliefs)
+        self.leading = Leadership(mission, self.formation, team)
         self.predecessor: Predecessor | None = None
-        self._around = Around(mission.radius_m, mission.limits, beliefs.obstacles)
-        self._ground_crossing = GroundCrossing(self._around.ground, mission.limits, mission.radius_m)
+        self._obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
+        self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing()
-        self._plight = Plight(again=mission.leading.motion != "explore")
-        self._retreat = Retreat()
+        self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
+        self._back_up_path = BackUp()
         self._role = Role.WAITING
         self._last = STILL
         self._driven_at: float | None = None
         self._steps = 0
 
     @property
-    def lead(self) -> Lead:
+    def lead(self) -> PathFollower:
         return self.leading.lead
 
     @property
@@ -86,7 +86,7 @@ class Driver:
     @property
     def stuck(self) -> str | None:
         """Why this robot is stuck, None when it is not."""
-        return self._plight.reason
+        return self._stuck_monitor.reason
 
     @property
     def decision(self) -> Decision | None:
@@ -110,15 +110,15 @@ class Driver:
         if known is not None:
             mates = self._mates(now)
             # An explorer's map tells where it can go: what moves shows there and goes again.
-            self._around.see(scan, known[0], mates, now, track=self.explore is None)
+            self._obstacles.see(scan, known[0], mates, now, track=self.explore is None)
             if self.explore is not None:
                 self.explore.see(scan, known[0], known[1], mates)
 
-    def feel(self, profile: GroundProfile, now: float) -> None:
+    def update_ground(self, profile: GroundProfile, now: float) -> None:
         """Take a look at the floor ahead."""
         known = self.estimator.pose_at(now)
         if known is not None:
-            self._around.feel(profile, known[0], now)
+            self._obstacles.update_ground(profile, known[0], now)
 
     def avoid_trap(self, note: ObstacleNote, now: float) -> None:
         """Keep out of a place in which another robot got stuck."""
@@ -127,17 +127,17 @@ class Driver:
     def _bar(self, trap: Point, now: float) -> None:
         """No more into `trap`; an explorer's map tells where it can go, and in a corner it would be barred in."""
         if self.explore is None:
-            self._around.avoid_trap(*trap, now)
+            self._obstacles.avoid_trap(*trap, now)
 
     def back_out(self, pose: Pose2D) -> None:
         """Leave this place, in which the robot is stuck, the way that it came."""
-        if self.stuck is not None and not self._retreat.under_way:
-            self._retreat.begin(pose)
-            self._plight.backing_out = True
+        if self.stuck is not None and not self._back_up_path.under_way:
+            self._back_up_path.begin(pose)
+            self._stuck_monitor.backing_out = True
 
-    def met(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
+    def nearest(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
         """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
-        return self._around.met(pose, kind, now)
+        return self._obstacles.nearest(pose, kind, now)
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Whose successor this robot is from now on; None for nobody's."""
@@ -153,9 +153,9 @@ class Driver:
         self._driven_at = now
         if role != self._role:
             self._change(role, pose, twist, now)
-        points = self._around.points(pose)
+        points = self._obstacles.points(pose)
         self.leading.work(role is Role.LEADER, pose, self._mates, now)
-        moving = self._around.moving(pose, now)
+        moving = self._obstacles.moving(pose, now)
         still = resting(points, pose, moving) if self._crossing.patient else points
         if role is Role.LEADER:
             wanted = self._lead(chain, still, pose, now)
@@ -164,18 +164,18 @@ class Driver:
             if self._steps % TRACK_EVERY == 0:
                 self.lead.track(pose)
             wanted = self._follow(still, pose, twist, dt, now)
-            wanted = self._back_out(points, pose, wanted, now) if self._retreat.under_way else wanted
+            wanted = self._back_out(points, pose, wanted, now) if self._back_up_path.under_way else wanted
         else:
             wanted = STILL
         if role is not Role.WAITING:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
             wanted = self._ground_crossing.cross(wanted, now)
             wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
-        if not self._retreat.under_way:
-            self._retreat.keep(pose)
+        if not self._back_up_path.under_way:
+            self._back_up_path.keep(pose)
         self._watch(role, pose, wanted, now)
         limits = self._mission.limits
-        braked_for = points + self._around.ground.doubtful(pose)
+        braked_for = points + self._obstacles.ground.doubtful(pose)
         self._last = safe(wanted, self._last, braked_for, self._mission.radius_m, limits, dt)
         self.follower.overridden(self._last)
         return self._last
@@ -186,7 +186,7 @@ class Driver:
     def _change(self, role: Role, pose: Pose2D, twist: Twist, now: float) -> None:
         self._role = role
         self._detour.decision = self._crossing.decision = None
-        self._plight.begin(leading=role is Role.LEADER)
+        self._stuck_monitor.begin(leading=role is Role.LEADER)
         omega_max = self._mission.limits.omega_max_radps
         self._detour.omega_max_radps = min(LEADER_OMEGA_MAX_RADPS, omega_max) if role is Role.LEADER else omega_max
         if role is Role.LEADER:
@@ -198,16 +198,16 @@ class Driver:
         """Whether the robot is stuck on its way; not when it stands where it belongs or waits for its team."""
         waits = role is Role.LEADER and self.leading.waiting
         if role is Role.WAITING or waits or self.lead.arrived(pose, self._last):
-            self._plight.rest(pose, now)
+            self._stuck_monitor.rest(pose, now)
             return
         decision = self.decision
         action = None if decision is None else decision.action
         leads = role is Role.LEADER and self.leading.under_way
-        self._plight.watch(pose, wanted, action, self.estimator.age_s(now), now, leads=leads)
+        self._stuck_monitor.watch(pose, wanted, action, self.estimator.age_s(now), now, leads=leads)
 
     def _mates(self, now: float) -> list[Pose2D]:
         """Where the team-mates are, as far as known: the predecessor by its poses, the others by the table."""
-        places = [self._beliefs.pose_of(robot, now) for robot in self._mission.robots if robot != self._id]
+        places = [self._team.pose_of(robot, now) for robot in self._mission.robots if robot != self._id]
         if self.predecessor is not None:
             sighting = self.predecessor.at(now)
             places.append(None if sighting is None else sighting.pose)
@@ -218,7 +218,7 @@ class Driver:
         ahead = None if self.predecessor is None else self.predecessor.robot
         c, s, mates = cos(pose.theta), sin(pose.theta), []
         for robot in self._mission.robots:
-            place = None if robot in (self._id, ahead) else self._beliefs.pose_of(robot, now)
+            place = None if robot in (self._id, ahead) else self._team.pose_of(robot, now)
             if place is not None:
                 dx, dy = place.x - pose.x, place.y - pose.y
                 mates.append((c * dx + s * dy, c * dy - s * dx))
@@ -236,20 +236,20 @@ class Driver:
     ) -> Twist | None:
         """A detour, if one is needed."""
         return self._detour.steer(
-            points, target, wanted, speed, now, lambda free_m: self._around.thing(pose, wanted, free_m, now)
+            points, target, wanted, speed, now, lambda free_m: self._obstacles.blocking(pose, wanted, free_m, now)
         )
 
     def _back_out(self, points: list[Point], pose: Pose2D, wanted: Twist, now: float) -> Twist:
         """Backwards out of a trap, which is kept out of from then on; `wanted` once that is done."""
-        twist = self._retreat.step(points, pose, self._mission.radius_m)
+        twist = self._back_up_path.step(points, pose, self._mission.radius_m)
         if twist is not None:
             self._detour.decision = Decision("back" if twist.linear_x else "blocked", inf, pi, "wall", "out of a trap")
             return twist
-        self._plight.out()
+        self._stuck_monitor.out()
         self._detour.decision = None
         self.follower.rejoin(pose, self._last)
-        if self._retreat.trap is not None:
-            self._bar(self._retreat.trap, now)
+        if self._back_up_path.trap is not None:
+            self._bar(self._back_up_path.trap, now)
         return wanted
 
     def _follow(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from math import floor, inf
 
-from lfa.agents.navigator import Driver
+from lfa.agents.navigator import Navigator
 from lfa.agents.perception.obstacle_model import TRAP_M
 from lfa.agents.recovery.stuck_detector import POSE_LOST
-from lfa.agents.team_state import Beliefs
+from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.lease.lease import Lease
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.team import ObstacleNote
 from lfa.protocol.mission import Mission
-from lfa.protocol.outbox import Voice
+from lfa.protocol.outbox import Outbox
 
 HANDOVER_S = 2.0
 """At least between two hand-overs that a stuck leader asks for."""
@@ -28,14 +28,14 @@ PLACE_M = 1.0
 """Side of the cell within which being stuck twice is being stuck in the same place."""
 
 
-class Distress:
+class StuckPolicy:
     """Of one robot; `step` after each control step."""
 
-    def __init__(self, robot_id: int, mission: Mission, voice: Voice, beliefs: Beliefs) -> None:
+    def __init__(self, robot_id: int, mission: Mission, outbox: Outbox, team: TeamState) -> None:
         self._id = robot_id
         self._robots = mission.robots
-        self._voice = voice
-        self._beliefs = beliefs
+        self._outbox = outbox
+        self._team = team
         self._said: str | None = None
         self._failed = False
         self._next_handover = 0.0
@@ -44,7 +44,7 @@ class Distress:
         """Who gave the lease away, until it is out of its plight."""
         self._reign_from = 0.0
 
-    def step(self, role: Role, pose: Pose2D, lease: Lease, driver: Driver, now: float) -> bool:
+    def step(self, role: Role, pose: Pose2D, lease: Lease, driver: Navigator, now: float) -> bool:
         """Say what has changed. True when the lease is to be handed over now."""
         if driver.stuck != self._said:
             self._said = driver.stuck
@@ -62,20 +62,20 @@ class Distress:
             self._fail(failure, lease, now)
         return driver.stuck is not None and now >= self._next_handover and self._gives_up(pose, lease, driver, now)
 
-    def _left_out(self, lease: Lease, driver: Driver, now: float) -> frozenset[int]:
+    def _left_out(self, lease: Lease, driver: Navigator, now: float) -> frozenset[int]:
         """The stuck ones that are out stay out, and so does who gave the lease away; the others that are stuck go once
         the leader has waited for them."""
         before = self._led_before
-        if before is not None and now >= self._reign_from + NEWS_S and not self._beliefs.stuck(before, now):
+        if before is not None and now >= self._reign_from + NEWS_S and not self._team.stuck(before, now):
             self._led_before = None
         chain = lease.chain
         waited_for = () if driver.leading.waited_out else [robot for robot in chain if robot != self._led_before]
-        stuck = {robot for robot in self._robots if robot not in waited_for and self._beliefs.stuck(robot, now)}
+        stuck = {robot for robot in self._robots if robot not in waited_for and self._team.stuck(robot, now)}
         for robot in stuck.intersection(chain) - lease.left_out:
             self._event("left_out", now, lease, {"robot_left": robot})
         return frozenset(stuck)
 
-    def _gives_up(self, pose: Pose2D, lease: Lease, driver: Driver, now: float) -> bool:
+    def _gives_up(self, pose: Pose2D, lease: Lease, driver: Navigator, now: float) -> bool:
         """Hand over, or fail."""
         self._next_handover = now + HANDOVER_S
         if driver.stuck == POSE_LOST:  # no fault of the place: it comes back with the hardware that starts again
@@ -87,8 +87,8 @@ class Distress:
             self._fail(f"robot {self._id} is {again}: {driver.stuck}", lease, now)
             return False
         self._given_up.append(place)
-        header = self._voice.header("obstacles", now)
-        self._voice.say("obstacles", ObstacleNote(header, "trap", pose.x, pose.y, TRAP_M))
+        header = self._outbox.header("obstacles", now)
+        self._outbox.publish("obstacles", ObstacleNote(header, "trap", pose.x, pose.y, TRAP_M))
         driver.back_out(pose)
         return True
 
@@ -99,4 +99,4 @@ class Distress:
             self._event("failed", now, lease, {"reason": reason})
 
     def _event(self, kind: str, now: float, lease: Lease, data: dict[str, object]) -> None:
-        self._voice.event(kind, now, lease.term, data)
+        self._outbox.event(kind, now, lease.term, data)

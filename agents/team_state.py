@@ -16,7 +16,7 @@ GOES_ON_S = 0.6
 """A robot is taken to go on as it went for so long after its last row."""
 
 
-class Beliefs:
+class TeamState:
     """Latest values, each fresh or stale by the topic table."""
 
     def __init__(self) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Decision
-from lfa.agents.navigator import Driver
-from lfa.agents.team_state import Beliefs
+from lfa.agents.navigator import Navigator
+from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.consensus import Role, Term, Version
 from lfa.protocol.messages.team import Level, ObstacleNote, PlanNote, PoseStamped, Status, TableRow, Tracking
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Vitals
-from lfa.protocol.outbox import Voice
+from lfa.protocol.outbox import Outbox
 
 if TYPE_CHECKING:
     from lfa.agents.exploration.explorer import Explore  # a map and a planner: memory that only explorers need
@@ -30,8 +30,8 @@ FAR_M = 99.0
 class Reports:
     """Keeps the rates of one robot's reports."""
 
-    def __init__(self, voice: Voice, robots: int) -> None:
-        self._voice = voice
+    def __init__(self, outbox: Outbox, robots: int) -> None:
+        self._outbox = outbox
         self._table_s = TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
         self._next_table = 0.0
         self._next_obstacle = 0.0
@@ -39,20 +39,20 @@ class Reports:
         self._met: tuple[str, str] | None = None
 
     def place(
-        self, driver: Driver, beliefs: Beliefs, near: tuple[int, ...], role: Role, term: Term,
+        self, driver: Navigator, team: TeamState, near: tuple[int, ...], role: Role, term: Term,
         pose: Pose2D, twist: Twist, now: float,
     ) -> None:  # fmt: skip
         """After each control step: pose; less often tracking and the table's row. `near` are its neighbours' ids."""
-        voice, odometer_m = self._voice, driver.estimator.odometer_m
-        header = voice.header("pose", now)
-        voice.say("pose", PoseStamped(header, pose.x, pose.y, 0.0, pose.theta, twist, odometer_m, role, term))
+        outbox, odometer_m = self._outbox, driver.estimator.odometer_m
+        header = outbox.header("pose", now)
+        outbox.publish("pose", PoseStamped(header, pose.x, pose.y, 0.0, pose.theta, twist, odometer_m, role, term))
         self._steps += 1
         if role is Role.FOLLOWER and driver.predecessor is not None and self._steps % TRACKING_EVERY == 0:
             self._tracking(driver, driver.predecessor.robot, now)
         if now >= self._next_table:
             self._next_table = now + self._table_s
-            header, delays, stuck = voice.header("table", now), beliefs.delays(near, now), driver.stuck is not None
-            voice.say("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck))
+            header, delays, stuck = outbox.header("table", now), team.delays(near, now), driver.stuck is not None
+            outbox.publish("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck))
 
     def decision(self, decision: Decision | None, term: Term, now: float) -> None:
         """Each change of what a robot does about its surroundings, with the values that decided it."""
@@ -66,9 +66,9 @@ class Reports:
             data |= {"class": decision.kind, "action": decision.action, "free_m": free_m, "bearing_rad": bearing}
             if decision.condition:
                 data |= {"condition": decision.condition, "updates": decision.updates}
-        self._voice.event("decision", now, term, data)
+        self._outbox.event("decision", now, term, data)
 
-    def obstacle(self, driver: Driver, pose: Pose2D, now: float) -> None:
+    def obstacle(self, driver: Navigator, pose: Pose2D, now: float) -> None:
         """What this robot is dealing with, for all: at once when it changes, and while it lasts twice a second."""
         decision = driver.decision
         if decision is None:
@@ -76,12 +76,12 @@ class Reports:
             return
         if now < self._next_obstacle:
             return
-        feature = driver.met(pose, decision.kind, now)
+        feature = driver.nearest(pose, decision.kind, now)
         if feature is not None:
             self._next_obstacle = now + OBSTACLE_S
-            header, velocity = self._voice.header("obstacles", now), (feature.vx, feature.vy)
+            header, velocity = self._outbox.header("obstacles", now), (feature.vx, feature.vy)
             note = ObstacleNote(header, feature.kind, feature.x, feature.y, feature.radius_m, velocity)
-            self._voice.say("obstacles", note)
+            self._outbox.publish("obstacles", note)
 
     def plan(self, explore: Explore, pose: Pose2D, now: float) -> None:
         """Of who leads through unknown ground: its route, and a tile of its map where there is news."""
@@ -91,20 +91,20 @@ class Reports:
         if tile is not None:
             step = max(1, -(-len(explore.route) // ROUTE_POINTS_MAX))
             route = (*explore.route[::step], *explore.route[-1:])
-            self._voice.say("plan", PlanNote(self._voice.header("plan", now), route, *tile))
+            self._outbox.publish("plan", PlanNote(self._outbox.header("plan", now), route, *tile))
 
-    def _tracking(self, driver: Driver, predecessor: int, now: float) -> None:
+    def _tracking(self, driver: Navigator, predecessor: int, now: float) -> None:
         r = driver.follower.readout
         if r.separation_m <= 0.0:  # no step of following was made yet: there is nothing to tell
             return
-        self._voice.say("tracking", Tracking(
-            self._voice.header("tracking", now), predecessor, r.separation_m, r.phi, r.chi, r.heading,
+        self._outbox.publish("tracking", Tracking(
+            self._outbox.header("tracking", now), predecessor, r.separation_m, r.phi, r.chi, r.heading,
             r.slot_map, r.error_m, driver.decision is not None, r.state.value,
         ))  # fmt: skip
 
 
 def status(
-    voice: Voice, vitals: Vitals, beliefs: Beliefs, driver: Driver | None, missing: tuple[int, ...],
+    outbox: Outbox, vitals: Vitals, team: TeamState, driver: Navigator | None, missing: tuple[int, ...],
     role: Role, term: Term, version: Version | None, now: float,
 ) -> None:  # fmt: skip
     """Diagnostics in the sense of ROS. `driver` is None before the mission is known; `missing` stay away (E18)."""
@@ -115,8 +115,8 @@ def status(
         "undecodable": vitals.undecodable,
         "cpu_percent": round(vitals.cpu_percent, 2),
         "rss_mib": round(vitals.rss_mib, 1),
-        "rows_heard": beliefs.rows_heard,
-        "rows_lost": beliefs.rows_lost,
+        "rows_heard": team.rows_heard,
+        "rows_lost": team.rows_lost,
     }
     if version is not None:  # of the config, and so of the chain: who missed the event knows it by this
         counters |= {"config_n": version.term.n, "config_seq": version.seq}
@@ -129,4 +129,4 @@ def status(
         if driver.predecessor is not None:
             counters["predecessor_clock_offset_s"] = driver.predecessor.clock.offset(now)
             counters["predecessor_refused"] = driver.predecessor.refused
-    voice.say("status", Status(voice.header("status", now), level, text, role, term, counters))
+    outbox.publish("status", Status(outbox.header("status", now), level, text, role, term, counters))

@@ -14,7 +14,7 @@ import typer
 from msgspec import Struct
 from typer.models import OptionInfo
 
-from lfa.deploy.cli import COMMANDS, Entry
+from lfa.deploy.cli import COMMANDS, Command
 from lfa.world.description.load import shipped
 
 
@@ -39,7 +39,7 @@ def words() -> list[Words]:
     return [_words_of(entry, import_module(entry.module).command) for entry in COMMANDS]
 
 
-def _words_of(entry: Entry, function: Callable[..., Any]) -> Words:
+def _words_of(entry: Command, function: Callable[..., Any]) -> Words:
     options, choices = ["--help"], []
     for name, hint in get_type_hints(function, include_extras=True).items():
         kind, *about = get_args(hint) if get_origin(hint) is Annotated else (hint,)

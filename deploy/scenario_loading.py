@@ -9,7 +9,7 @@ from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
 
 
-def choose(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
+def load_scenario(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
     """`scenario` by name or path, its values overridden; also what only a robot could refuse (gains, controller).
 
     Raises Refused with one line.

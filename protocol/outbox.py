@@ -13,7 +13,7 @@ from lfa.protocol.node import Envelope
 from lfa.protocol.topics import TOPIC, key
 
 
-class Voice:
+class Outbox:
     """The sender's side of every message of one life of one robot."""
 
     def __init__(self, fleet: str, robot_id: int, incarnation: int) -> None:
@@ -33,15 +33,15 @@ class Voice:
         """This robot's own key of `topic`."""
         return self._keys[topic]
 
-    def say(self, topic: str, message: Message, to: str | None = None) -> None:
+    def publish(self, topic: str, message: Message, to: str | None = None) -> None:
         own = self._keys[topic]
         self._out.append(Envelope(own if to is None else f"{own}/{to}", message))
 
     def event(self, kind: str, now: float, term: Term | None, data: dict[str, Any]) -> None:
         """A line for `events.jsonl`."""
-        self.say("event", Event(self.header("event", now), kind, term, data))
+        self.publish("event", Event(self.header("event", now), kind, term, data))
 
-    def spoken(self) -> list[Envelope]:
+    def drain(self) -> list[Envelope]:
         """All that was said since the last call."""
         out, self._out = self._out, []
         return out

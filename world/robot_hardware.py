@@ -22,7 +22,7 @@ REFUSAL_EVERY_S = 0.2
 """Between two events of a gateway about the same reason, however often the term changes."""
 
 
-class Robot:
+class RobotHardware:
     """What stands between an agent and its simulated body. `now` is the world's monotonic time [s] throughout."""
 
     def __init__(self, fleet: str, robot_id: int, scenario: Scenario, seed: int, incarnation: int, now: float) -> None:

@@ -17,9 +17,9 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
 from lfa.protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
 from lfa.protocol.runtime.journal import Journal
-from lfa.protocol.runtime.node_host import Host, Sent
+from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
-from lfa.protocol.transport.link_model import Air, Link, Radio, link_of
+from lfa.protocol.transport.link_model import Link, LinkModel, Radio, link_of
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
@@ -43,10 +43,10 @@ class LocalClock(Struct, frozen=True):
         return (local_s - self.offset_s) / self.rate
 
 
-class _Seat:
+class _SimulatedNode:
     """One living process: its host, its clock, what it follows, and what waits for it while it is stopped."""
 
-    def __init__(self, host: Host, clock: LocalClock) -> None:
+    def __init__(self, host: NodeHost, clock: LocalClock) -> None:
         self.host = host
         self.node: Node = host.node
         self.clock = clock
@@ -65,11 +65,11 @@ class Simulator:
         self.now = 0.0
         self.taps: list[Tap] = []
         self._random = Random(f"air-{seed}")
-        self.air = Air(radio, self._random)
-        self._seats: dict[str, _Seat] = {}
+        self.air = LinkModel(radio, self._random)
+        self._seats: dict[str, _SimulatedNode] = {}
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = 0
-        self._routes: dict[str, list[tuple[_Seat, Link | None]]] = {}
+        self._routes: dict[str, list[tuple[_SimulatedNode, Link | None]]] = {}
         """Who hears what comes on a key, and over which link through the air."""
         self._wanted: dict[tuple[frozenset[str], str], bool] = {}
 
@@ -79,7 +79,7 @@ class Simulator:
 
     def add(self, node: Node, journal: Journal, clock: LocalClock | None = None) -> None:
         """A process starts now. Its token is told to the others, and theirs to it."""
-        seat = _Seat(Host(node, journal), clock or LocalClock())
+        seat = _SimulatedNode(NodeHost(node, journal), clock or LocalClock())
         self._seats[node.name] = seat
         self._refresh(seat)
         self._announce(PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)
@@ -156,7 +156,7 @@ class Simulator:
 
     # --- one call of one node ---------------------------------------------------------------------------------
 
-    def _give(self, seat: _Seat, key: str, message: Message | Local, payload: bytes) -> None:
+    def _give(self, seat: _SimulatedNode, key: str, message: Message | Local, payload: bytes) -> None:
         if seat.gone:
             return
         if seat.paused:
@@ -164,7 +164,7 @@ class Simulator:
             return
         self._after(seat, seat.host.deliver(seat.clock.local(self.now), key, message, payload))
 
-    def _tick(self, seat: _Seat, deadline: float) -> None:
+    def _tick(self, seat: _SimulatedNode, deadline: float) -> None:
         """`deadline` is the node's own, as it said after its last call."""
         if seat.gone or seat.paused:
             return
@@ -174,7 +174,7 @@ class Simulator:
         else:
             self._plan(seat)
 
-    def _after(self, seat: _Seat, sent: Sent) -> None:
+    def _after(self, seat: _SimulatedNode, sent: Sent) -> None:
         node = seat.node
         for key, payload in sent:
             self._publish(seat, key, payload)
@@ -187,30 +187,30 @@ class Simulator:
         else:
             self._plan(seat)
 
-    def _plan(self, seat: _Seat) -> None:
+    def _plan(self, seat: _SimulatedNode) -> None:
         deadline = seat.node.next_deadline()
         if deadline == seat.deadline:
             return
         seat.deadline = deadline
         self.at(max(seat.clock.true(deadline), self.now), self._due, seat, deadline)
 
-    def _due(self, seat: _Seat, deadline: float) -> None:
+    def _due(self, seat: _SimulatedNode, deadline: float) -> None:
         if seat.deadline == deadline:
             seat.deadline = None
             self._tick(seat, deadline)
 
-    def _leave(self, seat: _Seat) -> None:
+    def _leave(self, seat: _SimulatedNode) -> None:
         if not seat.gone:
             self._remove(seat)
             self._announce(PeerDown(seat.node.name, seat.node.incarnation), LOCAL_DELAY_S)
 
-    def _remove(self, seat: _Seat) -> None:
+    def _remove(self, seat: _SimulatedNode) -> None:
         del self._seats[seat.node.name]
         seat.gone = True
         seat.host.journal.close()
         self._routes.clear()
 
-    def _vitals(self, seat: _Seat) -> None:
+    def _vitals(self, seat: _SimulatedNode) -> None:
         if not seat.gone:
             if not seat.paused:
                 self._give(seat, "", Vitals(0.0, 0, seat.host.undecodable, 0.0, 0.0), b"")
@@ -218,7 +218,7 @@ class Simulator:
 
     # --- between nodes ------------------------------------------------------------------------------------------
 
-    def _publish(self, sender: _Seat, key: str, payload: bytes) -> None:
+    def _publish(self, sender: _SimulatedNode, key: str, payload: bytes) -> None:
         message = sender.host.decoded(key, payload)
         if message is None:
             return
@@ -231,7 +231,7 @@ class Simulator:
             for delay_s in LOCAL_DELAYS_S if link is None else self.air.delays(*link):
                 self.at(self.now + delay_s, self._give, seat, key, message, payload)
 
-    def _route(self, key: str) -> list[tuple[_Seat, Link | None]]:
+    def _route(self, key: str) -> list[tuple[_SimulatedNode, Link | None]]:
         hear = [seat for seat in self._seats.values() if self._wants(seat.interests, key)]
         routes = self._routes[key] = [(seat, link_of(key, seat.node.name)) for seat in hear]
         return routes
@@ -243,7 +243,7 @@ class Simulator:
             known = self._wanted[interests, key] = any(matches(e, key) for e in interests)
         return known
 
-    def _refresh(self, seat: _Seat) -> None:
+    def _refresh(self, seat: _SimulatedNode) -> None:
         """The node's interests changed: it also hears of the tokens that already stand."""
         new = seat.node.interests
         added = sorted(new - seat.interests)
@@ -260,7 +260,7 @@ class Simulator:
             if seat.node.name != event.name and any(matches(e, token) for e in seat.interests):
                 self._hint_later(seat, event, delay_s)
 
-    def _hint_later(self, seat: _Seat, event: PeerUp | PeerDown, delay_s: float) -> None:
+    def _hint_later(self, seat: _SimulatedNode, event: PeerUp | PeerDown, delay_s: float) -> None:
         self.at(self.now + delay_s, self._give, seat, "", event, b"")
 
 

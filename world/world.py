@@ -25,7 +25,7 @@ from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_k
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
-from lfa.world.robot_hardware import Robot
+from lfa.world.robot_hardware import RobotHardware
 from lfa.world.sensors.ground_sensor import Profiler
 from lfa.world.sensors.lidar import Scanner
 
@@ -91,13 +91,13 @@ class World:
         self._bodies = bodies(scenario)
         self._scanner = Scanner(scenario)
         self._profiler = Profiler(scenario)
-        self._robots: list[Robot] = []
+        self._robots: list[RobotHardware] = []
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
         self._real = {robot_name(robot): self._place[robot_name(robot)] for robot in scenario.world.real_robots}
         """Robots whose hardware speaks for itself, with their places."""
         simulated = [robot for robot in scenario.mission.robots if robot_name(robot) not in self._real]
-        self._simulated: list[tuple[int, Robot]] = []
+        self._simulated: list[tuple[int, RobotHardware]] = []
         """All the others, with their places."""
         self._driven: dict[int, tuple[Twist, float]] = {}
         """How such a robot said that it moves, and when, by its place."""
@@ -196,7 +196,7 @@ class World:
         if not self._robots:
             mission = self._scenario.mission
             self._robots = [
-                Robot(self._fleet, robot_id, self._scenario, self._seed, self.incarnation, now)
+                RobotHardware(self._fleet, robot_id, self._scenario, self._seed, self.incarnation, now)
                 for robot_id in mission.robots
             ]
             self._simulated = [(n, robot) for n, robot in enumerate(self._robots) if robot.name not in self._real]

@@ -42,7 +42,7 @@ class Situation(Struct, frozen=True):
     """r_sw: what it needs to turn on the spot."""
 
 
-class Row(Struct, frozen=True):
+class DecisionRow(Struct, frozen=True):
     kind: Class
     name: str
     holds: Callable[[Situation], bool]
@@ -72,29 +72,29 @@ def _turns(s: Situation) -> bool:
 
 
 #   class, condition, when it holds, action, what it updates
-TABLE: tuple[Row, ...] = (
-    Row("moving", "it keeps its distance", lambda s: s.closest_m >= 0.6, "continue", MOTION),
-    Row("moving", "it comes too near", lambda s: s.closest_m < 0.6, "give_way", MOTION),
-    Row("wall", "a side is free", lambda s: _turns(s) and _beside(s), "aside", ANGLE),
-    Row("wall", "both sides barred", lambda s: _turns(s) and _behind(s), "u_turn", ANGLE),
-    Row("wall", "too near to turn", lambda s: not _turns(s) and s.back_m >= s.swing_m, "back", ANGLE),
-    Row("ditch", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
-    Row("ditch", "a side is free", _beside, "aside", ANGLE),
-    Row("ditch", "both sides barred", _behind, "u_turn", ANGLE),
-    Row("pothole", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
-    Row("pothole", "too large, a side is free", lambda s: _known(s) and _beside(s), "aside", ANGLE),
-    Row("pothole", "its end is not in sight", _behind, "u_turn", ANGLE),
-    Row("stationary", "a side is free", lambda s: _known(s) and _beside(s), "aside", MOTION),
-    Row("stationary", "both sides barred", lambda s: _known(s) and _behind(s), "u_turn", MOTION),
-    Row("stationary", "its end is not in sight", lambda s: not _known(s) and not s.crept, "creep", MOTION),
-    Row("stationary", "its end stays out of sight", lambda s: not _known(s) and _behind(s), "u_turn", MOTION),
-    Row("bump", "low enough", lambda s: _known(s) and s.crossable, "climb", ANGLE),
-    Row("bump", "too high, a side is free", _beside, "aside", ANGLE),
-    Row("bump", "too high, both sides barred", _behind, "u_turn", ANGLE),
+TABLE: tuple[DecisionRow, ...] = (
+    DecisionRow("moving", "it keeps its distance", lambda s: s.closest_m >= 0.6, "continue", MOTION),
+    DecisionRow("moving", "it comes too near", lambda s: s.closest_m < 0.6, "give_way", MOTION),
+    DecisionRow("wall", "a side is free", lambda s: _turns(s) and _beside(s), "aside", ANGLE),
+    DecisionRow("wall", "both sides barred", lambda s: _turns(s) and _behind(s), "u_turn", ANGLE),
+    DecisionRow("wall", "too near to turn", lambda s: not _turns(s) and s.back_m >= s.swing_m, "back", ANGLE),
+    DecisionRow("ditch", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
+    DecisionRow("ditch", "a side is free", _beside, "aside", ANGLE),
+    DecisionRow("ditch", "both sides barred", _behind, "u_turn", ANGLE),
+    DecisionRow("pothole", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
+    DecisionRow("pothole", "too large, a side is free", lambda s: _known(s) and _beside(s), "aside", ANGLE),
+    DecisionRow("pothole", "its end is not in sight", _behind, "u_turn", ANGLE),
+    DecisionRow("stationary", "a side is free", lambda s: _known(s) and _beside(s), "aside", MOTION),
+    DecisionRow("stationary", "both sides barred", lambda s: _known(s) and _behind(s), "u_turn", MOTION),
+    DecisionRow("stationary", "its end is not in sight", lambda s: not _known(s) and not s.crept, "creep", MOTION),
+    DecisionRow("stationary", "its end stays out of sight", lambda s: not _known(s) and _behind(s), "u_turn", MOTION),
+    DecisionRow("bump", "low enough", lambda s: _known(s) and s.crossable, "climb", ANGLE),
+    DecisionRow("bump", "too high, a side is free", _beside, "aside", ANGLE),
+    DecisionRow("bump", "too high, both sides barred", _behind, "u_turn", ANGLE),
 )  # fmt: skip
 
 
-def decide(situation: Situation) -> Row | None:
+def decide(situation: Situation) -> DecisionRow | None:
     """The first row of the situation's class that holds; None when the robot is stuck."""
     return next((row for row in TABLE if row.kind == situation.kind and row.holds(situation)), None)
 

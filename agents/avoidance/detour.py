@@ -12,10 +12,10 @@ from math import atan2, cos, hypot, inf, pi, sqrt
 from msgspec.structs import replace
 
 from lfa.agents.avoidance import safety
-from lfa.agents.avoidance.decision import Decision, Row, Situation, decide
+from lfa.agents.avoidance.decision import Decision, DecisionRow, Situation, decide
 from lfa.agents.avoidance.openings import ALL_STEPS, ASIDE_STEPS, BESIDE, NARROW_M, WIDE_M, _bar, _first_open, _Openings
 from lfa.agents.config import CONTROL_PERIOD_S
-from lfa.agents.perception.obstacle import Thing
+from lfa.agents.perception.obstacle import BlockingObstacle
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Twist, wrap
 from lfa.protocol.mission import Limits
@@ -54,7 +54,7 @@ class Detour:
         """None while the wanted way is taken."""
         self._kept_m = NARROW_M
         """`NARROW_M`, less where the robot is nearer to something already."""
-        self._thing = Thing()
+        self._thing = BlockingObstacle()
         self._side = 0.0
         self._side_at = -inf
         self._acted_at = -inf
@@ -70,7 +70,7 @@ class Detour:
         wanted: Twist,
         speed_mps: float,
         now: float,
-        thing: Callable[[float], Thing] = lambda free_m: Thing(),
+        thing: Callable[[float], BlockingObstacle] = lambda free_m: BlockingObstacle(),
     ) -> Twist | None:
         """The twist of a detour towards `target` (both in `base_link`), or None: the wanted twist may go on.
 
@@ -150,7 +150,7 @@ class Detour:
         self._say(action, free_m, bearing, row if action != "blocked" else None, now)
         return twist
 
-    def _row(self, points: Sequence[Point], openings: _Openings, free_m: float) -> Row | None:
+    def _row(self, points: Sequence[Point], openings: _Openings, free_m: float) -> DecisionRow | None:
         """The table's row for what was met: an opening is as wide as the robot needs, whatever lies beside it."""
         nose_m = free_along(points, AHEAD, self._radius_m)
         # A bend that would lead nearer to what the robot has beside it says nothing of what is before its nose.
@@ -211,7 +211,7 @@ class Detour:
             self._open_since = now
         return now - self._open_since < CLEAR_S
 
-    def _say(self, action: str, free_m: float, bearing: float, row: Row | None, now: float) -> None:
+    def _say(self, action: str, free_m: float, bearing: float, row: DecisionRow | None, now: float) -> None:
         """What is logged keeps its name for a while, unless there is no way at all."""
         before = self.decision
         held = before is not None and now - self._acted_at < HOLD_S and "blocked" not in (action, before.action)

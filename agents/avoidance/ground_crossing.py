@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from lfa.agents.avoidance.decision import Decision, Situation, decide
-from lfa.agents.perception.ground_map import Ground
+from lfa.agents.perception.ground_map import GroundMap
 from lfa.protocol.geometry import Twist
 from lfa.protocol.mission import Limits
 
@@ -22,7 +22,7 @@ BESIDE_M = 0.05
 class GroundCrossing:
     """Crossing by one robot of the features that its ground map shows."""
 
-    def __init__(self, ground: Ground, limits: Limits, radius_m: float) -> None:
+    def __init__(self, ground: GroundMap, limits: Limits, radius_m: float) -> None:
         self._ground = ground
         self._limits = limits
         self._radius_m = radius_m

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from heapq import heappop, heappush
 
-from lfa.agents.exploration.costmap import DIAGONAL, FREE, STRAIGHT, UNSEEN, Footing
+from lfa.agents.exploration.costmap import DIAGONAL, FREE, STRAIGHT, UNSEEN, Costmap
 from lfa.agents.exploration.occupancy_grid import REACH
 
 GUESS = 11
@@ -20,7 +20,7 @@ LONG_CELLS, ROOM_CELLS_MAX = 12_000, 60_000
 """A search that has looked at so many cells asks whether the robot is walled in, in a room of at most so many."""
 
 
-def search(footing: Footing, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
+def search(footing: Costmap, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
     """Whether there is a way; each `toward[cell]` becomes the number, from 1, of the step by which it was reached."""
     looked_at, asked = 0, False
     for looked in _spread(footing, goal, start, toward):
@@ -43,7 +43,7 @@ def chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
     return cells
 
 
-def _spread(footing: Footing, goal: int, start: int, toward: bytearray) -> Iterator[int]:
+def _spread(footing: Costmap, goal: int, start: int, toward: bytearray) -> Iterator[int]:
     """A* from `goal`: `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. Ends
     with a negative number when `start` is reached, else when nothing is left."""
     grid, near, prices = footing.grid, footing.near, footing.prices
@@ -96,7 +96,7 @@ def _spread(footing: Footing, goal: int, start: int, toward: bytearray) -> Itera
     yield looked
 
 
-def _closed_in(footing: Footing, start: int, goal: int) -> Generator[int, None, bool]:
+def _closed_in(footing: Costmap, start: int, goal: int) -> Generator[int, None, bool]:
     """Whether the ground around the robot ends before the goal: a long search would find that out last."""
     near, prices, columns, rows = footing.near, footing.prices, footing.grid.columns, footing.grid.rows
     seen = bytearray(len(near))

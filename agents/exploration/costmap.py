@@ -30,7 +30,7 @@ Box = tuple[float, float, float, float]
 """x1, y1, x2, y2 in `map` [m]."""
 
 
-class Footing:
+class Costmap:
     """Of one search. `near` is a copy of the grid's nearness, so what is barred here is barred for this search only."""
 
     def __init__(self, grid: Grid, prices: bytes) -> None:

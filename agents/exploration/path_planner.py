@@ -11,7 +11,7 @@ from itertools import pairwise
 from math import ceil, cos, hypot, inf, sin
 
 from lfa.agents.exploration.astar import chain, search
-from lfa.agents.exploration.costmap import Box, Footing, between, prices_of, runs_of
+from lfa.agents.exploration.costmap import Box, Costmap, between, prices_of, runs_of
 from lfa.agents.exploration.occupancy_grid import CELL_M, Grid, Point
 from lfa.agents.exploration.path_smoothing import PIECE_M, smoothed, straightened
 from lfa.protocol.geometry import Pose2D
@@ -131,7 +131,7 @@ class Planner:
         if footing.price_of_cells(cells) <= IMPROVED * old:
             yield from self._shape(footing, cells)
 
-    def _shape(self, footing: Footing, cells: Sequence[int]) -> Iterator[int]:
+    def _shape(self, footing: Costmap, cells: Sequence[int]) -> Iterator[int]:
         """Make `route` of the cells."""
         points: list[Point] = []
         for looked, so_far in straightened(footing, cells):
@@ -144,9 +144,9 @@ class Planner:
         self.route, self.unreachable = tuple(points), None
         self.number += 1
 
-    def _footing(self, mates: tuple[Pose2D, ...]) -> Footing:
+    def _footing(self, mates: tuple[Pose2D, ...]) -> Costmap:
         """Ground as it is now, less what is kept out of and where team-mates are and come to."""
-        footing = Footing(self._grid, self._prices)
+        footing = Costmap(self._grid, self._prices)
         footing.bar_runs(self._keepout)
         for mate in mates:
             apart = hypot(mate.x - self._pose[0], mate.y - self._pose[1])

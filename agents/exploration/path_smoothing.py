@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import ceil, hypot
 
-from lfa.agents.exploration.costmap import FREE, STRAIGHT, Footing
+from lfa.agents.exploration.costmap import FREE, STRAIGHT, Costmap
 from lfa.agents.exploration.occupancy_grid import Point
 
 PIECE_M = 0.4
@@ -18,7 +18,7 @@ CUT_MAX = 48
 """A shortcut replaces at most so many cells of path."""
 
 
-def straightened(footing: Footing, cells: Sequence[int]) -> Iterator[tuple[int, list[Point]]]:
+def straightened(footing: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, list[Point]]]:
     """Shortcuts where the straight line is not dearer than the cells it replaces; work and points so far."""
     grid = footing.grid
     at = 0
@@ -39,7 +39,7 @@ def straightened(footing: Footing, cells: Sequence[int]) -> Iterator[tuple[int, 
         yield looked, points
 
 
-def smoothed(footing: Footing, points: list[Point]) -> Iterator[list[Point]]:
+def smoothed(footing: Costmap, points: list[Point]) -> Iterator[list[Point]]:
     """Each point drawn to the middle of its neighbours, as far as that brings it no nearer to a wall."""
     for _ in range(SMOOTHINGS):
         for n in range(1, len(points) - 1):

@@ -11,7 +11,7 @@ from math import isfinite
 from msgspec import Struct
 
 from lfa.agents.following.observer import Mode, Observer
-from lfa.agents.formation.pose_history import JitterBuffer, Sample, Trace
+from lfa.agents.formation.pose_history import JitterBuffer, PoseHistory, Sample
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.localization.plausibility import plausible
 from lfa.protocol.geometry import Pose2D, Twist
@@ -43,7 +43,7 @@ class Sighting(Struct, frozen=True):
     """How old the state is on purpose."""
     travelled_m: float
     """Arc length of `pose` on `trace`."""
-    trace: Trace
+    trace: PoseHistory
 
 
 class Predecessor:
@@ -57,7 +57,7 @@ class Predecessor:
         extrapolation_max_s: float = 0.5,
         delay_s: float | None = 0.0,
         trace_m: float = 4.0,
-        trace: Trace | None = None,
+        trace: PoseHistory | None = None,
     ) -> None:
         """`delay_s` 0 dead-reckons, None chooses a buffer by what the messages' ages turn out to be.
 
@@ -65,7 +65,7 @@ class Predecessor:
         """
         self.robot = robot
         self.clock = ClockOffset()
-        self.trace = trace or Trace(trace_m + TRACE_MARGIN_M)
+        self.trace = trace or PoseHistory(trace_m + TRACE_MARGIN_M)
         self._joining = trace is not None
         self._mode: Mode = mode
         self._extrapolation_max_s = extrapolation_max_s

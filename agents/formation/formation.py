@@ -12,7 +12,7 @@ from math import cos, hypot, isfinite, pi, sin, sqrt
 
 from lfa.agents.config import Gains
 from lfa.agents.formation.kinematics import slot_velocity
-from lfa.agents.formation.pose_history import Trace
+from lfa.agents.formation.pose_history import PoseHistory
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import TAU, Pose2D, Twist, bearing, wrap
 from lfa.protocol.messages.consensus import NO_TERM, Term
@@ -236,7 +236,9 @@ class SlotMotion:
         self.y = predecessor.y + behind_y + self.offset_y
         self.settled = self._blend(slot, c, s, dt)
 
-    def step_on(self, trace: Trace, travelled_m: float, slot: Slot, predecessor: Pose2D, v: float, dt: float) -> None:
+    def step_on(
+        self, trace: PoseHistory, travelled_m: float, slot: Slot, predecessor: Pose2D, v: float, dt: float
+    ) -> None:
         """Move on by `dt` along the predecessor's trace, `slot.separation_m` of path behind it (5.5)."""
         point = trace.at(travelled_m - self.separation_m + self.lead_m)
         c, s = cos(point.theta), sin(point.theta)

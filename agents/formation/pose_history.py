@@ -125,7 +125,7 @@ class TracePoint(Struct, frozen=True, gc=False):
     curvature: float
 
 
-class Trace:
+class PoseHistory:
     """A path by arc length, [m]. Where the predecessor reverses, its path is taken back."""
 
     def __init__(self, length_m: float) -> None:

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from math import pi
 
 from lfa.agents.formation.formation import Formation, named, slots_of
-from lfa.agents.leading.path_follower import Lead
+from lfa.agents.leading.path_follower import PathFollower
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.consensus import Term
 from lfa.protocol.messages.team import FormationNote, Slot
 from lfa.protocol.mission import Mission
-from lfa.protocol.outbox import Voice
+from lfa.protocol.outbox import Outbox
 
 REPEAT_S = 1.0
 BEND_CHECK_S = 0.5
@@ -26,29 +26,29 @@ BEND_AHEAD_M = 5.0
 """Far enough ahead for a chain of four to fall into column at cruise speed."""
 
 
-class Orders:
+class FormationCommands:
     """One robot's side of it while it leads; `begin` starts a reign."""
 
-    def __init__(self, voice: Voice, mission: Mission, formation: Formation) -> None:
-        self._voice = voice
+    def __init__(self, outbox: Outbox, mission: Mission, formation: Formation) -> None:
+        self._outbox = outbox
         self._mission = mission
         self._formation = formation
         self._number = 0
-        self._given = 0
+        self._next = 0
         self._repeat_at = 0.0
         self._check_at = self._fold_at = 0.0
 
     def begin(self, progress_m: float, now: float) -> None:
         """What the route asked for so far has been asked for; requests of this term count from 0."""
         self._number, self._repeat_at = 0, now
-        self._given = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
+        self._next = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
 
-    def lead(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
+    def lead(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
         """One control step of the leader: what is due by the route, and the standing request once a second."""
         orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
-        while self._given < len(orientations) and orientations[self._given].at_m <= lead.progress_m:
-            self.order(orientations[self._given].side, "mission", followers, term, now)
-            self._given += 1
+        while self._next < len(orientations) and orientations[self._next].at_m <= lead.progress_m:
+            self.order(orientations[self._next].side, "mission", followers, term, now)
+            self._next += 1
         if now >= self._check_at:
             self._check_at = now + BEND_CHECK_S
             self._column_where_narrow(lead, followers, term, now)
@@ -63,9 +63,9 @@ class Orders:
             return
         self._number += 1
         self._say(slots_of(spec, followers), term, now)
-        self._voice.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
+        self._outbox.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
 
-    def _column_where_narrow(self, lead: Lead, followers: Sequence[int], term: Term, now: float) -> None:
+    def _column_where_narrow(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
         """Before a bend that the formation cannot follow, and where obstacles are known: the route is past them."""
         slots = [self._formation.slot_of(robot) for robot in followers]
         if self._formation.trace or all(map(_behind, slots)):
@@ -87,13 +87,13 @@ class Orders:
         self._number += 1
         self._say((*slots[:last], *column[last:]), term, now)
         note = {"number": self._number, "side": "column", "by": "known obstacles", "robot": followers[last]}
-        self._voice.event("formation", now, term, note)
+        self._outbox.event("formation", now, term, note)
 
     def _say(self, slots: tuple[Slot, ...], term: Term, now: float) -> None:
-        header = self._voice.header("formation", now)
+        header = self._outbox.header("formation", now)
         note = FormationNote(header, term, self._number, slots, self._formation.trace)
         self._formation.request(note)
-        self._voice.say("formation", note)
+        self._outbox.publish("formation", note)
         self._repeat_at = now + REPEAT_S
 
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.safety import SKIN_M
 from lfa.agents.formation.formation import Formation
-from lfa.agents.leading.path_follower import Lead
+from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.perception.scan import Point, free_along
-from lfa.agents.team_state import Beliefs
+from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Mission
@@ -41,11 +41,11 @@ LOOK_ROUND_M = 0.35
 class Leadership:
     """One robot's side of it; `begin` starts a reign."""
 
-    def __init__(self, mission: Mission, formation: Formation, beliefs: Beliefs) -> None:
+    def __init__(self, mission: Mission, formation: Formation, team: TeamState) -> None:
         self._mission = mission
         self._formation = formation
-        self._beliefs = beliefs
-        self.lead = Lead(mission.leading, mission.limits, mission.radius_m)
+        self._team = team
+        self.lead = PathFollower(mission.leading, mission.limits, mission.radius_m)
         self.explore: Explore | None = None
         self._timetable: Timetable | None = None
         if mission.leading.motion == "explore":
@@ -129,7 +129,7 @@ class Leadership:
         ahead: Pose2D | None = pose
         widest = 0.0
         for robot in chain[1:]:
-            here = self._beliefs.pose_of(robot, now)
+            here = self._team.pose_of(robot, now)
             if here is not None and ahead is not None:
                 widest = max(widest, distance(ahead, here) / self._formation.slot_of(robot).separation_m)
             ahead = here

@@ -73,7 +73,7 @@ class Route:
         return min(max(bisect_right(self.at_m, s) - 1, 0), len(self.points) - 2)
 
 
-class Lead:
+class PathFollower:
     """One robot's progress along the route, and its twist when it leads."""
 
     def __init__(self, leading: Leading, limits: Limits, radius_m: float = 0.15) -> None:

@@ -26,7 +26,7 @@ OUTLIERS_TO_RELOCATE = 5
 EXTRAPOLATION_MAX_S = 0.2
 
 
-class Noise(Struct, frozen=True, forbid_unknown_fields=True):
+class EstimatorNoise(Struct, frozen=True, forbid_unknown_fields=True):
     """What the filter assumes: standard deviations of a fix, and of odometry after one metre, radian or second."""
 
     fix_m: float = 0.005
@@ -38,7 +38,7 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     per_second_rad: float = 0.0005
 
 
-NOISE = Noise()
+NOISE = EstimatorNoise()
 
 
 class _Odometry(Struct, frozen=True, gc=False):
@@ -51,7 +51,7 @@ class _Odometry(Struct, frozen=True, gc=False):
 class Estimator:
     """Of one robot. All stamps are of the driver's clock; its offset to one's own is estimated here."""
 
-    def __init__(self, noise: Noise = NOISE) -> None:
+    def __init__(self, noise: EstimatorNoise = NOISE) -> None:
         self._noise = noise
         self._clock = ClockOffset()
         self._incarnation: int | None = None
@@ -194,7 +194,7 @@ class Estimator:
         self._outlier = None
 
 
-def _near(step: Pose2D, noise: Noise) -> bool:
+def _near(step: Pose2D, noise: EstimatorNoise) -> bool:
     """Two fixes one period apart can both be of one robot: half a metre, half a radian."""
     return abs(step.x) + abs(step.y) < 0.5 + 10.0 * noise.fix_m and abs(step.theta) < 0.5
 

@@ -31,7 +31,7 @@ AGAIN_S = 0.3
 """A cell counts when so many looks showed it, each within so long of the last: a bad reading or two are no hole."""
 
 
-class Ground:
+class GroundMap:
     """Of one robot: the features of the newest profile, and the floor that it must not drive on."""
 
     def __init__(self, limits: Limits) -> None:

@@ -9,7 +9,7 @@ from msgspec import Struct
 Class = Literal["stationary", "moving", "wall", "pothole", "bump", "ditch"]
 
 
-class Thing(Struct, frozen=True):
+class BlockingObstacle(Struct, frozen=True):
     """What bars the way."""
 
     kind: Class = "stationary"

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, hypot, inf, sin
 
-from lfa.agents.perception.ground_map import Ground
-from lfa.agents.perception.obstacle import Thing
+from lfa.agents.perception.ground_map import GroundMap
+from lfa.agents.perception.obstacle import BlockingObstacle
 from lfa.agents.perception.obstacle_tracker import Feature, Tracker
 from lfa.agents.perception.scan import Point, Surroundings
 from lfa.agents.perception.shared_obstacles import SharedObstacles
@@ -29,7 +29,7 @@ NEAR_M = 0.3
 TURN_MPS = 0.05
 
 
-class Around:
+class ObstacleModel:
     """Of one robot. `ground` is the floor as far as felt."""
 
     def __init__(self, radius_m: float, limits: Limits, shared: SharedObstacles) -> None:
@@ -37,7 +37,7 @@ class Around:
         self._shared = shared
         self._scan = Surroundings()
         self._tracker = Tracker()
-        self.ground = Ground(limits)
+        self.ground = GroundMap(limits)
 
     def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float, *, track: bool) -> None:
         """Take a scan made at `pose`; with `track`, tell what its points belong to."""
@@ -46,7 +46,7 @@ class Around:
             places = [(mate.x, mate.y) for mate in mates]
             self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now)
 
-    def feel(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
+    def update_ground(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
         """Take a look at the floor ahead, made at `pose`."""
         self.ground.profile(profile, pose, now)
 
@@ -64,7 +64,7 @@ class Around:
         """What moves, as seen by this robot and as told by others."""
         return self._shared.moving(self._tracker.moving(now), pose, now, self._tracker.shows)
 
-    def thing(self, pose: Pose2D, wanted: Twist, free_m: float, now: float) -> Thing:
+    def blocking(self, pose: Pose2D, wanted: Twist, free_m: float, now: float) -> BlockingObstacle:
         """What ends the way along `wanted` after `free_m`."""
         v = max(abs(wanted.linear_x), TURN_MPS)
         end = along_arc(pose, wanted, min(free_m, LOOK_M) / v)
@@ -72,12 +72,12 @@ class Around:
         seen = self._tracker.nearest(x, y, now)
         floor = self.ground.nearest(x, y, NEAR_M if seen is None else min(NEAR_M, seen[1]))
         if floor is not None:
-            return Thing(*floor)
+            return BlockingObstacle(*floor)
         if seen is None:
-            return Thing()
-        return Thing(seen[0].kind, 2.0 * seen[0].radius_m if seen[0].whole else inf)
+            return BlockingObstacle()
+        return BlockingObstacle(seen[0].kind, 2.0 * seen[0].radius_m if seen[0].whole else inf)
 
-    def met(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
+    def nearest(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
         """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
         of_kind = [feature for feature in self._tracker.features(now) if feature.kind == kind]
         return min(of_kind, key=lambda f: hypot(f.x - pose.x, f.y - pose.y) - f.radius_m, default=None)

@@ -11,7 +11,7 @@ from lfa.protocol.messages.team import ObstacleNote
 
 REPORTERS_MAX = 512
 """Maximum number of robots whose reports are kept."""
-TOLD_S, GLIMPSED_S = 3.0, 6.0
+REMOTE_TRACK_S, PARTIAL_TRACK_S = 3.0, 6.0
 """A moving obstacle reported by another robot is extrapolated this long [s] after the last report; it may be occluded.
 The longer time holds where this robot's own scan shows something whose motion is not known yet."""
 SAME_M = 0.5
@@ -46,7 +46,7 @@ class SharedObstacles:
         for note, at in self._told.values():
             vx, vy = note.twist_map
             x, y = note.x + vx * (now - at), note.y + vy * (now - at)
-            if now - at <= TOLD_S or (now - at <= GLIMPSED_S and glimpsed(x, y, SAME_M)):
+            if now - at <= REMOTE_TRACK_S or (now - at <= PARTIAL_TRACK_S and glimpsed(x, y, SAME_M)):
                 robots = (here, *self._robots(now))
                 ours = any(p is not None and hypot(x - p.x, y - p.y) < SAME_M for p in robots)
                 if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):

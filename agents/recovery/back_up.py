@@ -18,7 +18,7 @@ BACK_MPS = 0.2
 ROOM_M = 0.05
 
 
-class Retreat:
+class BackUp:
     """Of one robot: its trail, and the way back along it once `begin` was called."""
 
     def __init__(self) -> None:

@@ -27,11 +27,11 @@ CALM_S = 5.0
 """or when nothing has held it for so long."""
 
 
-class Plight:
+class StuckMonitor:
     """Whether one robot is stuck: from the first condition that holds until it is free again."""
 
     def __init__(self, *, again: bool = True) -> None:
-        self._stuck = Stuck(again=again)
+        self._stuck = StuckConditions(again=again)
         self._at: Pose2D | None = None
         self._held_at = 0.0
         self._stands: tuple[float, Pose2D] | None = None
@@ -50,7 +50,7 @@ class Plight:
     def watch(
         self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool
     ) -> None:
-        """One control step on the way; arguments as of `Stuck.watch`. `leads`: it is a leader, and is to go."""
+        """One control step on the way; arguments as of `StuckConditions.watch`. `leads`: it is a leader, and is to go."""
         if self.backing_out:
             return
         held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
@@ -90,7 +90,7 @@ class Plight:
             self.out()
 
 
-class Stuck:
+class StuckConditions:
     """Watches one robot on its way; `reset` when it arrives, waits for its team, or starts anew."""
 
     def __init__(self, *, again: bool = True) -> None:

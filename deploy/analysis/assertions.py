@@ -16,8 +16,8 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from lfa.deploy.analysis.tracking_errors import Errors
-from lfa.deploy.recording.mcap_reader import Trace
+from lfa.deploy.analysis.tracking_errors import TrackingErrors
+from lfa.deploy.recording.mcap_reader import RecordedRun
 from lfa.protocol.errors import Refused
 from lfa.world.description.scenario import Assert
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 from lfa.deploy.analysis.summary import Assertion
 
 
-def judge(wanted: Assert, summary: Summary, seen: Trace, followed: Iterable[Errors]) -> list[Assertion]:
+def judge(wanted: Assert, summary: Summary, seen: RecordedRun, followed: Iterable[TrackingErrors]) -> list[Assertion]:
     """One for each bound that `wanted` gives. `followed`: the errors of all that followed at the end, too."""
     errors = list(followed)
     followers = [robot for robot in summary.robots if robot.settled_after_s is not None or robot.final_distance_error_m]
@@ -56,7 +56,7 @@ def judge(wanted: Assert, summary: Summary, seen: Trace, followed: Iterable[Erro
     return judged
 
 
-def separation_min_m(seen: Trace) -> float:
+def separation_min_m(seen: RecordedRun) -> float:
     """Least distance between the centres of two robots at any time [m]; inf for a single one."""
     nearest = inf
     for a, b in combinations(seen.truth.values(), 2):
@@ -103,5 +103,5 @@ def _most(values: Iterable[float | None]) -> float:
     return max((inf if value is None else value for value in values), default=0.0)
 
 
-def _largest(e: Errors) -> float | None:
+def _largest(e: TrackingErrors) -> float | None:
     return float(np.max(np.abs(e.distance[e.steady]))) if e.steady.any() else None

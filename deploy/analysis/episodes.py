@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Struct
 
 from lfa.deploy.analysis.run_data import Run
-from lfa.deploy.analysis.tracking_errors import RECOVERY_S_MAX, Errors, Mask
+from lfa.deploy.analysis.tracking_errors import RECOVERY_S_MAX, Mask, TrackingErrors
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.mcap_reader import Array
 
@@ -152,7 +152,7 @@ def felt(run: Run, episode: Episode, found: Sequence[Spike]) -> bool:
     )
 
 
-def quiet(run: Run, robot: int, e: Errors, known: Sequence[Episode]) -> Mask:
+def quiet(run: Run, robot: int, e: TrackingErrors, known: Sequence[Episode]) -> Mask:
     """The moments of a follower outside of episodes, its own and of those ahead, and of what came of them.
 
     An excursion from the baseline comes of an episode that it overlaps, or that ended within `RECOVERY_S_MAX` before.

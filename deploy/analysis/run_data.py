@@ -9,10 +9,10 @@ import numpy as np
 
 from lfa.deploy.analysis import summary as summaries
 from lfa.deploy.analysis import tracking_errors
-from lfa.deploy.analysis.tracking_errors import Errors, Mask
+from lfa.deploy.analysis.tracking_errors import Mask, TrackingErrors
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.event_log import Line
-from lfa.deploy.recording.mcap_reader import Array, Trace
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.run_folder import scenario_of
 from lfa.world.description.load import Scenario
 
@@ -24,7 +24,7 @@ class Run:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.scenario: Scenario = scenario_of(folder)
-        self.seen: Trace = mcap_reader.read(folder)
+        self.seen: RecordedRun = mcap_reader.read(folder)
         self.events: list[Line] = event_log.lines(folder)
 
     @cached_property
@@ -40,13 +40,13 @@ class Run:
         return self.scenario.mission.robots
 
     @cached_property
-    def errors(self) -> dict[int, Errors]:
+    def errors(self) -> dict[int, TrackingErrors]:
         """Of every robot that ever followed."""
         found = {robot: tracking_errors.of_follower(self.seen, robot) for robot in self.robots}
         return {robot: of for robot, of in found.items() if of is not None}
 
     @cached_property
-    def reigns(self) -> list[event_log.Reign]:
+    def reigns(self) -> list[event_log.LeaderTerm]:
         return event_log.reigns(self.events)
 
     def led(self, robot: int, t: Array) -> Mask:

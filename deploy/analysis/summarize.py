@@ -10,10 +10,10 @@ import numpy as np
 from lfa.deploy.analysis import tracking_errors
 from lfa.deploy.analysis.assertions import judge
 from lfa.deploy.analysis.summary import Assertion, RobotSummary, Summary
-from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.analysis.tracking_errors import TrackingErrors
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.event_log import Line
-from lfa.deploy.recording.mcap_reader import Array, Trace
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, scenario_of
 
@@ -59,7 +59,7 @@ def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, f
     return summary
 
 
-def _robot(robot: int, seen: Trace, events: Sequence[Line]) -> RobotSummary:
+def _robot(robot: int, seen: RecordedRun, events: Sequence[Line]) -> RobotSummary:
     own = [line for line in events if line["robot"] == robot]
     last = seen.truth[robot][-1] if robot in seen.truth else None
     summary = RobotSummary(
@@ -84,7 +84,7 @@ def _left_behind(robot: RobotSummary, chain: Sequence[int]) -> bool:
     return robot.id not in chain or out_of_place
 
 
-def _fill_errors(summary: RobotSummary, e: Errors) -> None:
+def _fill_errors(summary: RobotSummary, e: TrackingErrors) -> None:
     steady = e.steady
     settled = e.settled_after_s
     period_s = float(np.median(np.diff(e.t))) if e.t.size > 1 else 0.0

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from lfa.deploy.recording.event_log import Failover, FaultDone, Reign, Violation
+from lfa.deploy.recording.event_log import Failover, FaultDone, LeaderTerm, TermViolation
 from lfa.deploy.recording.recorder import Recording
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Outcome
@@ -57,11 +57,11 @@ class Summary(Struct, kw_only=True):
     robots: list[RobotSummary]
     left_behind: list[int] = []
     """Alive at the end, but out of the chain or more than `LEFT_BEHIND_M` out of place in it."""
-    leaders: list[Reign]
+    leaders: list[LeaderTerm]
     failovers: list[Failover]
     faults: list[FaultDone]
     assertions: list[Assertion]
-    violations: list[Violation]
+    violations: list[TermViolation]
     recording: Recording | None = None
     """None when its recorder died before it could count."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from lfa.deploy.recording.mcap_reader import Array, Trace
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 
 Mask = NDArray[np.bool_]
 
@@ -23,7 +23,7 @@ _CHANGED_PHI = 1e-6
 _CHANGED_M = 1e-6
 
 
-class Errors(Struct):
+class TrackingErrors(Struct):
     """Of one follower, one entry a ground truth during which it followed somebody; [s], [m], [rad]."""
 
     t: Array
@@ -54,7 +54,7 @@ class Errors(Struct):
         return (self.t >= settled) & ~self.excused if settled is not None else np.zeros(self.t.size, dtype=bool)
 
 
-def of_follower(trace: Trace, robot: int) -> Errors | None:
+def of_follower(trace: RecordedRun, robot: int) -> TrackingErrors | None:
     """The errors of `robot`, None when it never followed anybody."""
     own, said = trace.truth.get(robot), trace.tracking.get(robot)
     if own is None or said is None:
@@ -75,7 +75,7 @@ def of_follower(trace: Trace, robot: int) -> Errors | None:
     distance = np.hypot(dx, dy) - separation
     avoiding = said[at, 7] > 0.5
     changing = _held(_changes(said), at)
-    return Errors(
+    return TrackingErrors(
         t=t,
         predecessor=said[at, 1],
         distance=distance,
@@ -99,7 +99,7 @@ def runs(mask: Mask) -> int:
     return int(np.count_nonzero(np.diff(mask.astype(np.int8), prepend=0) == 1))
 
 
-def _predecessors(trace: Trace, t: Array, ids: Array) -> Array:
+def _predecessors(trace: RecordedRun, t: Array, ids: Array) -> Array:
     """The truth of robot `ids[i]` at `t[i]`, one row each; all robots of one ground truth have the same time."""
     rows = np.empty((t.size, 6))
     for robot in np.unique(ids):
@@ -109,7 +109,7 @@ def _predecessors(trace: Trace, t: Array, ids: Array) -> Array:
     return rows
 
 
-def _asked(trace: Trace, robot: int, t: Array, blended: Array) -> Array:
+def _asked(trace: RecordedRun, robot: int, t: Array, blended: Array) -> Array:
     """phi^d [rad] that the leader last asked for; until it has asked, what the follower keeps."""
     requests = trace.commanded.get(robot)
     if requests is None:

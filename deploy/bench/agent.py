@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from lfa.agents.agent import Agent
 from lfa.deploy.bench.harness import bare_process
 from lfa.deploy.bench.harness.child_process import cpu_s, pause, started
-from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Team
 from lfa.deploy.client.session import listen
 from lfa.deploy.process import identity
@@ -42,14 +42,20 @@ def run(as_json: bool) -> int:
     return show(_rows(), as_json)
 
 
-def _rows() -> Iterator[list[Row]]:
+def _rows() -> Iterator[list[BenchRow]]:
     with Team(load(SCENARIO)) as team:
         robots = team.scenario.mission.robots
         team.await_chain(len(robots))
         pause(team, SETTLE_S)
         task = _task(team)
         elsewhere = replace(team.fleet, name=_elsewhere(team))
-        words = [sys.executable, "-P", "-m", "lfa.deploy.bench.harness.bare_process", msgspec.json.encode(task).decode()]
+        words = [
+            sys.executable,
+            "-P",
+            "-m",
+            "lfa.deploy.bench.harness.bare_process",
+            msgspec.json.encode(task).decode(),
+        ]
         with listen(elsewhere, frozenset({f"{robot_name(LIKE)}/**"})), started(words) as process:
             pause(team, SETTLE_S)
             agents = [team.process_of(robot_name(robot)) for robot in robots]
@@ -70,7 +76,7 @@ def _shares(
     return [percent * used_s for used_s in used], percent * (cpu_s(process) - bare_before)
 
 
-def _costs(shares: Sequence[float], bare_share: float) -> list[Row]:
+def _costs(shares: Sequence[float], bare_share: float) -> list[BenchRow]:
     """What those shares [%] make as rows."""
     mean = statistics.mean(shares)
     return [
@@ -81,7 +87,7 @@ def _costs(shares: Sequence[float], bare_share: float) -> list[Row]:
     ]
 
 
-def _task(team: Team) -> bare_process.Task:
+def _task(team: Team) -> bare_process.BareTask:
     """What robot `LIKE` hears, and what it is heard to say, on keys of a fleet that nobody else is in."""
     fleet, name, ahead = team.fleet.name, robot_name(LIKE), robot_name(LIKE - 1)
     agent = Agent(LIKE, 1, fleet, 1, team.scenario.mission)
@@ -103,7 +109,9 @@ def _task(team: Team) -> bare_process.Task:
         )
         for where in sorted(count)
     )
-    return bare_process.Task(team.fleet.endpoint, (*sorted(agent.interests), key(fleet, ahead, "pose")), tuple(says))
+    return bare_process.BareTask(
+        team.fleet.endpoint, (*sorted(agent.interests), key(fleet, ahead, "pose")), tuple(says)
+    )
 
 
 def _of_agent(where: str) -> bool:

@@ -17,7 +17,7 @@ from random import Random
 
 from msgspec import Struct
 
-from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Broken, Team, endless
 from lfa.protocol import clock
 from lfa.protocol.lease.timing import timing_of
@@ -47,7 +47,7 @@ class Took(Struct, frozen=True):
         return max(self.command_ms, self.chain_ms) < 1000.0 * PATIENCE_S
 
 
-Deed = Callable[[Team, int], float]
+FaultAction = Callable[[Team, int], float]
 """Does it to a robot; the moment of it."""
 
 
@@ -55,7 +55,7 @@ class Kind(Struct, frozen=True):
     """One row of the table of faults: what is done to the leader, how it comes back, and the bars."""
 
     name: str
-    do: Deed
+    do: FaultAction
     undo: Callable[[Team, int], object] | None
     restarts: bool
     bars: tuple[tuple[Callable[[Took], float], str, str, float], ...]
@@ -102,7 +102,7 @@ def run(as_json: bool, rows: str = "*", kills: int = ROUNDS, full: bool = False)
     return show(_rows(rows, FULL_ROUNDS if full else kills, full), as_json)
 
 
-def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[Row]]:
+def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[BenchRow]]:
     with _Bench(ROBOTS) as bench:
         for kind in KINDS:
             if not fnmatchcase(kind.name, glob.split("/")[0]):
@@ -122,15 +122,15 @@ def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[Row]]:
         ]
 
 
-def _against_bars(kind: Kind, took: Sequence[Took]) -> list[Row]:
+def _against_bars(kind: Kind, took: Sequence[Took]) -> list[BenchRow]:
     return [_row(kind.name, what, statistic, [of(one) for one in took], bar) for of, what, statistic, bar in kind.bars]
 
 
-def _tails(kind: Kind, took: Sequence[Took]) -> list[Row]:
+def _tails(kind: Kind, took: Sequence[Took]) -> list[BenchRow]:
     return [_row(kind.name, "first command", "p99", [one.command_ms for one in took], None)]
 
 
-def _row(name: str, what: str, statistic: str, times_ms: Sequence[float], bar: float | None) -> Row:
+def _row(name: str, what: str, statistic: str, times_ms: Sequence[float], bar: float | None) -> BenchRow:
     value = quantile(times_ms, {"p50": 0.5, "28 of 30": NEARLY_ALL, "p99": 0.99, "worst": 1.0}[statistic])
     return row(name, Quantity(f"{what}, {statistic}", "ms", bar), value)
 

@@ -21,13 +21,13 @@ import msgspec
 from msgspec.structs import replace
 
 from lfa.deploy.bench.harness.child_process import cpu_s, pause, started
-from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Team, endless
-from lfa.deploy.client.session import Ear, Fleet, listen
+from lfa.deploy.client.session import FleetAddress, Subscriber, listen
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.run import simulate
-from lfa.deploy.run.recorder_process import LastWord, Task
+from lfa.deploy.run.recorder_process import RecorderTask, RunResult
 from lfa.deploy.view.report import command
 from lfa.deploy.view.rerun.command import converted
 from lfa.protocol import clock
@@ -47,7 +47,7 @@ def run(as_json: bool) -> int:
     return show(_rows(), as_json)
 
 
-def _rows() -> Iterator[list[Row]]:
+def _rows() -> Iterator[list[BenchRow]]:
     yield _help()
     with Team(endless(ROBOTS)) as team, tempfile.TemporaryDirectory() as place:
         team.await_chain(ROBOTS)
@@ -70,7 +70,7 @@ def _rows() -> Iterator[list[Row]]:
     yield from _files()
 
 
-def _help() -> list[Row]:
+def _help() -> list[BenchRow]:
     """Beside a bare start of the interpreter, so that a slow machine is no slow command."""
     bare = statistics.median(_took([sys.executable, "-c", "pass"]) for _ in range(STARTS))
     told = statistics.median(_took([*LFA, "--help"]) for _ in range(STARTS))
@@ -81,17 +81,19 @@ def _help() -> list[Row]:
     ]
 
 
-def _recorder(team: Team, place: Path) -> list[Row]:
+def _recorder(team: Team, place: Path) -> list[BenchRow]:
     """The process of `lfa run`, on this team."""
     folder = make(place / "run", team.scenario)
-    task = Task(str(folder), About("endless", "bench", 0, team.fleet.name), team.fleet.endpoint, str(place / "none"))
+    task = RecorderTask(
+        str(folder), About("endless", "bench", 0, team.fleet.name), team.fleet.endpoint, str(place / "none")
+    )
     words = [sys.executable, "-P", "-m", "lfa.deploy.run.recorder_process", msgspec.json.encode(task).decode()]
     with started(words, stdin=subprocess.PIPE) as process:
         pause(team, SETTLE_S)
         before, since = cpu_s(process), clock.now()
         pause(team, WATCHED_S)
         share = 100.0 * (cpu_s(process) - before) / (clock.now() - since)
-        process.communicate(msgspec.json.encode(LastWord(Verdict("time_limit"), WATCHED_S, ())) + b"\n")
+        process.communicate(msgspec.json.encode(RunResult(Verdict("time_limit"), WATCHED_S, ())) + b"\n")
     kept = msgspec.json.decode((folder / "summary.json").read_bytes())["recording"]
     return [
         row("recorder", Quantity("share of a core", "%", 10.0), share),
@@ -100,7 +102,7 @@ def _recorder(team: Team, place: Path) -> list[Row]:
     ]
 
 
-def _watch(team: Team) -> list[Row]:
+def _watch(team: Team) -> list[BenchRow]:
     """On a terminal of 80 columns that nobody looks at."""
     terminal, inside = os.openpty()
     termios.tcsetwinsize(inside, (24, 80))
@@ -121,7 +123,7 @@ def _drain(terminal: int) -> None:
             pass
 
 
-def _files() -> Iterator[list[Row]]:
+def _files() -> Iterator[list[BenchRow]]:
     """Of a run of two minutes."""
     place = Path(tempfile.mkdtemp(prefix="lfa-"))
     try:
@@ -143,7 +145,7 @@ def _files() -> Iterator[list[Row]]:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def _view(fleet: Fleet) -> list[str]:
+def _view(fleet: FleetAddress) -> list[str]:
     ports = []
     for _ in range(2):
         with socket() as free:
@@ -159,7 +161,7 @@ def _took(words: Sequence[str]) -> float:
     return clock.now() - since
 
 
-def _lags(team: Team, ear: Ear, duration_s: float) -> float:
+def _lags(team: Team, ear: Subscriber, duration_s: float) -> float:
     """Median over the agents' largest lags of each second [ms]."""
     ear.take()
     pause(team, duration_s)

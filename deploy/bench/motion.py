@@ -29,7 +29,7 @@ TRIES_MAX = 4000
 FOUND_IN = Path("shared") / "data" / "maps"
 
 
-class Ground(Struct, frozen=True):
+class BenchMap(Struct, frozen=True):
     """A map that the robots do not know, and the pairs of start and goal that are drawn on it."""
 
     name: str
@@ -45,9 +45,11 @@ class Ground(Struct, frozen=True):
 
 GOOD_SHARE = 0.9
 GROUNDS = (
-    Ground("rooms", shipped=True),
-    Ground("depot"),
-    Ground("tb3_sandbox", robots=2, apart_m=3.0, clear_m=0.25, pairs=10, sets=("mission.formation.separation_m=0.6",)),
+    BenchMap("rooms", shipped=True),
+    BenchMap("depot"),
+    BenchMap(
+        "tb3_sandbox", robots=2, apart_m=3.0, clear_m=0.25, pairs=10, sets=("mission.formation.separation_m=0.6",)
+    ),
 )
 
 
@@ -61,12 +63,12 @@ def cases(seeds: int | None) -> list[Case]:
     return runs + [_unknown(ground, seeds or ground.pairs) for ground in GROUNDS if map_of(ground) is not None]
 
 
-def _unknown(ground: Ground, count: int) -> Case:
+def _unknown(ground: BenchMap, count: int) -> Case:
     good = Quantity(f"good of {count}", "runs", float(ceil(GOOD_SHARE * count)), "at least")
     return Case(f"unknown/{ground.name}", (good,), partial(pairs_good, ground, count))
 
 
-def map_of(ground: Ground) -> Path | None:
+def map_of(ground: BenchMap) -> Path | None:
     """The `map.yaml`; None where it is not there."""
     from lfa.world.description.load import SCENARIOS
 
@@ -90,13 +92,13 @@ def scenario_good(name: str, seeds: int) -> tuple[float]:
     return (float(sum(_good(name, seed, ()) for seed in range(1, seeds + 1))),)
 
 
-def pairs_good(ground: Ground, count: int) -> tuple[float]:
+def pairs_good(ground: BenchMap, count: int) -> tuple[float]:
     """How many random pairs on the map end well."""
     drawn = enumerate(pairs(ground, count), start=1)
     return (float(sum(_good("explore", number, sets, ground.robots) for number, sets in drawn)),)
 
 
-def pairs(ground: Ground, count: int) -> list[tuple[str, ...]]:
+def pairs(ground: BenchMap, count: int) -> list[tuple[str, ...]]:
     """So many pairs on free ground that a chain can be laid out at and reaches, each as `--set` takes it."""
     from lfa.world.description import maps
     from lfa.world.description.load import load

@@ -24,7 +24,7 @@ from lfa.deploy.process.worker_pool import workers
 SEEDS = 20
 
 
-class Row(Struct, frozen=True):
+class PaperRow(Struct, frozen=True):
     name: str
     value: float | None
     """The worst of all runs; None: nothing of the kind happened in any."""
@@ -51,21 +51,21 @@ def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
     """The findings on one run, what is kept of it and of its iteration 2; nothing is left behind on disk."""
     from lfa.deploy.analysis.paper.checks import of_run
     from lfa.deploy.analysis.run_data import Run
-    from lfa.deploy.run.load import choose_again
+    from lfa.deploy.run.load import rebuild_scenario
     from lfa.deploy.run.simulate import run as simulate
 
     folder = Path(tempfile.mkdtemp(prefix="lfa-paper-"))
     try:
-        chosen, _ = choose_again(scenario, (), None, seed, None)
+        chosen, _ = rebuild_scenario(scenario, (), None, seed, None)
         first = Run(simulate(chosen, seed, folder / "first").folder)
-        known, _ = choose_again(scenario, (), None, seed, first.folder)
+        known, _ = rebuild_scenario(scenario, (), None, seed, first.folder)
         second = Run(simulate(known, seed, folder / "second").folder)
         return scenario, seed, of_run(first), [across_seeds.keep(first), across_seeds.keep(second)]
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _rows(seeds: int, jobs: int) -> list[Row]:
+def _rows(seeds: int, jobs: int) -> list[PaperRow]:
     kept: list[Kept] = []
     found: dict[str, dict[str, list[Finding]]] = {path: {} for path in PATHS}
     with workers(jobs) as pool:
@@ -82,12 +82,12 @@ def _rows(seeds: int, jobs: int) -> list[Row]:
     return rows + [_row(f"both {finding.figure} {finding.name}", [finding]) for finding in across_seeds.across(kept)]
 
 
-def _row(name: str, found: Sequence[Finding]) -> Row:
+def _row(name: str, found: Sequence[Finding]) -> PaperRow:
     judged = [one for one in found if one.value is not None]
     holds = sum(one.status == "ok" for one in judged)
     worst = max(judged, key=_badness, default=None)
     value = None if worst is None else worst.value
-    return Row(name, value, found[0].unit, found[0].bar, holds, len(judged), holds == len(judged))
+    return PaperRow(name, value, found[0].unit, found[0].bar, holds, len(judged), holds == len(judged))
 
 
 def _badness(finding: Finding) -> float:
@@ -98,7 +98,7 @@ def _badness(finding: Finding) -> float:
     return abs(off) if rule == "=" else off if rule.startswith("<") else -off
 
 
-def _line(row: Row) -> str:
+def _line(row: PaperRow) -> str:
     value = "-" if row.value is None else f"{row.value:.4g}"
     mark = "ok" if row.ok else "BELOW THE BAR"
     return f"{row.name:<64}{value:>10} {row.unit:<4} bar {row.bar:<11} {row.holds:>3} of {row.of:<3} {mark}"

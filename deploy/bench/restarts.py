@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from random import Random
 
-from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Broken, Team, endless
 from lfa.protocol import clock
 
@@ -24,7 +24,7 @@ def run(as_json: bool, kills: int = RESTARTS) -> int:
     return show(_rows(kills), as_json)
 
 
-def _rows(kills: int) -> Iterator[list[Row]]:
+def _rows(kills: int) -> Iterator[list[BenchRow]]:
     chance = Random("restarts")
     rejoined, slowest_s = 0, 0.0
     with Team(endless(ROBOTS)) as team:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from fnmatch import fnmatchcase
 
 from lfa.agents.agent import Agent
-from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Broken, Team, endless
 from lfa.protocol import clock
 from lfa.protocol.lease.witness import Witness
@@ -66,7 +66,7 @@ def run(as_json: bool, rows: str = "*", minutes: float = MINUTES) -> int:
     return show(_rows(rows, 60.0 * minutes), as_json)
 
 
-def _rows(glob: str, duration_s: float) -> Iterator[list[Row]]:
+def _rows(glob: str, duration_s: float) -> Iterator[list[BenchRow]]:
     if fnmatchcase("busy", glob.split("/")[0]):
         with _busy(BUSY_CORES):
             yield _counted(f"busy, std, {ROBOTS} processes", duration_s, _live(endless(ROBOTS), duration_s, loss=0.0))
@@ -76,7 +76,7 @@ def _rows(glob: str, duration_s: float) -> Iterator[list[Row]]:
         yield _counted(f"loss {LOSS:g}, wifi, {ROBOTS} processes", duration_s, _live(wifi, duration_s, loss=LOSS))
 
 
-def _counted(name: str, duration_s: float, watch: Watch) -> list[Row]:
+def _counted(name: str, duration_s: float, watch: Watch) -> list[BenchRow]:
     minutes = duration_s / 60.0
     return [
         row(name, Quantity(f"holder changes in {minutes:g} min", "times", 0.0), float(watch.holder_changes)),

@@ -11,7 +11,7 @@ from time import process_time
 
 from msgspec.structs import replace
 
-from lfa.deploy.bench.harness.rows import Quantity, Row, row, show
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Team
 from lfa.deploy.process.identity import cpu_s
 from lfa.protocol import clock
@@ -23,7 +23,7 @@ from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.names import robot_name
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
-from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import WORLD_NAME, key
 from lfa.world.description.load import Scenario, draw, load
 from lfa.world.description.scenario import Lidar
@@ -48,7 +48,7 @@ def scenario_of(robots: int) -> Scenario:
     return draw(replace(scenario, world=replace(scenario.world, lidar=Lidar(beams=180, rate_hz=10.0))), 1)
 
 
-def _rows(processes: bool) -> Iterator[list[Row]]:
+def _rows(processes: bool) -> Iterator[list[BenchRow]]:
     for robots, bar in BARS.items():
         share = 100.0 * simulated(scenario_of(robots))
         yield [row(f"world/{robots} robots", Quantity("in process", "%", bar), share)]
@@ -59,7 +59,7 @@ def _rows(processes: bool) -> Iterator[list[Row]]:
 def simulated(scenario: Scenario) -> float:
     """Processor time per second of the world's time, with every robot driving and turning."""
     world = World(FLEET, scenario, 1, 1, start_at=0.0)
-    host = Host(world, Journal(None, Heading(JOURNAL_VERSION, WORLD_NAME, 1, 0, {})))
+    host = NodeHost(world, Journal(None, Heading(JOURNAL_VERSION, WORLD_NAME, 1, 0, {})))
     now, number = 0.0, 0
     shut_s = timing_of(scenario.mission.profile).grant_s + COMMAND_S
     began: float | None = None

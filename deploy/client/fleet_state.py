@@ -10,7 +10,7 @@ from lfa.protocol.messages.team import Event, Status, Tracking
 from lfa.protocol.names import robot_id_of
 
 
-class Standing:
+class FleetState:
     """Feed it messages as they come; `line` and `rows` say what a person wants to see. Times are world time [s]."""
 
     def __init__(self, robots: tuple[int, ...]) -> None:

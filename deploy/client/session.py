@@ -24,7 +24,7 @@ from lfa.world.description.load import Scenario, draw, load
 INBOX_SIZE_MAX = 65536
 
 
-class Fleet(Struct, frozen=True):
+class FleetAddress(Struct, frozen=True):
     """A fleet, the endpoint where it meets, and those of its agents that are this user's own and run here."""
 
     name: str
@@ -34,24 +34,24 @@ class Fleet(Struct, frozen=True):
     """Folder with the operator's certificate, for a fleet that wants to see one."""
 
 
-def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> Fleet:
+def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> FleetAddress:
     """The fleet that is meant: one that runs here, or any by its name, its router and its keys. Raises Refused."""
     running = agents()
     if connect is None and running and (fleet is None or any(agent.fleet == fleet for agent in running)):
         team = one_fleet(running, fleet)
-        return Fleet(team[0].fleet, team[0].endpoint, tuple(team), keys or team[0].keys)
+        return FleetAddress(team[0].fleet, team[0].endpoint, tuple(team), keys or team[0].keys)
     if fleet is None:
         raise Refused("no agent of yours runs on this machine: say --fleet NAME, and --connect for another router")
-    return Fleet(fleet, connect or default_endpoint(), (), keys)
+    return FleetAddress(fleet, connect or default_endpoint(), (), keys)
 
 
-class Ear:
+class Subscriber:
     """What comes from one fleet, also after links between its routers went and came back.
 
     `wait` sleeps until something wakes it or the time is over.
     """
 
-    def __init__(self, fleet: Fleet, bus: ZenohBus, inbox: Inbox, wake: Wake) -> None:
+    def __init__(self, fleet: FleetAddress, bus: ZenohBus, inbox: Inbox, wake: Wake) -> None:
         self.fleet = fleet
         self.bus = bus
         self._inbox = inbox
@@ -74,7 +74,7 @@ class Ear:
                 self._links.see(arrival.payload, now)
                 self._see_token(arrival.payload)
         if self._links.due(now):
-            self.bus.follow_anew()
+            self.bus.resubscribe()
         found = ((arrival, _message(arrival)) for arrival in arrivals)
         return [(arrival, message) for arrival, message in found if message is not None]
 
@@ -99,7 +99,7 @@ class Ear:
 
 
 @contextmanager
-def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iterator[Ear]:
+def listen(fleet: FleetAddress, topics: frozenset[str], *, every: bool = False) -> Iterator[Subscriber]:
     """An ear for the key expressions `topics` (`*/pose`) of `fleet`; `every`: all values of states, not the newest."""
     fleet_name(fleet.name)  # what is said to `*` would be said to every fleet
     wake = Wake()
@@ -111,7 +111,7 @@ def listen(fleet: Fleet, topics: frozenset[str], *, every: bool = False) -> Iter
         raise Refused(f"no router answers at {fleet.endpoint}: must be the router of fleet {fleet.name}") from None
     try:
         bus.follow(frozenset(f"lfa/{fleet.name}/{topic}" for topic in topics) | {alive_key(fleet.name, "*", "*")})
-        yield Ear(fleet, bus, inbox, wake)
+        yield Subscriber(fleet, bus, inbox, wake)
     finally:
         bus.close()
 
@@ -127,7 +127,7 @@ def _message(arrival: Arrival) -> Message | None:
         return None
 
 
-def scenario_of_fleet(fleet: Fleet) -> Scenario | None:
+def scenario_of_fleet(fleet: FleetAddress) -> Scenario | None:
     """The scenario that the fleet's world was started with, when that is one of this user's processes here."""
     for identity in own_processes():
         words = list(identity.arguments)

@@ -22,7 +22,7 @@ LISTED_MAX = 12
 DULL = ("peer_up", "peer_down")
 
 
-class Row(Struct, frozen=True):
+class RobotStatus(Struct, frozen=True):
     """One robot. None: it has not said."""
 
     robot: int
@@ -90,10 +90,10 @@ class Board:
         ]
         return max(claims)[1] if claims else None
 
-    def rows(self, now: float) -> list[Row]:
+    def rows(self, now: float) -> list[RobotStatus]:
         return [self._row(robot, now) for robot in sorted(self._robots)]
 
-    def _row(self, robot: int, now: float) -> Row:
+    def _row(self, robot: int, now: float) -> RobotStatus:
         at, pose = self._poses.get(robot, (None, None))
         heard_at, tracking = self._tracking.get(robot, (0.0, None))
         status = self._status.get(robot)
@@ -105,7 +105,7 @@ class Board:
         if tracking is not None and (role != "follower" or now - heard_at > STALE_S):
             tracking = None
         counters = {} if status is None else status.counters
-        return Row(
+        return RobotStatus(
             robot=robot,
             role=role,
             term=None if pose is None else pose.term.n,

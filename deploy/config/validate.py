@@ -11,7 +11,7 @@ import typer
 from lfa.deploy.faults.script import parse_all
 from lfa.deploy.fleet.plan.fleet_file import is_fleet_file, load
 from lfa.deploy.recording.run_folder import toml
-from lfa.deploy.scenario_loading import choose
+from lfa.deploy.scenario_loading import load_scenario
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 from lfa.world.description.load import draw
@@ -28,7 +28,7 @@ def command(
         if overrides or robots is not None:
             raise Refused(f"{scenario}: --set and --robots are for a scenario: a fleet file has the keys set and team")
         return _fleet(Path(scenario), as_json=as_json)
-    chosen = choose(scenario, overrides or (), robots)
+    chosen = load_scenario(scenario, overrides or (), robots)
     parse_all(chosen.mission, chosen.faults, ())
     drawn = draw(chosen, seed)
     print(msgspec.json.encode(drawn).decode() if as_json else toml(drawn), end="\n" if as_json else "")

@@ -18,7 +18,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import whole_number
 
-Deed = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
+FaultAction = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
 
 #            deed          what it is
 DEEDS: dict[str, str] = {
@@ -42,11 +42,11 @@ SIGNALS: dict[str, signal.Signals] = {
 
 ORDERS = ("cut", "heal", "loss", "handover")
 """Deeds that are an operator's word to all, and no signal to one."""
-LASTING: dict[str, Deed] = {"stop": "continue", "cut": "heal", "loss": "loss"}
+LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "loss"}
 """What can be for a while, and what ends it."""
 
 LEADER = "leader"
-RESTART: Deed = "restart"
+RESTART: FaultAction = "restart"
 """Done by whoever started the fleet: to one that runs already, an operator's word asks for it."""
 COMMON = ("router", "world")
 """What can be killed, stopped and continued besides robots, where the fleet runs as processes."""
@@ -65,7 +65,7 @@ class Fault(Struct, frozen=True):
     """`target` is a robot's id, or `leader` for whoever leads at that moment, or what an order says; `at_s` is world
     time."""
 
-    deed: Deed
+    deed: FaultAction
     target: int | str
     at_s: float
     for_s: float | None = None
@@ -91,7 +91,7 @@ def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
         raise Refused(f"{where} {text!r}: only {', '.join(LASTING)} can be 'for' a while")
     if match["deed"] in ("restart", "continue") and target == LEADER:
         raise Refused(f"{where} {text!r}: {match['deed']} needs an id, one of {_ids(mission)}")
-    return Fault(cast(Deed, match["deed"]), target, float(match["at"]), for_s)
+    return Fault(cast(FaultAction, match["deed"]), target, float(match["at"]), for_s)
 
 
 def parse_all(mission: Mission, from_scenario: Sequence[str], from_operator: Sequence[str]) -> list[Fault]:
@@ -100,15 +100,15 @@ def parse_all(mission: Mission, from_scenario: Sequence[str], from_operator: Seq
     return faults + [parse(text, mission) for text in from_operator]
 
 
-class Schedule:
+class FaultSchedule:
     """Faults that are still to come, in the order of their times."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.pending = sorted(faults, key=_at_s)
 
-    def due(self, now: float, leader: int | None) -> list[tuple[Deed, int | str]]:
+    def due(self, now: float, leader: int | None) -> list[tuple[FaultAction, int | str]]:
         """What to do to whom at world time `now` [s]. One that means the leader waits until somebody leads."""
-        deeds: list[tuple[Deed, int | str]] = []
+        deeds: list[tuple[FaultAction, int | str]] = []
         while self.pending and self.pending[0].at_s <= now:
             fault = self.pending[0]
             victim = leader if fault.target == LEADER else fault.target

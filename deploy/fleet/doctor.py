@@ -17,8 +17,8 @@ from msgspec import Struct
 from lfa.deploy.fleet import fleet_view
 from lfa.deploy.fleet.host.host import Found
 from lfa.deploy.fleet.plan import host_plan as parts
-from lfa.deploy.fleet.plan.fleet_file import Machine, Plan, load
-from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine, load
+from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.hosts import CLOCK_S_MAX, ask
 from lfa.deploy.fleet.remote.key_distribution import operator
 from lfa.deploy.fleet.remote.ssh import PYTHON_MIN, Probed, Shell, Unreachable, probe, python_of, reach
@@ -31,7 +31,7 @@ EXTRAS = {"world": ("numpy", "pymunk"), "view": ("mcap", "matplotlib", "rerun"),
 KNOCK_S = 3.0
 
 
-class Finding(Struct, frozen=True):
+class Diagnosis(Struct, frozen=True):
     """One check."""
 
     host: str
@@ -57,58 +57,58 @@ def command(
 # --- this machine -----------------------------------------------------------------------------------------------------
 
 
-def this_machine() -> list[Finding]:
+def this_machine() -> list[Diagnosis]:
     """Python, `lfa` and what it needs, and the routers of the fleets that run here."""
     is_ = ".".join(map(str, sys.version_info[:3]))
     found = [_finding("here", "python", sys.version_info >= PYTHON_MIN, is_, "3.11 or newer")]
     try:
-        found.append(Finding("here", "lfa", True, version("lfa")))
+        found.append(Diagnosis("here", "lfa", True, version("lfa")))
     except PackageNotFoundError:
-        found.append(Finding("here", "lfa", False, "is not installed: pip install lfa"))
+        found.append(Diagnosis("here", "lfa", False, "is not installed: pip install lfa"))
     for extra, modules in EXTRAS.items():
         absent = [module for module in modules if find_spec(module) is None]
         says = "there" if not absent else f"without {', '.join(absent)}: pip install 'lfa[{extra}]' where it is needed"
-        found.append(Finding("here", f"[{extra}]", True, says))
+        found.append(Diagnosis("here", f"[{extra}]", True, says))
     running = fleet_view.here()
     for part in running:
         found += _own_part(part)
     if not running:
         there = answers(default_endpoint())
         says = f"{default_endpoint()} {'answers' if there else 'does not answer: lfa-router, or lfa up, starts one'}"
-        found.append(Finding("here", "router", there, says))
+        found.append(Diagnosis("here", "router", there, says))
     return found
 
 
-def _own_part(part: Part) -> list[Finding]:
+def _own_part(part: HostPlan) -> list[Diagnosis]:
     """The router here, and those of the other machines as they are seen from here."""
     try:
         known = part.known_as(f"{HOST_PREFIX}{part.host}")
     except Refused as refused:
-        return [Finding(part.host, "certificate", False, str(refused))]
+        return [Diagnosis(part.host, "certificate", False, str(refused))]
     found = [_router(part.host, answers(part.socket, known))]
     far = [end for end in part.others if not answers(end, known)]
     says = "all answer" if not far else f"{', '.join(far)} do not answer: must be up, and their ports open"
-    return [*found, Finding(part.host, "other hosts", not far, says)] if part.others else found
+    return [*found, Diagnosis(part.host, "other hosts", not far, says)] if part.others else found
 
 
 # --- all machines of a file -------------------------------------------------------------------------------------------
 
 
-async def examine(plan: Plan) -> list[Finding]:
+async def examine(plan: FleetPlan) -> list[Diagnosis]:
     """Every machine of `plan`, all at once. Starts nothing, but for a moment's listening where a router would."""
     shares = parts.parts(plan, "", "")
     each = await asyncio.gather(*(_examine(name, plan, shares[name]) for name in plan.hosts))
     return [finding for found in each for finding in found]
 
 
-async def _examine(name: str, plan: Plan, part: Part) -> list[Finding]:
+async def _examine(name: str, plan: FleetPlan, part: HostPlan) -> list[Diagnosis]:
     machine = plan.hosts[name]
     try:
         shell = await reach(machine)
     except Unreachable as error:
-        return [Finding(name, "ssh", False, str(error))]
+        return [Diagnosis(name, "ssh", False, str(error))]
     how = "here, without ssh" if machine.local else f"lets us in at {machine.ssh or machine.address}"
-    found = [Finding(name, "ssh", True, how)]
+    found = [Diagnosis(name, "ssh", True, how)]
     try:
         asked = clock.wall_ms()
         probed = await probe(shell, python_of(machine))
@@ -116,35 +116,35 @@ async def _examine(name: str, plan: Plan, part: Part) -> list[Finding]:
         if probed.lfa == part.version:
             found += await _place(name, shell, plan, part)
     except (Unreachable, Refused) as error:
-        found.append(Finding(name, "python", False, str(error)))
+        found.append(Diagnosis(name, "python", False, str(error)))
     finally:
         await shell.close()
     return found
 
 
-def _probed(name: str, probed: Probed, part: Part, here_ms: float) -> list[Finding]:
+def _probed(name: str, probed: Probed, part: HostPlan, here_ms: float) -> list[Diagnosis]:
     off_s = (probed.wall_ms - here_ms) / 1000.0
     says = f"{off_s:+.1f} s off this one's"
     right = f"within {CLOCK_S_MAX:g} s (timedatectl set-ntp true)"
     return [
-        Finding(name, "python", True, ".".join(map(str, probed.python))),
+        Diagnosis(name, "python", True, ".".join(map(str, probed.python))),
         _finding(name, "lfa", probed.lfa == part.version, probed.lfa or "none", f"{part.version} (lfa up --install)"),
         _finding(name, "clock", abs(off_s) <= CLOCK_S_MAX, says, right),
     ]
 
 
-async def _place(name: str, shell: Shell, plan: Plan, part: Part) -> list[Finding]:
+async def _place(name: str, shell: Shell, plan: FleetPlan, part: HostPlan) -> list[Diagnosis]:
     """Folder, router, certificates and port; whether the port is open is tried from here."""
     machine = plan.hosts[name]
     try:
         state: Found = await ask(shell, machine, "check", part)
     except Refused as refused:
-        return [Finding(name, "place", False, str(refused))]
-    found = [Finding(name, "place", True, part.state)]
+        return [Diagnosis(name, "place", False, str(refused))]
+    found = [Diagnosis(name, "place", True, part.state)]
     if state.run:
         found.append(_router(name, state.router))
     if state.certificate:
-        found.append(Finding(name, "certificate", False, state.certificate))
+        found.append(Diagnosis(name, "certificate", False, state.certificate))
     if part.port == 0 or machine.local:
         return found
     where, known = parts.endpoint(plan, name), operator(plan)
@@ -153,7 +153,7 @@ async def _place(name: str, shell: Shell, plan: Plan, part: Part) -> list[Findin
     return [*found, _finding(name, "port", open_, where, right)]
 
 
-async def _knock(shell: Shell, machine: Machine, part: Part) -> bool:
+async def _knock(shell: Shell, machine: Machine, part: HostPlan) -> bool:
     """Somebody listens there for a moment; whether we get through."""
     listening = asyncio.create_task(ask(shell, machine, "listen", part))
     until = clock.now() + KNOCK_S
@@ -183,9 +183,9 @@ def _knock_udp(machine: Machine) -> None:
         knocking.recv(64)
 
 
-def _router(host: str, there: bool) -> Finding:
-    return Finding(host, "router", there, "answers" if there else f"does not answer: see lfa logs {host}/router")
+def _router(host: str, there: bool) -> Diagnosis:
+    return Diagnosis(host, "router", there, "answers" if there else f"does not answer: see lfa logs {host}/router")
 
 
-def _finding(host: str, check: str, ok: bool, says: str, right: str) -> Finding:
-    return Finding(host, check, ok, says if ok else f"{says}: must be {right}")
+def _finding(host: str, check: str, ok: bool, says: str, right: str) -> Diagnosis:
+    return Diagnosis(host, check, ok, says if ok else f"{says}: must be {right}")

@@ -10,12 +10,12 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import Seen, Sight, find, first_word, sight
+from lfa.deploy.fleet.fleet_view import FleetView, Seen, await_first_status, find, sight
 from lfa.deploy.fleet.host import host
-from lfa.deploy.fleet.plan.fleet_file import Plan
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import parts
 from lfa.deploy.fleet.remote import journals
-from lfa.deploy.fleet.remote.hosts import Fleet
+from lfa.deploy.fleet.remote.hosts import FleetHosts
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -56,9 +56,9 @@ def _bring(seen: Seen, keep: Path) -> list[str]:
     return []
 
 
-async def _by_shell(plan: Plan) -> tuple[list[str], list[str]]:
+async def _by_shell(plan: FleetPlan) -> tuple[list[str], list[str]]:
     """Each machine is asked to end its part, and answers when nothing of it is left."""
-    fleet = Fleet(plan, parts(plan, "", ""))
+    fleet = FleetHosts(plan, parts(plan, "", ""))
     try:
         await fleet.reach()
         answers = await fleet.do("stop")
@@ -77,7 +77,7 @@ def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
         return [own.host], []
     try:
         with sight(seen) as view:
-            first_word(view, HEAR_S)
+            await_first_status(view, HEAR_S)
             far = [name for name in view.names if own is None or name != own.host]
             wrong = [f"host {name}: is not heard, and may run on" for name in far if name not in view.hosts]
             far = [name for name in far if name in view.hosts]
@@ -93,7 +93,7 @@ def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
     return ended, wrong
 
 
-def _order_down(view: Sight, names: list[str]) -> tuple[list[str], list[str]]:
+def _order_down(view: FleetView, names: list[str]) -> tuple[list[str], list[str]]:
     """Those that ended, and those that did not. Whose router the word came through goes last: it may be any."""
     orders = {name: view.order("down", name) for name in names}
     left = set(names)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from lfa.deploy.client.session import Ear, Fleet, listen
+from lfa.deploy.client.session import FleetAddress, Subscriber, listen
 from lfa.deploy.fleet.plan import host_plan as parts
-from lfa.deploy.fleet.plan.fleet_file import Plan, load
-from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
+from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol import clock
@@ -35,9 +35,9 @@ class Seen(Struct, frozen=True):
     endpoint: str
     hosts: tuple[str, ...]
     """Empty: not known."""
-    part: Part | None = None
+    part: HostPlan | None = None
     """This machine's own, when it is one of them."""
-    plan: Plan | None = None
+    plan: FleetPlan | None = None
     keys: Path | None = None
     """Where the operator's certificate lies, for a fleet that wants to see one."""
 
@@ -65,11 +65,11 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
     return Seen(names[0], own_all[0].endpoint, own_all[0].hosts, own_all[0], None, _keys(own_all[0]))
 
 
-def _keys(part: Part | None) -> Path | None:
+def _keys(part: HostPlan | None) -> Path | None:
     return part.folder / parts.KEYS if part is not None and part.keyed else None
 
 
-def here() -> list[Part]:
+def here() -> list[HostPlan]:
     """The parts of this user's supervisors on this machine."""
     found = []
     for identity in own_processes():
@@ -82,10 +82,10 @@ def here() -> list[Part]:
     return found
 
 
-class Sight:
+class FleetView:
     """What has been heard, newest first in mind: feed it by `hear`."""
 
-    def __init__(self, ear: Ear, seen: Seen) -> None:
+    def __init__(self, ear: Subscriber, seen: Seen) -> None:
         self._ear = ear
         self.seen = seen
         self._life = clock.wall_ms()
@@ -160,16 +160,16 @@ class Sight:
 
 
 @contextmanager
-def sight(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[Sight]:
+def sight(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[FleetView]:
     """Raises Refused when no router answers."""
-    with listen(Fleet(seen.name, seen.endpoint, (), seen.keys), topics) as ear:
-        yield Sight(ear, seen)
+    with listen(FleetAddress(seen.name, seen.endpoint, (), seen.keys), topics) as ear:
+        yield FleetView(ear, seen)
 
 
-def first_word(view: Sight, within_s: float) -> None:
+def await_first_status(view: FleetView, within_s: float) -> None:
     """Until every known host has told its state, or the time is over."""
     order = view.order("report")
     view.say_until(order, lambda: bool(view.names) and all(view.obeyed(order, n) for n in view.names), within_s)
 
 
-__all__ = ["LogLines", "Seen", "Sight", "find", "first_word", "here", "sight"]
+__all__ = ["LogLines", "Seen", "FleetView", "await_first_status", "find", "here", "sight"]

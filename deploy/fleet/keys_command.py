@@ -10,12 +10,11 @@ from typing import Annotated, Literal
 import msgspec
 import typer
 
-from lfa.deploy.fleet.plan.fleet_file import Plan as FleetPlan
-from lfa.deploy.fleet.plan.fleet_file import is_fleet_file, load
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, is_fleet_file, load
 from lfa.deploy.fleet.plan.host_plan import store
 from lfa.deploy.fleet.remote.key_distribution import push
 from lfa.deploy.fleet.security import keys
-from lfa.deploy.fleet.security.access_rules import Plan, host_name
+from lfa.deploy.fleet.security.access_rules import KeyPlan, host_name
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import fleet_name
@@ -83,7 +82,7 @@ def _change(
     return 1 if wrong else 0
 
 
-def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: list[int]) -> Plan:
+def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: list[int]) -> KeyPlan:
     """The plan that the options say. Raises Refused."""
     if not 1 <= robots <= ROBOTS_MAX:
         raise Refused(f"--robots {robots}: must be from 1 to {ROBOTS_MAX}")
@@ -97,7 +96,7 @@ def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: lis
     return keys.spread(fleet_name(fleet), machines, range(1, robots + 1), said, drivers)
 
 
-def _init(folder: Path, plan: Plan, days: float, as_json: bool) -> int:
+def _init(folder: Path, plan: KeyPlan, days: float, as_json: bool) -> int:
     made = keys.make(folder, plan, days)
     machines = {host: str(keys.folder_of(folder, host)) for host in plan.hosts}
     lines = [f"{len(made)} certificates made, {len(plan.places)} in all: {folder}"]

@@ -9,7 +9,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
 from lfa.deploy.fleet.host.log_tail import FOLLOW_S
 from lfa.deploy.process.signals import Interrupts
 from lfa.protocol import clock
@@ -38,7 +38,7 @@ def command(
     target = f"robot{process}" if process.isdecimal() else process
     seen = find(file, fleet, connect)
     with sight(seen, frozenset({"*/host", "*/log"})) as view, Interrupts() as interrupts:
-        first_word(view, HEAR_S)
+        await_first_status(view, HEAR_S)
         places = _places(view, target)
         printed_at = clock.now()
 
@@ -62,7 +62,7 @@ def command(
         return 0 if interrupts.signal is None else 128 + interrupts.signal
 
 
-def _places(view: Sight, target: str) -> list[str]:
+def _places(view: FleetView, target: str) -> list[str]:
     place, _, name = target.rpartition("/")
     if not name or name in view.hosts:
         return [name] if name else list(view.hosts)

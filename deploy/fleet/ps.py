@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
 from lfa.protocol import clock
 from lfa.protocol.names import robot_id_of
 
@@ -31,7 +31,7 @@ def command(
     seen = find(file, fleet, connect)
     with sight(seen, frozenset({"*/host", "*/status"})) as view:
         began = clock.now()
-        first_word(view, HEAR_S)
+        await_first_status(view, HEAR_S)
         while clock.now() < began + STATUS_S and not _all_have_spoken(view):
             clock.sleep(0.05)
             view.hear()
@@ -49,13 +49,13 @@ def command(
     return 1 if silent or not facts or any(row["state"] != "running" for row in facts) else 0
 
 
-def _all_have_spoken(view: Sight) -> bool:
+def _all_have_spoken(view: FleetView) -> bool:
     """Each running robot has told how it is."""
     running = [report.name for status in view.hosts.values() for report in status.processes if report.pid]
     return all(name in view.texts for name in running if robot_id_of(name))
 
 
-def rows(view: Sight) -> list[dict[str, Any]]:
+def rows(view: FleetView) -> list[dict[str, Any]]:
     """One a process, hosts and processes in their order."""
     return [
         {

@@ -11,7 +11,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.client.session import Ear, Fleet, find, listen, scenario_of_fleet
+from lfa.deploy.client.session import FleetAddress, Subscriber, find, listen, scenario_of_fleet
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.remote import journals
 from lfa.deploy.process.signals import Interrupts
@@ -70,7 +70,7 @@ def command(
     return 0 if recording.messages and not ear.dropped else 1
 
 
-def _write(ear: Ear, recorder: Recorder, seen: WorldTime, begun: float) -> None:
+def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, begun: float) -> None:
     """Times are the world's, or since the start of the recording where no world tells its own."""
     for arrival, message in ear.take():
         if isinstance(message, Truth):
@@ -78,7 +78,7 @@ def _write(ear: Ear, recorder: Recorder, seen: WorldTime, begun: float) -> None:
         recorder.record(seen.of(arrival.at) if seen.known else arrival.at - begun, arrival.key, message)
 
 
-def _folder(fleet: Fleet, out: Path | None) -> Path:
+def _folder(fleet: FleetAddress, out: Path | None) -> Path:
     """With the scenario in it where the world runs here, so that the views know walls and obstacles."""
     scenario = scenario_of_fleet(fleet)
     path = out or RUNS / f"{fleet.name}-{time.strftime('%Y%m%d-%H%M%S')}"

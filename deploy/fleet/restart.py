@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.fleet import ProcessReport
@@ -28,7 +28,7 @@ def command(
     name = f"robot{process}" if process.isdecimal() else process
     seen = find(file, fleet, connect)
     with sight(seen) as view:
-        first_word(view, HEAR_S)
+        await_first_status(view, HEAR_S)
         place = host or _place(view, name)
         before = _report(view, place, name)
         if before is None:
@@ -51,7 +51,7 @@ def command(
     return 0 if done else 1
 
 
-def _place(view: Sight, name: str) -> str:
+def _place(view: FleetView, name: str) -> str:
     places = [host for host, status in view.hosts.items() if any(r.name == name for r in status.processes)]
     if not places:
         raise Refused(f"{name}: no host that is heard has it: must be one of {', '.join(_names(view))}")
@@ -60,10 +60,10 @@ def _place(view: Sight, name: str) -> str:
     return places[0]
 
 
-def _report(view: Sight, host: str, name: str) -> ProcessReport | None:
+def _report(view: FleetView, host: str, name: str) -> ProcessReport | None:
     status = view.hosts.get(host)
     return next((r for r in status.processes if r.name == name), None) if status is not None else None
 
 
-def _names(view: Sight) -> list[str]:
+def _names(view: FleetView) -> list[str]:
     return sorted({report.name for status in view.hosts.values() for report in status.processes})

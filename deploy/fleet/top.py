@@ -11,7 +11,7 @@ import msgspec
 import typer
 
 from lfa.deploy.client.team_status import Board
-from lfa.deploy.fleet.fleet_view import Sight, find, first_word, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
 from lfa.deploy.fleet.ps import rows as processes
 from lfa.deploy.process.signals import Interrupts
 from lfa.protocol import clock
@@ -43,7 +43,7 @@ def command(
 
     board = Board()
     with sight(seen) as view:
-        first_word(view, HEAR_S)
+        await_first_status(view, HEAR_S)
         _hear_for(view, board, FIRST_S)
         if as_json:
             print(msgspec.json.encode(_facts(view, board)).decode())
@@ -56,7 +56,7 @@ def command(
     return 0
 
 
-def _live(view: Sight, board: Board) -> None:
+def _live(view: FleetView, board: Board) -> None:
     from rich.live import Live
 
     with Interrupts() as interrupts, Live(screen=True, auto_refresh=False) as live:
@@ -65,7 +65,7 @@ def _live(view: Sight, board: Board) -> None:
             _hear_for(view, board, REFRESH_S)
 
 
-def _hear_for(view: Sight, board: Board, duration_s: float) -> None:
+def _hear_for(view: FleetView, board: Board, duration_s: float) -> None:
     until = clock.now() + duration_s
     while clock.now() < until:
         clock.sleep(0.05)
@@ -74,7 +74,7 @@ def _hear_for(view: Sight, board: Board, duration_s: float) -> None:
     board.sample(clock.now())
 
 
-def _facts(view: Sight, board: Board) -> dict[str, Any]:
+def _facts(view: FleetView, board: Board) -> dict[str, Any]:
     now = clock.now()
     leader = board.leader(now)
     silent = view.silent(now)
@@ -87,7 +87,7 @@ def _facts(view: Sight, board: Board) -> dict[str, Any]:
     }
 
 
-def _screen(view: Sight, board: Board) -> Group:
+def _screen(view: FleetView, board: Board) -> Group:
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

@@ -21,11 +21,11 @@ from lfa.deploy.fleet import fleet_view as sights
 from lfa.deploy.fleet.fleet_view import Seen
 from lfa.deploy.fleet.health import Health
 from lfa.deploy.fleet.host.host import Found
-from lfa.deploy.fleet.plan.fleet_file import Plan, load
-from lfa.deploy.fleet.plan.host_plan import Part, parts, store
-from lfa.deploy.fleet.security.private_files import ISSUED
-from lfa.deploy.fleet.remote.hosts import Fleet
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
+from lfa.deploy.fleet.plan.host_plan import HostPlan, parts, store
+from lfa.deploy.fleet.remote.hosts import FleetHosts
 from lfa.deploy.fleet.remote.key_distribution import Bundle, bundles
+from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.deploy.process.signals import Interrupts
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -76,14 +76,14 @@ def command(
     return 0
 
 
-def _secured(plan: Plan) -> Plan:
+def _secured(plan: FleetPlan) -> FleetPlan:
     return replace(plan, file=replace(plan.file, secure=True))
 
 
-async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
+async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
     """Raises NotUp, with all that was started here ended again."""
     digest, keys = _digest(plan), bundles(plan)
-    fleet = Fleet(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest, keys))
+    fleet = FleetHosts(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest, keys))
     try:
         await fleet.reach()
         found = await fleet.check(may_install=may_install)
@@ -102,7 +102,7 @@ async def bring_up(plan: Plan, interrupts: Interrupts, *, may_install: bool, wai
         await fleet.close()
 
 
-async def _take_down(fleet: Fleet, names: list[str]) -> list[str]:
+async def _take_down(fleet: FleetHosts, names: list[str]) -> list[str]:
     """End what this very `lfa up` has started; a line for each machine where that did not go well."""
     if not names:
         return []
@@ -113,13 +113,13 @@ async def _take_down(fleet: Fleet, names: list[str]) -> list[str]:
     return left or [f"taken down again: {', '.join(names)}"]
 
 
-def _all_well(fleet: Fleet) -> None:
+def _all_well(fleet: FleetHosts) -> None:
     if fleet.wrong:
         raise NotUp(fleet.lines(), 1 if fleet.unreached == set(fleet.wrong) else 2)
 
 
 def _join_those_that_run(
-    plan: Plan, fleet: Fleet, found: dict[str, Found], digest: str, keys: dict[str, Bundle]
+    plan: FleetPlan, fleet: FleetHosts, found: dict[str, Found], digest: str, keys: dict[str, Bundle]
 ) -> None:
     """Machines that run already set the run that the others join; they must have been told the same file."""
     for name, one in found.items():
@@ -132,7 +132,9 @@ def _join_those_that_run(
         fleet.parts = parts(plan, run, digest, keys)
 
 
-def _await_health(plan: Plan, shares: dict[str, Part], interrupts: Interrupts, wait_s: float) -> dict[str, Any]:
+def _await_health(
+    plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float
+) -> dict[str, Any]:
     """Listens as an onlooker until the judge has nothing to say for a moment. Raises NotUp."""
     own = next((part for part in sights.here() if part.fleet == plan.name), None)
     endpoints = [own.socket] if own is not None else []
@@ -174,6 +176,6 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _digest(plan: Plan) -> str:
+def _digest(plan: FleetPlan) -> str:
     said = msgspec.json.encode((plan.file, plan.scenario), order="deterministic")
     return hashlib.sha256(said).hexdigest()[:8]

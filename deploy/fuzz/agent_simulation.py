@@ -15,10 +15,10 @@ from msgspec import Struct
 
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.verification.checker import Checker, listeners
-from lfa.deploy.analysis.verification.lease_observer import overhear, said, told
+from lfa.deploy.analysis.verification.lease_observer import effect_facts, message_facts, observe_lease
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.fuzz import network
-from lfa.deploy.fuzz.network import Trace, Weather
+from lfa.deploy.fuzz.network import LinkConditions, Trace
 from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
 from lfa.protocol.lease.effects import BecomeLeader, Effect
 from lfa.protocol.lease.lease import Lease
@@ -32,7 +32,7 @@ from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
 from lfa.protocol.node import Envelope, Node, PeerDown, PeerUp, Received
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME, address
-from lfa.protocol.transport.link_model import Air, Radio
+from lfa.protocol.transport.link_model import LinkModel, Radio
 from lfa.world.checkpoint import resumed
 from lfa.world.description.scenario import Lidar, Scenario, WorldSpec
 from lfa.world.physics.kinematics import Kinematic
@@ -43,10 +43,10 @@ FLEET = "whole"
 ROAD_M = 100.0
 
 
-class Gale(Air):
+class Gale(LinkModel):
     """The arena's weather and cuts, on the simulator's links."""
 
-    def __init__(self, whole: Whole) -> None:
+    def __init__(self, whole: AgentSimulation) -> None:
         super().__init__(Radio(), whole.random)
         self._whole = whole
 
@@ -91,7 +91,7 @@ class Hardware(Struct):
     alive: bool = True
 
 
-class Whole:
+class AgentSimulation:
     def __init__(self, schedule: Schedule, road_m: float = ROAD_M) -> None:
         """Nobody has started yet; the goal is `road_m` straight ahead of the first robot."""
         self.random = Random(schedule.seed)
@@ -99,7 +99,7 @@ class Whole:
         robots = tuple(range(1, schedule.robots + 1))
         self.mission = Mission(robots, witness=schedule.witness, profile=schedule.profile, leading=leading)
         self.timing = timing_of(schedule.profile)
-        self.weather: Weather = schedule.weather
+        self.weather: LinkConditions = schedule.weather
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
         self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max if schedule.faults else float("inf")
@@ -134,13 +134,13 @@ class Whole:
         """`what(*arguments)` when true time reaches `time`."""
         self.simulator.at(time, lambda: what(*arguments))
 
-    def run(self, until: float) -> Whole:
+    def run(self, until: float) -> AgentSimulation:
         self.simulator.run(until)
         return self
 
     # --- lives -------------------------------------------------------------------------------------------------
 
-    def start_all(self) -> Whole:
+    def start_all(self) -> AgentSimulation:
         """The world with its gateways, then everybody at once."""
         self._start_world(World(FLEET, self._scenario, 1, self._next_life(), start_at=None, bodies=Kinematic))
         for robot_id in self.ids:
@@ -160,7 +160,7 @@ class Whole:
         )
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         life = self.processes[robot_id] = Life(self.simulator, node, member, clock)
-        overhear(node, lambda effects: self._done(life, effects))
+        observe_lease(node, lambda effects: self._done(life, effects))
         _before(node, lambda received: self._received(received))
         self._say(robot_id, f"starts, life {member.incarnation}")
         self._tell("lives", self.now, member)
@@ -228,7 +228,7 @@ class Whole:
         self.cuts |= pairs
         self._tell("parts", self.now, self.cuts)
 
-    def mend(self, pairs: set[tuple[int, int]]) -> None:
+    def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
         self.cuts -= pairs
         self._tell("parts", self.now, self.cuts)
 
@@ -280,13 +280,15 @@ class Whole:
             self._say(life.id, network.told(effect))
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, life.id, effect))
-            for words in told(effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true):
+            for words in effect_facts(
+                effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true
+            ):
                 self._tell(*words)
 
     def _received(self, received: Received) -> None:
         note = received.message
         if isinstance(note, LeaseNote) and isinstance(note.body, Promise):
-            for words in said(note, self.now):
+            for words in message_facts(note, self.now):
                 self._tell(*words)
 
     def _at_gateways(

@@ -11,17 +11,17 @@ from msgspec import Struct, structs
 from lfa.deploy.analysis.verification.checker import Checker, Violation
 from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS, NextInChain, Steady, StopsWithoutQuorum
 from lfa.deploy.analysis.verification.safety import SAFETY
-from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
-from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Fault, Schedule
+from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.names import WITNESS_ID
 
 if TYPE_CHECKING:
-    from lfa.deploy.fuzz.agent_simulation import Whole
+    from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 
-Stage = Union["Arena", "Whole"]
+Stage = Union["LeaseSimulation", "AgentSimulation"]
 """Where a schedule is played: leases alone, or whole agents."""
 EXIT_S = 0.3
 """Enough for the last words of a process that is told to exit."""
@@ -49,7 +49,7 @@ class Faults:
             arena.at(fault.at, self._do, fault)
         arena.at(FAULTS_UNTIL_S, self.heal)
 
-    def _target(self, fault: Fault) -> int | None:
+    def _target(self, fault: ScheduledFault) -> int | None:
         """The id meant, None when nobody is there to be hit."""
         target = fault.targets[0] if fault.targets else WITNESS_ID
         if target == LEADER:
@@ -58,7 +58,7 @@ class Faults:
         process = self.arena.processes.get(target)
         return target if process is not None and process.alive else None
 
-    def _do(self, fault: Fault) -> None:
+    def _do(self, fault: ScheduledFault) -> None:
         target = self._target(fault)
         # What a fault began ends with the faults: L1-L4 count from there.
         arena, lasts = self.arena, min(self.arena.now + fault.duration_s, FAULTS_UNTIL_S)
@@ -92,7 +92,7 @@ class Faults:
             case "cut" | "cut_one_way" | "cut_pair":
                 pairs = self._pairs(fault, target)
                 arena.part(pairs)
-                arena.at(lasts, arena.mend, pairs)
+                arena.at(lasts, arena.heal_partition, pairs)
                 done = bool(pairs)
             case "loss" | "burst" | "duplicate" | "tail" | "reorder":
                 name = "loss" if fault.kind == "burst" else fault.kind
@@ -104,7 +104,7 @@ class Faults:
         if done and arena.trace is not None:
             arena.trace(arena.now, WITNESS_ID if target is None else target, f"# {fault.kind}")
 
-    def _pairs(self, fault: Fault, target: int | None) -> set[tuple[int, int]]:
+    def _pairs(self, fault: ScheduledFault, target: int | None) -> set[tuple[int, int]]:
         ids = set(self.arena.ids)
         if fault.kind == "cut_pair":
             other = fault.targets[1]
@@ -120,7 +120,7 @@ class Faults:
         if not self.arena.processes[target].alive:
             self.arena.start(target)
 
-    def _step_wall(self, fault: Fault, target: int, lasts: float) -> None:
+    def _step_wall(self, fault: ScheduledFault, target: int, lasts: float) -> None:
         self.arena.step_wall(target, fault.value)
         if fault.duration_s > 0.0:
             self.arena.kill(target)
@@ -170,13 +170,13 @@ def play(schedule: Schedule, trace: Trace | None = None) -> Played:
 
 def play_whole(schedule: Schedule, trace: Trace | None = None) -> Played:
     """The same with whole agents, witness and world."""
-    from lfa.deploy.fuzz.agent_simulation import Whole
+    from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 
-    return _play(schedule, trace, Whole)
+    return _play(schedule, trace, AgentSimulation)
 
 
 def _arena(schedule: Schedule) -> Stage:
-    return Arena(
+    return LeaseSimulation(
         schedule.robots,
         seed=schedule.seed,
         profile=schedule.profile,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from lfa.deploy.fuzz.network import Clock, Network, Weather
+from lfa.deploy.fuzz.network import LinkConditions, Network, SimulatedClock
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Fence, Fenced, GatewayStamp, LeaseBody, Member
@@ -15,19 +15,19 @@ class GatewayHost(Struct):
     """One life of one robot's gateway, and its clock."""
 
     gateway: Gateway
-    clock: Clock
+    clock: SimulatedClock
     born_at: float
     alive: bool = True
 
 
-class Motors(Network):
+class GatewaySimulation(Network):
     """A network with gateways on it. Lives of processes and gateways are counted together."""
 
     def __init__(
         self,
         seed: int,
         ids: tuple[int, ...],
-        weather: Weather,
+        weather: LinkConditions,
         gateways_at: int | None,
         timing: Timing,
         rates: dict[int, float],
@@ -48,7 +48,7 @@ class Motors(Network):
         """A new life of a robot's gateway; `at` may lie in the past: it has then been up since."""
         born_at = self.now if at is None else at
         self._lives += 1
-        clock = Clock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
+        clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
         gateway = self._gateway_type(robot_id, self._lives, self.timing, clock.local(born_at))
         self.gateways[robot_id] = GatewayHost(gateway, clock, born_at)
         for tell in self._tell["gateway_starts"]:

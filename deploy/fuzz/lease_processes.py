@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from lfa.deploy.fuzz.gateways import Motors
-from lfa.deploy.fuzz.network import Clock, told
+from lfa.deploy.fuzz.gateways import GatewaySimulation
+from lfa.deploy.fuzz.network import SimulatedClock, told
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
 from lfa.protocol.lease.lease import Lease
@@ -39,7 +39,7 @@ NEVER = float("inf")
 class Process:
     """One life of one robot's (or the witness's) lease, with its own clock."""
 
-    def __init__(self, member: Member, lease: Lease, clock: Clock) -> None:
+    def __init__(self, member: Member, lease: Lease, clock: SimulatedClock) -> None:
         self.member = member
         self.id = member.id
         self.lease = lease
@@ -57,7 +57,7 @@ class Process:
         """The last command computed as leader: what a pause may hold back."""
 
 
-class Hosts(Motors):
+class Hosts(GatewaySimulation):
     """Gateways and processes; `processes` holds the newest life of each id, alive or not."""
 
     def __init__(self, *arguments: Any) -> None:

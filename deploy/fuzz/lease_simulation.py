@@ -7,7 +7,7 @@ processes and gateways, in true time, which no process knows.
 from __future__ import annotations
 
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
-from lfa.deploy.fuzz.network import Clock, Weather
+from lfa.deploy.fuzz.network import LinkConditions, SimulatedClock
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.lease import Lease
 from lfa.protocol.lease.timing import timing_of
@@ -16,7 +16,7 @@ from lfa.protocol.mission import Leading, Mission, Profile
 from lfa.protocol.names import WITNESS_ID
 
 
-class Arena(Hosts):
+class LeaseSimulation(Hosts):
     def __init__(
         self,
         robots: int = 4,
@@ -26,7 +26,7 @@ class Arena(Hosts):
         witness: bool = True,
         rates: dict[int, float] | None = None,
         mission: Mission | None = None,
-        weather: Weather | None = None,
+        weather: LinkConditions | None = None,
         gateways_at_world: bool = False,
         gateway_type: type[Gateway] = Gateway,
     ) -> None:
@@ -38,13 +38,13 @@ class Arena(Hosts):
         )
         ids = ((WITNESS_ID,) if self.mission.witness else ()) + self.mission.robots
         timing, gateways_at = timing_of(self.mission.profile), WITNESS_ID if gateways_at_world else None
-        super().__init__(seed, ids, weather or Weather(), gateways_at, timing, rates or {}, gateway_type)
+        super().__init__(seed, ids, weather or LinkConditions(), gateways_at, timing, rates or {}, gateway_type)
         self.wall_ms: dict[int, int] = {}
         """How far each host's wall clock is wrong: terms of lives that begin there start above it."""
 
     # --- lives -------------------------------------------------------------------------------------------------
 
-    def start_all(self, at: float = 0.0, gateways_shut_s: float = 0.0) -> Arena:
+    def start_all(self, at: float = 0.0, gateways_shut_s: float = 0.0) -> LeaseSimulation:
         """Everybody starts at once; gateways have been up before."""
         for robot_id in self.mission.robots:
             self.start_gateway(robot_id, at - self.timing.grant_s + gateways_shut_s)
@@ -58,7 +58,7 @@ class Arena(Hosts):
             self.kill(robot_id)
         self._lives += 1
         member = Member(robot_id, self._lives)
-        clock = Clock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
+        clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor)
         process = Process(member, lease, clock)

@@ -21,7 +21,7 @@ REORDER_S = 0.15
 """More than three heartbeats of the profile std."""
 
 
-class Clock(Struct, frozen=True):
+class SimulatedClock(Struct, frozen=True):
     """local = offset + rate * true."""
 
     offset: float = 0.0
@@ -34,7 +34,7 @@ class Clock(Struct, frozen=True):
         return (local - self.offset) / self.rate
 
 
-class Weather(Struct):
+class LinkConditions(Struct):
     """What the network does to messages that leave now; times in seconds."""
 
     delay_min: float = 0.0003
@@ -72,7 +72,7 @@ Trace = Callable[[float, int, str], None]
 class Network:
     """Time, chance, weather and cuts between `ids`; a gateway is addressed as minus its robot's id."""
 
-    def __init__(self, seed: int, ids: tuple[int, ...], weather: Weather, gateways_at: int | None) -> None:
+    def __init__(self, seed: int, ids: tuple[int, ...], weather: LinkConditions, gateways_at: int | None) -> None:
         """`gateways_at`: the id on whose host all gateways are; None: each is on its robot's."""
         self.random = Random(seed)
         self.now = 0.0
@@ -124,7 +124,7 @@ class Network:
         self.cuts |= pairs
         self._tell_cuts()
 
-    def mend(self, pairs: set[tuple[int, int]]) -> None:
+    def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
         self.cuts -= pairs
         self._tell_cuts()
 

@@ -10,7 +10,7 @@ from random import Random
 
 from msgspec import Struct, structs
 
-from lfa.deploy.fuzz.network import Weather
+from lfa.deploy.fuzz.network import LinkConditions
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
 from lfa.protocol.mission import Profile
 
@@ -28,7 +28,7 @@ LEADER_SHARE = 0.4
 LEADER = -1
 
 
-class Fault(Struct, frozen=True):
+class ScheduledFault(Struct, frozen=True):
     """One thing done at true time `at`. `targets` are ids, LEADER is whoever leads then."""
 
     at: float
@@ -47,8 +47,8 @@ class Schedule(Struct, frozen=True):
     profile: Profile
     gateways_at_world: bool
     rates: dict[int, float]
-    faults: tuple[Fault, ...]
-    weather: Weather
+    faults: tuple[ScheduledFault, ...]
+    weather: LinkConditions
     revive_all: bool
     """At the end of the faults every dead process starts again; else only as many as a quorum needs."""
 
@@ -59,7 +59,7 @@ class Schedule(Struct, frozen=True):
         return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.weather == FAIR
 
 
-FAIR = Weather()
+FAIR = LinkConditions()
 KINDS: tuple[str, ...] = (
     "kill",
     "restart",
@@ -96,7 +96,7 @@ def draw(seed: int) -> Schedule:
     if share < CALM_SHARE:
         faults = []
     elif share < CALM_SHARE + SINGLE_SHARE:
-        faults, weather = [Fault(random.uniform(1.5, FAULTS_UNTIL_S), "kill", (LEADER,))], FAIR
+        faults, weather = [ScheduledFault(random.uniform(1.5, FAULTS_UNTIL_S), "kill", (LEADER,))], FAIR
     return Schedule(
         seed=seed,
         robots=robots,
@@ -114,7 +114,7 @@ def _count(random: Random, mean: float) -> int:
     return round(mean * random.uniform(0.8, 1.4))
 
 
-def _when(fault: Fault) -> float:
+def _when(fault: ScheduledFault) -> float:
     return fault.at
 
 
@@ -123,8 +123,8 @@ def _rate(random: Random) -> float:
     return 1.0 + CLOCK_RATE_ERROR * random.choice((-1.0, 1.0, random.uniform(-1.0, 1.0)))
 
 
-def _weather(random: Random) -> Weather:
-    return Weather(
+def _weather(random: Random) -> LinkConditions:
+    return LinkConditions(
         delay_max=random.choice((0.002, 0.002, 0.005, 0.02)),
         loss=random.choice((0.0, 0.0, 0.0, 0.05, 0.2)),
         duplicate=random.choice((0.0, 0.0, 0.05, 0.3)),
@@ -133,7 +133,7 @@ def _weather(random: Random) -> Weather:
     )
 
 
-def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> Fault:
+def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> ScheduledFault:
     at = random.uniform(WARM_UP_S, FAULTS_UNTIL_S)
     kind = random.choice(kinds)
     target = LEADER if random.random() < LEADER_SHARE else random.choice(ids)
@@ -141,30 +141,30 @@ def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> Fault:
     match kind:
         case "cut" | "cut_one_way":
             side = tuple(i for i in (*ids, 0) if random.random() < 0.5)
-            return Fault(at, kind, side or (target,), random.uniform(0.05, 1.5))
+            return ScheduledFault(at, kind, side or (target,), random.uniform(0.05, 1.5))
         case "cut_pair":
-            return Fault(at, kind, (target, random.choice((*ids, 0))), random.uniform(0.05, 1.5))
+            return ScheduledFault(at, kind, (target, random.choice((*ids, 0))), random.uniform(0.05, 1.5))
         case "loss":
-            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.5))
+            return ScheduledFault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.5))
         case "burst":
-            return Fault(at, kind, (), random.uniform(0.01, 0.15), 1.0)
+            return ScheduledFault(at, kind, (), random.uniform(0.01, 0.15), 1.0)
         case "duplicate":
-            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
+            return ScheduledFault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
         case "tail":
-            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.05, 0.5))
+            return ScheduledFault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.05, 0.5))
         case "reorder":
-            return Fault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
+            return ScheduledFault(at, kind, (), random.uniform(0.1, 1.0), random.uniform(0.1, 0.6))
         case "clock_step":
-            return Fault(at, kind, (target,), lasts, random.choice((-1.0, 1.0)) * random.uniform(1.0, 3600.0))
+            return ScheduledFault(at, kind, (target,), lasts, random.choice((-1.0, 1.0)) * random.uniform(1.0, 3600.0))
         case "false_hint":
             observers = tuple(i for i in (*ids, 0) if random.random() < random.choice((0.3, 1.0)))
-            return Fault(at, kind, (target, *observers), lasts, float(random.random() < 0.3))
+            return ScheduledFault(at, kind, (target, *observers), lasts, float(random.random() < 0.3))
         case "pause":
-            return Fault(at, kind, (target,), random.uniform(0.05, 1.0), float(random.random() < 0.3))
+            return ScheduledFault(at, kind, (target,), random.uniform(0.05, 1.0), float(random.random() < 0.3))
         case "witness":
-            return Fault(at, kind, (0,), lasts)
+            return ScheduledFault(at, kind, (0,), lasts)
         case _:
-            return Fault(at, kind, (target,), lasts)
+            return ScheduledFault(at, kind, (target,), lasts)
 
 
 def without(schedule: Schedule, *indices: int) -> Schedule:

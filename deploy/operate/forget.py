@@ -9,7 +9,7 @@ import msgspec
 import typer
 
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.client.session import Ear, find, listen
+from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import encode
@@ -60,7 +60,7 @@ def command(
     return 0 if leader is not None else 1
 
 
-def _say(ear: Ear, robots: list[int]) -> None:
+def _say(ear: Subscriber, robots: list[int]) -> None:
     """Every life that began before this moment is meant; one that begins later may join."""
     now_ms = clock.wall_ms()
     operator = Operator(ear.fleet.name, now_ms)
@@ -68,7 +68,7 @@ def _say(ear: Ear, robots: list[int]) -> None:
     ear.bus.publish(operator.orders_key, encode(operator.orders("forget", clock.now(), lives=lives)))
 
 
-def _listen(ear: Ear, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:
+def _listen(ear: Subscriber, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:
     """Who leads, what is said about waiting for others, and the mission's robots, where it was told; with `until_led`,
     no longer than needed."""
     leader: int | None = None

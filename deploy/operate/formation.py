@@ -10,7 +10,7 @@ import typer
 
 from lfa.agents.formation.formation import named
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.client.session import Ear, find, listen
+from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.protocol import clock
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.team import Event
@@ -41,7 +41,7 @@ def command(
     return 0 if answer is not None else 1
 
 
-def ask(ear: Ear, side: str) -> Event | None:
+def ask(ear: Subscriber, side: str) -> Event | None:
     """Say it to `ear`'s fleet; the event by which a leader acknowledges it, None when none does in time."""
     say(ear, side)
     until = clock.now() + ANSWER_S_MAX
@@ -53,6 +53,6 @@ def ask(ear: Ear, side: str) -> Event | None:
     return None
 
 
-def say(ear: Ear, side: str) -> None:
+def say(ear: Subscriber, side: str) -> None:
     operator = Operator(ear.fleet.name, clock.wall_ms())
     ear.bus.publish(operator.orders_key, encode(operator.orders("formation", clock.now(), side=side)))

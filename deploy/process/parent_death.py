@@ -13,11 +13,11 @@ PR_SET_PDEATHSIG = 1
 
 def main() -> None:
     parent, signal, command = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:]
-    tie(parent, signal)
+    die_with_parent(parent, signal)
     os.execv(command[0], command)
 
 
-def tie(parent: int, signal: int) -> None:
+def die_with_parent(parent: int, signal: int) -> None:
     """Have the kernel send `signal` to this process when `parent` dies; ends it when that is so already."""
     if ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal) != 0:
         sys.exit(f"prctl: {os.strerror(ctypes.get_errno())}")

@@ -19,25 +19,25 @@ GRACE_S = 2.0  # between SIGTERM and SIGKILL
 POLL_S = 0.01
 
 
-class Row(Struct, frozen=True):
+class ProcessSpec(Struct, frozen=True):
     """One process: what it is called, and `python -m` what."""
 
     name: str
     arguments: tuple[str, ...]
     outlives_launcher: bool = False
     """It hears of the launcher's death, wakes up if it was stopped, and ends by itself."""
-    again: tuple[str, ...] = ()
+    restart_args: tuple[str, ...] = ()
     """What it is told besides when it starts again."""
-    inside: tuple[str, ...] = ()
+    command_prefix: tuple[str, ...] = ()
     """The command that it runs under, such as one that enters a network namespace."""
 
-    def restarted(self) -> Row:
+    def restarted(self) -> ProcessSpec:
         """An agent that starts again starts as a follower, and the others tell it the rest; a world resumes."""
         told = tuple("follower" if word == "leader" else word for word in self.arguments)
-        return Row(self.name, (*told, *self.again), inside=self.inside)
+        return ProcessSpec(self.name, (*told, *self.restart_args), command_prefix=self.command_prefix)
 
 
-class Crew:
+class ProcessGroup:
     """Those that were started; each has its log. All calls come from the main thread."""
 
     def __init__(self, folder: Path) -> None:
@@ -45,12 +45,12 @@ class Crew:
         self._logs.mkdir(parents=True, exist_ok=True)
         self._children: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, row: Row) -> None:
+    def start(self, row: ProcessSpec) -> None:
         """Raises OSError when no process can be made."""
         death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
         with self.log(row.name).open("ab") as log:
-            self._children[row.name] = processes.start(row.arguments, log, death, stdin, row.inside)
+            self._children[row.name] = processes.start(row.arguments, log, death, stdin, row.command_prefix)
 
     def runs(self, name: str) -> bool:
         child = self._children.get(name)
@@ -90,7 +90,7 @@ class Crew:
         identity = self.identity(name)
         return identity is not None and processes.send(identity, number)
 
-    def tell(self, name: str, line: bytes) -> None:
+    def write_line(self, name: str, line: bytes) -> None:
         """Write a line to the standard input of `name` and close it; one that has gone hears nothing."""
         stdin = self._children[name].stdin
         if stdin is None or stdin.closed:
@@ -101,7 +101,7 @@ class Crew:
         except BrokenPipeError:
             pass
 
-    def end(self, names: Sequence[str], grace_s: float = GRACE_S) -> None:
+    def terminate(self, names: Sequence[str], grace_s: float = GRACE_S) -> None:
         """SIGTERM to all of them, SIGKILL to what is left after the grace; stopped ones are woken for it."""
         for name in names:
             self.signal(name, signal.SIGTERM)

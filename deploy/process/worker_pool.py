@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
 
-from lfa.deploy.process.parent_death import tie
+from lfa.deploy.process.parent_death import die_with_parent
 
 
 @contextmanager
@@ -34,4 +34,4 @@ def _begin(parent: int, place: str) -> None:
     """In a worker: its temporary files go to `place`, and Ctrl-C, which reaches it too, leaves no traceback."""
     tempfile.tempdir = place
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    tie(parent, signal.SIGKILL)
+    die_with_parent(parent, signal.SIGKILL)

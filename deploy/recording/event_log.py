@@ -17,7 +17,7 @@ ENDING_FAULTS = ("kill", "terminate", "stop", "cut")
 Line = dict[str, Any]
 
 
-class Reign(Struct):
+class LeaderTerm(Struct):
     """One holder of the lease, from its first accepted leader command on. `term` is (n, issuer)."""
 
     term: tuple[int, int]
@@ -52,7 +52,7 @@ class FaultDone(Struct):
     """A robot's id, or whom a cut parts, or what share is lost."""
 
 
-class Violation(Struct):
+class TermViolation(Struct):
     """An invariant that did not hold, when, and between whom."""
 
     invariant: str
@@ -80,9 +80,9 @@ def asked_by_leader(line: Line) -> bool:
     return bool(line.get("by", "operator") != "operator")
 
 
-def reigns(events: Sequence[Line]) -> list[Reign]:
+def reigns(events: Sequence[Line]) -> list[LeaderTerm]:
     """Who led, by accepted leader commands over all gateways."""
-    found: list[Reign] = []
+    found: list[LeaderTerm] = []
     done = faults(events)
     for line in of_kind(events, "leader_command"):
         term, robot, at_s = (line["term"][0], line["term"][1]), line["robot"], line["t"]
@@ -92,7 +92,7 @@ def reigns(events: Sequence[Line]) -> list[Reign]:
         if found:
             found[-1].until_s = at_s if ended is None else ended.at_s
         cause = "start" if not found else ended.kind if ended is not None else _given_up(events, found[-1], robot)
-        found.append(Reign(term, robot, at_s, None, cause))
+        found.append(LeaderTerm(term, robot, at_s, None, cause))
     if found:
         last = _ending(done, found[-1], float("inf"))
         found[-1].until_s = None if last is None else last.at_s
@@ -113,7 +113,7 @@ def places(events: Sequence[Line], robots: Sequence[int], end_s: float) -> dict[
     return {robot: [*known, (end_s, known[-1][1])] for robot, known in steps.items()}
 
 
-def failovers(events: Sequence[Line], reigns: Sequence[Reign]) -> list[Failover]:
+def failovers(events: Sequence[Line], reigns: Sequence[LeaderTerm]) -> list[Failover]:
     """One for each fault that ended a reign; None where the run ended before it was over."""
     found = []
     for reign, successor in zip_longest(reigns, reigns[1:]):
@@ -152,7 +152,7 @@ def last_chain(events: Sequence[Line]) -> list[int]:
     return [] if newest is None else list(newest["chain"])
 
 
-def terms_that_went_back(events: Sequence[Line]) -> list[Violation]:
+def terms_that_went_back(events: Sequence[Line]) -> list[TermViolation]:
     """I2: over all gateways, no leader command of an older term is accepted after one of a newer term."""
     newest: tuple[int, ...] = ()
     found = []
@@ -160,7 +160,7 @@ def terms_that_went_back(events: Sequence[Line]) -> list[Violation]:
         term = tuple(line["term"])
         if term < newest:
             text = f"robot {line['robot']} took a leader command of term {term} after one of term {newest}"
-            found.append(Violation("I2", line["t"], text))
+            found.append(TermViolation("I2", line["t"], text))
         newest = max(newest, term)
     return found
 
@@ -173,11 +173,11 @@ def _line(text: bytes) -> Line | None:
     return line if "t" in line and "kind" in line else None
 
 
-def _ended_by(fault: FaultDone, reign: Reign) -> bool:
+def _ended_by(fault: FaultDone, reign: LeaderTerm) -> bool:
     return fault.kind in ENDING_FAULTS and fault.target == reign.robot_id and fault.at_s >= reign.from_s
 
 
-def _given_up(events: Sequence[Line], before: Reign, successor: int) -> str:
+def _given_up(events: Sequence[Line], before: LeaderTerm, successor: int) -> str:
     """How `before`, which no fault ended, came to its end."""
     if before.robot_id == successor:
         return "reelection"
@@ -185,7 +185,7 @@ def _given_up(events: Sequence[Line], before: Reign, successor: int) -> str:
     return next((str(e["change"]) for e in said if e.get("change") not in (None, "acquired")), "handover")
 
 
-def _ending(done: Sequence[FaultDone], reign: Reign, before_s: float) -> FaultDone | None:
+def _ending(done: Sequence[FaultDone], reign: LeaderTerm, before_s: float) -> FaultDone | None:
     """The first fault that can have ended `reign`."""
     return next((fault for fault in done if _ended_by(fault, reign) and fault.at_s <= before_s), None)
 

@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 Row = tuple[float, ...]
 
 
-class Trace(Struct):
+class RecordedRun(Struct):
     """Arrays with one row a message, first column the time [s] since the run's start; columns as in `COLUMNS`."""
 
     truth: dict[int, Array]
@@ -60,7 +60,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 }
 
 
-def read(folder: Path) -> Trace:
+def read(folder: Path) -> RecordedRun:
     """The trace of the run in `folder`; an empty one when nothing was recorded."""
     truth: dict[int, list[Row]] = {}
     obstacles: dict[int, list[Row]] = {}
@@ -79,7 +79,7 @@ def read(folder: Path) -> Trace:
                 commanded.setdefault(slot.robot, []).append((t, slot.separation_m, slot.phi))
         elif robot is not None and topic in _ROWS:
             said[topic].setdefault(robot, []).append(_ROWS[topic](t, message))
-    return Trace(
+    return RecordedRun(
         _arrays(truth), _arrays(said["tracking"]), _arrays(said["cmd_vel"]), _arrays(obstacles), _arrays(commanded)
     )
 

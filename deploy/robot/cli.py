@@ -72,14 +72,14 @@ def _pose(text: str) -> Pose2D:
     return Pose2D(x, y, theta)
 
 
-class _Parser(argparse.ArgumentParser):
+class _DriverParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """One line instead of usage and a line."""
         raise Refused(f"{message} ({EXAMPLE})")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = _DriverParser(
         prog="lfa-driver", description="Drive one robot's (simulated) motor until stopped.", epilog=EXAMPLE
     )
     add = parser.add_argument

@@ -16,21 +16,21 @@ from random import Random
 import msgspec
 
 from lfa.deploy.analysis.assertions import check_junit
-from lfa.deploy.client.fleet_state import Standing
+from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import ORDERS, RESTART, SIGNALS, Deed, Fault, Schedule, parse_all
-from lfa.deploy.process.process_group import ROUTER_NAME, Crew
+from lfa.deploy.faults.script import ORDERS, RESTART, SIGNALS, Fault, FaultAction, FaultSchedule, parse_all
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.finish import Ended, finish, report, reread, verdict_of
-from lfa.deploy.run.load import choose_again
+from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from lfa.deploy.run.process_table import rows
 from lfa.deploy.run.progress import Progress, progress
-from lfa.deploy.run.recorder_process import LastWord, Task
+from lfa.deploy.run.recorder_process import RecorderTask, RunResult
 from lfa.deploy.run.termination import Referee
 from lfa.protocol import clock
 from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
@@ -39,7 +39,7 @@ from lfa.protocol.messages.team import Event, OperatorNote
 from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
 from lfa.protocol.transport.bus import Inbox
-from lfa.protocol.transport.link_model import CLEAR, WEATHER, Air
+from lfa.protocol.transport.link_model import CLEAR, WEATHER, LinkModel
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
 from lfa.world.description.load import Scenario, draw
@@ -66,7 +66,7 @@ def command(
     junit: JUnit = None,
     as_json: AsJson = False,
 ) -> int:
-    chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
+    chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     if junit is not None:
         check_junit(junit)
@@ -108,25 +108,25 @@ class _Launch:
         self._mission = drawn.mission
         self._about = about
         self._endpoint = f"unixsock-stream/{sockets / 'router.sock'}"
-        task = msgspec.json.encode(Task(str(folder), about, self._endpoint, str(sockets))).decode()
+        task = msgspec.json.encode(RecorderTask(str(folder), about, self._endpoint, str(sockets))).decode()
         self._rows = rows(folder, about, self._endpoint, drawn.mission, task)
-        self._crew = Crew(folder)
+        self._processes = ProcessGroup(folder)
         self._restart = drawn.restart
         self._revive_at: dict[str, float] = {}
         self._restarted: list[str] = []
         """Processes started again of which nobody was told yet."""
-        self._schedule = Schedule(faults)
+        self._schedule = FaultSchedule(faults)
         self._undone: list[str] = []
         self._doomed: set[str] = set()
         self._referee = Referee(drawn)
-        self._standing = Standing(drawn.mission.robots)
+        self._standing = FleetState(drawn.mission.robots)
         self._time = WorldTime()
         self._heard_at = clock.now()
         self._began_at: float | None = None
         self._operator = Operator(about.fleet, clock.wall_ms())
         self._inbox = Inbox()
         self._bus: ZenohBus | None = None
-        self._air = Air(CLEAR, Random(0))
+        self._air = LinkModel(CLEAR, Random(0))
         """The weather as ordered, by whomever: one that starts again during it is told."""
         self._repeat_weather_until = 0.0
         self.summed_up = False
@@ -134,21 +134,21 @@ class _Launch:
 
     # --- from start to verdict ----------------------------------------------------------------------------------
 
-    def play(self, interrupts: Interrupts) -> LastWord:
+    def play(self, interrupts: Interrupts) -> RunResult:
         """All of the run; nothing that was started is left when this returns or raises."""
         view = progress()
         try:
             verdict = self._watch(interrupts, view)
             now = clock.now()
             left = (*self._undone, *(str(fault) for fault in self._schedule.pending))
-            word = LastWord(verdict, now - (self._began_at or now), left)
+            word = RunResult(verdict, now - (self._began_at or now), left)
             self._end(word)
             return word
         finally:
             view.close()
             if self._bus is not None:
                 self._bus.close()
-            self._crew.kill_all()
+            self._processes.kill_all()
 
     def _watch(self, interrupts: Interrupts, view: Progress) -> Verdict:
         try:
@@ -169,9 +169,9 @@ class _Launch:
     def _start(self, interrupts: Interrupts) -> None:
         """Router first, then the recorder, so that nothing goes unheard; world and agents in no order."""
         router, recorder, *others = self._rows
-        self._crew.start(router)
+        self._processes.start(router)
         self._await(router.name, lambda: answers(self._endpoint), interrupts)
-        self._crew.start(recorder)
+        self._processes.start(recorder)
         self._bus = bus = ZenohBus(self._endpoint, self._inbox)
         wanted = {key(self._about.fleet, "*", topic) for topic in ("event", "tracking", "status", "truth", "operator")}
         bus.follow(frozenset(wanted))
@@ -179,7 +179,7 @@ class _Launch:
         self._await(recorder.name, lambda: bool(bus.living(fleet, RECORDER_NAME)), interrupts)
         self._say("start", scenario=self._about.scenario, seed=self._about.seed)
         for row in others:
-            self._crew.start(row)
+            self._processes.start(row)
         self._heard_at = clock.now()
 
     def _await(self, name: str, ready: Callable[[], bool], interrupts: Interrupts) -> None:
@@ -241,9 +241,9 @@ class _Launch:
             name = robot_name(robot_id)
             if self._revives(name, view):
                 continue
-            if robot_id not in self._standing.gone and not self._crew.runs(name):
+            if robot_id not in self._standing.gone and not self._processes.runs(name):
                 self._standing.gone.add(robot_id)
-                how = self._crew.exit_of(name)
+                how = self._processes.exit_of(name)
                 view.note(self._standing, str(how))
                 if name not in self._doomed:
                     self._say("died", robot=robot_id, how=how)
@@ -256,21 +256,21 @@ class _Launch:
     def _revives(self, name: str, view: Progress) -> bool:
         """Start it again when it has failed and the scenario says so; False when its end is for good."""
         policy = self._restart.get(name, self._restart.get("robots") if name.startswith("robot") else None)
-        if policy != "on-failure" or not self._crew.failed(name):
+        if policy != "on-failure" or not self._processes.failed(name):
             return False
         if clock.now() >= self._revive_at.get(name, 0.0):
             self._revive_at[name] = clock.now() + REVIVE_S_MIN
-            view.note(self._standing, f"{self._crew.exit_of(name)}: started again")
+            view.note(self._standing, f"{self._processes.exit_of(name)}: started again")
             self._start_again(name)
             self._restarted.append(name)
         return True
 
     def _start_again(self, name: str) -> None:
-        self._crew.start(next(row for row in self._rows if row.name == name).restarted())
+        self._processes.start(next(row for row in self._rows if row.name == name).restarted())
         self._repeat_weather_until = clock.now() + NEWS_S
 
     def _needs(self, name: str) -> None:
-        how = self._crew.exit_of(name)
+        how = self._processes.exit_of(name)
         if how is not None:
             raise _Aborted(how)
 
@@ -286,7 +286,7 @@ class _Launch:
             again = self._operator.orders(WEATHER, clock.now(), **self._air.orders)
             self._publish(self._operator.orders_key, again)
 
-    def _do(self, deed: Deed, victim: int | str) -> bool:
+    def _do(self, deed: FaultAction, victim: int | str) -> bool:
         """False when there is nobody to do it to, or somebody already."""
         if deed in ORDERS:
             self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
@@ -295,7 +295,7 @@ class _Launch:
             )
             return True
         name = robot_name(victim) if isinstance(victim, int) else victim
-        if self._crew.runs(name) == (deed == RESTART):
+        if self._processes.runs(name) == (deed == RESTART):
             return False
         self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
         if deed == RESTART:
@@ -305,7 +305,7 @@ class _Launch:
             return True
         if deed in ("kill", "terminate"):
             self._doomed.add(name)
-        return self._crew.signal(name, SIGNALS[deed])
+        return self._processes.signal(name, SIGNALS[deed])
 
     def _say(self, kind: str, **data: object) -> None:
         self._publish(self._operator.key, self._operator.says(kind, clock.now(), **data))
@@ -316,14 +316,14 @@ class _Launch:
 
     # --- the end ---------------------------------------------------------------------------------------------------
 
-    def _end(self, word: LastWord) -> None:
+    def _end(self, word: RunResult) -> None:
         """Agents and world, then the recorder, which sums up, then the router; each with a grace."""
         team = [row.name for row in self._rows if row.name not in (ROUTER_NAME, RECORDER_NAME)]
         # When it is said: on a busy machine some of the team are gone before this comes to the recorder.
         self._say("over", t=self._time.of(clock.now()))
-        self._crew.end(team)
-        if self._crew.runs(RECORDER_NAME):
-            self._crew.tell(RECORDER_NAME, msgspec.json.encode(word))
-            self._crew.wait([RECORDER_NAME], RECORDER_S_MAX)
-            self.summed_up = self._crew.succeeded(RECORDER_NAME)
-        self._crew.end([RECORDER_NAME, ROUTER_NAME])
+        self._processes.terminate(team)
+        if self._processes.runs(RECORDER_NAME):
+            self._processes.write_line(RECORDER_NAME, msgspec.json.encode(word))
+            self._processes.wait([RECORDER_NAME], RECORDER_S_MAX)
+            self.summed_up = self._processes.succeeded(RECORDER_NAME)
+        self._processes.terminate([RECORDER_NAME, ROUTER_NAME])

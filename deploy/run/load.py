@@ -8,13 +8,13 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from lfa.deploy.recording.run_folder import SCENARIO
-from lfa.deploy.scenario_loading import choose
+from lfa.deploy.scenario_loading import load_scenario
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission_checks import check_mission
 from lfa.world.description.load import Scenario
 
 
-def choose_again(
+def rebuild_scenario(
     scenario: str, overrides: Sequence[str], robots: int | None, seed: int | None, map_from: Path | None
 ) -> tuple[Scenario, int]:
     """The scenario and the seed (0 when not given); with `map_from` the paper's iteration 2.
@@ -22,7 +22,7 @@ def choose_again(
     That is the world of the earlier run in that folder (its seed, unless another is given), with what its robots met
     told to the team as known. Raises Refused with one line.
     """
-    chosen = choose(scenario, overrides, robots)
+    chosen = load_scenario(scenario, overrides, robots)
     if map_from is None:
         return chosen, seed or 0
     from lfa.deploy.analysis import summary  # both read recordings: numpy

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, About
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
 
 
-def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[Row]:
+def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[ProcessSpec]:
     """The table of processes of a run, in the order in which they are started."""
     team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
     world = ("lfa.world.cli", str(folder / SCENARIO), "--seed", str(about.seed), "--state", str(folder), *team)
     return [
-        Row(ROUTER_NAME, ("lfa.deploy.fleet.host.router", "--listen", endpoint)),
-        Row(RECORDER_NAME, ("lfa.deploy.run.recorder_process", recorder_task), outlives_launcher=True),
-        Row(WORLD_NAME, world, again=("--resume", str(folder))),
-        *(Row(robot_name(i), ("lfa.agents.cli", "--role", _role(i, mission), "--id", str(i), *team))
+        ProcessSpec(ROUTER_NAME, ("lfa.deploy.fleet.host.router", "--listen", endpoint)),
+        ProcessSpec(RECORDER_NAME, ("lfa.deploy.run.recorder_process", recorder_task), outlives_launcher=True),
+        ProcessSpec(WORLD_NAME, world, restart_args=("--resume", str(folder))),
+        *(ProcessSpec(robot_name(i), ("lfa.agents.cli", "--role", _role(i, mission), "--id", str(i), *team))
           for i in mission.robots),
     ]  # fmt: skip
 

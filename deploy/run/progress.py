@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Protocol
 
-from lfa.deploy.client.fleet_state import Standing
+from lfa.deploy.client.fleet_state import FleetState
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -18,9 +18,9 @@ REDRAW_HZ = 5.0
 class Progress(Protocol):
     """Where a person looks while a run goes on. It goes to stderr: stdout is for what comes out at the end."""
 
-    def show(self, standing: Standing, leader: int | None) -> None: ...
+    def show(self, standing: FleetState, leader: int | None) -> None: ...
 
-    def note(self, standing: Standing, text: str) -> None:
+    def note(self, standing: FleetState, text: str) -> None:
         """Something happened."""
 
     def close(self) -> None: ...
@@ -35,13 +35,13 @@ class _InLines:
         self._next_s = 0.0
         self._leader: int | None = None
 
-    def show(self, standing: Standing, leader: int | None) -> None:
+    def show(self, standing: FleetState, leader: int | None) -> None:
         if standing.time_s >= self._next_s or leader != self._leader:
             self._next_s = standing.time_s + LINE_EVERY_S
             self._leader = leader
             print(standing.line(leader), file=sys.stderr, flush=True)
 
-    def note(self, standing: Standing, text: str) -> None:
+    def note(self, standing: FleetState, text: str) -> None:
         print(f"{standing.time_s:7.1f} s  {text}", file=sys.stderr, flush=True)
 
     def close(self) -> None:
@@ -56,17 +56,17 @@ class _OnTerminal:
         self._live: Live = Live(console=Console(stderr=True), refresh_per_second=REDRAW_HZ)
         self._live.start()
 
-    def show(self, standing: Standing, leader: int | None) -> None:
+    def show(self, standing: FleetState, leader: int | None) -> None:
         self._live.update(_table(standing, leader))
 
-    def note(self, standing: Standing, text: str) -> None:
+    def note(self, standing: FleetState, text: str) -> None:
         self._live.console.print(f"{standing.time_s:7.1f} s  {text}", highlight=False)
 
     def close(self) -> None:
         self._live.stop()
 
 
-def _table(standing: Standing, leader: int | None) -> Table:
+def _table(standing: FleetState, leader: int | None) -> Table:
     from rich.table import Table
 
     table = Table(title=standing.headline(leader), title_justify="left", box=None, padding=(0, 2))

@@ -2,7 +2,7 @@
 
 The launcher holds the other end of its standard input. One line of JSON there is the verdict; an end of file without
 one means that the launcher died: then the run is called aborted, and what the launcher would have cleaned up is
-cleaned up here. Start: `python -m lfa.deploy.run.recorder_process TASK`, with a `Task` as JSON.
+cleaned up here. Start: `python -m lfa.deploy.run.recorder_process TASK`, with a `RecorderTask` as JSON.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ WAIT_S = 0.05
 LAST_WORDS_S = 0.2  # what is still on its way when the verdict comes
 
 
-class Task(Struct, frozen=True):
+class RecorderTask(Struct, frozen=True):
     """What to record, where to, and which folder of sockets goes when the launcher cannot remove it."""
 
     folder: str
@@ -47,7 +47,7 @@ class Task(Struct, frozen=True):
     sockets: str
 
 
-class LastWord(Struct, frozen=True):
+class RunResult(Struct, frozen=True):
     """The verdict, as the launcher sends it."""
 
     verdict: Verdict
@@ -56,38 +56,38 @@ class LastWord(Struct, frozen=True):
 
 
 def main() -> None:
-    task = msgspec.json.decode(sys.argv[1], type=Task)
+    task = msgspec.json.decode(sys.argv[1], type=RecorderTask)
     told = Wake()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: told.set())
-    word: list[LastWord] = []
+    word: list[RunResult] = []
     threading.Thread(target=_listen, args=(word, told), daemon=True).start()
     tape = _Tape(task)
     begun = clock.now()
     while not told.wait(WAIT_S):
-        tape.wind()
+        tape.drain()
     if word:
         clock.sleep(LAST_WORDS_S)
-    tape.wind()
-    last = word[0] if word else LastWord(Verdict("aborted", "the launcher died"), clock.now() - begun, ())
+    tape.drain()
+    last = word[0] if word else RunResult(Verdict("aborted", "the launcher died"), clock.now() - begun, ())
     recording = tape.close(last.verdict)
     finish(Path(task.folder), task.about, last.verdict, last.duration_s, last.faults_left, None, recording)
     if not word:
         shutil.rmtree(task.sockets, ignore_errors=True)
 
 
-def _listen(word: list[LastWord], told: Wake) -> None:
+def _listen(word: list[RunResult], told: Wake) -> None:
     """Wait for the launcher's line, or for its end."""
     line = sys.stdin.buffer.readline()
     if line.endswith(b"\n"):
-        word.append(msgspec.json.decode(line, type=LastWord))
+        word.append(msgspec.json.decode(line, type=RunResult))
     told.set()
 
 
 class _Tape:
     """The bus on one side, the recorder on the other."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: RecorderTask) -> None:
         fleet = task.about.fleet
         self._inbox = Inbox(size_max=INBOX_SIZE_MAX, every=True)
         self._incarnation = clock.wall_ms()
@@ -103,7 +103,7 @@ class _Tape:
         self._bus.follow(frozenset({f"lfa/{fleet}/**", alive_key(fleet, "*", "*")}))
         self._bus.announce(fleet, RECORDER_NAME, self._incarnation)
 
-    def wind(self) -> None:
+    def drain(self) -> None:
         """Write down all that came."""
         for arrival in self._inbox.take():
             heard = self._heard(arrival)

@@ -10,13 +10,13 @@ from lfa.agents.agent import Agent
 from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import COMMON, ORDERS, Deed, Fault, Schedule, parse_all
+from lfa.deploy.faults.script import COMMON, ORDERS, Fault, FaultAction, FaultSchedule, parse_all
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import JOURNALS, About, make
 from lfa.deploy.run.finish import Ended, finish, report, verdict_of
-from lfa.deploy.run.load import choose_again
+from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from lfa.deploy.run.termination import Referee
 from lfa.protocol.errors import Refused
@@ -49,7 +49,7 @@ def command(
     junit: JUnit = None,
     as_json: AsJson = False,
 ) -> int:
-    chosen, number = choose_again(scenario, overrides or (), robots, seed, map_from)
+    chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     if junit is not None:
         check_junit(junit)
@@ -69,7 +69,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     run = _Run(drawn, seed, folder, recorder)
     started = time.perf_counter()
     with Interrupts() as interrupts:
-        verdict = run.play(Schedule(faults), interrupts)
+        verdict = run.play(FaultSchedule(faults), interrupts)
     duration_s = time.perf_counter() - started
     return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, run.recording)
 
@@ -91,7 +91,7 @@ class _Run:
         self.faults_left: list[str] = []
         self.recording: Recording | None = None
 
-    def play(self, schedule: Schedule, interrupts: Interrupts) -> Verdict:
+    def play(self, schedule: FaultSchedule, interrupts: Interrupts) -> Verdict:
         """Start the team, run until it is over, close the recording and the journals."""
         self._say("start", scenario=self._scenario.name, seed=self._seed)
         self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
@@ -108,7 +108,7 @@ class _Run:
             journal.close()
         return verdict
 
-    def _until_over(self, schedule: Schedule, interrupts: Interrupts) -> Verdict:
+    def _until_over(self, schedule: FaultSchedule, interrupts: Interrupts) -> Verdict:
         simulator, referee = self._simulator, self._referee
         silent_at = self._scenario.time_limit_s + SILENCE_S_MAX
         while simulator.now < silent_at:
@@ -122,7 +122,7 @@ class _Run:
                 return verdict
         return Verdict("aborted", "the world fell silent")
 
-    def _do(self, deed: Deed, victim: int | str) -> None:
+    def _do(self, deed: FaultAction, victim: int | str) -> None:
         """A deed on one that is not there, or is there already, does nothing, as a signal would."""
         if deed in ORDERS:
             self._order(deed, victim)
@@ -145,7 +145,7 @@ class _Run:
             case "restart":
                 self._add(self._agent(victim))
 
-    def _order(self, deed: Deed, target: int | str) -> None:
+    def _order(self, deed: FaultAction, target: int | str) -> None:
         """An operator's word: about the weather it goes to the air, else to all agents."""
         now = self._simulator.now
         self._say("fault", deed=deed, robot=target, t=now)

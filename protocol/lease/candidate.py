@@ -26,13 +26,13 @@ class Candidate:
         self.ask_at = now
         self.holder: Holder | None = None
         """Set once the first PROPOSE has left: the term as it is being granted."""
-        self.given = False
+        self.transferred = False
         """The term was handed over by its issuer (E16): this process only counts the grants."""
         self._promised: dict[Member, Grantee | None] = {}
         self._absent: frozenset[Grantee] = frozenset()
         """E21: stands for whatever a robot that did not promise may still command."""
         self._fenced: set[Grantee] = set()
-        self._remembering: set[Member] = set()
+        self._with_state: set[Member] = set()
         self._refused: set[Member] = set()
         self._bound_until = now
         self._act_s = timing.act_s
@@ -56,7 +56,7 @@ class Candidate:
     def deadline(self) -> float:
         if self.holder is None:
             return self.ask_at
-        return self.gives_up_at if self.given else self.holder.next_round_at
+        return self.gives_up_at if self.transferred else self.holder.next_round_at
 
     @property
     def gives_up_at(self) -> float:
@@ -67,7 +67,7 @@ class Candidate:
         """The newest answer of a voter counts: a bond that it named before may have run out since."""
         self._promised[src] = needs_fence
         if not blank:
-            self._remembering.add(src)
+            self._with_state.add(src)
 
     def fenced(self, robot_id: int, old: Term) -> None:
         """The gateway of `robot_id` refuses `old`."""
@@ -106,7 +106,7 @@ class Candidate:
 
     def has_quorum(self, config: Config) -> bool:
         """E18: only lives that `config` names, and that know of a config, count."""
-        return is_quorum(config, self._remembering)
+        return is_quorum(config, self._with_state)
 
     def _answering(self, superseded: Callable[[Member], bool]) -> dict[int, Member]:
         """Of each id the newest life that promised. One that a later life has replaced cannot grant any more:
@@ -133,7 +133,7 @@ class Candidate:
         """
         lives = self._answering(superseded)
         here = tuple(lives[i] for i in universe if i in lives)
-        fine = 2 * len(here) > len(universe) and universe[-1] in lives and not self._remembering
+        fine = 2 * len(here) > len(universe) and universe[-1] in lives and not self._with_state
         return here if fine else ()
 
     def whoever_answers(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:

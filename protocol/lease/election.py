@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from lfa.protocol.lease.candidate import Candidate
-from lfa.protocol.lease.failure_detector import Peers
-from lfa.protocol.lease.membership import is_first, rank, universe
+from lfa.protocol.lease.failure_detector import FailureDetector
+from lfa.protocol.lease.membership import all_member_ids, is_first, rank
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Member
 from lfa.protocol.mission import Mission
@@ -19,7 +19,7 @@ FORGET_GRANTS = 3
 class Election:
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float) -> None:
         self.me = me
-        self.universe = universe(mission)
+        self.all_member_ids = all_member_ids(mission)
         self.may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
         self.at = NEVER
         """When to stand."""
@@ -34,10 +34,10 @@ class Election:
         self._lonely_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
         self._lonely_from = now + self._lonely_s
 
-    def rank(self, config: Config, robot_id: int, peers: Peers) -> int:
+    def rank(self, config: Config, robot_id: int, peers: FailureDetector) -> int:
         return rank(config, robot_id, lambda other: other.id not in self.may_lead or peers.is_gone(other))
 
-    def after(self, at: float, config: Config, peers: Peers) -> None:
+    def after(self, at: float, config: Config, peers: FailureDetector) -> None:
         """E6: stand once `at` has passed, each robot its rank later than the one before it."""
         self.base = at
         if self.me.id not in self.may_lead:
@@ -58,12 +58,14 @@ class Election:
     def forgotten(self, now: float) -> tuple[Member, ...]:
         return self._forget if now < self.forget_until else ()
 
-    def without_quorum(self, candidate: Candidate, config: Config, peers: Peers, now: float) -> tuple[Member, ...]:
+    def without_quorum(
+        self, candidate: Candidate, config: Config, peers: FailureDetector, now: float
+    ) -> tuple[Member, ...]:
         """Who makes a fresh config where no quorum of the known one answers; nobody while too few do."""
-        lives = candidate.full_house(config, self.universe, peers.is_superseded)
+        lives = candidate.full_house(config, self.all_member_ids, peers.is_superseded)
         if not lives and is_first(config) and now >= self._majority_from:
-            lives = candidate.blank_majority(self.universe, peers.is_superseded)
+            lives = candidate.blank_majority(self.all_member_ids, peers.is_superseded)
         asked_all = now >= candidate.began_at + self._timing.heartbeat_s
         if not lives and not is_first(config) and now >= self._lonely_from and asked_all:
-            lives = candidate.whoever_answers(self.universe, peers.is_superseded)
+            lives = candidate.whoever_answers(self.all_member_ids, peers.is_superseded)
         return lives

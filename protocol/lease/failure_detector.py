@@ -9,7 +9,7 @@ LAST_WORDS_HEARTBEATS = 2.0
 """How long after its token vanished a process may still be heard without being alive."""
 
 
-class Peers:
+class FailureDetector:
     def __init__(self, me: Member, heartbeat_s: float) -> None:
         self._newest: dict[int, int] = {me.id: me.incarnation}
         """Of each id the newest life that was heard."""

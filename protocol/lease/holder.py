@@ -46,7 +46,7 @@ class Holder:
         fenced = self._fenced if now - self.began_at < self._timing.grant_s else ()
         return Propose(self.term, config, number, self._me, fenced)
 
-    def given(self, number: int, since: float) -> None:
+    def transferred(self, number: int, since: float) -> None:
         """E16: round `number` was asked by the term's issuer; it counts from `since`, a moment that we told it."""
         self._sent_at[number] = since
         self._round = number + 1

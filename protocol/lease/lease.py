@@ -11,12 +11,12 @@ from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.candidate import Candidate
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Cause, Effect, LeaseExtended, Send, StepDown
 from lfa.protocol.lease.election import Election
-from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.holder import Holder
-from lfa.protocol.lease.membership import VOTERS_MAX, first_config, ids, is_first, led_by, of_full_house
+from lfa.protocol.lease.membership import VOTERS_MAX, first_config, ids, is_first, led_by, unanimous_config
 from lfa.protocol.lease.quorum import electors
 from lfa.protocol.lease.reconfiguration import Policy, reshaped
-from lfa.protocol.lease.step_down import SLOWEST, Stopping
+from lfa.protocol.lease.step_down import SLOWEST, PendingRelease
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import (
     NO_TERM,
@@ -71,14 +71,14 @@ class Lease:
         self._timing = timing
         self._grant_s = timing.grant_s
         self._election = Election(me, mission, timing, now)
-        self._policy = Policy(mission.tiebreak, mission.shrink, len(self._election.universe))
+        self._policy = Policy(mission.tiebreak, mission.shrink, len(self._election.all_member_ids))
         self._acceptor = Acceptor(Term(floor), self._grant_s, now)
         self._candidate: Candidate | None = None
         self._holder: Holder | None = None
         self._seen = Term(floor)
         """The highest term heard of."""
-        self._peers = Peers(me, timing.heartbeat_s)
-        self._stopping = Stopping(timing.deadman_s)
+        self._peers = FailureDetector(me, timing.heartbeat_s)
+        self._pending_release = PendingRelease(timing.deadman_s)
         self._pending: tuple[Member, Prepare] | None = None
         """The last PREPARE refused because of a bond."""
         self._leader_until = now
@@ -108,7 +108,9 @@ class Lease:
     @property
     def missing(self) -> tuple[int, ...]:
         """Ids that the first election of the fleet still waits for (E18); empty once somebody has led."""
-        return tuple(i for i in self._election.universe if not self._peers.knows(i)) if is_first(self.config) else ()
+        return (
+            tuple(i for i in self._election.all_member_ids if not self._peers.knows(i)) if is_first(self.config) else ()
+        )
 
     def may_command(self, now: float) -> bool:
         """Leading, and `now` is before the lease's expiry (I1, I2)."""
@@ -116,7 +118,7 @@ class Lease:
 
     def commanded(self, now: float) -> None:
         """A command as leader was just sent."""
-        self._stopping.commanded_at = now
+        self._pending_release.commanded_at = now
 
     # --- what comes in -----------------------------------------------------------------------------------------
 
@@ -153,7 +155,7 @@ class Lease:
         """A deadline passed. A round that would fall due before `again_at`, the next tick, is sent now."""
         effects: list[Effect] = []
         self._expire(now, effects)
-        if now >= self._stopping.release_at:
+        if now >= self._pending_release.release_at:
             self._stopped(now, effects)
         due_by = max(now, again_at - LATE_S)
         if self._holder is not None and self._candidate is None and due_by >= self._holder.next_round_at:
@@ -168,7 +170,7 @@ class Lease:
             pause_s = HELLO_HEARTBEATS * self._timing.heartbeat_s
             on_time = now < self._hello_at + pause_s  # then late looks do not add up
             self._hello_at = (self._hello_at if on_time else now) + pause_s
-            if self._is_out(now) and not self._stopping.closing:
+            if self._is_out(now) and not self._pending_release.closing:
                 effects.append(Send("all", Hello(None if is_first(self.config) else self.config.version)))
         if self.leader is not None and self._holder is None and now >= self._leader_until:
             self.leader = None
@@ -180,7 +182,7 @@ class Lease:
         Who ticks at `again_at` anyway is not woken before it only to find that it need not say HELLO, nor just
         before it for a round.
         """
-        at = self._stopping.release_at
+        at = self._pending_release.release_at
         if self._hello_at >= again_at or self._candidate is not None or self._is_out(self._hello_at):
             at = min(at, self._hello_at)
         if self._holder is not None:
@@ -227,11 +229,11 @@ class Lease:
     def request_release(self, now: float) -> list[Effect]:
         """Clean exit: stop leading, tell the voters; `released` turns true, at once if there is nothing to give up."""
         effects: list[Effect] = []
-        self._stopping.closing = True
+        self._pending_release.closing = True
         self._election.at = NEVER
         self._step_down(now, "released", effects)
         self._drop_candidate(now, effects)
-        self.released = self._stopping.unreleased is None
+        self.released = self._pending_release.unreleased is None
         return effects
 
     def request_handover(self, now: float) -> list[Effect]:
@@ -250,7 +252,7 @@ class Lease:
         """
         effects: list[Effect] = []
         self._expire(now, effects)
-        lost = tuple(m for m in lost if m.id in self._election.universe)
+        lost = tuple(m for m in lost if m.id in self._election.all_member_ids)
         if self._holder is None and self.leader is None and lost and not self._lives_on(lost):
             self._drop_candidate(now, effects)
             self._election.forget(lost, now)
@@ -283,7 +285,7 @@ class Lease:
     def _stands_before(self, src: Member, body: Prepare) -> bool:
         """E5: in the first election of a fleet nobody promises to a candidate further back than itself."""
         first = is_first(self.config) and body.version == self.config.version and self.me.id in self._election.may_lead
-        return first and not self._stopping.closing and self._rank(self.me.id) < self._rank(src.id)
+        return first and not self._pending_release.closing and self._rank(self.me.id) < self._rank(src.id)
 
     def _on_propose(self, src: Member, body: Propose, now: float, effects: list[Effect]) -> None:
         self._seen = max(self._seen, body.term)
@@ -346,7 +348,7 @@ class Lease:
 
     def _elect_after(self, at: float) -> None:
         """E6: stand for election when the line has come to us, counted from `at`."""
-        if not self._stopping.closing:
+        if not self._pending_release.closing:
             self._election.after(at, self.config, self._peers)
 
     def _stand(self, now: float, effects: list[Effect]) -> None:
@@ -368,7 +370,7 @@ class Lease:
             if now >= candidate.gives_up_at:
                 self._drop_candidate(now, effects)
                 self._elect_after(now + self._timing.rank_step_s)
-            elif now >= candidate.holder.next_round_at and not candidate.given:
+            elif now >= candidate.holder.next_round_at and not candidate.transferred:
                 self._send_round(candidate.holder, now, effects)
         elif candidate.forget and now >= self._election.forget_until:
             self._drop_candidate(now, effects)
@@ -401,14 +403,14 @@ class Lease:
         if not candidate.unfenced(self.me):
             candidate.holder = Holder(self.me, candidate.term, self._timing, now, candidate.fenced_terms)
             if lives:
-                config = of_full_house(self.config, self.me, candidate.term, lives)
+                config = unanimous_config(self.config, self.me, candidate.term, lives)
             else:
                 config = led_by(self.config, self.me, candidate.term, self._peers.is_gone)
             self._adopt(config, now, effects)
             self._send_round(candidate.holder, now, effects)
 
     def _on_fenced(self, src: Member, body: Fenced, now: float, effects: list[Effect]) -> None:
-        if src.id == self.me.id and body.old == self._stopping.unreleased:
+        if src.id == self.me.id and body.old == self._pending_release.unreleased:
             self._stopped(now, effects)
         candidate = self._candidate
         if candidate is not None and candidate.holder is None and body.term == candidate.term:
@@ -420,7 +422,7 @@ class Lease:
         candidate, self._candidate = self._candidate, None
         if candidate is None or candidate.holder is None or self._holder is not None:
             return
-        if now >= self._stopping.at_rest_at:
+        if now >= self._pending_release.at_rest_at:
             self._acceptor.release(candidate.term)
             effects.append(Send("all", Release(candidate.term)))
 
@@ -488,7 +490,7 @@ class Lease:
             if self.config.previous is not None and self._candidate is None:
                 self._reshape(now, effects)  # the joint config may have been accepted
         elif now < expiry:
-            if self._candidate is not None and self._candidate.given:
+            if self._candidate is not None and self._candidate.transferred:
                 self._adopt(
                     led_by(self.config, self.me, holder.term, self._peers.is_gone, keep_leader=True), now, effects
                 )
@@ -511,7 +513,7 @@ class Lease:
         """E9: whoever is out asks the leader; while nobody leads, it is told the newest config."""
         if self.leader is None and (body.version is None or body.version < self.config.version):
             effects.append(Send(robot_name(src.id), self._acceptor.refusal(NO_TERM, self.config, now)))
-        if self._holder is None or src.id not in self._election.universe or self._peers.is_superseded(src):
+        if self._holder is None or src.id not in self._election.all_member_ids or self._peers.is_superseded(src):
             return
         self._holder.heard_at[src] = now
         if src not in self._holder.said_hello:
@@ -535,21 +537,23 @@ class Lease:
         if holder is None:
             return
         self.leader = None
-        self._stopping.begin(holder.term, now)
+        self._pending_release.begin(holder.term, now)
         effects.append(StepDown(holder.term, cause))
         effects.append(Send(gateway_of(self.me.id), Fence(holder.term, below or _just_above(holder.term))))
 
     def _stopped(self, now: float, effects: list[Effect]) -> None:
         """The own gateway refuses the term, or its last command is too old: RELEASE, or what was to be handed over."""
-        term, gift = self._stopping.end()
-        self.released = self._stopping.closing
+        term, transfer_proposal = self._pending_release.end()
+        self.released = self._pending_release.closing
         if term is None:
             return
-        own = None if gift is None else self._acceptor.propose(self.me, gift, self.config, now)
-        if gift is not None and isinstance(own, Grant):
-            effects.append(Send("all", gift))
-            effects.append(Send(robot_name(gift.holder.id), own))
-            self.leader, self._leader_until = gift.holder.id, now + self._grant_s
+        own = (
+            None if transfer_proposal is None else self._acceptor.propose(self.me, transfer_proposal, self.config, now)
+        )
+        if transfer_proposal is not None and isinstance(own, Grant):
+            effects.append(Send("all", transfer_proposal))
+            effects.append(Send(robot_name(transfer_proposal.holder.id), own))
+            self.leader, self._leader_until = transfer_proposal.holder.id, now + self._grant_s
         else:
             self._acceptor.release(term)
             effects.append(Send("all", Release(term)))
@@ -567,10 +571,10 @@ class Lease:
             life, nonce = successor
             term = Term(max(self._seen.n, holder.term.n) + 1, self.me.id, self.me.incarnation)
             self._seen = term
-            self._stopping.gift = Propose(term, self.config, 0, life, nonce=nonce)
+            self._pending_release.transfer_proposal = Propose(term, self.config, 0, life, nonce=nonce)
         self._drop_candidate(now, effects)
-        gift = self._stopping.gift
-        self._step_down(now, "handed_over", effects, None if gift is None else gift.term)
+        transfer_proposal = self._pending_release.transfer_proposal
+        self._step_down(now, "handed_over", effects, None if transfer_proposal is None else transfer_proposal.term)
         self._elect_after(now + self._grant_s)
 
     def _successor(self, holder: Holder, now: float) -> tuple[Member, float] | None:
@@ -591,9 +595,9 @@ class Lease:
         if body.nonce is None or self._holder is not None or self._candidate is not None:
             return
         candidate = Candidate(body.term, self._timing, now)
-        candidate.given = True
+        candidate.transferred = True
         candidate.holder = Holder(self.me, body.term, self._timing, now)
-        candidate.holder.given(body.round, body.nonce)
+        candidate.holder.transferred(body.round, body.nonce)
         self._candidate = candidate
         early, self._early = self._early, []
         for src, grant in [(self.me, own), *early]:

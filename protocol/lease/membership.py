@@ -34,7 +34,7 @@ def ids(chain: tuple[Member, ...]) -> tuple[int, ...]:
     return tuple([member.id for member in chain])  # asked for at every control step: a generator takes twice as long
 
 
-def universe(mission: Mission) -> tuple[int, ...]:
+def all_member_ids(mission: Mission) -> tuple[int, ...]:
     """Every id that the mission names, the witness last."""
     return (*mission.robots, WITNESS_ID) if mission.witness else mission.robots
 
@@ -66,7 +66,7 @@ def led_by(config: Config, leader: Member, term: Term, gone: Gone, keep_leader: 
     return Config(Version(term, 0), config.voters, config.tie, config.previous, (leader, *rest))
 
 
-def of_full_house(config: Config, leader: Member, term: Term, lives: tuple[Member, ...]) -> Config:
+def unanimous_config(config: Config, leader: Member, term: Term, lives: tuple[Member, ...]) -> Config:
     """E18: a fresh config of all the lives that promised; every one of them must accept it."""
     line = [leader.id, *ids(config.chain), *ids(lives)]
     known = {m.id: m for m in lives}

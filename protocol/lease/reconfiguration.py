@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.membership import chosen, ids, rewritten
 from lfa.protocol.lease.timing import Timing
@@ -23,7 +23,7 @@ class Policy(Struct, frozen=True):
 
 
 def reshaped(
-    config: Config, holder: Holder, me: Member, peers: Peers, left_out: frozenset[int], policy: Policy, timing: Timing,
+    config: Config, holder: Holder, me: Member, peers: FailureDetector, left_out: frozenset[int], policy: Policy, timing: Timing,
     now: float,
 ) -> Config:  # fmt: skip
     """The next config, or `config` itself.

@@ -10,7 +10,7 @@ SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 """How many seconds of the fastest clock one second of the slowest may last."""
 
 
-class Stopping:
+class PendingRelease:
     def __init__(self, deadman_s: float) -> None:
         self.closing = False
         """The process was told to end."""
@@ -19,7 +19,7 @@ class Stopping:
         self.unreleased: Term | None = None
         """The term given up whose RELEASE waits for the own gateway, until `release_at` at most."""
         self.release_at = NEVER
-        self.gift: Propose | None = None
+        self.transfer_proposal: Propose | None = None
         """What is handed over instead of a RELEASE, once we have stopped."""
         self._deadman_s = deadman_s
 
@@ -33,6 +33,6 @@ class Stopping:
 
     def end(self) -> tuple[Term | None, Propose | None]:
         """The gateway refuses the term, or its last command is too old: what was given up, and what is handed over."""
-        done = self.unreleased, self.gift
-        self.unreleased, self.gift, self.release_at = None, None, NEVER
+        done = self.unreleased, self.transfer_proposal
+        self.unreleased, self.transfer_proposal, self.release_at = None, None, NEVER
         return done

@@ -31,7 +31,7 @@ class Heading(Struct, frozen=True):
     config: dict[str, Any]
 
 
-class Entry(Struct, frozen=True, array_like=True, gc=False):
+class JournalEntry(Struct, frozen=True, array_like=True, gc=False):
     """One call. `kind` is `message` (key and payload as they came), `local` (payload is the local event) or `tick`."""
 
     kind: str
@@ -42,7 +42,7 @@ class Entry(Struct, frozen=True, array_like=True, gc=False):
 
 
 _encoder = msgspec.msgpack.Encoder()
-_entry_decoder = msgspec.msgpack.Decoder(Entry)
+_entry_decoder = msgspec.msgpack.Decoder(JournalEntry)
 _heading_decoder = msgspec.msgpack.Decoder(Heading)
 
 
@@ -71,7 +71,7 @@ class Journal:
 
     def add(self, kind: str, at: float, key: str, payload: bytes, sent: Sequence[tuple[str, bytes]]) -> None:
         if self._file is not None:
-            self._append(Entry(kind, at, key, payload, digest(sent)))
+            self._append(JournalEntry(kind, at, key, payload, digest(sent)))
 
     def flush(self) -> None:
         """Hand everything added so far to the kernel. On a full disk the journal ends; the robot does not."""
@@ -97,7 +97,7 @@ class Journal:
         self._pending += body
 
 
-def read(path: Path) -> tuple[Heading, Iterator[Entry]]:
+def read(path: Path) -> tuple[Heading, Iterator[JournalEntry]]:
     """Heading and entries of a journal, up to its last whole entry. Raises ValueError when it is none.
 
     The entries raise Refused where bytes were changed.
@@ -110,7 +110,7 @@ def read(path: Path) -> tuple[Heading, Iterator[Entry]]:
     return heading, _entries(path, bodies)
 
 
-def _entries(path: Path, bodies: Iterator[bytes]) -> Iterator[Entry]:
+def _entries(path: Path, bodies: Iterator[bytes]) -> Iterator[JournalEntry]:
     """Raises Refused where one of them is no entry: bytes that were changed, not cut off."""
     for n, body in enumerate(bodies, start=1):
         try:

@@ -17,7 +17,7 @@ Sent = list[tuple[str, bytes]]
 _local_encoder = msgspec.msgpack.Encoder()
 
 
-class Host:
+class NodeHost:
     """Calls one Node and keeps its journal. What a call returns is what there is to publish, encoded."""
 
     def __init__(self, node: Node, journal: Journal) -> None:

@@ -27,7 +27,7 @@ from lfa.protocol.names import WITNESS_NAME, robot_id_of
 from lfa.protocol.node import Local, Node, Stop, Vitals
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
-from lfa.protocol.runtime.node_host import Host, Sent
+from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.runtime.systemd import Notify
 from lfa.protocol.topics import OPERATOR_NAME, TOPIC, address, key, matches
 from lfa.protocol.transport.bus import Arrival, Inbox, Links, Tokens, Wake
@@ -62,13 +62,13 @@ class Options(Struct, frozen=True):
     """Where systemd listens (NOTIFY_SOCKET); empty: nowhere."""
 
 
-class _Seat:
+class _NodeRunner:
     """One node in the loop: its session, its inbox, its host, and what it has followed so far."""
 
     def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal, weather_key: str | None) -> None:
         """`weather_key` is where an operator's weather comes, None when there shall be none."""
         self.node = node
-        self.host = Host(node, journal)
+        self.host = NodeHost(node, journal)
         self.bus = bus
         self.inbox = inbox
         self._followed: frozenset[str] | None = None
@@ -99,9 +99,9 @@ class _Seat:
             self._ticks_s.append(clock.thread_s() - before_s)
             self._publish(sent)
         if not self._follow() and self._links.due(now):
-            self.bus.follow_anew()
+            self.bus.resubscribe()
         host.journal.flush()
-        self.inbox.at_ease = getattr(node, "at_ease", False)  # only a robot ever leads
+        self.inbox.defer_grants = getattr(node, "defer_grants", False)  # only a robot ever leads
         return late
 
     def tick_p99_s(self) -> float:
@@ -126,7 +126,7 @@ class _Seat:
 
     def _through_the_air(self, now: float) -> list[Arrival]:
         """What came, less what the weather took; the operator's word about the weather goes no further."""
-        arrivals = self._tokens.sift(self.inbox.take(), now)
+        arrivals = self._tokens.debounce(self.inbox.take(), now)
         if self._weather_key is None:
             return arrivals
         if self._reception.is_clear and self._weather_key not in [arrival.key for arrival in arrivals]:
@@ -165,18 +165,18 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     _libc("mallopt", M_ARENA_MAX, 1)  # not a heap for each of Zenoh's threads
     wake = Wake()
     stop = _on_signals(wake)
-    seats: list[_Seat] = []
+    seats: list[_NodeRunner] = []
     weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     try:
         for node in nodes:
-            inbox = Inbox(wake, patient=node.name != WITNESS_NAME)
+            inbox = Inbox(wake, defer_hellos=node.name != WITNESS_NAME)
             bus = connect(options, inbox, stop)
             if bus is None:
                 return 0
             dead = _refuse_double(bus, inbox, options, node)
             started_with = {"fleet": options.fleet, **node.started_with}
             heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
-            seats.append(_Seat(node, bus, inbox, Journal(options.journal, heading), weather_key))
+            seats.append(_NodeRunner(node, bus, inbox, Journal(options.journal, heading), weather_key))
             bus.announce(options.fleet, node.name, node.incarnation)
             _refuse_twin(bus, options, node, dead)
         gc.collect()
@@ -208,7 +208,7 @@ def connect(options: Options, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
     return None
 
 
-def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping, notify: Notify) -> int:
+def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _Stopping, notify: Notify) -> int:
     began = now = clock.now()
     notify.ready()
     stop_by = None
@@ -231,7 +231,7 @@ def _loop(seats: Sequence[_Seat], wake: Wake, stop: _Stopping, notify: Notify) -
             return 0
 
 
-def _is_over(seats: Sequence[_Seat]) -> bool:
+def _is_over(seats: Sequence[_NodeRunner]) -> bool:
     """All have finished. Raises Refused when one of them cannot take part."""
     over = True
     for seat in seats:
@@ -349,7 +349,7 @@ class _VitalSigns:
         self._since, self._cpu_s = now, cpu_s
         return True
 
-    def of(self, seat: _Seat) -> Vitals:
+    def of(self, seat: _NodeRunner) -> Vitals:
         lag_s, self._lag_s = self._lag_s, 0.0
         dropped, undecodable = seat.inbox.dropped, seat.host.undecodable
         return Vitals(lag_s, dropped, undecodable, self._cpu_percent, _resident_mib(), seat.tick_p99_s())

@@ -84,19 +84,19 @@ class Inbox:
         size_max: int = INBOX_SIZE_MAX,
         *,
         every: bool = False,
-        patient: bool = False,
+        defer_hellos: bool = False,
     ) -> None:
         """`wake` is set when something urgent came; several inboxes of one loop share it.
 
-        `every` queues state topics too: a recorder wants all values, not the newest. `patient`: who looks in fifty
+        `every` queues state topics too: a recorder wants all values, not the newest. `defer_hellos`: who looks in fifty
         times a second anyway is not woken by HELLO, which all without a vote keep saying.
         """
         self._queue: deque[Arrival] = deque()
         self._newest: dict[str, Arrival] = {}
         self._size_max = size_max
         self._every = every
-        self._patient = patient
-        self.at_ease = False
+        self._defer_hellos = defer_hellos
+        self.defer_grants = False
         """GRANT can wait as well: of one that leads, and whose lease lasts well beyond its next look."""
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
@@ -122,7 +122,7 @@ class Inbox:
     def _can_wait(self, topic: Topic, payload: object) -> bool:
         if topic.name != "lease" or not isinstance(payload, bytes):
             return False
-        return (self._patient and HELLO_MARK in payload) or (self.at_ease and GRANT_MARK in payload)
+        return (self._defer_hellos and HELLO_MARK in payload) or (self.defer_grants and GRANT_MARK in payload)
 
     def _allows(self, where: Address | None, now: float) -> bool:
         """A token bucket an owner: whoever floods is heard less, and takes neither time nor room from the others."""
@@ -160,7 +160,7 @@ class Tokens:
         self._held: list[Arrival] = []
         self._cut_off = False
 
-    def sift(self, arrivals: list[Arrival], now: float) -> list[Arrival]:
+    def debounce(self, arrivals: list[Arrival], now: float) -> list[Arrival]:
         """Of `arrivals` and of what is held, what may be believed by `now`; a token that is held comes later."""
         if not arrivals and not self._held:
             return arrivals

@@ -21,7 +21,7 @@ from lfa.protocol.transport.bus import Arrival
 Link = tuple[str, str]
 """From a place to a place."""
 WEATHER = "weather"
-"""The operator's command; its arguments are those of `Air.obey`."""
+"""The operator's command; its arguments are those of `LinkModel.obey`."""
 WAITING_MAX = 4096
 """Messages that wait in a live receiver's air."""
 _NOT_IN_THE_AIR = (OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
@@ -68,7 +68,7 @@ def _place(name: str) -> str:
     return WORLD_NAME if name == WITNESS_NAME else name
 
 
-class Air:
+class LinkModel:
     """The weather with its memory: chance comes in as a seeded generator."""
 
     def __init__(self, radio: Radio, random: Random) -> None:
@@ -104,7 +104,7 @@ class Air:
         except msgspec.ValidationError:
             return False
         cuts = frozenset() if order.heal else self.cuts
-        self.cuts = (cuts | _links(order.cut)) - _links(order.mend)
+        self.cuts = (cuts | _links(order.cut)) - _links(order.heal_partition)
         return True
 
     @property
@@ -129,7 +129,7 @@ class Air:
 
 class _Order(Struct, forbid_unknown_fields=True):
     cut: tuple[Link, ...] = ()
-    mend: tuple[Link, ...] = ()
+    heal_partition: tuple[Link, ...] = msgspec.field(default=(), name="mend")
     radio: dict[str, float] = {}
     fair: bool = False
     heal: bool = False
@@ -139,7 +139,7 @@ class Reception:
     """The air before one process on a live bus: what is put in comes out when it has come through, or never."""
 
     def __init__(self, receiver: str, random: Random) -> None:
-        self.air = Air(CLEAR, random)
+        self.air = LinkModel(CLEAR, random)
         self._receiver = receiver
         self._waiting: list[tuple[float, int, Arrival]] = []
         self._order = 0

@@ -76,7 +76,7 @@ class ZenohBus:
         for key in sorted(interests - self._followed.keys()):
             self._followed[key] = self._subscribe(key)
 
-    def follow_anew(self) -> None:
+    def resubscribe(self) -> None:
         """Say once more to the router what is followed: declarations that cross a link while it comes back are
         dropped for good by a router that is busy (zenoh#1886), and all that they ask for with them."""
         for key in sorted(self._followed):

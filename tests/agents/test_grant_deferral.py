@@ -21,7 +21,7 @@ def test_only_a_leader_with_time_left_is_at_ease() -> None:
     for node in (world, Witness("f", 1, 1), *agents.values()):
         simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 0, {})))
     simulator.run(2.0)
-    assert {robot for robot, agent in agents.items() if agent.at_ease} == {1}
+    assert {robot for robot, agent in agents.items() if agent.defer_grants} == {1}
     for other in ("witness", "robot2", "robot3", "robot4"):
         simulator.kill(other, hinted=False)
     leader, last_at_ease, led_until = agents[1], 0.0, 0.0
@@ -29,6 +29,6 @@ def test_only_a_leader_with_time_left_is_at_ease() -> None:
         simulator.run(simulator.now + 0.001)
         if leader.lease is not None and leader.lease.role is Role.LEADER:
             led_until = simulator.now
-        if leader.at_ease:
+        if leader.defer_grants:
             last_at_ease = simulator.now
     assert 2.0 < last_at_ease < led_until - 0.5 * EASE_S < 2.5

@@ -4,8 +4,8 @@ import pytest
 from msgspec.structs import replace
 
 from lfa.agents.perception.obstacle_tracker import Feature
-from lfa.agents.perception.shared_obstacles import GLIMPSED_S, TOLD_S
-from lfa.agents.team_state import Beliefs
+from lfa.agents.perception.shared_obstacles import PARTIAL_TRACK_S, REMOTE_TRACK_S
+from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.header import Header
@@ -23,71 +23,71 @@ def told(kind: str, x: float) -> ObstacleNote:
 
 
 def test_the_newest_row_of_the_newest_life_counts() -> None:
-    beliefs = Beliefs()
+    team = TeamState()
     for heard in (row(3, 3.0), row(2, 2.0), row(3, 9.0), row(0, 5.0, life=2), row(9, 9.0, life=1)):
-        beliefs.hear_row(2, heard, 1.0)
-    pose = beliefs.pose_of(2, 1.0)
+        team.hear_row(2, heard, 1.0)
+    pose = team.pose_of(2, 1.0)
     assert pose is not None
     assert pose.x == 5.0
 
 
 def test_a_robot_is_where_it_went_on_to_since_its_last_row() -> None:
-    beliefs = Beliefs()
+    team = TeamState()
     for seq in (1, 2):
-        beliefs.hear_row(2, row(seq, 0.05 * seq), 1.0 + 0.1 * seq)  # 0.5 m/s
-    pose = beliefs.pose_of(2, 1.6)
+        team.hear_row(2, row(seq, 0.05 * seq), 1.0 + 0.1 * seq)  # 0.5 m/s
+    pose = team.pose_of(2, 1.6)
     assert pose is not None
     assert pose.x == pytest.approx(0.1 + 0.5 * 0.4)
 
 
 def test_a_stale_row_is_no_place() -> None:
-    beliefs = Beliefs()
-    beliefs.hear_row(2, row(1, 1.0), 1.0)
-    assert beliefs.pose_of(2, 3.9) is not None
-    assert beliefs.pose_of(2, 4.1) is None
+    team = TeamState()
+    team.hear_row(2, row(1, 1.0), 1.0)
+    assert team.pose_of(2, 3.9) is not None
+    assert team.pose_of(2, 4.1) is None
 
 
 def test_what_another_saw_moving_moves_on_and_is_forgotten() -> None:
-    beliefs = Beliefs()
-    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
-    [feature] = beliefs.obstacles.moving([], AWAY, 0.5)
+    team = TeamState()
+    team.obstacles.update(2, told("moving", 1.0), 0.0)
+    [feature] = team.obstacles.moving([], AWAY, 0.5)
     assert feature.x == 1.1
-    assert beliefs.obstacles.moving([], AWAY, TOLD_S + 0.1) == []
+    assert team.obstacles.moving([], AWAY, REMOTE_TRACK_S + 0.1) == []
 
 
 def test_what_one_sees_oneself_counts_once() -> None:
-    beliefs = Beliefs()
-    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
+    team = TeamState()
+    team.obstacles.update(2, told("moving", 1.0), 0.0)
     own = Feature("moving", 1.2, 0.1, 0.25, 0.2, 0.0)
-    assert beliefs.obstacles.moving([own], AWAY, 0.0) == [own]
+    assert team.obstacles.moving([own], AWAY, 0.0) == [own]
 
 
 def test_what_another_saw_standing_does_not_move() -> None:
-    beliefs = Beliefs()
-    beliefs.obstacles.update(2, told("stationary", 1.0), 0.0)
-    assert beliefs.obstacles.moving([], AWAY, 0.1) == []
+    team = TeamState()
+    team.obstacles.update(2, told("stationary", 1.0), 0.0)
+    assert team.obstacles.moving([], AWAY, 0.1) == []
 
 
 def test_what_another_saw_moving_is_not_the_robot_itself() -> None:
-    beliefs = Beliefs()
-    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
-    assert beliefs.obstacles.moving([], Pose2D(1.0, 0.1, 0.0), 0.0) == []
-    assert len(beliefs.obstacles.moving([], AWAY, 0.0)) == 1
+    team = TeamState()
+    team.obstacles.update(2, told("moving", 1.0), 0.0)
+    assert team.obstacles.moving([], Pose2D(1.0, 0.1, 0.0), 0.0) == []
+    assert len(team.obstacles.moving([], AWAY, 0.0)) == 1
 
 
 def test_a_robot_is_stuck_as_long_as_it_says_so() -> None:
-    beliefs = Beliefs()
-    assert not beliefs.stuck(2, 0.0)
-    beliefs.hear_row(2, replace(row(1, 0.0), stuck=True), 1.0)
-    assert beliefs.stuck(2, 3.9)
-    assert not beliefs.stuck(2, 4.1)
-    beliefs.hear_row(2, row(2, 0.0), 4.2)
-    assert not beliefs.stuck(2, 4.2)
+    team = TeamState()
+    assert not team.stuck(2, 0.0)
+    team.hear_row(2, replace(row(1, 0.0), stuck=True), 1.0)
+    assert team.stuck(2, 3.9)
+    assert not team.stuck(2, 4.1)
+    team.hear_row(2, row(2, 0.0), 4.2)
+    assert not team.stuck(2, 4.2)
 
 
 def test_what_another_saw_moving_is_believed_for_longer_where_something_is_seen() -> None:
-    beliefs = Beliefs()
-    beliefs.obstacles.update(2, told("moving", 1.0), 0.0)
-    later = TOLD_S + 0.1
-    assert beliefs.obstacles.moving([], AWAY, later, lambda x, y, within_m: abs(x - 1.0 - 0.2 * later) < within_m)
-    assert beliefs.obstacles.moving([], AWAY, GLIMPSED_S + 0.1, lambda x, y, within_m: True) == []
+    team = TeamState()
+    team.obstacles.update(2, told("moving", 1.0), 0.0)
+    later = REMOTE_TRACK_S + 0.1
+    assert team.obstacles.moving([], AWAY, later, lambda x, y, within_m: abs(x - 1.0 - 0.2 * later) < within_m)
+    assert team.obstacles.moving([], AWAY, PARTIAL_TRACK_S + 0.1, lambda x, y, within_m: True) == []

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from lfa.deploy.client.session import Ear, Fleet, listen
+from lfa.deploy.client.session import FleetAddress, Subscriber, listen
 from lfa.deploy.fleet.health import Health
 from lfa.protocol import clock
 from lfa.protocol.messages.team import Event, PoseStamped
@@ -24,7 +24,7 @@ TOPICS = frozenset({"*/pose", "*/tracking", "*/host", "*/event", "*/status"})
 class Onlooker:
     """Poses as they arrive, with the longest silence of each robot since `begin`."""
 
-    def __init__(self, ear: Ear, robots: tuple[int, ...]) -> None:
+    def __init__(self, ear: Subscriber, robots: tuple[int, ...]) -> None:
         self._ear = ear
         self.robots = robots
         self.health = Health(robots, ())
@@ -82,5 +82,5 @@ def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[O
     """At machine `at`'s router, over its unix socket: no network lies between."""
     part = machines.part(at)
     eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at}")), f"no router answers at {at}")
-    with listen(Fleet(part.fleet, part.socket, ()), TOPICS, every=True) as ear:
+    with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS, every=True) as ear:
         yield Onlooker(ear, robots)

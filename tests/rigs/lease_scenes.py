@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.analysis.verification.safety import SAFETY
-from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.effects import BecomeLeader, Effect, Send
 from lfa.protocol.lease.lease import Lease
@@ -28,7 +28,7 @@ STD = timing_of("std")
 TEAM = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))
 
 
-class Team(Arena):
+class Team(LeaseSimulation):
     """An arena whose safety checkers are on, with everybody started and led by robot 1 at 1 s, or at `led_by`."""
 
     def __init__(self, robots: int = 4, led_by: float = 1.0, **options: object) -> None:

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lfa.deploy.fleet.plan import host_plan as parts
-from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
 from lfa.protocol import clock
@@ -133,7 +133,7 @@ class Machines:
             (site / f"lfa-{version}.dist-info/METADATA").write_text(metadata)
         return str(venv / "bin/python")
 
-    def part(self, name: str) -> Part:
+    def part(self, name: str) -> HostPlan:
         return parts.read(self.state(name) / parts.PART)
 
     def processes(self, name: str) -> list[Identity]:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lfa.deploy.bench.harness.team import Team, endless
-from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
 
@@ -135,7 +135,7 @@ def team_on_hosts() -> Iterator[tuple[Team, Net]]:
         yield team, net
 
 
-def _table(usual: Sequence[Row], sockets: Path) -> list[Row]:
+def _table(usual: Sequence[ProcessSpec], sockets: Path) -> list[ProcessSpec]:
     """A router a host, and on each what lives there; the onlooker joins the world's router over its unix socket."""
     rows = [_router(host, sockets) for host in range(ROBOTS + 1)]
     for row in usual:
@@ -144,15 +144,15 @@ def _table(usual: Sequence[Row], sockets: Path) -> list[Row]:
             told = tuple(
                 _socket(host, sockets) if word == _socket(WORLD_HOST, sockets) else word for word in row.arguments
             )
-            rows.append(Row(row.name, told, again=row.again, inside=_enter(host)))
+            rows.append(ProcessSpec(row.name, told, restart_args=row.restart_args, command_prefix=_enter(host)))
     return rows
 
 
-def _router(host: int, sockets: Path) -> Row:
+def _router(host: int, sockets: Path) -> ProcessSpec:
     listen = ("--listen", _socket(host, sockets), "--listen", f"tcp/{_ip(host)}:{PORT}")
     others = (word for far in range(host) for word in ("--connect", f"tcp/{_ip(far)}:{PORT}"))
     name = ROUTER_NAME if host == WORLD_HOST else f"{ROUTER_NAME}{host}"
-    return Row(name, ("lfa.deploy.fleet.host.router", *listen, *others), inside=_enter(host))
+    return ProcessSpec(name, ("lfa.deploy.fleet.host.router", *listen, *others), command_prefix=_enter(host))
 
 
 def _socket(host: int, sockets: Path) -> str:

@@ -14,7 +14,7 @@ from lfa.deploy.recording.recorder import parts
 from lfa.protocol.messages.codec import decode
 from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import Journal
-from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, address
 
 Stream = tuple[str, str, int]
@@ -43,7 +43,7 @@ def journalled_ends(folder: Path) -> Ends:
     ends: Ends = {}
     for path in sorted((folder / "journal").glob("*.bin")):
         heading, entries = journal.read(path)
-        host = Host(reexecution.node_of(path, heading), Journal(None, heading))
+        host = NodeHost(reexecution.node_of(path, heading), Journal(None, heading))
         for entry in entries:
             for to, payload in reexecution.call(host, entry):
                 where = address(to)

@@ -15,7 +15,7 @@ import zenoh
 
 from lfa.deploy.bench.harness.team import Team, endless
 from lfa.deploy.fleet.security import authority, keys
-from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.protocol import clock
 from lfa.protocol.topics import RECORDER_NAME
 from lfa.protocol.transport.credentials import Credentials, credentials
@@ -47,16 +47,16 @@ class Attacked:
     def _credentials(self, name: str) -> Credentials:
         return credentials(self.home, name, clock.wall_ms())
 
-    def _table(self, usual: Sequence[Row], sockets: Path) -> list[Row]:
+    def _table(self, usual: Sequence[ProcessSpec], sockets: Path) -> list[ProcessSpec]:
         """Robot 2 joins over tls with its certificate, everybody else over the unix socket by password."""
         self.unix = usual[0].arguments[-1]
         listen = ("lfa.deploy.fleet.host.router", "--listen", self.unix, "--listen", self.tls, *self._keys(True))
-        rows = [Row(ROUTER_NAME, listen)]
+        rows = [ProcessSpec(ROUTER_NAME, listen)]
         for row in usual:
             if row.name not in (ROUTER_NAME, RECORDER_NAME):
                 endpoint = self.tls if row.name == "robot2" else self.unix
                 told = (endpoint if word.startswith("unixsock") else word for word in row.arguments)
-                rows.append(Row(row.name, (*told, *self._keys(False)), again=row.again))
+                rows.append(ProcessSpec(row.name, (*told, *self._keys(False)), again=row.restart_args))
         return rows
 
     def _keys(self, secure: bool) -> tuple[str, ...]:

@@ -83,7 +83,7 @@ class Floor:
         self._traction = body.push_n / (body.mass_kg * GRAVITY_MPS2)
         self._dt_s = 1.0 / scenario.world.physics_hz
         self._looked_at = [(inf, inf)] * len(poses)
-        self._around: list[list[Patch]] = [[] for _ in poses]
+        self._obstacles: list[list[Patch]] = [[] for _ in poses]
         self._under: list[list[Patch | None]] = [[None, None] for _ in poses]
         """What is under the left and the right wheel of each robot; None is the floor at 0."""
         self._height_m = [[0.0, 0.0] for _ in poses]
@@ -102,8 +102,8 @@ class Floor:
         if not (x - pose.x) ** 2 + (y - pose.y) ** 2 < AROUND_M * AROUND_M:
             self._looked_at[n] = pose.x, pose.y
             within_m = AROUND_M + self._robot_radius_m + STEP_M_MAX
-            self._around[n] = [patch for patch in self._patches if patch.gap_m(pose.x, pose.y) <= within_m]
-        return bool(self._around[n])
+            self._obstacles[n] = [patch for patch in self._patches if patch.gap_m(pose.x, pose.y) <= within_m]
+        return bool(self._obstacles[n])
 
     def standing_m(self, n: int) -> float:
         """Height [m] of what the robot stands on, the mean of its wheels."""
@@ -156,7 +156,7 @@ class Floor:
         c, s = cos(pose.theta), sin(pose.theta)
         beside = self._side_m if wheel == 0 else -self._side_m
         x, y = pose.x - beside * s, pose.y + beside * c
-        patch = next((patch for patch in self._around[n] if patch.covers(x, y)), None)
+        patch = next((patch for patch in self._obstacles[n] if patch.covers(x, y)), None)
         if patch is self._under[n][wheel]:
             return None
         if patch is None:

@@ -35,7 +35,7 @@ class Checked(Struct, frozen=True):
     """Empty when the scenario is none of the paper's."""
 
 
-class Verdict(Struct, frozen=True):
+class VerifyReport(Struct, frozen=True):
     ok: bool
     runs: tuple[Checked, ...]
     across: tuple[Finding, ...]
@@ -56,7 +56,7 @@ def command(
         if not as_json:
             _print(one)
     compared = tuple(across_seeds.across(kept)) if kept else ()
-    verdict = Verdict(not any(map(_faulty, checked)) and not _fails(compared), tuple(checked), compared)
+    verdict = VerifyReport(not any(map(_faulty, checked)) and not _fails(compared), tuple(checked), compared)
     if as_json:
         print(msgspec.json.encode(verdict).decode())
     elif compared:

@@ -21,7 +21,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import Journal
-from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.runtime.node_host import NodeHost
 from lfa.world.description import maps
 from lfa.world.description.maps import Map
 
@@ -61,7 +61,7 @@ def map_of(run: Path, robot: int | None = None) -> Map:
     except (OSError, ValueError) as error:
         raise Refused(f"{lives[-1]}: cannot be read ({error})") from None
     node = reexecution.node_of(lives[-1], heading)
-    host = Host(node, Journal(None, heading))
+    host = NodeHost(node, Journal(None, heading))
     for entry in entries:
         reexecution.call(host, entry)
     grid = node.grid if isinstance(node, Agent) else None

@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.verification.checker import Violation, listeners
-from lfa.deploy.analysis.verification.lease_observer import Words, overhear, said, told
+from lfa.deploy.analysis.verification.lease_observer import Words, effect_facts, message_facts, observe_lease
 from lfa.deploy.analysis.verification.reexecution import call, node_of
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.recording import event_log
@@ -34,8 +34,8 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
 from lfa.protocol.runtime import journal
-from lfa.protocol.runtime.journal import Entry, Heading, Journal, digest
-from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.runtime.journal import Heading, Journal, JournalEntry, digest
+from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, WORLD_NAME, address
 
 _local_decoder = msgspec.msgpack.Decoder(Local)
@@ -48,14 +48,14 @@ class Happening(Struct, frozen=True):
     words: Words
 
 
-class Verdict(Struct, frozen=True):
+class JournalVerdict(Struct, frozen=True):
     journals: int
     happenings: int
     broken: tuple[Violation, ...]
     """With times from the run's first journalled moment on."""
 
 
-def verify(folder: Path) -> Verdict:
+def verify(folder: Path) -> JournalVerdict:
     """Check the run in `folder`. Raises Refused when it has no journals, or those of another version of the cores."""
     paths = sorted((folder / JOURNALS).glob("*.bin"))
     if not paths:
@@ -71,7 +71,7 @@ def verify(folder: Path) -> Verdict:
             listen(*facts)
     began = happenings[0].at if happenings else 0.0
     broken = sorted((v for checker in checkers for v in checker.violations), key=lambda v: v.at)
-    return Verdict(len(paths), len(happenings), tuple(Violation(v.name, v.at - began, v.text) for v in broken))
+    return JournalVerdict(len(paths), len(happenings), tuple(Violation(v.name, v.at - began, v.text) for v in broken))
 
 
 def _refuse_lost(journalled: set[str], folder: Path, mission: Mission) -> None:
@@ -107,26 +107,26 @@ def _happenings(path: Path, timing: Timing) -> Iterator[Happening]:
 # --- leases ---------------------------------------------------------------------------------------------------------
 
 
-def _of_lease(path: Path, heading: Heading, entries: Iterator[Entry], timing: Timing) -> Iterator[Happening]:
+def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], timing: Timing) -> Iterator[Happening]:
     node = node_of(path, heading)
     robot = robot_id_of(heading.node)
     if robot is None or not isinstance(node, Agent | Witness):
         return
     me = Member(robot, heading.incarnation)
     effects: list[Effect] = []
-    overhear(node, effects.extend)
-    host = Host(node, Journal(None, heading))
+    observe_lease(node, effects.extend)
+    host = NodeHost(node, Journal(None, heading))
     at = 0.0
     for entry in entries:
         at = max(at, entry.at)
         note = _message(entry)
-        for words in said(note, at) if isinstance(note, LeaseNote) else ():
+        for words in message_facts(note, at) if isinstance(note, LeaseNote) else ():
             yield Happening(at, words)
         effects.clear()
         if digest(call(host, entry)) != entry.digest:
             raise Refused(f"{path}: cannot be verified, it was written by another version of the cores (lfa replay)")
         for effect in effects:
-            for words in told(effect, me, at, timing.grant_s, float):
+            for words in effect_facts(effect, me, at, timing.grant_s, float):
                 yield Happening(at, words)
     yield Happening(at, ("leads_no_more", at, me))
 
@@ -141,7 +141,7 @@ class _Gateways:
         self.gateways = {robot: Gateway(robot, incarnation, timing, now) for robot in robots}
         self._cut_off = False
 
-    def feed(self, entry: Entry, at: float) -> Iterator[Words]:
+    def feed(self, entry: JournalEntry, at: float) -> Iterator[Words]:
         message = _message(entry)
         where = address(entry.key) if entry.key else None
         match message:
@@ -164,7 +164,7 @@ class _Gateways:
                 self._cut_off = True
 
 
-def _of_gateways(heading: Heading, entries: Iterator[Entry], timing: Timing) -> Iterator[Happening]:
+def _of_gateways(heading: Heading, entries: Iterator[JournalEntry], timing: Timing) -> Iterator[Happening]:
     robots = heading.config["scenario"]["mission"]["robots"]
     gateways: _Gateways | None = None
     at = 0.0
@@ -178,7 +178,7 @@ def _of_gateways(heading: Heading, entries: Iterator[Entry], timing: Timing) -> 
             yield Happening(at, words)
 
 
-def _message(entry: Entry) -> Any:
+def _message(entry: JournalEntry) -> Any:
     """What came with this call, None for a tick and for bytes that are none of ours."""
     if entry.kind == "local":
         return _local_decoder.decode(entry.payload)

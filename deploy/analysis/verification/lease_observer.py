@@ -16,7 +16,7 @@ Words = tuple[Any, ...]
 """The name of a method of `Checker`, and what it is called with."""
 
 
-def overhear(node: Agent | Witness, hear: Callable[[list[Effect]], object]) -> None:
+def observe_lease(node: Agent | Witness, hear: Callable[[list[Effect]], object]) -> None:
     """Give `hear` the effects of the node's lease, just before the node carries them out."""
     name = "_apply" if isinstance(node, Agent) else "_carry_out"
     carry_out = getattr(node, name)
@@ -28,7 +28,9 @@ def overhear(node: Agent | Witness, hear: Callable[[list[Effect]], object]) -> N
     setattr(node, name, heard)
 
 
-def told(effect: Effect, me: Member, at: float, bond_s: float, true: Callable[[float], float]) -> Iterator[Words]:
+def effect_facts(
+    effect: Effect, me: Member, at: float, bond_s: float, true: Callable[[float], float]
+) -> Iterator[Words]:
     """`bond_s` is how long a voter is bound in true time; `true` makes that of the node's own."""
     match effect:
         case BecomeLeader(term, expiry) | LeaseExtended(term, expiry):
@@ -48,7 +50,7 @@ def told(effect: Effect, me: Member, at: float, bond_s: float, true: Callable[[f
             yield ("releases", at, body.term)
 
 
-def said(note: LeaseNote, at: float) -> Iterator[Words]:
+def message_facts(note: LeaseNote, at: float) -> Iterator[Words]:
     """What a message that came says of its sender, who may not have lived to journal that it said it."""
     source = robot_id_of(note.header.sender)
     if source is None:

@@ -18,8 +18,8 @@ from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.mission import Mission
 from lfa.protocol.node import Local, Node
 from lfa.protocol.runtime import journal
-from lfa.protocol.runtime.journal import JOURNAL_VERSION, Entry, Heading, Journal, digest
-from lfa.protocol.runtime.node_host import Host, Sent
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, JournalEntry, digest
+from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import TOPIC, address
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic
@@ -60,7 +60,7 @@ def compare(path: Path) -> Comparison:
         heading, entries = journal.read(path)
     except (OSError, ValueError) as error:
         raise Refused(f"{path}: cannot be replayed ({error}): must be a journal of a run folder") from None
-    host = Host(node_of(path, heading), Journal(None, heading))
+    host = NodeHost(node_of(path, heading), Journal(None, heading))
     calls = 0
     for entry in entries:
         calls += 1
@@ -70,7 +70,7 @@ def compare(path: Path) -> Comparison:
     return Comparison(path.name, calls)
 
 
-def call(host: Host, entry: Entry) -> Sent:
+def call(host: NodeHost, entry: JournalEntry) -> Sent:
     match entry.kind:
         case "tick":
             return host.tick(entry.at)
@@ -118,7 +118,7 @@ def _mission(told: dict[str, Any]) -> Mission | None:
 _MAKE: dict[str, Callable[[Heading, dict[str, Any]], Node]] = {"agent": _agent, "witness": _witness, "world": _world}
 
 
-def _what(entry: Entry) -> str:
+def _what(entry: JournalEntry) -> str:
     return "tick" if entry.kind == "tick" else f"{entry.kind} {entry.key}".rstrip()
 
 

@@ -45,7 +45,7 @@ class Acting(Checker):
         self._highest = Term()
         self._of_gateway: dict[int, Term] = {}
         self._holder: dict[Term, int] = {}
-        self._remembering: set[Member] = set()
+        self._with_state: set[Member] = set()
         self._wall_stepped = False
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
@@ -55,12 +55,12 @@ class Acting(Checker):
         self._wall_stepped = True
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
-        self._remembering.add(who)
+        self._with_state.add(who)
 
     def ends(self, at: float, who: Member) -> None:
         """When nobody is left who remembers a term, the wall clocks alone keep the order (E1)."""
-        self._remembering.discard(who)
-        if self._wall_stepped and not self._remembering:
+        self._with_state.discard(who)
+        if self._wall_stepped and not self._with_state:
             self._highest = Term()
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
@@ -117,7 +117,7 @@ class OneBond(WithFences):
         holder = self._holder[grant.term]
         term, other, its_until = self._bond.get(voter, (grant.term, holder, LONG_AGO))
         issued_by = (grant.term.issuer, grant.term.incarnation)
-        # The receiver's own grant of a gift is seen by nobody: it shows in its next one only.
+        # The receiver's own grant of a transfer_proposal is seen by nobody: it shows in its next one only.
         handed_over = issued_by == (other.id, other.incarnation) or (other, voter) in self._gifts
         free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
         fenced = self.fences.fenced(other.id, term) or self.fences.refuses(other.id, term, its_until)

@@ -18,7 +18,7 @@ from math import hypot, pi, sin, sqrt
 from pathlib import Path
 
 from lfa.agents.agent import Agent
-from lfa.agents.leading.path_follower import Lead
+from lfa.agents.leading.path_follower import PathFollower
 from lfa.deploy.bench.control_cases.string_stability import (
     CRUISE_MPS,
     RAMP_MPS2,
@@ -85,7 +85,7 @@ def against_bare(scheme: Scheme) -> tuple[float]:
     return ((whole[FOLLOWERS] / whole[0]) / (bare[FOLLOWERS] / bare[0]),)
 
 
-class Waving(Lead):
+class Waving(PathFollower):
     """A leader that goes straight on with a sine on its speed."""
 
     def __init__(self, mission: Mission, now: Callable[[], float]) -> None:
@@ -164,7 +164,7 @@ def clock_errors() -> tuple[float]:
     return (1e3 * sqrt(max(sums) / count),)
 
 
-def _let_wave(agent: Agent, lead: Lead) -> None:
+def _let_wave(agent: Agent, lead: PathFollower) -> None:
     """No mission can ask a leader for a wave: what it drives is replaced once it has one."""
     assert agent._driver is not None
     agent._driver.leading.lead = lead

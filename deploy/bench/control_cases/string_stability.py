@@ -16,8 +16,8 @@ from msgspec import Struct
 
 from lfa.agents.config import CONTROL_PERIOD_S, Gains
 from lfa.agents.formation.formation import slots_of
-from lfa.agents.formation.pose_history import Trace
-from lfa.deploy.bench.harness.chain import Chain, Setup, Weather
+from lfa.agents.formation.pose_history import PoseHistory
+from lfa.deploy.bench.harness.chain import Chain, ChainLink, Setup
 from lfa.deploy.bench.harness.leader_trajectories import Leader, figure_eight
 from lfa.deploy.bench.harness.rows import Case, Quantity, Rule
 from lfa.protocol.geometry import Twist
@@ -136,8 +136,8 @@ def cases() -> list[Case]:
     return [
         *(_lateral(mode) for mode in MODES),
         *(_longitudinal(scheme) for scheme in SCHEMES),
-        _trace_path("20 ms", Weather(), 0.04),
-        _trace_path("100 ms + 40 ms, 10 %", Weather(0.1, 0.04, 0.1), 0.22),
+        _trace_path("20 ms", ChainLink(), 0.04),
+        _trace_path("100 ms + 40 ms, 10 %", ChainLink(0.1, 0.04, 0.1), 0.22),
     ]
 
 
@@ -176,7 +176,7 @@ def speed_wave(scheme: Scheme, omega: float, followers: int) -> list[float]:
             mode=scheme.mode,
             delay_s=scheme.delay_s,
             trace=True,
-            weather=Weather(scheme.latency_s, scheme.jitter_s, scheme.loss),
+            weather=ChainLink(scheme.latency_s, scheme.jitter_s, scheme.loss),
             extrapolation_max_s=scheme.extrapolation_max_s,
             judged=False,
         )
@@ -241,14 +241,14 @@ def lateral(mode: Mode) -> tuple[float, ...]:
 # --- a hundred robots on one path ---------------------------------------------------------------------------------
 
 
-def _trace_path(name: str, weather: Weather, delay_s: float) -> Case:
+def _trace_path(name: str, weather: ChainLink, delay_s: float) -> Case:
     quantities = tuple(
         Quantity(f"robot {n} off the leader's path", "mm", 8.0 if n == TRACE_FOLLOWERS else None) for n in PLACES
     )
     return Case(f"trace/figure_eight {name}", quantities, partial(trace_path, weather, delay_s))
 
 
-def trace_path(weather: Weather, delay_s: float) -> tuple[float, ...]:
+def trace_path(weather: ChainLink, delay_s: float) -> tuple[float, ...]:
     """Rms distance [mm] of robots' paths from the leader's, over one lap of a small figure-eight."""
     slots: tuple[Slot, ...] = slots_of(FormationSpec(side="column"), range(2, TRACE_FOLLOWERS + 2))
     setup = Setup(slots, trace=True, delay_s=delay_s, weather=weather, judged=False)
@@ -256,7 +256,7 @@ def trace_path(weather: Weather, delay_s: float) -> tuple[float, ...]:
     leader = Leader(figure_eight(TRACE_LAP_M), (), setup.limits)
     # The last robot starts 120 m behind on a straight line, and must have reached the curve before it is measured.
     way_m = TRACE_FOLLOWERS * SEPARATION_M + 2.0 * TRACE_LAP_M
-    path = Trace(2.0 * way_m)
+    path = PoseHistory(2.0 * way_m)
     sums, count = [0.0] * len(PLACES), 0
     while leader.s < way_m:
         path.add(chain.leader_pose)
@@ -269,7 +269,7 @@ def trace_path(weather: Weather, delay_s: float) -> tuple[float, ...]:
     return tuple(1e3 * sqrt(total / count) for total in sums)
 
 
-def _off(path: Trace, x: float, y: float, near_s: float) -> float:
+def _off(path: PoseHistory, x: float, y: float, near_s: float) -> float:
     """Distance [m] of a point from `path`, looked for around arc length `near_s`."""
     s = near_s
     for _ in range(20):

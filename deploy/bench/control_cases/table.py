@@ -9,7 +9,7 @@ from time import process_time
 
 from lfa.agents.config import CONTROL_PERIOD_S, SHARP, Gains
 from lfa.agents.formation.formation import slots_of
-from lfa.deploy.bench.harness.chain import Blur, Chain, Setup, Weather, in_slots
+from lfa.deploy.bench.harness.chain import Blur, Chain, ChainLink, Setup, in_slots
 from lfa.deploy.bench.harness.leader_trajectories import Curvature, Leader, circle, figure_eight, straight
 from lfa.deploy.bench.harness.rows import Case, Quantity
 from lfa.protocol.geometry import Pose2D, Twist, along_arc, distance
@@ -33,7 +33,7 @@ FORMATIONS: dict[str, tuple[Side, bool]] = {
     "zigzag": ("zigzag", False),
     "trace": ("column", True),
 }
-SLOW_NETWORK = Weather(delay_s=0.1, jitter_s=0.04, loss=0.1)
+SLOW_NETWORK = ChainLink(delay_s=0.1, jitter_s=0.04, loss=0.1)
 NOISE_FILTER_M = 0.36
 """0.6 k |cos phi| of the 60 degree slots: rigid slots amplify noise along the chain (5.4)."""
 
@@ -69,7 +69,7 @@ def slots(side: Side, followers: int = len(FOLLOWERS)) -> tuple[Slot, ...]:
 def setup_of(condition: str, formation: str, seed: int = 1) -> Setup:
     """The chain of one row of the table."""
     side, on_trace = FORMATIONS[formation]
-    weather = SLOW_NETWORK if condition == "network" else Weather()
+    weather = SLOW_NETWORK if condition == "network" else ChainLink()
     noisy = condition == "noise"
     return Setup(
         slots(side),

@@ -25,7 +25,7 @@ class Saying(Struct, frozen=True):
     rate_hz: float
 
 
-class Task(Struct, frozen=True):
+class BareTask(Struct, frozen=True):
     """Its one argument, as JSON."""
 
     endpoint: str
@@ -34,10 +34,10 @@ class Task(Struct, frozen=True):
     says: tuple[Saying, ...]
 
 
-def main(task: Task) -> NoReturn:
+def main(task: BareTask) -> NoReturn:
     """Until it is killed."""
     wake = Wake()
-    inbox = Inbox(wake, patient=True)
+    inbox = Inbox(wake, defer_hellos=True)
     bus = ZenohBus(task.endpoint, inbox)
     bus.follow(frozenset(task.hears))
     owed = dict.fromkeys(task.says, 0.0)
@@ -56,4 +56,4 @@ def main(task: Task) -> NoReturn:
 
 
 if __name__ == "__main__":
-    main(msgspec.json.decode(sys.argv[1], type=Task))
+    main(msgspec.json.decode(sys.argv[1], type=BareTask))

@@ -18,7 +18,7 @@ from lfa.agents.following.controller import find_controller
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import SlotMotion
-from lfa.agents.formation.pose_history import Trace
+from lfa.agents.formation.pose_history import PoseHistory
 from lfa.agents.localization.estimator import Estimator
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, bearing, wrap
 from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp, Role
@@ -31,7 +31,7 @@ FIX_EVERY = 5
 """Control periods between two localisation fixes: 10 Hz."""
 
 
-class Weather(Struct, frozen=True):
+class ChainLink(Struct, frozen=True):
     """Between two robots: latency [s], uniform jitter on top of it [s], loss probability."""
 
     delay_s: float = 0.02
@@ -62,7 +62,7 @@ class Setup(Struct, frozen=True):
     heading_filter_m: float = 0.0
     cruise_mps: float = 0.5
     extrapolation_max_s: float = 0.5
-    weather: Weather = Weather()
+    weather: ChainLink = ChainLink()
     blur: Blur | None = None
     clock_offset_s: float = 0.0
     """Of each robot's clock against that of the one before it."""
@@ -73,7 +73,7 @@ class Setup(Struct, frozen=True):
     seed: int = 1
 
 
-class Errors(Struct, frozen=True):
+class ChainErrors(Struct, frozen=True):
     """Of one follower, from the true poses: architecture.md section 5 says what each is."""
 
     slot_m: float
@@ -82,7 +82,7 @@ class Errors(Struct, frozen=True):
     heading_rad: float
 
 
-class Robot:
+class ChainRobot:
     """One follower: what it is, what it knows, and a second slot computed from the truth to judge it by."""
 
     def __init__(self, setup: Setup, index: int, pose: Pose2D) -> None:
@@ -104,7 +104,7 @@ class Robot:
             trace_m=self.slot.separation_m,
         )
         self.true_slot = SlotMotion(gains, limits, setup.heading_filter_m)
-        self.true_trace = Trace(self.slot.separation_m + 2.0)
+        self.true_trace = PoseHistory(self.slot.separation_m + 2.0)
         self.heading = pose.theta
         self.pose = pose
         self.twist = STILL
@@ -120,9 +120,9 @@ class Chain:
         self.leader_pose = Pose2D() if starts is None else starts[0]
         self.leader_twist = STILL
         poses = list(starts[1:]) if starts is not None else in_slots(self.leader_pose, setup.slots)
-        self.robots = [Robot(setup, index, pose) for index, pose in enumerate(poses)]
+        self.robots = [ChainRobot(setup, index, pose) for index, pose in enumerate(poses)]
         self._chance = Random(setup.seed)
-        self._errors: list[Errors] = []
+        self._errors: list[ChainErrors] = []
         self._air: list[tuple[float, int, int, PoseStamped]] = []
         self._sent = 0
         self._slots_known = False
@@ -149,7 +149,7 @@ class Chain:
         self._move(dt)
         self.time_s = now + dt
 
-    def lose(self, index: int) -> Robot:
+    def lose(self, index: int) -> ChainRobot:
         """Follower `index` is gone, and the one behind it closes over it. Messages under way are lost."""
         gone = self.robots.pop(index)
         if index < len(self.robots):
@@ -158,7 +158,7 @@ class Chain:
         self._air.clear()
         return gone
 
-    def errors(self, index: int) -> Errors:
+    def errors(self, index: int) -> ChainErrors:
         """Of follower `index` (from 0) before the last move."""
         return self._errors[index]
 
@@ -182,7 +182,7 @@ class Chain:
             side = bearing(ahead_pose, Pose2D(slot.x, slot.y))
             commanded_m = hypot(slot.x - ahead_pose.x, slot.y - ahead_pose.y)
             self._errors.append(
-                Errors(
+                ChainErrors(
                     hypot(slot.x - pose.x, slot.y - pose.y),
                     apart - commanded_m,
                     wrap(bearing(ahead_pose, pose) - side),

@@ -46,7 +46,7 @@ class Case(Struct, frozen=True):
         return [f"{self.name}/{quantity.name}" for quantity in self.quantities]
 
 
-class Row(Struct, frozen=True):
+class BenchRow(Struct, frozen=True):
     name: str
     value: float
     unit: str
@@ -56,12 +56,14 @@ class Row(Struct, frozen=True):
     ok: bool
 
 
-def row(case: str, quantity: Quantity, value: float) -> Row:
+def row(case: str, quantity: Quantity, value: float) -> BenchRow:
     """A value that is not finite never reaches a bar."""
     bar = quantity.bar
     value = float(f"{value:.{ROUNDED}g}")
     ratio = None if not bar else float(f"{value / bar:.4g}")
-    return Row(f"{case}/{quantity.name}", value, quantity.unit, bar, ratio, isfinite(value) and _holds(quantity, value))
+    return BenchRow(
+        f"{case}/{quantity.name}", value, quantity.unit, bar, ratio, isfinite(value) and _holds(quantity, value)
+    )
 
 
 def _holds(quantity: Quantity, value: float) -> bool:
@@ -88,7 +90,7 @@ def select(cases: Sequence[Case], glob: str) -> list[Case]:
     return chosen
 
 
-def measured(cases: Sequence[Case], jobs: int, glob: str = "*") -> Iterator[list[Row]]:
+def measured(cases: Sequence[Case], jobs: int, glob: str = "*") -> Iterator[list[BenchRow]]:
     """The matching rows of each case, in the order of the cases, as they become known."""
     if jobs <= 1 or len(cases) == 1:
         for case in cases:
@@ -100,14 +102,14 @@ def measured(cases: Sequence[Case], jobs: int, glob: str = "*") -> Iterator[list
             yield _matching(case, future.result(), glob)
 
 
-def _matching(case: Case, values: Sequence[float], glob: str) -> list[Row]:
+def _matching(case: Case, values: Sequence[float], glob: str) -> list[BenchRow]:
     rows = (row(case.name, quantity, value) for quantity, value in zip(case.quantities, values, strict=True))
     return [row for row in rows if fnmatchcase(row.name, glob)]
 
 
-def show(rows: Iterator[list[Row]], as_json: bool) -> int:
+def show(rows: Iterator[list[BenchRow]], as_json: bool) -> int:
     """Print as they come (a table) or at the end (JSON); 0 when every row holds, else 1."""
-    done: list[Row] = []
+    done: list[BenchRow] = []
     for some in rows:
         done += some
         if not as_json:
@@ -121,7 +123,7 @@ def show(rows: Iterator[list[Row]], as_json: bool) -> int:
     return 1 if failed else 0
 
 
-def line(one: Row) -> str:
+def line(one: BenchRow) -> str:
     bar = "-" if one.bar is None else f"{one.bar:g}"
     mark = "ok" if one.ok else "BELOW THE BAR"
     return f"{one.name:<52}{one.value:>12.5g} {one.unit:<6} bar {bar:>8}  {mark}"

@@ -17,11 +17,11 @@ from typing import Any
 
 from msgspec import structs
 
-from lfa.deploy.analysis.verification.journals import Verdict, verify
+from lfa.deploy.analysis.verification.journals import JournalVerdict, verify
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.client.session import Fleet
+from lfa.deploy.client.session import FleetAddress
 from lfa.deploy.process.identity import Identity
-from lfa.deploy.process.process_group import ROUTER_NAME, Crew, Row
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.run.process_table import rows
 from lfa.protocol import clock
@@ -47,12 +47,12 @@ SETTLED_S = 0.5
 REST_MPS = 1e-3
 """Who is no faster stands."""
 ANEW_S = 3.0
-"""Routers whose link has come back may not know any more what is listened to (`ZenohBus.follow_anew`)."""
+"""Routers whose link has come back may not know any more what is listened to (`ZenohBus.resubscribe`)."""
 EVENTS_MAX = 4096
 TOPICS = ("event", "tracking", "pose", "truth", "status")
 
 
-Table = Callable[[Sequence[Row], Path], Sequence[Row]]
+Table = Callable[[Sequence[ProcessSpec], Path], Sequence[ProcessSpec]]
 
 
 class Broken(Exception):
@@ -96,7 +96,7 @@ class Team:
         self._about = About(scenario.name, "processes", 0, fleet or f"bench{clock.wall_ms()}")
         usual = rows(run, self._about, self._endpoint, scenario.mission, "")
         self._rows = {row.name: row for row in (usual if table is None else table(usual, self.folder))}
-        self._crew = Crew(run)
+        self._processes = ProcessGroup(run)
         self._inbox = Inbox(every=True)
         self._bus: ZenohBus | None = None
         self._operator = Operator(self._about.fleet, clock.wall_ms())
@@ -111,13 +111,13 @@ class Team:
 
     def __enter__(self) -> Team:
         try:
-            self._crew.start(self._rows[ROUTER_NAME])
+            self._processes.start(self._rows[ROUTER_NAME])
             self.wait_until(lambda: answers(self._endpoint, self._credentials), "the router does not answer")
             self._bus = ZenohBus(self._endpoint, self._inbox, credentials=self._credentials)
             self._bus.follow(frozenset(key(self._about.fleet, "*", topic) for topic in TOPICS))
             for name, row in self._rows.items():
                 if name not in (ROUTER_NAME, RECORDER_NAME):
-                    self._crew.start(row)
+                    self._processes.start(row)
         except BaseException:
             self._end()
             raise
@@ -129,34 +129,34 @@ class Team:
     def _end(self) -> None:
         if self._bus is not None:
             self._bus.close()
-        self._crew.kill_all()
+        self._processes.kill_all()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def judged(self) -> Verdict:
+    def judged(self) -> JournalVerdict:
         """End all processes, then check the journals of their whole lives.
 
         Read one after the other while they grow, a late one would tell of a PROPOSE whose promises an early one lacks.
         """
-        self._crew.kill_all()
+        self._processes.kill_all()
         return verify(self.folder / "run")
 
     @property
-    def fleet(self) -> Fleet:
+    def fleet(self) -> FleetAddress:
         """For those who look on."""
-        return Fleet(self._about.fleet, self._endpoint, ())
+        return FleetAddress(self._about.fleet, self._endpoint, ())
 
     # --- what can be done to it ------------------------------------------------------------------------------------
 
     def signal(self, whom: int | str, number: signal.Signals) -> float:
         """Signal an agent by its robot's id, or another process by its name; the moment just before."""
         at, name = clock.now(), _name(whom)
-        if not self._crew.signal(name, number):
+        if not self._processes.signal(name, number):
             raise Broken(f"{name} is not there to be signalled")
         return at
 
     def process_of(self, name: str) -> Identity:
         """Raises Broken when it does not run."""
-        identity = self._crew.identity(name)
+        identity = self._processes.identity(name)
         if identity is None:
             raise Broken(f"{name} does not run")
         return identity
@@ -165,17 +165,17 @@ class Team:
         """Start processes again that have ended: agents with empty memory, a world from where it was."""
         for whom in ended:
             name = _name(whom)
-            if not self._crew.wait([name], START_S_MAX):
+            if not self._processes.wait([name], START_S_MAX):
                 raise Broken(f"{name} does not end")
             if isinstance(whom, int):
                 self._poses.pop(whom, None)  # what its earlier life said counts no more
                 self._chains.pop(whom, None)
-            self._crew.start(self._rows[name].restarted())
+            self._processes.start(self._rows[name].restarted())
 
-    def start(self, row: Row) -> None:
-        self._crew.start(row)
+    def start(self, row: ProcessSpec) -> None:
+        self._processes.start(row)
 
-    def row(self, name: str) -> Row:
+    def row(self, name: str) -> ProcessSpec:
         return self._rows[name]
 
     def order(self, command: str, **arguments: Any) -> float:
@@ -272,7 +272,7 @@ class Team:
             chain, now = self.chain(), clock.now()
             if now > anew_at and self._bus is not None:
                 anew_at = now + ANEW_S
-                self._bus.follow_anew()
+                self._bus.resubscribe()
             if chain != last or len(chain) != length:
                 since, last = now, chain
             return now - since >= SETTLED_S

@@ -21,7 +21,7 @@ from msgspec import Struct
 from lfa.deploy.fleet.host.router import LISTENS
 from lfa.deploy.fleet.host.supervisor import Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.plan import host_plan as parts
-from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import unpack
 from lfa.deploy.process import identity as processes
 from lfa.deploy.process.process_group import ROUTER_NAME
@@ -57,7 +57,7 @@ class Found(Struct, frozen=True):
     """What is wrong with one; empty: nothing."""
 
 
-def check(part: Part) -> Found:
+def check(part: HostPlan) -> Found:
     """Whether `start` would do. Raises Refused; starts nothing and leaves nothing."""
     if part.version != version("lfa"):
         raise Refused(f"has lfa {version('lfa')}: must be {part.version}, as on the operator's (lfa up --install)")
@@ -78,7 +78,7 @@ def check(part: Part) -> Found:
     return found
 
 
-def _running(found: Found, running: Ledger, own: Part) -> Found:
+def _running(found: Found, running: Ledger, own: HostPlan) -> Found:
     """How the router stands that runs here, and the certificates that it and its clients show."""
     expired, known = "", None
     with contextlib.suppress(Refused):
@@ -92,7 +92,7 @@ def _running(found: Found, running: Ledger, own: Part) -> Found:
     return msgspec.structs.replace(found, run=running.run, digest=running.digest, router=there, certificate=expired)
 
 
-def start(part: Part) -> Found:
+def start(part: HostPlan) -> Found:
     """Bring this machine's part up, so that it outlives the session that asked for it. Raises Refused."""
     found = check(part)
     if found.run:
@@ -113,7 +113,7 @@ def start(part: Part) -> Found:
     return msgspec.structs.replace(found, run=part.run, digest=part.digest, orphans=tuple(orphans))
 
 
-def stop(part: Part) -> Found:
+def stop(part: HostPlan) -> Found:
     """End this machine's part and wait until nothing of it is left. Raises Refused when something is."""
     running = living(part.folder)
     if running is None:
@@ -141,7 +141,7 @@ def _wait_gone(everybody: tuple[processes.Identity, ...], within_s: float) -> li
         clock.sleep(POLL_S)
 
 
-def _check_place(part: Part) -> None:
+def _check_place(part: HostPlan) -> None:
     """The nearest folder that exists can be written to, and has room."""
     place = part.folder
     while not place.exists():
@@ -153,7 +153,7 @@ def _check_place(part: Part) -> None:
         raise Refused(f"state = {part.state}: {free_mib} MiB are free there: must be at least {FREE_MIB_MIN}")
 
 
-def _check_port(part: Part) -> None:
+def _check_port(part: HostPlan) -> None:
     """For routers over udp it is also that of tcp, for processes."""
     kinds = {"tcp": socket.SOCK_STREAM, **({"udp": socket.SOCK_DGRAM} if part.over_udp else {})}
     for name, kind in kinds.items():
@@ -174,7 +174,7 @@ def _check_world() -> None:
         raise Refused(f"the world needs what is not installed ({error.name}): pip install 'lfa[world]'") from None
 
 
-def _spawn(part: Part, path: Path, log: Path) -> subprocess.Popen[bytes]:
+def _spawn(part: HostPlan, path: Path, log: Path) -> subprocess.Popen[bytes]:
     """The supervisor, under systemd where it runs here, else in a session of its own."""
     command = [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.supervisor", str(path)]
     with log.open("ab") as out:
@@ -185,7 +185,7 @@ def _spawn(part: Part, path: Path, log: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True)
 
 
-def _runners(part: Part) -> list[list[str]]:
+def _runners(part: HostPlan) -> list[list[str]]:
     """How to ask systemd, which starts it again should it fail: as the system's unit for root, else as the user's."""
     if not SYSTEMD.is_dir() or shutil.which("systemd-run") is None:
         return []
@@ -194,7 +194,7 @@ def _runners(part: Part) -> list[list[str]]:
     return [["systemd-run", *([] if os.getuid() == 0 else ["--user"]), "--quiet", *unit, *log]]
 
 
-def _await_ready(part: Part, child: subprocess.Popen[bytes], log: Path) -> None:
+def _await_ready(part: HostPlan, child: subprocess.Popen[bytes], log: Path) -> None:
     """Until its router answers."""
     known = part.known_as(f"{HOST_PREFIX}{part.host}")
     until = clock.now() + READY_S
@@ -209,7 +209,7 @@ def _await_ready(part: Part, child: subprocess.Popen[bytes], log: Path) -> None:
         clock.sleep(POLL_S)
 
 
-def listen(part: Part) -> Found:
+def listen(part: HostPlan) -> Found:
     """Listen where the router would, until somebody comes or a few seconds are over: is the port open?"""
     if part.over_udp:
         _echo(part.port)
@@ -230,7 +230,7 @@ def _echo(port: int) -> None:
             server.sendto(knock, who)
 
 
-def rekey(part: Part) -> Found:
+def rekey(part: HostPlan) -> Found:
     """New keys and rules for what runs here already: its router opens anew with them. Raises Refused."""
     running = living(part.folder)
     if running is None or not (own := parts.read(part.folder / parts.PART)).keyed:
@@ -253,7 +253,7 @@ DEEDS = {"check": check, "start": start, "stop": stop, "listen": listen, "rekey"
 
 def main() -> None:
     try:
-        part = msgspec.json.decode(sys.stdin.buffer.read(), type=Part)
+        part = msgspec.json.decode(sys.stdin.buffer.read(), type=HostPlan)
         print(msgspec.json.encode(DEEDS[sys.argv[1]](part)).decode())
     except Refused as refused:
         print(refused, file=sys.stderr)

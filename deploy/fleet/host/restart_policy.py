@@ -13,31 +13,31 @@ ROUTER = Restart(policy="always", delay_s=0.05, delay_max_s=2.0, window_s=60.0, 
 """Without its router a machine is alone: nobody gains by giving it up."""
 
 
-class Verdict(Struct, frozen=True):
+class RestartDecision(Struct, frozen=True):
     """`at`: when to start again; None: never, and why in one word."""
 
     at: float | None
     word: str
 
 
-class Lives:
+class RestartBackoff:
     """The ends of one process, as far as they count."""
 
     def __init__(self, restart: Restart) -> None:
         self._restart = restart
         self._ends: deque[float] = deque()
 
-    def ended(self, code: int, now: float) -> Verdict:
+    def ended(self, code: int, now: float) -> RestartDecision:
         """`code` as of a `Popen`: negative for a signal; 2 is a refusal, which another start would not change."""
         if not _again(self._restart.policy, code):
-            return Verdict(None, "refused" if code == REFUSED_CODE else "ended" if code == 0 else "failed")
+            return RestartDecision(None, "refused" if code == REFUSED_CODE else "ended" if code == 0 else "failed")
         while self._ends and self._ends[0] <= now - self._restart.window_s:
             self._ends.popleft()
         if len(self._ends) >= self._restart.starts_max:
-            return Verdict(None, "failed")
+            return RestartDecision(None, "failed")
         delay_s = min(self._restart.delay_s * 2.0 ** min(len(self._ends), 32), self._restart.delay_max_s)
         self._ends.append(now)
-        return Verdict(now + delay_s, "waiting")
+        return RestartDecision(now + delay_s, "waiting")
 
     def forget(self) -> None:
         """An operator has started it: what was before counts no more."""

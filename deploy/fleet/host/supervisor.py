@@ -20,12 +20,12 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.fleet.host.log_tail import Tail
-from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE, ROUTER, Lives
+from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE, ROUTER, RestartBackoff
 from lfa.deploy.fleet.plan import host_plan as parts
-from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
-from lfa.deploy.process.process_group import ROUTER_NAME, Crew, Row
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
@@ -89,10 +89,10 @@ def sweep(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-class _Ward:
+class _ManagedProcess:
     """One process in care."""
 
-    def __init__(self, row: Row, lives: Lives) -> None:
+    def __init__(self, row: ProcessSpec, lives: RestartBackoff) -> None:
         self.row = row
         self.lives = lives
         self.starts = 0
@@ -111,12 +111,13 @@ class _Ward:
 class Supervisor:
     """All of one machine. Every call comes from the main thread: the kernel takes it for its children's parent."""
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: HostPlan) -> None:
         self._part = part
         self._me = f"{HOST_PREFIX}{part.host}"
-        self._crew = Crew(part.run_folder)
-        self._wards = {
-            row.name: _Ward(row, Lives(ROUTER if row.name == ROUTER_NAME else part.restart)) for row in parts.rows(part)
+        self._processes = ProcessGroup(part.run_folder)
+        self._managed = {
+            row.name: _ManagedProcess(row, RestartBackoff(ROUTER if row.name == ROUTER_NAME else part.restart))
+            for row in parts.rows(part)
         }
         self._life = clock.wall_ms()
         self._seqs: dict[str, int] = {}
@@ -153,14 +154,14 @@ class Supervisor:
             self._end()
             return 0
         finally:
-            self._crew.kill_all()
+            self._processes.kill_all()
             sweep(self._part.folder)
 
     def _stop(self) -> None:
         self._ending = True
 
     def _step(self, now: float) -> None:
-        changed = [ward for ward in self._wards.values() if self._look_after(ward, now)]
+        changed = [ward for ward in self._managed.values() if self._look_after(ward, now)]
         self._join(now)
         told = self._hear(now)
         if changed or told or now >= self._tell_at:
@@ -174,7 +175,7 @@ class Supervisor:
 
     # --- the processes ---------------------------------------------------------------------------------------------
 
-    def _look_after(self, ward: _Ward, now: float) -> bool:
+    def _look_after(self, ward: _ManagedProcess, now: float) -> bool:
         """Start it when it is due, notice when it has ended; True when something changed."""
         name = ward.row.name
         if ward.start_at is not None:
@@ -182,10 +183,10 @@ class Supervisor:
                 return False
             self._start(ward, now)
             return True
-        code = self._crew.code(name)
+        code = self._processes.code(name)
         if ward.state != "running" or code is None:
             return False
-        ward.ended = str(self._crew.exit_of(name))
+        ward.ended = str(self._processes.exit_of(name))
         print(ward.ended, flush=True)
         if ward.ordered_end:
             ward.ordered_end = False
@@ -203,27 +204,27 @@ class Supervisor:
         """At the very start, so that nobody has to look for it again and again."""
         return self._bus is None and now < self._began + ROUTER_S
 
-    def _start(self, ward: _Ward, now: float) -> None:
+    def _start(self, ward: _ManagedProcess, now: float) -> None:
         row = ward.row if ward.starts == 0 or not self._remembers(ward) else ward.row.restarted()
         ward.start_at = None
         ward.began, ward.began_ms = now, clock.wall_ms()
         ward.starts += 1
         try:
-            self._crew.start(row)
+            self._processes.start(row)
             ward.state = "running"
         except OSError as error:
             ward.ended = f"{row.name} cannot be started: {error.strerror}"
             verdict = ward.lives.ended(1, now)
             ward.start_at, ward.state = verdict.at, verdict.word
 
-    def _remembers(self, ward: _Ward) -> bool:
+    def _remembers(self, ward: _ManagedProcess) -> bool:
         """A world that ended before it wrote its first state begins anew."""
-        return not ward.row.again or (self._part.run_folder / STATE).exists()
+        return not ward.row.restart_args or (self._part.run_folder / STATE).exists()
 
     def _write_ledger(self) -> None:
         me = identity.identify(os.getpid())
         assert me is not None
-        children = [self._crew.identity(name) for name in self._wards]
+        children = [self._processes.identity(name) for name in self._managed]
         book = Ledger(self._part.run, self._part.digest, me, tuple(child for child in children if child is not None))
         if book == self._book:
             return
@@ -237,8 +238,8 @@ class Supervisor:
 
     def _end(self) -> None:
         """Robots and world in order, then one last word, then the router."""
-        self._crew.end([name for name in self._wards if name != ROUTER_NAME], END_S)
-        for ward in self._wards.values():
+        self._processes.terminate([name for name in self._managed if name != ROUTER_NAME], END_S)
+        for ward in self._managed.values():
             if ward.row.name != ROUTER_NAME:
                 ward.state, ward.ended = "ended", "lfa down"
         self._tell(clock.now())
@@ -247,7 +248,7 @@ class Supervisor:
             leaving = threading.Thread(target=self._bus.close, daemon=True)
             leaving.start()
             leaving.join(LEAVE_S)  # a router that hangs would hold us longer
-        self._crew.end([ROUTER_NAME], LEAVE_S)
+        self._processes.terminate([ROUTER_NAME], LEAVE_S)
 
     # --- what is said and heard ------------------------------------------------------------------------------------
 
@@ -270,7 +271,7 @@ class Supervisor:
     def _hear(self, now: float) -> bool:
         told = False
         if self._bus is not None and self._links.due(now):
-            self._bus.follow_anew()
+            self._bus.resubscribe()
         for arrival in self._inbox.take():
             if not isinstance(arrival.payload, bytes):
                 self._links.see(arrival.payload, now)
@@ -287,7 +288,7 @@ class Supervisor:
         """Each order once, however often it is said; True when it is to be answered."""
         place, _, name = order.target.rpartition("/")
         here = not place and name in ("", self._part.host)
-        if place not in ("", self._part.host) or not (here or name in self._wards):
+        if place not in ("", self._part.host) or not (here or name in self._managed):
             return False
         number = (order.header.incarnation, order.header.seq)
         if order.header.seq <= self._orders.get(order.header.incarnation, 0):
@@ -300,28 +301,28 @@ class Supervisor:
         if order.deed == "down" and here:
             self._ending = True
         elif order.deed == "restart":
-            for ward in self._wards.values() if here else (self._wards[name],):
+            for ward in self._managed.values() if here else (self._managed[name],):
                 self._start_again(ward, now)
         elif order.deed == "logs":
-            for one in self._wards if here else (name,):
+            for one in self._managed if here else (name,):
                 if order.lines or one not in self._tails:
-                    self._tails[one] = Tail(self._crew.log(one), order.lines, now)
+                    self._tails[one] = Tail(self._processes.log(one), order.lines, now)
                 self._tails[one].prolong(now)
         return True
 
-    def _start_again(self, ward: _Ward, now: float) -> None:
+    def _start_again(self, ward: _ManagedProcess, now: float) -> None:
         ward.lives.forget()
-        if self._crew.runs(ward.row.name):
+        if self._processes.runs(ward.row.name):
             ward.ordered_end = True
-            self._crew.signal(ward.row.name, signal.SIGTERM)
-            self._crew.signal(ward.row.name, signal.SIGCONT)
+            self._processes.signal(ward.row.name, signal.SIGTERM)
+            self._processes.signal(ward.row.name, signal.SIGCONT)
         else:
             ward.start_at = now
 
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_S
         self._write_ledger()
-        reports = tuple(ward.report(self._crew.pid(name), now) for name, ward in self._wards.items())
+        reports = tuple(ward.report(self._processes.pid(name), now) for name, ward in self._managed.items())
         part = self._part
         header = self._header("host", now)
         self._say("host", HostStatus(header, part.host, part.version, part.run, self._obeyed, reports))

@@ -10,7 +10,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from lfa.deploy.fleet.plan import tables
-from lfa.deploy.scenario_loading import choose
+from lfa.deploy.scenario_loading import load_scenario
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Profile
 from lfa.world.description.load import Scenario, draw
@@ -58,7 +58,7 @@ class Robots(Struct, frozen=True, forbid_unknown_fields=True):
     """Robots with a place of their own: `3 = "pi-3"`."""
 
 
-class Links(Struct, frozen=True, forbid_unknown_fields=True):
+class LinkPlan(Struct, frozen=True, forbid_unknown_fields=True):
     """How the machines' routers are joined."""
 
     transport: Literal["quic", "tcp"] = "quic"
@@ -101,7 +101,7 @@ class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
     witness: str = ""
     """The machine of the witness. Default: the world's, in its process."""
     robots: Robots = Robots()
-    links: Links = Links()
+    links: LinkPlan = LinkPlan()
     restart: Restart = Restart()
     secure: bool = False
     """Everybody shows who it is, and what the rules do not allow is denied (also `lfa up --secure`)."""
@@ -109,7 +109,7 @@ class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
     """Folder of the fleet's authority, on the operator's machine. Default: `~/.local/state/lfa/<fleet>.keys`."""
 
 
-class Plan(Struct, frozen=True):
+class FleetPlan(Struct, frozen=True):
     """A fleet file that can be obeyed, with nothing left open."""
 
     path: Path
@@ -155,7 +155,7 @@ def is_fleet_file(path: Path) -> bool:
         return False
 
 
-def load(path: Path) -> Plan:
+def load(path: Path) -> FleetPlan:
     """The plan in that file. Raises Refused, and Mistaken with every mistake at once."""
     document = read_toml(path, "a fleet file")
     mistakes: list[str] = []
@@ -170,7 +170,7 @@ def load(path: Path) -> Plan:
     places = {} if scenario is None else _places(file, scenario.mission.robots, mistakes)
     if mistakes or scenario is None:
         raise Mistaken(path, mistakes)
-    return Plan(path, file, scenario, places)
+    return FleetPlan(path, file, scenario, places)
 
 
 def _scenario(file: FleetFile, path: Path, mistakes: list[str]) -> Scenario | None:
@@ -178,7 +178,7 @@ def _scenario(file: FleetFile, path: Path, mistakes: list[str]) -> Scenario | No
     overrides = [*file.set, *([f"mission.profile='{file.profile}'"] if file.profile else [])]
     try:
         named = str(beside) if beside.suffix == ".toml" else file.scenario
-        return draw(choose(named, overrides, file.team), file.seed)
+        return draw(load_scenario(named, overrides, file.team), file.seed)
     except Refused as refused:
         mistakes.append(f"scenario = {file.scenario}: {refused}")
         return None

@@ -9,8 +9,8 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from lfa.deploy.fleet.plan.fleet_file import Machine, Plan, Restart
-from lfa.deploy.process.process_group import ROUTER_NAME, Row
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine, Restart
+from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, toml
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -26,7 +26,7 @@ KEYS = "keys"
 USUAL_STATE = "~/.local/state/lfa"
 
 
-class Part(Struct, frozen=True):
+class HostPlan(Struct, frozen=True):
     """One machine's share."""
 
     fleet: str
@@ -92,14 +92,16 @@ class Part(Struct, frozen=True):
         return ",".join((self.socket, *self.others))
 
 
-def parts(plan: Plan, run: str, digest: str, bundles: Mapping[str, dict[str, str]] | None = None) -> dict[str, Part]:
+def parts(
+    plan: FleetPlan, run: str, digest: str, bundles: Mapping[str, dict[str, str]] | None = None
+) -> dict[str, HostPlan]:
     """Each machine's share of `plan`, with its keys."""
     file, names = plan.file, list(plan.hosts)
     scenario = toml(plan.scenario)
     mission = plan.scenario.mission
     made = {}
     for n, (name, machine) in enumerate(plan.hosts.items()):
-        made[name] = Part(
+        made[name] = HostPlan(
             fleet=plan.name,
             host=name,
             run=run,
@@ -126,17 +128,17 @@ def parts(plan: Plan, run: str, digest: str, bundles: Mapping[str, dict[str, str
     return made
 
 
-def store(plan: Plan) -> Path:
+def store(plan: FleetPlan) -> Path:
     """Where the fleet's authority lives, on the operator's machine."""
     return Path(plan.file.keys or f"{USUAL_STATE}/{plan.name}.keys").expanduser()
 
 
-def endpoint(plan: Plan, name: str) -> str:
+def endpoint(plan: FleetPlan, name: str) -> str:
     """Where other machines' routers find the router of machine `name`."""
     return f"{plan.file.links.transport}/{_at(plan.hosts[name])}"
 
 
-def door(plan: Plan, name: str) -> str:
+def door(plan: FleetPlan, name: str) -> str:
     """Where processes of other machines, and the operator, find that router.
 
     By tls, where routers speak quic: the end of a router's process ends its tcp links at once, as the kernel tells the
@@ -153,19 +155,19 @@ def _at(machine: Machine) -> str:
     return f"{host}:{machine.router_port}"
 
 
-def _listen(plan: Plan, machine: Machine) -> tuple[str, ...]:
+def _listen(plan: FleetPlan, machine: Machine) -> tuple[str, ...]:
     """The same port number, of udp for routers and of tcp for processes."""
     where = f"{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
     transport = plan.file.links.transport
     return tuple(f"{kind}/{where}" for kind in dict.fromkeys((transport, _DOORS[transport])))
 
 
-def _joined(plan: Plan, a: str, b: str) -> bool:
+def _joined(plan: FleetPlan, a: str, b: str) -> bool:
     pairs = plan.file.links.pairs
     return not pairs or (a, b) in pairs or (b, a) in pairs
 
 
-def rows(part: Part) -> list[Row]:
+def rows(part: HostPlan) -> list[ProcessSpec]:
     """The processes of this machine, its router first."""
     folder = part.run_folder
     keys = ("--keys", str(part.folder / KEYS)) if part.keyed else ()
@@ -174,7 +176,7 @@ def rows(part: Part) -> list[Row]:
     guarded = (*keys, *link, "--secure") if part.secure else (*keys, *link)
     listen = (word for where in (part.socket, *part.listen) for word in ("--listen", where))
     connect = (word for where in part.connect for word in ("--connect", where))
-    made = [Row(ROUTER_NAME, ("lfa.deploy.fleet.host.router", *listen, *connect, *guarded))]
+    made = [ProcessSpec(ROUTER_NAME, ("lfa.deploy.fleet.host.router", *listen, *connect, *guarded))]
     if part.world:
         witness = () if part.world_witness else ("--no-witness",)
         world = (
@@ -187,19 +189,19 @@ def rows(part: Part) -> list[Row]:
             *team,
             *witness,
         )
-        row = Row(WORLD_NAME, world, again=("--resume", str(folder)))
+        row = ProcessSpec(WORLD_NAME, world, restart_args=("--resume", str(folder)))
         made.append(row.restarted() if (folder / STATE).exists() else row)
     if part.witness:
-        made.append(Row(WITNESS_NAME, ("lfa.agents.cli", "--role", "witness", "--id", "w", *team)))
+        made.append(ProcessSpec(WITNESS_NAME, ("lfa.agents.cli", "--role", "witness", "--id", "w", *team)))
     for robot in part.robots:
-        made.append(Row(robot_name(robot), ("lfa.agents.cli", "--role", "follower", "--id", str(robot), *team)))
+        made.append(ProcessSpec(robot_name(robot), ("lfa.agents.cli", "--role", "follower", "--id", str(robot), *team)))
     return made
 
 
-def read(path: Path) -> Part:
+def read(path: Path) -> HostPlan:
     """Raises Refused for a file that is no part of a fleet."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Part)
+        return msgspec.json.decode(path.read_bytes(), type=HostPlan)
     except OSError as error:
         raise Refused(f"{path}: cannot be read ({error.strerror})") from None
     except msgspec.DecodeError as error:

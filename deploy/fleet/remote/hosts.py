@@ -10,8 +10,8 @@ import msgspec
 
 from lfa.deploy.fleet.host.host import Found
 from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE
-from lfa.deploy.fleet.plan.fleet_file import Machine, Plan
-from lfa.deploy.fleet.plan.host_plan import Part
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
+from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, reach
 from lfa.deploy.fleet.remote.wheel import install
 from lfa.protocol import clock
@@ -21,10 +21,10 @@ CLOCK_S_MAX = 60.0
 """Beyond it certificates begin or end at the wrong time."""
 
 
-class Fleet:
+class FleetHosts:
     """A shell on each machine that can be reached; `wrong` has a line for each that cannot, or does not obey."""
 
-    def __init__(self, plan: Plan, parts: Mapping[str, Part]) -> None:
+    def __init__(self, plan: FleetPlan, parts: Mapping[str, HostPlan]) -> None:
         self._plan = plan
         self.parts = dict(parts)
         self._shells: dict[str, Shell] = {}
@@ -85,7 +85,7 @@ class Fleet:
         await asyncio.gather(*(guarded(name) for name in names if name not in self.wrong))
 
 
-async def ask(shell: Shell, machine: Machine, deed: str, part: Part) -> Found:
+async def ask(shell: Shell, machine: Machine, deed: str, part: HostPlan) -> Found:
     """What `host.py` there answers. Raises Refused, with the cause when it is Python or another `lfa`."""
     python = python_of(machine)
     done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", deed), msgspec.json.encode(part))

@@ -9,8 +9,8 @@ import tarfile
 from pathlib import Path
 
 from lfa.deploy.client.discovery import option
-from lfa.deploy.fleet.plan.fleet_file import Plan
-from lfa.deploy.fleet.plan.host_plan import Part, parts
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan
+from lfa.deploy.fleet.plan.host_plan import HostPlan, parts
 from lfa.deploy.fleet.remote.ssh import Unreachable, python_of, reach
 from lfa.deploy.process.identity import own_processes
 from lfa.deploy.recording.run_folder import JOURNALS
@@ -43,19 +43,19 @@ def copy(folders: set[Path], run: Path) -> int:
     return len(journals)
 
 
-def fetch(plan: Plan, run: Path) -> tuple[int, list[str]]:
+def fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
     """Bring the newest run's journals of every machine of `plan` into `run`'s folder: how many, and what went wrong."""
     return asyncio.run(_fetch(plan, run))
 
 
-async def _fetch(plan: Plan, run: Path) -> tuple[int, list[str]]:
+async def _fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
     shares = parts(plan, "", "")
     answers = await asyncio.gather(*(_of_machine(plan, name, shares[name], run) for name in plan.hosts))
     wrong = [f"host {name}: {said}" for name, said in zip(plan.hosts, answers, strict=True) if isinstance(said, str)]
     return sum(answer for answer in answers if isinstance(answer, int)), wrong
 
 
-async def _of_machine(plan: Plan, name: str, part: Part, run: Path) -> int | str:
+async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> int | str:
     """How many came, or what is wrong."""
     machine = plan.hosts[name]
     try:

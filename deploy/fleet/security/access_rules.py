@@ -38,7 +38,7 @@ SAY = ("put", "liveliness_token")
 HEAR = ("put", "reply", "liveliness_token")
 
 
-class Plan(Struct, frozen=True):
+class KeyPlan(Struct, frozen=True):
     """A fleet's machines, and who joins at which of their routers."""
 
     fleet: str
@@ -72,7 +72,7 @@ def host_name(host: str) -> str:
     return f"{HOST_PREFIX}{host}"
 
 
-def voices(name: str, plan: Plan) -> list[tuple[str, str]]:
+def voices(name: str, plan: KeyPlan) -> list[tuple[str, str]]:
     """As which kind (the table's `publishers`) under which owner's keys `name` may speak."""
     if name == WORLD_NAME:
         hardware = [("driver", robot) for robot in plan.simulated()]
@@ -89,7 +89,7 @@ def voices(name: str, plan: Plan) -> list[tuple[str, str]]:
     return [("agent", name)] if robot_id_of(name) else []
 
 
-def sayable(name: str, plan: Plan) -> list[str]:
+def sayable(name: str, plan: KeyPlan) -> list[str]:
     """Every key expression that `name` may publish on."""
     keys = [
         f"lfa/{plan.fleet}/{owner}/{topic.name}{_receiver(topic, kind)}"
@@ -121,7 +121,7 @@ def _receiver(topic: Topic, kind: str) -> str:
     return f"/{TO_ALL}" if kind == "driver" else "/*"
 
 
-def hearable(name: str, plan: Plan) -> list[str]:
+def hearable(name: str, plan: KeyPlan) -> list[str]:
     """What is brought to `name`: to robots all but ground truth, to everybody else all."""
     base = f"lfa/{plan.fleet}"
     if robot_id_of(name) is None:
@@ -130,7 +130,7 @@ def hearable(name: str, plan: Plan) -> list[str]:
     return [*plain, f"{base}/*/lease/*", f"{base}/*/alive/*"]
 
 
-def rules(plan: Plan, host: str, common_names: dict[str, str]) -> dict[str, Any]:
+def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, Any]:
     """The part of Zenoh's configuration that guards the router of `host`; `common_names`: those not revoked."""
     neighbours = [host_name(other) for other in plan.hosts if other != host]
     members = [name for name in plan.at(host) if name not in neighbours]
@@ -157,7 +157,7 @@ def rules(plan: Plan, host: str, common_names: dict[str, str]) -> dict[str, Any]
     }
 
 
-def _through(neighbour: str, plan: Plan, common_names: dict[str, str]) -> list[str]:
+def _through(neighbour: str, plan: KeyPlan, common_names: dict[str, str]) -> list[str]:
     """What a neighbour router may pass on: what those may say who may join there.
 
     Its own supervisor shows the same certificate: should that one come here, it gets no more.
@@ -181,7 +181,7 @@ def _rule(id: str, flow: str, messages: Iterable[str], keys: list[str]) -> dict[
     return {"id": id, "permission": "allow", "flows": [flow], "messages": list(messages), "key_exprs": keys}
 
 
-def _floods(plan: Plan, host: str) -> list[dict[str, Any]]:
+def _floods(plan: KeyPlan, host: str) -> list[dict[str, Any]]:
     """Only what robots say: a world that catches up says much at once, and its newest counts."""
     robots = [name for name in plan.places if robot_id_of(name)]
     receivers = [TO_ALL, WITNESS_NAME, *robots, *(name.replace("robot", "gateway", 1) for name in robots)]

@@ -28,9 +28,9 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct, structs
 
-from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
 from lfa.deploy.fleet.security import authority
-from lfa.deploy.fleet.security.access_rules import Plan, driver_of, host_name, rules, sayable
+from lfa.deploy.fleet.security.access_rules import KeyPlan, driver_of, host_name, rules, sayable
+from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
@@ -44,7 +44,7 @@ KINDS = ("pem", "key", "password")
 class Registry(Struct, frozen=True):
     """`fleet.json`."""
 
-    plan: Plan
+    plan: KeyPlan
     common_names: dict[str, str] = {}
     """Of those who are let in: what their certificates say. After a revocation never the same again."""
     revoked: dict[str, int] = {}
@@ -74,7 +74,7 @@ def spread(
     robots: Iterable[int],
     places: Mapping[str, Sequence[str]] | None = None,
     drivers: Iterable[int] = (),
-) -> Plan:
+) -> KeyPlan:
     """A plan: robots in turn over the machines, each with the next machine's router as its second.
 
     `places` says otherwise for some (`{"robot3": ["b"]}`); `drivers` are the robots whose hardware is not the
@@ -98,14 +98,14 @@ def spread(
             drawn[driver_of(name)] = tuple(where)
     if homeless := [name for name, where in drawn.items() if not where]:
         raise Refused(f"drivers: {', '.join(homeless)} drives no robot of this fleet")
-    return Plan(fleet, {host: tuple(addresses) for host, addresses in hosts.items()}, drawn)
+    return KeyPlan(fleet, {host: tuple(addresses) for host, addresses in hosts.items()}, drawn)
 
 
 def _turn(names: list[str], n: int) -> tuple[str, ...]:
     return tuple(dict.fromkeys((names[n % len(names)], names[(n + 1) % len(names)])))
 
 
-def make(folder: Path, plan: Plan, days: float = DAYS) -> list[str]:
+def make(folder: Path, plan: KeyPlan, days: float = DAYS) -> list[str]:
     """Everything that `plan` needs, in `folder`; whose certificates were made or renewed. Raises Refused."""
     try:
         private_folder(folder)
@@ -229,7 +229,7 @@ def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
     )
 
 
-def _addresses(name: str, plan: Plan) -> tuple[str, ...]:
+def _addresses(name: str, plan: KeyPlan) -> tuple[str, ...]:
     """Where a router may be called; nobody else's certificate serves."""
     for host, addresses in plan.hosts.items():
         if name == host_name(host):

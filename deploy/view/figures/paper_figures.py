@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import FigureBase
 
 from lfa.deploy.analysis.run_data import Run
-from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.analysis.tracking_errors import TrackingErrors
 from lfa.deploy.recording.mcap_reader import Array
 from lfa.deploy.view.figures.style import look
 from lfa.deploy.view.figures.time_panels import POINTS_MAX, finish, plot, strip, thin
@@ -23,7 +23,7 @@ def distance_error(figure: FigureBase, run: Run) -> None:
 
 def orientation_error(figure: FigureBase, run: Run) -> None:
     *panels, below = figure.subplots(4, 1, sharex=True, height_ratios=(3, 3, 3, 1.2))
-    table: tuple[tuple[str, Callable[[Errors], Array]], ...] = (
+    table: tuple[tuple[str, Callable[[TrackingErrors], Array]], ...] = (
         ("against the slot that the leader asked for", lambda e: e.bearing_asked),
         ("against the predecessor's body (the paper's)", lambda e: e.bearing_body),
         ("of the own heading against the feasible one", lambda e: e.heading),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lfa.deploy.client.session import Fleet, find, listen, scenario_of_fleet
+from lfa.deploy.client.session import FleetAddress, find, listen, scenario_of_fleet
 from lfa.deploy.recording.recorder import parts
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.protocol import clock
@@ -96,7 +96,7 @@ def converted(folder: Path) -> Path:
         unfinished.unlink(missing_ok=True)  # there still, when the recording was refused in the midst of it
 
 
-def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web_port: int) -> int:
+def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: int, web_port: int) -> int:
     """Draw a running fleet until Ctrl-C; viewers may come and go."""
     import rerun as rr
 
@@ -129,7 +129,7 @@ def _live(fleet: Fleet, serve_web: bool, screenshot: Path | None, port: int, web
     return 0
 
 
-def _draw(fleet: Fleet, stream: rerun.RecordingStream, scenario: Scenario | None, until: float | None) -> None:
+def _draw(fleet: FleetAddress, stream: rerun.RecordingStream, scenario: Scenario | None, until: float | None) -> None:
     from lfa.deploy.view.rerun.scene import TOPICS, Scene
 
     scene, time, lost = Scene(stream), WorldTime(), 0

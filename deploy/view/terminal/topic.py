@@ -12,7 +12,7 @@ import msgspec
 import typer
 from msgspec import Struct
 
-from lfa.deploy.client.session import Fleet, find, listen
+from lfa.deploy.client.session import FleetAddress, find, listen
 from lfa.deploy.recording import mcap_channels
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -77,7 +77,7 @@ def expressions(text: str) -> frozenset[str]:
     return frozenset({f"{owner or '*'}/{name or '*'}", f"{owner or '*'}/{name or '*'}/*"})
 
 
-def _echo(fleet: Fleet, wanted: frozenset[str], count: int, what: str) -> int:
+def _echo(fleet: FleetAddress, wanted: frozenset[str], count: int, what: str) -> int:
     """Every message as one line of JSON, with its channel."""
     left = count
     silent_at = clock.now() + SILENCE_S
@@ -95,7 +95,7 @@ def _echo(fleet: Fleet, wanted: frozenset[str], count: int, what: str) -> int:
                     return 0
 
 
-def _rates(fleet: Fleet, wanted: frozenset[str], seconds: float) -> list[Rate]:
+def _rates(fleet: FleetAddress, wanted: frozenset[str], seconds: float) -> list[Rate]:
     heard: dict[str, tuple[int, int]] = {}
     with listen(fleet, wanted, every=True) as ear:
         begun = clock.now()

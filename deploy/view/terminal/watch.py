@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
-from lfa.deploy.client.session import Ear, find, listen
-from lfa.deploy.client.team_status import Board, Row
+from lfa.deploy.client.session import Subscriber, find, listen
+from lfa.deploy.client.team_status import Board, RobotStatus
 from lfa.deploy.operate import fault, formation
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -73,24 +73,24 @@ def _check_terminal() -> None:
         raise Refused(f"terminal of {size.columns} x {size.lines} characters: {right}")
 
 
-def _hear_for(ear: Ear, board: Board, duration_s: float) -> None:
+def _hear_for(ear: Subscriber, board: Board, duration_s: float) -> None:
     until = clock.now() + duration_s
     while clock.now() < until:
         clock.sleep(0.1)
         _hear(ear, board)
 
 
-def _hear(ear: Ear, board: Board) -> None:
+def _hear(ear: Subscriber, board: Board) -> None:
     for arrival, message in ear.take():
         board.see(arrival.at, message)
     board.sample(clock.now())
 
 
-def _live(ear: Ear, board: Board) -> int:
+def _live(ear: Subscriber, board: Board) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    hand = Hand(ear)
+    hand = KeyHandler(ear)
     console = Console()
     with _raw_keys(), Live(console=console, screen=True, auto_refresh=False) as live:
         while True:
@@ -102,10 +102,10 @@ def _live(ear: Ear, board: Board) -> int:
                 hand.press(key)
 
 
-class Hand:
+class KeyHandler:
     """What the keys do: digits choose a robot, letters do something to it. `said` is how the last one went."""
 
-    def __init__(self, ear: Ear) -> None:
+    def __init__(self, ear: Subscriber) -> None:
         self._ear = ear
         self.chosen: int | None = None
         self.said = "" if ear.fleet.team else "this fleet is not yours to command: keys other than q do nothing"
@@ -139,7 +139,7 @@ class Hand:
             self.said = told.getvalue().strip()
 
 
-def _screen(ear: Ear, board: Board, hand: Hand, width: int, height: int) -> Group:
+def _screen(ear: Subscriber, board: Board, hand: KeyHandler, width: int, height: int) -> Group:
     from rich.console import Group
     from rich.text import Text
 
@@ -160,7 +160,7 @@ def _screen(ear: Ear, board: Board, hand: Hand, width: int, height: int) -> Grou
     )
 
 
-def _table(rows: list[Row], chosen: int | None) -> RenderableType:
+def _table(rows: list[RobotStatus], chosen: int | None) -> RenderableType:
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
@@ -172,7 +172,7 @@ def _table(rows: list[Row], chosen: int | None) -> RenderableType:
     return table
 
 
-def _cells(row: Row) -> tuple[str, ...]:
+def _cells(row: RobotStatus) -> tuple[str, ...]:
     """Units in the heads. Of a term number the last four digits: neighbours differ there."""
     return (
         str(row.robot),

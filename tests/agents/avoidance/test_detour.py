@@ -7,7 +7,7 @@ import pytest
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.openings import NARROW_M
 from lfa.agents.avoidance.safety import safe
-from lfa.agents.perception.obstacle import Thing
+from lfa.agents.perception.obstacle import BlockingObstacle
 from lfa.agents.perception.scan import Surroundings
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.mission import Limits
@@ -90,7 +90,9 @@ def test_a_decision_is_held_at_least_a_second() -> None:
 def test_what_has_no_visible_end_is_crept_towards_for_two_seconds_and_then_turned_from() -> None:
     detour, wanted, actions = Detour(RADIUS_M, LIMITS), Twist(0.3, 0.0), []
     for n in range(200):
-        twist = detour.steer(circle(0.8, 0.0, 0.2), (3.0, 0.0), wanted, 0.4, n * DT, lambda _: Thing("stationary", inf))
+        twist = detour.steer(
+            circle(0.8, 0.0, 0.2), (3.0, 0.0), wanted, 0.4, n * DT, lambda _: BlockingObstacle("stationary", inf)
+        )
         assert twist is not None
         assert detour.decision is not None
         if not actions or actions[-1][0] != detour.decision.action:
@@ -132,7 +134,7 @@ def test_a_robot_beside_which_something_stands_does_not_back_off_from_it() -> No
     """Were a bend towards a team-mate beside it taken for what is before its nose, two that turn round side by side in
     a pocket would back into it and wedge there (paper_path1, seed 7)."""
     detour = Detour(RADIUS_M, LIMITS)
-    thing = Thing("wall", 0.5)
+    thing = BlockingObstacle("wall", 0.5)
     twist = detour.steer(circle(0.03, 0.35, 0.15), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: thing)
     assert twist is not None
     assert twist.linear_x >= 0.0
@@ -140,6 +142,8 @@ def test_a_robot_beside_which_something_stands_does_not_back_off_from_it() -> No
 
 def test_a_robot_with_its_nose_at_a_wall_backs_off() -> None:
     detour = Detour(RADIUS_M, LIMITS)
-    twist = detour.steer(wall(0.19, -0.5, 0.5), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: Thing("wall", 0.5))
+    twist = detour.steer(
+        wall(0.19, -0.5, 0.5), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: BlockingObstacle("wall", 0.5)
+    )
     assert twist is not None
     assert twist.linear_x < 0.0

@@ -6,7 +6,7 @@ import pytest
 
 from lfa.agents.avoidance.ground_crossing import BESIDE_M, CROSSING_MPS, LATE_S, GroundCrossing
 from lfa.agents.avoidance.safety import safe
-from lfa.agents.perception.ground_map import SEEN_MIN, Ground
+from lfa.agents.perception.ground_map import SEEN_MIN, GroundMap
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import GroundProfile
@@ -33,14 +33,14 @@ def profile(
     return GroundProfile(HEADER, 0.1, STEP, (0.12, 0.0, -0.12), tuple(rows))
 
 
-def looked_at(seen: GroundProfile, times: int = SEEN_MIN) -> Ground:
-    ground = Ground(LIMITS)
+def looked_at(seen: GroundProfile, times: int = SEEN_MIN) -> GroundMap:
+    ground = GroundMap(LIMITS)
     for n in range(times):
         ground.profile(seen, Pose2D(), 0.05 * n)
     return ground
 
 
-def crossing(ground: Ground) -> GroundCrossing:
+def crossing(ground: GroundMap) -> GroundCrossing:
     return GroundCrossing(ground, LIMITS, 0.15)
 
 
@@ -80,7 +80,7 @@ def test_one_bad_reading_is_no_hole() -> None:
 
 
 def test_bad_readings_now_and_then_in_one_place_are_no_hole() -> None:
-    ground = Ground(LIMITS)
+    ground = GroundMap(LIMITS)
     for n in range(5):
         ground.profile(profile((0.5, 0.55, -0.2), lines=(n % 3,)), Pose2D(), 2.0 * n)
         assert ground.ahead is None
@@ -140,7 +140,7 @@ def looking(near_m: float, width_m: float, lines: tuple[int, ...] = (0, 1, 2)) -
 
 
 def test_a_hole_whose_end_a_nearer_look_shows_is_not_taken_for_endless() -> None:
-    ground = Ground(LIMITS)
+    ground = GroundMap(LIMITS)
     for n, near_m in enumerate((0.59, 0.57, 0.55, 0.53)):
         ground.profile(looking(near_m, 0.49), Pose2D(0.6 - near_m, 0.0, 0.0), 0.05 * n)
     assert ground.points(Pose2D(), 2.0) == []
@@ -179,11 +179,11 @@ def test_straight_on_and_in_slow_bends_nothing_is_slowed(wanted: Twist) -> None:
 
 
 def test_a_robot_that_does_not_look_at_the_floor_is_not_slowed_in_a_bend() -> None:
-    assert crossing(Ground(LIMITS)).cross(Twist(1.0, 1.7), 0.0) == Twist(1.0, 1.7)
+    assert crossing(GroundMap(LIMITS)).cross(Twist(1.0, 1.7), 0.0) == Twist(1.0, 1.7)
 
 
 def test_a_gap_that_seemed_too_wide_askew_bars_nothing_once_it_is_seen_straight_on() -> None:
-    ground = Ground(LIMITS)
+    ground = GroundMap(LIMITS)
     for n in range(SEEN_MIN):
         ground.profile(looking(0.5, 0.12), Pose2D(), 0.05 * n)
     assert ground.points(Pose2D(), 2.0) != []

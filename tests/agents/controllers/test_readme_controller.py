@@ -7,7 +7,7 @@ from pathlib import Path
 from lfa.agents.config import DEFAULT
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.predecessor import Sighting
-from lfa.agents.formation.pose_history import Trace
+from lfa.agents.formation.pose_history import PoseHistory
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Limits
@@ -24,7 +24,7 @@ def test_the_readmes_controller_brings_a_follower_into_its_slot() -> None:
     controller = names["Carrot"](DEFAULT, Limits())  # type: ignore[operator]
     follower = Follower(DEFAULT, Limits(), controller)
     slot, ahead, twist = Slot(2, 1.2, 2.0 * pi / 3), Pose2D(), Twist(0.5, 0.1)
-    own, own_twist, trace = Pose2D(-0.7, 0.9, 0.1), STILL, Trace(4.0)
+    own, own_twist, trace = Pose2D(-0.7, 0.9, 0.1), STILL, PoseHistory(4.0)
     for _ in range(1500):
         own_twist = follower.step(Sighting(1, 0, ahead, twist, 0.0, 0.0, 0.0, trace), slot, own, own_twist, DT)
         own, ahead = along_arc(own, own_twist, DT), along_arc(ahead, twist, DT)

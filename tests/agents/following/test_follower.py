@@ -11,7 +11,7 @@ from lfa.agents.config import DEFAULT, SHARP, Gains
 from lfa.agents.following.controller import Law
 from lfa.agents.following.follower import Follower, State
 from lfa.agents.following.predecessor import Sighting
-from lfa.agents.formation.pose_history import Trace
+from lfa.agents.formation.pose_history import PoseHistory
 from lfa.deploy.bench.harness.chain import Chain, Setup, in_slots
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, distance
 from lfa.protocol.messages.team import Slot
@@ -140,7 +140,7 @@ def test_a_jump_of_the_slot_by_a_change_of_predecessor_is_blended_in_time() -> N
     """The target goes on from where it was: 0.94 m at 0.3 m/s."""
     follower = Follower(DEFAULT, LIMITS, Law(DEFAULT, LIMITS))
     ahead, own, twist = Pose2D(), Pose2D(-1.2, 0.0, 0.0), STILL
-    trace, moved_at, fastest, settled = Trace(4.0), 250, 0.0, 0.0
+    trace, moved_at, fastest, settled = PoseHistory(4.0), 250, 0.0, 0.0
     for n in range(800):
         robot = 1 if n < moved_at else 5
         if n == moved_at:
@@ -179,7 +179,7 @@ def test_an_outage_is_bridged_by_dead_reckoning_then_by_standing(
 
 def test_when_the_predecessor_falls_silent_the_follower_brakes_along_its_path_and_holds() -> None:
     follower = Follower(DEFAULT, LIMITS, Law(DEFAULT, LIMITS))
-    twist, trace = STILL, Trace(4.0)
+    twist, trace = STILL, PoseHistory(4.0)
     for n in range(200):
         ahead = along_arc(Pose2D(1.2, 0.0, 0.0), Twist(0.5, 0.0), n * DT)
         own = Pose2D(ahead.x - 1.2, 0.0, 0.0)
@@ -239,7 +239,7 @@ def test_a_robot_that_comes_back_at_an_angle_does_not_swing_past_its_slot() -> N
 
 def test_saturation_keeps_the_ratio_of_v_and_omega() -> None:
     follower = Follower(DEFAULT, Limits(a_max_mps2=1e6, alpha_max_radps2=1e6), _Wants(Twist(3.0, 3.0)))
-    sighting = Sighting(1, 0, Pose2D(3.0, 0.0, 0.0), Twist(0.5, 0.0), 0.0, 0.0, 0.0, Trace(4.0))
+    sighting = Sighting(1, 0, Pose2D(3.0, 0.0, 0.0), Twist(0.5, 0.0), 0.0, 0.0, 0.0, PoseHistory(4.0))
     twist = follower.step(sighting, COLUMN, Pose2D(), STILL, DT)
     assert (twist.linear_x, twist.angular_z) == pytest.approx((1.0, 1.0))
     follower = Follower(DEFAULT, Limits(a_max_mps2=1e6, alpha_max_radps2=1e6), _Wants(Twist(-0.6, 1.0)))

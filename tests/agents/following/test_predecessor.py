@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from lfa.agents.following.predecessor import Predecessor, Sighting
-from lfa.agents.formation.pose_history import SPACING_M, Trace, arc_length
+from lfa.agents.formation.pose_history import SPACING_M, PoseHistory, arc_length
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.messages.consensus import NO_TERM, Role
 from lfa.protocol.messages.header import Header
@@ -106,8 +106,8 @@ def test_a_teleport_starts_a_new_epoch_after_two_messages() -> None:
 # --- the trace ----------------------------------------------------------------------------------------------
 
 
-def _traced(twist: Twist, seconds: float) -> tuple[Trace, Pose2D]:
-    trace, pose = Trace(4.0), Pose2D()
+def _traced(twist: Twist, seconds: float) -> tuple[PoseHistory, Pose2D]:
+    trace, pose = PoseHistory(4.0), Pose2D()
     for n in range(int(seconds / DT) + 1):
         pose = along_arc(Pose2D(), twist, n * DT)
         trace.add(pose)

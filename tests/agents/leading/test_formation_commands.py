@@ -7,13 +7,13 @@ from math import pi
 import pytest
 
 from lfa.agents.formation.formation import Formation
-from lfa.agents.leading.formation_commands import FOLD_S, Orders
-from lfa.agents.leading.path_follower import Lead
+from lfa.agents.leading.formation_commands import FOLD_S, FormationCommands
+from lfa.agents.leading.path_follower import PathFollower
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.consensus import Term
 from lfa.protocol.messages.team import Event, FormationNote
 from lfa.protocol.mission import FormationSpec, Leading, Limits, Mission, Orientation
-from lfa.protocol.outbox import Voice
+from lfa.protocol.outbox import Outbox
 
 FOLLOWERS = (2, 3, 4)
 LEFT = 2.0 * pi / 3.0
@@ -24,14 +24,14 @@ def asked(known: tuple[tuple[float, float, float], ...], until_s: float) -> list
     orientations = (Orientation(0.4, "right"),)
     leading = Leading(route_m=((20.0, 0.0),), known_m=known, orientations=orientations)
     mission = Mission(robots=(1, *FOLLOWERS), leading=leading, formation=FormationSpec(1.2, pi / 3.0, "left"))
-    voice, lead = Voice("fleet", 1, 1), Lead(leading, Limits())
-    orders = Orders(voice, mission, Formation.of(mission))
+    outbox, lead = Outbox("fleet", 1, 1), PathFollower(leading, Limits())
+    orders = FormationCommands(outbox, mission, Formation.of(mission))
     orders.begin(0.0, 0.0)
     lead.track(Pose2D())
     lead.track(Pose2D(0.5))
     for n in range(round(until_s * 50)):
         orders.lead(lead, FOLLOWERS, Term(2, 1, 1), n / 50)
-    said = [envelope.message for envelope in voice.spoken()]
+    said = [envelope.message for envelope in outbox.drain()]
     new = [n for n, message in enumerate(said) if isinstance(message, Event) and message.kind == "formation"]
     return [tuple(slot.phi for slot in note.slots) for n in new if isinstance(note := said[n - 1], FormationNote)]
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lfa.agents.leading.known_obstacles import ROOM_M, past_known
-from lfa.agents.leading.path_follower import Lead, Route
+from lfa.agents.leading.path_follower import PathFollower, Route
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, wrap
 from lfa.protocol.mission import Leading, Limits, Mission
@@ -53,7 +53,7 @@ def test_a_route_begins_and_ends_where_it_should_bends_gently_and_stays_near(
 
 def test_a_leader_with_known_obstacles_drives_past_them() -> None:
     leading = Leading(route_m=((20.0, 0.0),), known_m=((10.0, 0.0, 0.25),))
-    lead = Lead(leading, Limits(), RADIUS_M)
+    lead = PathFollower(leading, Limits(), RADIUS_M)
     lead.begin(Pose2D())
     assert lead.route is not None
     assert min(hypot(x - 10.0, y) for x, y in lead.route.points) > 0.25 + RADIUS_M + 0.2

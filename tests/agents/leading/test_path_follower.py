@@ -5,7 +5,7 @@ from math import atan2, hypot, pi
 import pytest
 
 from lfa.agents.formation.formation import slots_of
-from lfa.agents.leading.path_follower import CORNER_RADIUS_M, Lead, Route
+from lfa.agents.leading.path_follower import CORNER_RADIUS_M, PathFollower, Route
 from lfa.agents.leading.timed_route import Timetable
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.mission import FormationSpec, Leading, Limits
@@ -16,7 +16,7 @@ CORNERED = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0))
 
 
 def driven(leading: Leading, start: Pose2D, slots: tuple = (), seconds: float = 80.0) -> list[tuple[Pose2D, Twist]]:
-    lead, pose, twist = Lead(leading, LIMITS), start, STILL
+    lead, pose, twist = PathFollower(leading, LIMITS), start, STILL
     lead.begin(pose)
     course = []
     for _ in range(round(seconds / DT)):
@@ -73,7 +73,7 @@ def test_in_a_bend_the_leader_slows_for_the_outermost_follower() -> None:
 
 
 def test_reactive_goes_for_the_goal_from_wherever_it_is() -> None:
-    lead, pose = Lead(Leading(motion="reactive", route_m=CORNERED), LIMITS), Pose2D(3.0, 2.0, 0.0)
+    lead, pose = PathFollower(Leading(motion="reactive", route_m=CORNERED), LIMITS), Pose2D(3.0, 2.0, 0.0)
     lead.begin(pose)
     assert lead.route is None
     x, y = lead.ahead(pose, 1.0)
@@ -89,7 +89,7 @@ TIMED = Leading(motion="trajectory", route_m=((0.0, 0.0), (2.0, 0.0), (8.0, 0.0)
 
 def timed(pause: tuple[float, float] = (99.0, 99.0)) -> dict[float, tuple[float, float]]:
     """Of each half second: how far the leader has come, and how far it should be; it is held up during `pause`."""
-    lead, table, pose, twist = Lead(TIMED, LIMITS), Timetable(TIMED), Pose2D(), STILL
+    lead, table, pose, twist = PathFollower(TIMED, LIMITS), Timetable(TIMED), Pose2D(), STILL
     lead.begin(pose)
     assert lead.route is not None
     table.begin(lead.route, lead.progress_m, 0.0)
@@ -118,7 +118,7 @@ def test_a_delay_on_a_trajectory_is_made_up_for() -> None:
 
 
 def test_a_new_leader_takes_the_trajectory_up_where_it_stands() -> None:
-    lead, table = Lead(TIMED, LIMITS), Timetable(TIMED)
+    lead, table = PathFollower(TIMED, LIMITS), Timetable(TIMED)
     lead.begin(Pose2D(2.0, 0.3, 0.0))
     assert lead.route is not None
     table.begin(lead.route, lead.progress_m, 500.0)

@@ -2,7 +2,7 @@
 
 from math import hypot
 
-from lfa.agents.recovery.back_up import OUT_M, Retreat
+from lfa.agents.recovery.back_up import OUT_M, BackUp
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
 DT = 0.02
@@ -10,9 +10,9 @@ AHEAD = Twist(0.4, 0.2)
 BESIDE = [(0.05 * n, side * 0.4) for n in range(-60, 30) for side in (-1.0, 1.0)]
 
 
-def driven_in() -> tuple[Retreat, Pose2D]:
+def driven_in() -> tuple[BackUp, Pose2D]:
     """A robot that came along a bend."""
-    retreat, pose = Retreat(), Pose2D()
+    retreat, pose = BackUp(), Pose2D()
     for _ in range(300):
         pose = along_arc(pose, AHEAD, DT)
         retreat.keep(pose)
@@ -43,7 +43,7 @@ def test_it_waits_while_somebody_stands_behind() -> None:
 
 
 def test_walls_beside_the_way_do_not_hold_it() -> None:
-    retreat = Retreat()
+    retreat = BackUp()
     for n in range(30):
         retreat.keep(Pose2D(0.1 * n, 0.0, 0.0))
     retreat.begin(Pose2D(2.9, 0.0, 0.0))

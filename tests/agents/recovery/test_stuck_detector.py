@@ -8,8 +8,8 @@ from lfa.agents.recovery.stuck_detector import (
     STILL_S,
     TURNS,
     WAITING_S,
-    Plight,
-    Stuck,
+    StuckConditions,
+    StuckMonitor,
 )
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 
@@ -17,7 +17,7 @@ AHEAD = Twist(0.4, 0.0)
 
 
 def watched(seconds: float, wanted: Twist = AHEAD, action: str | None = None, speed: float = 0.0) -> str | None:
-    stuck, reason = Stuck(), None
+    stuck, reason = StuckConditions(), None
     for n in range(round(seconds / 0.02)):
         reason = stuck.watch(Pose2D(speed * 0.02 * n, 0.0, 0.0), wanted, action, 0.0, 0.02 * n)
     return reason
@@ -35,7 +35,7 @@ def test_who_is_not_asked_to_move_is_not_stuck() -> None:
 
 def stood(seconds: float, *, leads: bool, speed_mps: float = 0.0) -> str | None:
     """The plight of one that wants next to nothing, and says no other reason."""
-    plight = Plight()
+    plight = StuckMonitor()
     for n in range(round(seconds / 0.02)):
         plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, "left", 0.0, 0.02 * n, leads=leads)
     return plight.reason
@@ -58,7 +58,7 @@ def test_S2_blocked_on_all_sides() -> None:
 
 
 def test_S3_turned_round_again_and_again() -> None:
-    stuck, reason = Stuck(), None
+    stuck, reason = StuckConditions(), None
     for n in range(TURNS):
         stuck.watch(Pose2D(), STILL, "left", 0.0, 2.0 * n)
         reason = stuck.watch(Pose2D(), STILL, "u_turn", 0.0, 2.0 * n + 1.0)
@@ -66,7 +66,7 @@ def test_S3_turned_round_again_and_again() -> None:
 
 
 def test_S3_in_the_same_place_again_and_again() -> None:
-    stuck, reason = Stuck(), None
+    stuck, reason = StuckConditions(), None
     for n in range(CELL_ENTRIES):
         reason = stuck.watch(Pose2D(0.1, 0.1, 0.0), AHEAD, None, 0.0, 4.0 * n)
         if n < CELL_ENTRIES - 1:
@@ -76,7 +76,7 @@ def test_S3_in_the_same_place_again_and_again() -> None:
 
 
 def test_noise_on_a_cells_border_is_no_coming_back() -> None:
-    stuck = Stuck()
+    stuck = StuckConditions()
     for n in range(500):
         x = 0.5 + (0.004 if n % 2 else -0.004) + 0.0002 * n
         assert stuck.watch(Pose2D(x, 0.1, 0.0), STILL, None, 0.0, 0.02 * n) is None
@@ -87,19 +87,19 @@ def test_S4_waited_too_long_for_what_moves() -> None:
 
 
 def test_S5_own_pose_lost() -> None:
-    assert str(Stuck().watch(Pose2D(), STILL, None, 2.0, 0.0)).startswith("S5")
+    assert str(StuckConditions().watch(Pose2D(), STILL, None, 2.0, 0.0)).startswith("S5")
 
 
 def test_a_reset_forgets() -> None:
-    stuck = Stuck()
+    stuck = StuckConditions()
     for n in range(200):
         stuck.watch(Pose2D(), AHEAD, None, 0.0, 0.02 * n)
     stuck.reset()
     assert stuck.watch(Pose2D(), AHEAD, None, 0.0, 4.02) is None
 
 
-def in_a_plight() -> Plight:
-    plight = Plight()
+def in_a_plight() -> StuckMonitor:
+    plight = StuckMonitor()
     for n in range(150):
         plight.watch(Pose2D(), STILL, "blocked", 0.0, 0.02 * n, leads=False)
     assert plight.reason is not None

@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from lfa.deploy.analysis.tracking_errors import RECOVERY_S_MAX, Errors, Mask, of_follower
-from lfa.deploy.recording.mcap_reader import Array, Trace
+from lfa.deploy.analysis.tracking_errors import RECOVERY_S_MAX, Mask, TrackingErrors, of_follower
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 
 K, PHI = 1.2, 2.0 * pi / 3.0
 T = np.arange(0.0, 20.0, 0.02)
@@ -34,8 +34,8 @@ def _tracking(
     return np.column_stack([*columns, np.broadcast_to(avoiding, t.shape)])
 
 
-def _errors(leader: Array, follower: Array, tracking: Array) -> Errors:
-    found = of_follower(Trace({1: leader, 2: follower}, {2: tracking}, {}, {}), 2)
+def _errors(leader: Array, follower: Array, tracking: Array) -> TrackingErrors:
+    found = of_follower(RecordedRun({1: leader, 2: follower}, {2: tracking}, {}, {}), 2)
     assert found is not None
     return found
 

@@ -20,7 +20,7 @@ def test_every_shipped_scenario_is_a_case() -> None:
 
 
 @pytest.mark.parametrize("ground", motion.GROUNDS, ids=lambda ground: ground.name)
-def test_a_pair_is_far_apart_and_has_room_for_the_team(ground: motion.Ground) -> None:
+def test_a_pair_is_far_apart_and_has_room_for_the_team(ground: motion.BenchMap) -> None:
     path = motion.map_of(ground)
     if path is None:
         pytest.skip(f"no shared/data/maps/{ground.name}.yaml beside the checkout or above it")
@@ -36,7 +36,7 @@ def test_a_pair_is_far_apart_and_has_room_for_the_team(ground: motion.Ground) ->
 def test_a_map_that_is_not_there_is_left_out_and_said_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(motion, "GROUNDS", (motion.Ground("nowhere"),))
+    monkeypatch.setattr(motion, "GROUNDS", (motion.BenchMap("nowhere"),))
     with pytest.raises(Refused):
         motion.run(as_json=False, rows="unknown/nowhere*")
     assert "unknown/nowhere is left out" in capsys.readouterr().err

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from lfa.deploy.client.team_status import Board, Row
+from lfa.deploy.client.team_status import Board, RobotStatus
 from lfa.deploy.view.terminal.topic import expressions
 from lfa.deploy.view.terminal.watch import _table
 from lfa.protocol.errors import Refused
@@ -38,7 +38,7 @@ def _board(*said: tuple[float, Message]) -> Board:
     return board
 
 
-def _row(board: Board, robot: int, now: float) -> Row:
+def _row(board: Board, robot: int, now: float) -> RobotStatus:
     return next(row for row in board.rows(now) if row.robot == robot)
 
 
@@ -99,7 +99,9 @@ def test_a_topic_that_is_none_is_refused(wrong: str) -> None:
 
 
 def test_the_table_keeps_every_number_whole_on_80_columns() -> None:
-    row = Row(10, "follower", 1795717143586, 9, -1.7159, -3.1, -0.25, 12.345, "follow, avoids", 1200.0, 100.0, 135.0)
+    row = RobotStatus(
+        10, "follower", 1795717143586, 9, -1.7159, -3.1, -0.25, 12.345, "follow, avoids", 1200.0, 100.0, 135.0
+    )
     console = Console(width=80, file=StringIO(), record=True)
     console.print(_table([row], None))
     _, line = console.export_text().splitlines()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfa.deploy.faults.link_faults import links
-from lfa.deploy.faults.script import Fault, Schedule, parse, parse_all
+from lfa.deploy.faults.script import Fault, FaultSchedule, parse, parse_all
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Mission
 
@@ -60,27 +60,27 @@ def test_a_scenarios_fault_is_refused_as_the_scenarios() -> None:
 
 
 def test_faults_come_in_the_order_of_their_times() -> None:
-    schedule = Schedule(parse_all(MISSION, ["kill 3 at 9 s"], ["kill 2 at 4 s"]))
+    schedule = FaultSchedule(parse_all(MISSION, ["kill 3 at 9 s"], ["kill 2 at 4 s"]))
     assert schedule.due(3.9, None) == []
     assert schedule.due(10.0, None) == [("kill", 2), ("kill", 3)]
     assert schedule.pending == []
 
 
 def test_a_fault_on_the_leader_waits_for_one() -> None:
-    schedule = Schedule([parse("kill leader at 1 s", MISSION)])
+    schedule = FaultSchedule([parse("kill leader at 1 s", MISSION)])
     assert schedule.due(2.0, None) == []
     assert schedule.due(2.5, 4) == [("kill", 4)]
 
 
 def test_who_is_stopped_for_a_while_is_woken_even_if_another_leads_by_then() -> None:
-    schedule = Schedule([parse("stop leader at 1 s for 2 s", MISSION)])
+    schedule = FaultSchedule([parse("stop leader at 1 s for 2 s", MISSION)])
     assert schedule.due(1.0, 1) == [("stop", 1)]
     assert schedule.due(2.9, 2) == []
     assert schedule.due(3.0, 2) == [("continue", 1)]
 
 
 def test_a_cut_for_a_while_heals_only_itself() -> None:
-    schedule = Schedule([parse("cut leader at 1 s for 2 s", MISSION), parse("loss 0.1 at 1 s for 1 s", MISSION)])
+    schedule = FaultSchedule([parse("cut leader at 1 s for 2 s", MISSION), parse("loss 0.1 at 1 s for 1 s", MISSION)])
     assert schedule.due(1.0, 1) == [("cut", 1), ("loss", "0.1")]
     assert schedule.due(3.0, 2) == [("loss", ""), ("heal", 1)]
 

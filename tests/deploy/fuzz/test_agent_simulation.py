@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from lfa.deploy.fuzz.command import shrink
 from lfa.deploy.fuzz.fault_injector import play_whole
-from lfa.deploy.fuzz.schedules import KINDS, LEADER, Fault, draw
+from lfa.deploy.fuzz.schedules import KINDS, LEADER, ScheduledFault, draw
 from lfa.protocol.lease.gateway import Gateway
 
 SEEDS = (2, 3, 4, 7, 8, 14, 15, 18, 19)
@@ -39,8 +39,8 @@ def test_one_seed_is_one_run_under_any_hash_seed() -> None:
 
 @pytest.mark.usefixtures("forgetful_voter")
 def test_a_voter_that_forgets_its_bond_is_found_and_few_faults_are_enough() -> None:
-    loss, duplicate = Fault(1.2, "loss", (), 0.2, 0.1), Fault(2.5, "duplicate", (), 0.2, 0.2)
-    deaf = Fault(1.5, "cut_pair", (LEADER, 2), 1.0)  # robot 2 hears the leader no more, everybody else does
+    loss, duplicate = ScheduledFault(1.2, "loss", (), 0.2, 0.1), ScheduledFault(2.5, "duplicate", (), 0.2, 0.2)
+    deaf = ScheduledFault(1.5, "cut_pair", (LEADER, 2), 1.0)  # robot 2 hears the leader no more, everybody else does
     bad = replace(draw(3), faults=(loss, deaf, duplicate))
     name = play_whole(bad).violations[0].name
     small = shrink(bad, name, play_whole)

@@ -11,7 +11,7 @@ import pytest
 from lfa.deploy.analysis.verification.safety import OneBond
 from lfa.deploy.fuzz.command import Tally, parse_seeds, shrink, so_far
 from lfa.deploy.fuzz.fault_injector import play
-from lfa.deploy.fuzz.schedules import Fault, draw, without
+from lfa.deploy.fuzz.schedules import ScheduledFault, draw, without
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.membership import first_config
 from lfa.protocol.lease.timing import timing_of
@@ -75,7 +75,7 @@ def test_a_long_hunt_says_how_it_stands() -> None:
 def test_faults_can_be_left_out_one_by_one() -> None:
     schedule = draw(3)
     assert len(without(schedule, 0, 2).faults) == len(schedule.faults) - 2
-    assert all(isinstance(fault, Fault) for fault in schedule.faults)
+    assert all(isinstance(fault, ScheduledFault) for fault in schedule.faults)
 
 
 @pytest.mark.parametrize(("text", "seeds"), [("3", range(3)), ("5000..5002", range(5000, 5003))])

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from msgspec import structs
 
-from lfa.deploy.fuzz.agent_simulation import Whole
-from lfa.deploy.fuzz.network import Weather
+from lfa.deploy.fuzz.agent_simulation import AgentSimulation
+from lfa.deploy.fuzz.network import LinkConditions
 from lfa.deploy.fuzz.schedules import draw
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S
 from lfa.protocol.messages.codec import Message
@@ -29,9 +29,9 @@ class Cut:
     """A team of four, of which `side` is cut off from the rest and the witness; what became of it."""
 
     def __init__(self, side: Sequence[int]) -> None:
-        calm = Weather(delay_max=HEARD_S)
+        calm = LinkConditions(delay_max=HEARD_S)
         schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), weather=calm)
-        self.team = Whole(schedule).start_all()
+        self.team = AgentSimulation(schedule).start_all()
         self.timing = self.team.timing
         self.limits = self.team.mission.limits
         self.course: dict[int, list[tuple[float, float, float]]] = {}

@@ -16,7 +16,7 @@ from mcap.writer import Writer
 from lfa.deploy.analysis import summary
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.analysis.verification import playback
-from lfa.deploy.client.session import Fleet, listen
+from lfa.deploy.client.session import FleetAddress, listen
 from lfa.deploy.recording import mcap_reader
 from lfa.deploy.run.simulate import run
 from lfa.deploy.view.report import command as report
@@ -82,7 +82,10 @@ def test_a_refused_recording_leaves_nothing_half_converted(copied: Path) -> None
 def test_nothing_is_said_to_more_than_one_fleet(name: str, copied: Path) -> None:
     with pytest.raises(Refused, match="--fleet"):
         playback.play(copied, 1.0, name, None)
-    with pytest.raises(Refused, match="--fleet"), listen(Fleet(name, "tcp/127.0.0.1:1", ()), frozenset({"*/pose"})):
+    with (
+        pytest.raises(Refused, match="--fleet"),
+        listen(FleetAddress(name, "tcp/127.0.0.1:1", ()), frozenset({"*/pose"})),
+    ):
         pass
 
 

@@ -14,7 +14,7 @@ import lfa.protocol.lease.reconfiguration
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.candidate import Candidate
 from lfa.protocol.lease.election import Election
-from lfa.protocol.lease.failure_detector import Peers
+from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.lease import Lease
 from lfa.protocol.messages.consensus import Config, Member, Propose, Term
@@ -108,18 +108,24 @@ def hand_over_writes_a_config(patch: pytest.MonkeyPatch) -> None:
 
     def hand_over(self: Lease, holder: Holder, now: float, effects: list[Any]) -> None:
         honest(self, holder, now, effects)
-        gift = self._stopping.gift
-        if gift is not None:
+        transfer_proposal = self._pending_release.transfer_proposal
+        if transfer_proposal is not None:
             written = lfa.protocol.lease.membership.led_by(
-                self.config, gift.holder, gift.term, lambda m: False, keep_leader=True
+                self.config, transfer_proposal.holder, transfer_proposal.term, lambda m: False, keep_leader=True
             )
-            self._stopping.gift = Propose(gift.term, written, gift.round, gift.holder, nonce=gift.nonce)
+            self._pending_release.transfer_proposal = Propose(
+                transfer_proposal.term,
+                written,
+                transfer_proposal.round,
+                transfer_proposal.holder,
+                nonce=transfer_proposal.nonce,
+            )
 
     patch.setattr(Lease, "_hand_over", hand_over)
 
 
 def full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
-    honest = lfa.protocol.lease.membership.of_full_house
+    honest = lfa.protocol.lease.membership.unanimous_config
 
     def of_full_house(*arguments: Any) -> Config:
         config = honest(*arguments)
@@ -164,4 +170,4 @@ def forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
 
 
 def ended_lives_may_still_grant(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Peers, "has_ended", lambda self, member: False)
+    patch.setattr(FailureDetector, "has_ended", lambda self, member: False)

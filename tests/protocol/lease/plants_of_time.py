@@ -10,14 +10,14 @@ from msgspec import structs
 
 import lfa.protocol.lease.holder
 from lfa.deploy.fuzz import schedules
-from lfa.deploy.fuzz.lease_simulation import Arena
-from lfa.deploy.fuzz.network import Clock
+from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
+from lfa.deploy.fuzz.network import SimulatedClock
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.effects import StepDown
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.lease import Lease
-from lfa.protocol.lease.step_down import Stopping
+from lfa.protocol.lease.step_down import PendingRelease
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
 from tests.protocol.lease import test_usual_bugs
@@ -48,7 +48,7 @@ def bond_ignored(patch: pytest.MonkeyPatch) -> None:
 
 
 def release_before_the_stop_is_confirmed(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Stopping, "at_rest_at", float("-inf"))
+    patch.setattr(PendingRelease, "at_rest_at", float("-inf"))
 
 
 def released_term_granted_again(patch: pytest.MonkeyPatch) -> None:
@@ -98,16 +98,16 @@ def fence_without_effect(patch: pytest.MonkeyPatch) -> None:
 
 
 def wall_clock_in_lease_arithmetic(patch: pytest.MonkeyPatch) -> None:
-    honest = Arena.step_wall
+    honest = LeaseSimulation.step_wall
 
-    def step_wall(self: Arena, robot_id: int, by_s: float) -> None:
+    def step_wall(self: LeaseSimulation, robot_id: int, by_s: float) -> None:
         honest(self, robot_id, by_s)
         process = self.processes[robot_id]
-        process.clock = Clock(process.clock.offset + by_s, process.clock.rate)
+        process.clock = SimulatedClock(process.clock.offset + by_s, process.clock.rate)
         process.wakes_at = self.now
         self.at(self.now, self._wake, process)
 
-    patch.setattr(Arena, "step_wall", step_wall)
+    patch.setattr(LeaseSimulation, "step_wall", step_wall)
 
 
 def lease_end_not_told(patch: pytest.MonkeyPatch) -> None:
@@ -141,7 +141,7 @@ def deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
         if self._holder is None:
             return honest(self, again_at)
         asking = self._holder.next_round_at if self._candidate is None else self._candidate.deadline
-        return min(self._hello_at, self._stopping.release_at, asking)
+        return min(self._hello_at, self._pending_release.release_at, asking)
 
     patch.setattr(Lease, "next_deadline", next_deadline)
     patch.setattr(Lease, "_expire", lambda self, now, effects: None)
@@ -208,12 +208,12 @@ def rounds_that_restart(patch: pytest.MonkeyPatch) -> None:
 
 def stamp_read_after_the_check(patch: pytest.MonkeyPatch) -> None:
     """What a pause holds back gets a fresh stamp before it leaves."""
-    honest = Arena.resume
+    honest = LeaseSimulation.resume
 
-    def resume(self: Arena, robot_id: int, shuffled: bool = False) -> None:
+    def resume(self: LeaseSimulation, robot_id: int, shuffled: bool = False) -> None:
         process, stamp = self.processes[robot_id], self.stamp(robot_id)
         if process.paused and process.drawn is not None and stamp is not None:
             process.drawn = structs.replace(process.drawn, gateway=stamp)
         honest(self, robot_id, shuffled)
 
-    patch.setattr(Arena, "resume", resume)
+    patch.setattr(LeaseSimulation, "resume", resume)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lfa.deploy.fuzz.lease_simulation import Arena
+from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.protocol.lease.effects import BecomeLeader
 from lfa.protocol.lease.election import COLD_START_S
 from lfa.protocol.lease.lease import Lease
@@ -14,7 +14,7 @@ from tests.rigs.lease_scenes import STD, Team, sent
 
 
 def test_e5_whatever_the_order_of_starting_the_head_of_the_chain_leads_first() -> None:
-    team = Arena(4, seed=3)
+    team = LeaseSimulation(4, seed=3)
     for robot_id in team.mission.robots:
         team.start_gateway(robot_id, -1.0)
     for at, robot_id in ((0.0, 4), (0.3, 2), (0.9, 0), (1.4, 3), (2.0, 1)):
@@ -25,7 +25,7 @@ def test_e5_whatever_the_order_of_starting_the_head_of_the_chain_leads_first() -
 
 
 def test_e18_a_fleet_that_nobody_remembers_waits_for_everybody() -> None:
-    team = Arena(4, seed=3)
+    team = LeaseSimulation(4, seed=3)
     for robot_id in team.mission.robots:
         team.start_gateway(robot_id, -1.0)
     for robot_id in (0, 2, 3, 4):
@@ -41,7 +41,7 @@ def test_e18_a_fleet_that_nobody_remembers_waits_for_everybody() -> None:
 
 def test_e18_a_life_that_promised_and_was_replaced_makes_no_full_house() -> None:
     """It cannot accept the fresh config: counted in, it would hold everybody for T_act (seed 16062)."""
-    team = Arena(4, seed=3)
+    team = LeaseSimulation(4, seed=3)
     team.step_wall(1, 3600.0)  # terms of 1 are above all that a later life of 2 starts with, and refuses
     for robot_id in team.mission.robots:
         team.start_gateway(robot_id, -1.0)
@@ -108,7 +108,7 @@ def test_bug_10_an_isolated_follower_that_returns_deposes_nobody() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_bug_12_sixteen_that_start_at_once_agree_on_one_leader(seed: int) -> None:
-    team = Arena(16, seed=seed)
+    team = LeaseSimulation(16, seed=seed)
     team.start_all().run(STD.grant_s + 4 * STD.rank_step_s * 16)
     assert team.leaders() == [1]
 
@@ -165,9 +165,9 @@ def test_followers_that_leave_stay_out_of_the_election() -> None:
 MAJORITY = Mission(robots=(1, 2, 3, 4), cold_start="majority", leading=Leading(route_m=((1.0, 0.0),)))
 
 
-def started(*ids: int, mission: Mission) -> Arena:
+def started(*ids: int, mission: Mission) -> LeaseSimulation:
     """Only these processes, for six seconds."""
-    arena = Arena(4, mission=mission)
+    arena = LeaseSimulation(4, mission=mission)
     for robot_id in ids:
         arena.start(robot_id)
     arena.run(6.0)

@@ -1,4 +1,4 @@
-"""A leader's successor within milliseconds: after its death by a fence, from its own hand by a gift."""
+"""A leader's successor within milliseconds: after its death by a fence, from its own hand by a transfer_proposal."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ import pytest
 
 from lfa.deploy.analysis.verification.liveness import Steady
 from lfa.deploy.fuzz.fault_injector import play
-from lfa.deploy.fuzz.lease_simulation import Arena
-from lfa.deploy.fuzz.network import Weather
+from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
+from lfa.deploy.fuzz.network import LinkConditions
 from lfa.deploy.fuzz.schedules import Schedule
 from lfa.protocol.lease.effects import BecomeLeader, LeaseExtended, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, Member, Propose, Role, Term, Version
@@ -100,7 +100,7 @@ def test_e4_the_release_waits_for_the_own_gateway() -> None:
 def test_l5_a_pair_without_witness_keeps_its_leader_at_a_fifth_of_all_messages_lost() -> None:
     """Each round needs both of two messages: sent once a heartbeat only, a third of such leaders fell within 8 s."""
     for seed in range(10):
-        schedule = Schedule(seed, 2, False, "std", False, {}, (), Weather(delay_max=0.005, loss=0.2), False)
+        schedule = Schedule(seed, 2, False, "std", False, {}, (), LinkConditions(delay_max=0.005, loss=0.2), False)
         assert play(schedule).violations == [], f"of draw {seed}"
 
 
@@ -155,7 +155,7 @@ def test_l5_bug_15_loss_changes_neither_holder_nor_chain(loss: float) -> None:
 
 
 def test_l5_in_ten_minutes_at_20_percent_loss_the_holder_never_changes() -> None:
-    team = Arena(4, seed=5)
+    team = LeaseSimulation(4, seed=5)
     steady = Steady(team.timing)
     team.start_all().run(1.0)
     team.listen([steady])

@@ -117,9 +117,9 @@ def test_e16_a_hand_over_leaves_the_config_as_it_is_version_included() -> None:
     said = overheard(team, 1, Propose)
     team.hand_over(1)
     team.run(1.01)
-    gift = next(body for _, body in said if body.nonce is not None)
-    assert gift.config == before
-    assert gift.config.version.term < gift.term
+    transfer_proposal = next(body for _, body in said if body.nonce is not None)
+    assert transfer_proposal.config == before
+    assert transfer_proposal.config.version.term < transfer_proposal.term
 
 
 def test_e18_a_config_of_a_full_house_is_joint_with_all_of_it() -> None:
@@ -188,7 +188,7 @@ def test_e3_a_fence_of_a_later_term_frees_nobody_bound_to_an_earlier_one() -> No
 def test_rounds_of_a_term_go_on_where_its_issuer_stopped() -> None:
     """A round that was used twice would count old grants for a new question."""
     holder = Holder(A, Term(7, 2, 8), STD, 10.0)
-    holder.given(0, 9.9)
+    holder.transferred(0, 9.9)
     assert [holder.next_propose(config_of(LOW), 10.0).round, holder.next_propose(config_of(LOW), 10.1).round] == [1, 2]
 
 

@@ -7,7 +7,7 @@ import pytest
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.witness import Witness
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
-from lfa.protocol.runtime.node_runner import _Seat
+from lfa.protocol.runtime.node_runner import _NodeRunner
 from lfa.protocol.transport.bus import Inbox
 
 HEADING = Heading(JOURNAL_VERSION, "robot2", 17, 3, {"fleet": "f"})
@@ -88,7 +88,7 @@ class Witnessing:
 def test_what_is_said_was_journalled_before(tmp_path: Path) -> None:
     """Whoever is killed with a message on the wire has left the record that explains it (a PROPOSE its promises)."""
     bus = Witnessing(tmp_path / "witness-1.bin")
-    seat = _Seat(
+    seat = _NodeRunner(
         Witness("f", 1, 1), bus, Inbox(), Journal(tmp_path, Heading(JOURNAL_VERSION, "witness", 1, 1, {})), None
     )
     seat.step(0.5)

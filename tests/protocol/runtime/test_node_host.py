@@ -15,14 +15,14 @@ from lfa.protocol.messages.team import Ask, MissionNote, PoseStamped
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.node import Stop
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
-from lfa.protocol.runtime.node_host import Host
+from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, TOPICS, key
 
 MISSION = Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0))))
 
 
-def host_of(folder: Path | None = None) -> Host:
-    return Host(Witness("f", 1, 1), Journal(folder, Heading(JOURNAL_VERSION, "witness", 1, 1, {})))
+def host_of(folder: Path | None = None) -> NodeHost:
+    return NodeHost(Witness("f", 1, 1), Journal(folder, Heading(JOURNAL_VERSION, "witness", 1, 1, {})))
 
 
 @given(st.sampled_from([topic.name for topic in TOPICS]), st.binary(max_size=200))

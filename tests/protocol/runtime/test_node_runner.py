@@ -4,7 +4,7 @@ from pathlib import Path
 
 from lfa.protocol.lease.witness import Witness
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
-from lfa.protocol.runtime.node_runner import _Seat
+from lfa.protocol.runtime.node_runner import _NodeRunner
 from lfa.protocol.topics import address
 from lfa.protocol.transport.bus import Inbox
 
@@ -29,6 +29,6 @@ def test_who_asks_for_the_mission_listens_first(tmp_path: Path) -> None:
     later."""
     bus = Order()
     journal = Journal(tmp_path, Heading(JOURNAL_VERSION, "witness", 1, 1, {}))
-    _Seat(Witness("f", 1, 1), bus, Inbox(), journal, None).step(0.5)
+    _NodeRunner(Witness("f", 1, 1), bus, Inbox(), journal, None).step(0.5)
     assert bus.told[0] == "follow"
     assert "lfa/f/*/mission" in bus.told[: bus.told.index("ask")]

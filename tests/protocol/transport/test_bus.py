@@ -44,12 +44,12 @@ def test_who_looks_in_often_is_not_woken_by_hello() -> None:
 
 def test_a_leader_at_ease_is_not_woken_by_grants() -> None:
     note = encode(LeaseNote(Header("robot2", 1, 1, 0.0), Grant(Term(1, 1, 1), 7, Version(), 0.5)))
-    for at_ease in (True, False):
+    for defer_grants in (True, False):
         wake = Wake()
         inbox = Inbox(wake, patient=True)
-        inbox.at_ease = at_ease
+        inbox.defer_grants = defer_grants
         inbox.put(Arrival(0.0, "lfa/f/robot2/lease/robot1", note))
-        assert wake.wait(0.0) != at_ease
+        assert wake.wait(0.0) != defer_grants
         assert len(inbox.take()) == 1
 
 
@@ -101,32 +101,32 @@ def test_a_routers_death_is_not_everyones_death() -> None:
     """In the order and at the distances that a killed router was measured to make them."""
     tokens = Tokens()
     gone = [token(1.0 + n * 2e-5, PeerDown(f"robot{n}", 3)) for n in (1, 2, 3)]
-    assert tokens.sift(gone, 1.0001) == []
+    assert tokens.debounce(gone, 1.0001) == []
     assert tokens.next_due() == gone[0].at + TOKEN_HOLD_S
-    assert told(tokens.sift([Arrival(1.0002, "", RouterLost())], 1.01)) == [RouterLost()]
-    assert tokens.sift([token(1.02, PeerDown("robot4", 3))], 1.1) == [], "cut off: this says nothing about robot 4"
+    assert told(tokens.debounce([Arrival(1.0002, "", RouterLost())], 1.01)) == [RouterLost()]
+    assert tokens.debounce([token(1.02, PeerDown("robot4", 3))], 1.1) == [], "cut off: this says nothing about robot 4"
     assert tokens.next_due() == float("inf")
 
 
 def test_a_token_that_vanished_is_believed_after_a_millisecond() -> None:
     tokens = Tokens()
-    assert tokens.sift([token(1.0, PeerDown("robot1", 3))], 1.0) == []
-    assert told(tokens.sift([arrival(1.0005, "lease")], 1.0006)) == [b""]
-    assert told(tokens.sift([arrival(1.002, "lease")], 1.002)) == [PeerDown("robot1", 3), b""]
+    assert tokens.debounce([token(1.0, PeerDown("robot1", 3))], 1.0) == []
+    assert told(tokens.debounce([arrival(1.0005, "lease")], 1.0006)) == [b""]
+    assert told(tokens.debounce([arrival(1.002, "lease")], 1.002)) == [PeerDown("robot1", 3), b""]
 
 
 def test_a_token_that_comes_back_at_once_never_vanished() -> None:
     tokens = Tokens()
     back = PeerUp("robot1", 3)
-    assert told(tokens.sift([token(1.0, PeerDown("robot1", 3)), token(1.0002, back)], 1.1)) == [back]
+    assert told(tokens.debounce([token(1.0, PeerDown("robot1", 3)), token(1.0002, back)], 1.1)) == [back]
 
 
 def test_after_the_link_is_back_a_vanished_token_is_a_hint_again() -> None:
     tokens = Tokens()
-    tokens.sift([Arrival(1.0, "", RouterLost())], 1.0)
-    tokens.sift([token(2.0, PeerUp("robot1", 3))], 2.0)
-    tokens.sift([token(3.0, PeerDown("robot1", 3))], 3.0)
-    assert told(tokens.sift([], 3.1)) == [PeerDown("robot1", 3)]
+    tokens.debounce([Arrival(1.0, "", RouterLost())], 1.0)
+    tokens.debounce([token(2.0, PeerUp("robot1", 3))], 2.0)
+    tokens.debounce([token(3.0, PeerDown("robot1", 3))], 3.0)
+    assert told(tokens.debounce([], 3.1)) == [PeerDown("robot1", 3)]
 
 
 def test_a_signal_at_any_moment_of_the_wait_wakes_the_loop() -> None:

@@ -5,11 +5,11 @@ from random import Random
 import pytest
 
 from lfa.protocol.transport.bus import Arrival
-from lfa.protocol.transport.link_model import Air, Radio, Reception, link_of
+from lfa.protocol.transport.link_model import LinkModel, Radio, Reception, link_of
 
 
 def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:
-    air = Air(radio, Random(seed))
+    air = LinkModel(radio, Random(seed))
     return [air.delays("robot1", "robot2") for _ in range(count)]
 
 
@@ -68,7 +68,7 @@ def test_a_robot_and_its_own_hardware_do_not_speak_through_the_air(
 
 
 def test_a_cut_is_of_one_direction_and_healing_ends_it() -> None:
-    air = Air(Radio(), Random(1))
+    air = LinkModel(Radio(), Random(1))
     assert air.obey({"cut": [["robot1", "witness"]]})
     assert air.obey({"cut": [["robot2", "robot3"]]})
     assert air.delays("robot1", "world") == []
@@ -82,7 +82,7 @@ def test_a_cut_is_of_one_direction_and_healing_ends_it() -> None:
     "order", [{"cut": [["robot1"]]}, {"radio": {"lost": 0.2}}, {"radio": {"loss": "much"}}, {"x": 1}]
 )
 def test_an_order_that_is_none_changes_nothing(order: dict[str, object]) -> None:
-    air = Air(Radio(), Random(1))
+    air = LinkModel(Radio(), Random(1))
     assert not air.obey(order)
     assert (air.radio, air.cuts) == (Radio(), frozenset())
 

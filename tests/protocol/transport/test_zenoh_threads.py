@@ -17,7 +17,8 @@ def _router() -> Iterator[str]:
     with tempfile.TemporaryDirectory(prefix="lfa-", dir="/tmp") as folder:
         endpoint = f"unixsock-stream/{Path(folder) / 'router.sock'}"
         router = subprocess.Popen(
-            [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.router", "--listen", endpoint], stdout=subprocess.DEVNULL
+            [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.router", "--listen", endpoint],
+            stdout=subprocess.DEVNULL,
         )
         try:
             yield endpoint

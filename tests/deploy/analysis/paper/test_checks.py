@@ -20,9 +20,9 @@ from lfa.deploy.analysis.paper.checks import PROPERTIES, of_run
 from lfa.deploy.analysis.paper.criteria import Bar, Measured
 from lfa.deploy.analysis.paper.experiment import Subject, duration_s
 from lfa.deploy.analysis.run_data import Run
-from lfa.deploy.analysis.tracking_errors import Errors
+from lfa.deploy.analysis.tracking_errors import TrackingErrors
 from lfa.deploy.analysis.verification.command import command
-from lfa.deploy.run.load import choose_again
+from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.simulate import run
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import load
@@ -55,7 +55,7 @@ def test_what_stays_under_the_bar_is_no_spike_and_a_swing_through_zero_is_one() 
 class Seen:
     """A run in which robot 2 followed nobody that did anything."""
 
-    errors: ClassVar[dict[int, Errors]] = {}
+    errors: ClassVar[dict[int, TrackingErrors]] = {}
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_what_the_robots_met_is_where_it_stands(second_path: Path) -> None:
 
 
 def test_iteration_2_with_known_obstacles_is_shorter_and_takes_less_time(second_path: Path, tmp_path: Path) -> None:
-    chosen, seed = choose_again("paper_path2", (), None, None, second_path)
+    chosen, seed = rebuild_scenario("paper_path2", (), None, None, second_path)
     assert seed == 1
     again = run(chosen, seed, tmp_path / "again").folder
     first, second = across_seeds.keep(Run(second_path)), across_seeds.keep(Run(again))
@@ -149,15 +149,15 @@ def test_iteration_2_with_known_obstacles_is_shorter_and_takes_less_time(second_
 
 def test_a_map_from_what_is_no_run_or_for_another_motion_is_refused(second_path: Path, tmp_path: Path) -> None:
     with pytest.raises(Refused, match="no run folder"):
-        choose_again("paper_path2", (), None, None, tmp_path)
+        rebuild_scenario("paper_path2", (), None, None, tmp_path)
     with pytest.raises(Refused, match=r"known_m .* left out without motion"):
-        choose_again("paper_path2", ["mission.leading.motion='point_to_point'"], None, None, second_path)
+        rebuild_scenario("paper_path2", ["mission.leading.motion='point_to_point'"], None, None, second_path)
 
 
 def test_a_map_from_another_scenarios_run_is_refused(second_path: Path) -> None:
     with pytest.raises(Refused, match=r"--map-from .*: a run of paper_path2, must be one of paper_path1"):
-        choose_again("paper_path1", (), None, None, second_path)
-    assert choose_again(str(second_path / "scenario.toml"), (), None, None, second_path)[1] == 1
+        rebuild_scenario("paper_path1", (), None, None, second_path)
+    assert rebuild_scenario(str(second_path / "scenario.toml"), (), None, None, second_path)[1] == 1
 
 
 def test_with_obstacle_avoidance_switched_off_the_verdict_is_1(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lfa.deploy.fleet.host.restart_policy import ROUTER, Lives
+from lfa.deploy.fleet.host.restart_policy import ROUTER, RestartBackoff
 from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
 
 
@@ -23,24 +23,24 @@ from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
     ],
 )
 def test_the_policy_says_which_ends_are_for_good(policy: Policy, code: int, word: str) -> None:
-    verdict = Lives(Restart(policy)).ended(code, 100.0)
+    verdict = RestartBackoff(Restart(policy)).ended(code, 100.0)
     assert verdict.word == word
     assert (verdict.at is not None) == (word == "waiting")
 
 
 def test_the_delay_doubles_up_to_its_bound() -> None:
-    lives = Lives(Restart(delay_s=0.5, delay_max_s=3.0, starts_max=10))
+    lives = RestartBackoff(Restart(delay_s=0.5, delay_max_s=3.0, starts_max=10))
     delays = [lives.ended(1, 10.0 + n).at for n in range(5)]
     assert [at - 10.0 - n for n, at in enumerate(delays) if at is not None] == [0.5, 1.0, 2.0, 3.0, 3.0]
 
 
 def test_who_fails_too_often_within_the_window_is_given_up() -> None:
-    lives = Lives(Restart(window_s=60.0, starts_max=3))
+    lives = RestartBackoff(Restart(window_s=60.0, starts_max=3))
     assert [lives.ended(1, float(n)).word for n in range(4)] == ["waiting"] * 3 + ["failed"]
 
 
 def test_what_is_older_than_the_window_counts_no_more() -> None:
-    lives = Lives(Restart(delay_s=0.5, window_s=60.0, starts_max=3))
+    lives = RestartBackoff(Restart(delay_s=0.5, window_s=60.0, starts_max=3))
     for n in range(3):
         lives.ended(1, float(n))
     later = lives.ended(1, 100.0)
@@ -48,12 +48,12 @@ def test_what_is_older_than_the_window_counts_no_more() -> None:
 
 
 def test_an_operators_start_is_a_new_beginning() -> None:
-    lives = Lives(Restart(starts_max=1))
+    lives = RestartBackoff(Restart(starts_max=1))
     lives.ended(1, 0.0)
     lives.forget()
     assert lives.ended(1, 1.0).word == "waiting"
 
 
 def test_a_router_is_never_given_up() -> None:
-    lives = Lives(ROUTER)
+    lives = RestartBackoff(ROUTER)
     assert {lives.ended(-9, float(n) / 10.0).word for n in range(500)} == {"waiting"}

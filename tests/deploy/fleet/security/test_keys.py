@@ -13,7 +13,7 @@ import pytest
 
 from lfa.deploy.fleet.keys_command import command, planned
 from lfa.deploy.fleet.security import authority, keys
-from lfa.deploy.fleet.security.access_rules import Plan, rules, sayable
+from lfa.deploy.fleet.security.access_rules import KeyPlan, rules, sayable
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import TOPICS, Topic, matches
 from lfa.protocol.transport.credentials import check_valid, credentials, validity
@@ -31,11 +31,11 @@ SPEAKS = {
 }
 
 
-def plan(robots: int = 3, **more: Any) -> Plan:
+def plan(robots: int = 3, **more: Any) -> KeyPlan:
     return keys.spread("f", {"a": ("10.0.0.1",), "b": ()}, range(1, robots + 1), **more)
 
 
-def may(name: str, key: str, within: Plan) -> bool:
+def may(name: str, key: str, within: KeyPlan) -> bool:
     return any(matches(said, key) for said in sayable(name, within))
 
 

@@ -1,0 +1,198 @@
+"""Prove that two states of the code behave the same: a table of hashes of what they do, made twice and compared.
+
+`python -m tests.same --out before.table`, change the code, `python -m tests.same --against before.table`. It runs every
+shipped scenario in virtual time, plays fuzz seeds on leases alone and on whole agents, and, with `--runs DIR`, replays
+the recorded runs in DIR. Hashed is what robots say and decide and what a run comes to; left out is what may differ
+between two equal runs or with the names in the code: wall clock, paths, size and schemas of a recording.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import as_completed
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+import msgspec
+
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.analysis.verification.checker import Checker
+from lfa.deploy.analysis.verification.reexecution import compare
+from lfa.deploy.analysis.verification.replay import journals
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.fuzz.agent_simulation import AgentSimulation
+from lfa.deploy.fuzz.fault_injector import play, play_whole
+from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
+from lfa.deploy.fuzz.schedules import draw
+from lfa.deploy.process.worker_pool import workers
+from lfa.deploy.run.simulate import run
+from lfa.protocol.runtime.journal import read
+from lfa.world.description.load import load, shipped
+
+Task = tuple[Callable[..., "list[Row]"], tuple[Any, ...]]
+
+SEEDS = (1, 2, 3)
+ARENA_SEEDS = 60
+WHOLE_SEEDS = 20
+WHOLE_CHUNK = 5  # seeds that one worker plays at a time
+WALL_CLOCK = ("duration_s", "real_time_factor", "recording")
+"""What of a summary depends on the machine, or on docstrings: the recording's size, for its schemas hold them."""
+
+
+class Row(NamedTuple):
+    """One line of the table; no field holds a space."""
+
+    kind: str
+    scenario: str
+    seed: str
+    what: str
+    hash: str
+
+
+class Digest:
+    """A hash of values in order, by their fields and never by the names of their classes."""
+
+    def __init__(self, *values: Any) -> None:
+        self._sha = sha256()
+        self.add(*values)
+
+    def add(self, *values: Any) -> None:
+        """Take in `values`."""
+        plain = msgspec.to_builtins(values, builtin_types=(bytes,), str_keys=True, order="deterministic")
+        self._sha.update(msgspec.msgpack.encode(plain))
+
+    def __str__(self) -> str:
+        return self._sha.hexdigest()[:16]
+
+
+def simulated(name: str, seed: int) -> list[Row]:
+    """Run a shipped scenario in virtual time; return the rows of its events, summary and journals."""
+    scenario = load(name)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "run"
+        ended = run(scenario, seed, folder, parse_all(scenario.mission, scenario.faults, ()))
+        kept = journals(folder, "all")
+        found = {"events.jsonl": Digest((folder / "events.jsonl").read_bytes()), "summary": _of_summary(ended.summary)}
+        found["headings"] = Digest(*(read(path)[0] for path in kept))
+        found |= {path.name: _of_calls(path) for path in kept}
+    return [Row("sim", name, str(seed), what, str(digest)) for what, digest in found.items()]
+
+
+def _of_summary(summary: Summary) -> Digest:
+    facts = msgspec.to_builtins(summary)
+    return Digest({name: value for name, value in facts.items() if name not in WALL_CLOCK})
+
+
+def _of_calls(path: Path) -> Digest:
+    """Return the hash of every call of a journal: its input, and the checksum of its answer."""
+    digest = Digest()
+    for entry in read(path)[1]:
+        digest.add(entry)
+    return digest
+
+
+def fuzzed(whole: bool, first: int, beyond: int) -> list[Row]:
+    """Play the seeds from `first` to before `beyond`; return a row for each."""
+    name = "whole" if whole else "arena"
+    return [Row("fuzz", name, str(seed), "trace", str(_of_seed(whole, seed))) for seed in range(first, beyond)]
+
+
+def _of_seed(whole: bool, seed: int) -> Digest:
+    """Return the hash of a seed's trace, of all that the checkers hear, of the verdict and of the chance used up."""
+    digest, stage, player = Digest(), AgentSimulation if whole else LeaseSimulation, play_whole if whole else play
+    listen, heard = stage.listen, _listener(digest)
+    with patch.object(stage, "listen", lambda self, checkers: listen(self, [*checkers, heard])):
+        played = player(draw(seed), lambda *facts: digest.add("trace", *facts))
+    digest.add(played.schedule, played.violations, played.counts, played.elections)
+    digest.add(played.arena.log, repr(played.arena.random.getstate()))
+    return digest
+
+
+def _listener(digest: Digest) -> Any:
+    """Return a checker that finds nothing and gives `digest` all that any checker can hear."""
+
+    def hearing(what: str) -> Callable[..., None]:
+        return lambda _, *facts: digest.add(what, *facts)
+
+    heard = [name for name, value in vars(Checker).items() if callable(value) and name[0] != "_" and name != "broken"]
+    kind: Any = type("Listener", (Checker,), {name: hearing(name) for name in heard})
+    return kind(None)
+
+
+def replayed(folder: Path) -> list[Row]:
+    """Feed the journals of a recorded run to the code of today; return the rows of the comparisons and the events."""
+    found = {"events.jsonl": str(Digest((folder / "events.jsonl").read_bytes()))}
+    for path in journals(folder, "all"):
+        comparison = compare(path)
+        found[path.name] = str(Digest(comparison))
+        if not comparison.equal:
+            print(f"{path}: returns otherwise than recorded: {comparison.difference}", file=sys.stderr)
+    return [Row("replay", folder.name, "-", what, digest) for what, digest in found.items()]
+
+
+def tasks(runs: Path | None) -> list[Task]:
+    """Return all there is to do, the longest first, so that no worker ends with a long one alone."""
+    folders = sorted(path.parent for path in runs.glob("*/events.jsonl")) if runs else []
+    scenarios = sorted(shipped().items(), key=lambda item: -item[1].time_limit_s)
+    return [
+        *((simulated, (name, seed)) for name, _ in scenarios for seed in SEEDS),
+        *((replayed, (folder,)) for folder in folders),
+        *((fuzzed, (True, first, first + WHOLE_CHUNK)) for first in range(0, WHOLE_SEEDS, WHOLE_CHUNK)),
+        (fuzzed, (False, 0, ARENA_SEEDS)),
+    ]
+
+
+def rows(runs: Path | None, jobs: int) -> list[Row]:
+    """Do everything with `jobs` processes, telling how far it is; return the sorted table."""
+    began, table = time.perf_counter(), list[Row]()
+    with workers(jobs) as pool:
+        futures = {pool.submit(do, *arguments): (do, arguments) for do, arguments in tasks(runs)}
+        for number, future in enumerate(as_completed(futures), start=1):
+            do, arguments = futures[future]
+            table += future.result()
+            said = f"{number}/{len(futures)} {do.__name__} {' '.join(map(str, arguments))}"
+            print(f"{time.perf_counter() - began:6.1f} s  {said}", file=sys.stderr, flush=True)
+    return sorted(table)
+
+
+def text(table: list[Row]) -> str:
+    """Return the table as text, one row a line."""
+    return "".join(f"{r.kind:<7} {r.scenario:<15} {r.seed:<4} {r.what:<28} {r.hash}\n" for r in table)
+
+
+def differences(before: list[Row], after: list[Row]) -> Iterator[str]:
+    """Yield a line for each row that is in one table alone, or has another hash there."""
+    was, now = ({row[:4]: row.hash for row in table} for table in (before, after))
+    for key in sorted(was.keys() | now.keys()):
+        if was.get(key) != now.get(key):
+            yield f"{' '.join(key)}: was {was.get(key, 'absent')}, is {now.get(key, 'absent')}"
+
+
+def main() -> int:
+    """Make the table, write or compare it; return 1 when it differs."""
+    parser = argparse.ArgumentParser(prog="python -m tests.same", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--out", type=Path, help="write the table here")
+    parser.add_argument("--against", type=Path, help="compare with this table, made with the same --runs")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once (2)")
+    parser.add_argument("--runs", type=Path, help="a folder of recorded run folders to replay")
+    given = parser.parse_args()
+    before = [Row(*line.split()) for line in given.against.read_text().splitlines()] if given.against else None
+    table = rows(given.runs, given.jobs)
+    if given.out:
+        given.out.write_text(text(table))
+    if before is None:
+        print(text(table), end="")
+        return 0
+    differing = list(differences(before, table))
+    print("\n".join(differing) or f"same: {len(table)} rows")
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
