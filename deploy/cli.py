@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import typer
-from lfa.deploy.command_line import _PLAIN, _say, run_cli
+from lfa.deploy.command_line import PLAIN, print_errors, run_cli
 
 
 class Command(NamedTuple):
@@ -109,7 +109,7 @@ def main() -> None:
         extra = EXTRAS.get((error.name or "").partition(".")[0])
         if extra is None:
             raise
-        sys.exit(_say("lfa", f"{sys.argv[1]} needs {error.name}: install with: pip install 'lfa[{extra}]'"))
+        sys.exit(print_errors("lfa", f"{sys.argv[1]} needs {error.name}: install with: pip install 'lfa[{extra}]'"))
 
 
 def _end(*_: object) -> None:
@@ -127,7 +127,7 @@ def build(called: Sequence[str]) -> typer.Typer:
     """All commands; only those that are `called` are imported, the others are known by name and help."""
     import typer
 
-    app = typer.Typer(name="lfa", help=_ABOUT, no_args_is_help=True, **_PLAIN)
+    app = typer.Typer(name="lfa", help=_ABOUT, no_args_is_help=True, **PLAIN)
     for entry in COMMANDS:
         function = import_module(entry.module).command if entry.name in called else _absent
         app.command(entry.name, help=entry.help, epilog=f"Example: {entry.example}", no_args_is_help=False)(function)

@@ -31,9 +31,9 @@ def run_cli(name: str, app: typer.Typer) -> int:
     try:
         code = app(standalone_mode=False, prog_name=name)
     except Refused as refused:
-        return _say(name, *getattr(refused, "lines", (str(refused),)))
+        return print_errors(name, *getattr(refused, "lines", (str(refused),)))
     except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
-        return _say(name, error.format_message())
+        return print_errors(name, error.format_message())
     except typer.Abort:
         return 130
     except BrokenPipeError:  # the reader of a pipe has gone: nobody is left to tell
@@ -41,11 +41,11 @@ def run_cli(name: str, app: typer.Typer) -> int:
         return 1
     except OSError as error:
         if error.errno in NAMES:
-            return _say(name, f"{error.filename}: {error.strerror}: must be the path of a file or a folder")
+            return print_errors(name, f"{error.filename}: {error.strerror}: must be the path of a file or a folder")
         if error.errno not in DISK:
             raise
         where = f"{error.filename}: " if error.filename else ""
-        _say(name, f"{where}{error.strerror}: must be a place that has room, and that this user may use")
+        print_errors(name, f"{where}{error.strerror}: must be a place that has room, and that this user may use")
         return 1
     return code if isinstance(code, int) else 0
 
@@ -54,18 +54,18 @@ def command_app(function: Callable[..., Any], help_text: str, example: str) -> t
     """A script of one command."""
     import typer
 
-    app = typer.Typer(**_PLAIN)
+    app = typer.Typer(**PLAIN)
     app.command(help=help_text, epilog=f"Example: {example}")(function)
     return app
 
 
-def _say(name: str, *texts: str) -> int:
+def print_errors(name: str, *texts: str) -> int:
     for text in texts:
         print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
     return 2
 
 
-_PLAIN: dict[str, Any] = {
+PLAIN: dict[str, Any] = {
     "add_completion": False,
     "context_settings": {"help_option_names": ["-h", "--help"]},
     "rich_markup_mode": None,

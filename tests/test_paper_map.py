@@ -68,4 +68,4 @@ def test_figures_3_to_6_are_drawn_with_names_that_exist() -> None:
         drawing = (ROOT / "agents" / path).read_text()
         assert ElementTree.fromstring(drawing).tag.endswith("svg")
         modules = set(re.findall(r"\b(\w+\.py)\b", drawing))
-        assert modules <= {found.name for package in ("agents", "protocol") for found in (ROOT / package).iterdir()}
+        assert modules <= {found.name for package in ("agents", "protocol") for found in (ROOT / package).rglob("*.py")}

@@ -13,7 +13,16 @@ from msgspec.structs import replace
 
 from lfa.agents.avoidance import safety
 from lfa.agents.avoidance.decision import Decision, DecisionRow, Situation, decide
-from lfa.agents.avoidance.openings import ALL_STEPS, ASIDE_STEPS, BESIDE, NARROW_M, WIDE_M, _bar, _first_open, _Openings
+from lfa.agents.avoidance.openings import (
+    ALL_STEPS,
+    ASIDE_STEPS,
+    BESIDE,
+    NARROW_M,
+    WIDE_M,
+    barring_point,
+    first_open,
+    Openings,
+)
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.perception.obstacle import BlockingObstacle
 from lfa.agents.perception.scan import Point, free_along
@@ -109,7 +118,7 @@ class Detour:
     def _clear(self, points: Sequence[Point], target: Point, now: float) -> bool:
         """The straight way to the target has been free for `CLEAR_S`."""
         reach = min(hypot(*target), REACH_M)
-        if _bar(points, atan2(target[1], target[0]), reach, self._radius_m + NARROW_M) is not None:
+        if barring_point(points, atan2(target[1], target[0]), reach, self._radius_m + NARROW_M) is not None:
             self._clear_since = None
             return False
         if self._clear_since is None:
@@ -150,7 +159,7 @@ class Detour:
         self._say(action, free_m, bearing, row if action != "blocked" else None, now)
         return twist
 
-    def _row(self, points: Sequence[Point], openings: _Openings, free_m: float) -> DecisionRow | None:
+    def _row(self, points: Sequence[Point], openings: Openings, free_m: float) -> DecisionRow | None:
         """The table's row for what was met: an opening is as wide as the robot needs, whatever lies beside it."""
         nose_m = free_along(points, AHEAD, self._radius_m)
         # A bend that would lead nearer to what the robot has beside it says nothing of what is before its nose.
@@ -170,27 +179,27 @@ class Detour:
             )
         )
 
-    def _openings(self, points: Sequence[Point], towards: float, reach_m: float) -> _Openings:
+    def _openings(self, points: Sequence[Point], towards: float, reach_m: float) -> Openings:
         """With room to spare where there is, else just not touching."""
         for margin_m in dict.fromkeys((WIDE_M, NARROW_M, self._kept_m)):
             half_width_m = self._radius_m + margin_m
-            left = _first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
-            right = _first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
+            left = first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
+            right = first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             if left is not None or right is not None:
                 unknown = self._thing.width_m == inf  # the table asks for the way back as well
-                return _Openings(left, right, self._rear(points, towards, reach_m) if unknown else None)
-        return _Openings(None, None, self._rear(points, towards, reach_m))
+                return Openings(left, right, self._rear(points, towards, reach_m) if unknown else None)
+        return Openings(None, None, self._rear(points, towards, reach_m))
 
     def _rear(self, points: Sequence[Point], towards: float, reach_m: float) -> float | None:
         side = self._side or 1.0
         for margin_m in dict.fromkeys((WIDE_M, NARROW_M, self._kept_m)):
             half_width_m = self._radius_m + margin_m
-            rear = _first_open(points, towards, side, ASIDE_STEPS + 1, ALL_STEPS, reach_m, half_width_m)
+            rear = first_open(points, towards, side, ASIDE_STEPS + 1, ALL_STEPS, reach_m, half_width_m)
             if rear is not None:
                 return rear
         return None
 
-    def _chosen_side(self, openings: _Openings, towards: float, now: float) -> float:
+    def _chosen_side(self, openings: Openings, towards: float, now: float) -> float:
         """The side that needs less turning; the one taken before counts as nearer, and is kept for a while."""
         left = inf if openings.left is None else abs(wrap(openings.left - towards))
         right = inf if openings.right is None else abs(wrap(openings.right - towards))

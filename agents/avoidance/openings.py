@@ -30,7 +30,7 @@ BESIDE = 0.25
 """Less than this ahead, as a share of how far aside: beside the robot, which comes no nearer to it than 3 %."""
 
 
-class _Openings(Struct, frozen=True):
+class Openings(Struct, frozen=True):
     """The open direction nearest to the wanted one on either side, and the one that leads back; None where none is."""
 
     left: float | None
@@ -38,13 +38,13 @@ class _Openings(Struct, frozen=True):
     rear: float | None
 
 
-def _first_open(
+def first_open(
     points: Sequence[Point], towards: float, side: float, first: int, last: int, reach_m: float, half_width_m: float
 ) -> float | None:
     """The open direction nearest to `towards` among steps `first` to `last` to one side of it."""
     for n in range(first, last + 1):
         bearing = wrap(towards + side * n * STEP_RAD)
-        bar = _bar(points, bearing, reach_m, half_width_m)
+        bar = barring_point(points, bearing, reach_m, half_width_m)
         if bar is None:
             return bearing
         if bar:  # what bars one direction is likely to bar the next
@@ -52,7 +52,7 @@ def _first_open(
     return None
 
 
-def _bar(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: float) -> int | None:
+def barring_point(points: Sequence[Point], bearing: float, reach_m: float, half_width_m: float) -> int | None:
     """Which point lies within `half_width_m` of the straight way of `reach_m` in direction `bearing`; None: it is open.
 
     A point that is already nearer than the half width bars only what goes towards it, not what passes it by.

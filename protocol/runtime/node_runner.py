@@ -189,7 +189,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             seat.host.journal.close()
 
 
-def connect(options: Options, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
+def connect(options: Options, inbox: Inbox, stop: _StopRequest) -> ZenohBus | None:
     """A session with a router, waiting for it; None when told to stop meanwhile."""
     told = False
     while not stop.told:
@@ -208,7 +208,7 @@ def connect(options: Options, inbox: Inbox, stop: _Stopping) -> ZenohBus | None:
     return None
 
 
-def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _Stopping, notify: Notify) -> int:
+def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: Notify) -> int:
     began = now = clock.now()
     notify.ready()
     stop_by = None
@@ -241,7 +241,7 @@ def _is_over(seats: Sequence[_NodeRunner]) -> bool:
     return over
 
 
-class _Stopping:
+class _StopRequest:
     """Whether a signal has told this process to end; it wakes the loop as well."""
 
     def __init__(self, wake: Wake) -> None:
@@ -249,8 +249,8 @@ class _Stopping:
         self.told = False
 
 
-def _on_signals(wake: Wake) -> _Stopping:
-    stop = _Stopping(wake)
+def _on_signals(wake: Wake) -> _StopRequest:
+    stop = _StopRequest(wake)
 
     def order(_signum: int, _frame: FrameType | None) -> None:
         stop.told = True

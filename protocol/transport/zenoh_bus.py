@@ -20,7 +20,7 @@ from lfa.protocol.topics import NO_ECHO, TOPIC, Topic, address, alive_key
 from lfa.protocol.transport.bus import Arrival, Inbox
 from lfa.protocol.transport.credentials import Credentials
 from lfa.protocol.transport.endpoints import check_endpoints
-from lfa.protocol.transport.zenoh_config import FOLLOWED_AT_ONCE, LINK_LEASE_MS, RouterAbsent, _client, _reason
+from lfa.protocol.transport.zenoh_config import FOLLOWED_AT_ONCE, LINK_LEASE_MS, RouterAbsent, client_session, reason_of
 
 _PRIORITY = {
     "real_time": zenoh.Priority.REAL_TIME,
@@ -44,9 +44,9 @@ class ZenohBus:
         check_endpoints(endpoint, "connect")
         self._inbox = inbox
         try:
-            self._session = _client(endpoint, lease_ms, credentials)
+            self._session = client_session(endpoint, lease_ms, credentials)
         except zenoh.ZError as error:
-            raise RouterAbsent(_reason(error)) from None
+            raise RouterAbsent(reason_of(error)) from None
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._followed: dict[str, Any] = {}
         self._token: zenoh.LivelinessToken | None = None

@@ -57,22 +57,22 @@ class RouterAbsent(ConnectionError):
 def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
     """True when a session can be opened at `endpoint` at the moment."""
     try:
-        _client(endpoint, LINK_LEASE_MS, credentials).close()  # type: ignore[no-untyped-call]
+        client_session(endpoint, LINK_LEASE_MS, credentials).close()  # type: ignore[no-untyped-call]
     except zenoh.ZError:
         return False
     return True
 
 
-def _client(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
-    config = _config("client", [], endpoint.split(","), lease_ms, credentials)
-    login = {} if credentials is None else _login(credentials)
+def client_session(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
+    config = session_config("client", [], endpoint.split(","), lease_ms, credentials)
+    login = {} if credentials is None else login_settings(credentials)
     if not login:
         return _open(config, CLIENT_THREADS)
-    _insert(config, login)
+    insert_settings(config, login)
     try:
         return _open(config, CLIENT_THREADS)
     except zenoh.ZError:  # a router that asks for no password does not take one either
-        return _open(_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_THREADS)
+        return _open(session_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_THREADS)
 
 
 def _open(config: zenoh.Config, threads: int) -> zenoh.Session:
@@ -90,7 +90,7 @@ def _open(config: zenoh.Config, threads: int) -> zenoh.Session:
         del os.environ["ZENOH_RUNTIME"]
 
 
-def _config(
+def session_config(
     mode: str, listen: Sequence[str], connect: Sequence[str], lease_ms: int, credentials: Credentials | None
 ) -> zenoh.Config:
     settings: dict[str, object] = {
@@ -108,11 +108,11 @@ def _config(
     if credentials is not None:
         settings |= _certified(credentials, serves=mode == "router")
     config = zenoh.Config()
-    _insert(config, settings)
+    insert_settings(config, settings)
     return config
 
 
-def _insert(config: zenoh.Config, settings: dict[str, Any]) -> None:
+def insert_settings(config: zenoh.Config, settings: dict[str, Any]) -> None:
     for name, value in settings.items():
         config.insert_json5(name, msgspec.json.encode(value).decode())
 
@@ -132,13 +132,13 @@ def _certified(credentials: Credentials, *, serves: bool) -> dict[str, Any]:
     return {"transport/link/tls": tls}
 
 
-def _login(credentials: Credentials) -> dict[str, Any]:
+def login_settings(credentials: Credentials) -> dict[str, Any]:
     """Name and password, which secure routers ask for on all links; a router with one asks everybody for theirs."""
     known = credentials.user_and_password()
     return {} if known is None else {"transport/auth/usrpwd": {"user": known[0], "password": known[1]}}
 
 
-def _reason(error: zenoh.ZError) -> str:
+def reason_of(error: zenoh.ZError) -> str:
     """The last cause of Zenoh's nested error text, on one line."""
     text = " ".join(str(error).split())
     return text.split(" at ")[0] if len(text) > 200 else text

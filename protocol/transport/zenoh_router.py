@@ -16,10 +16,10 @@ from lfa.protocol.transport.endpoints import check_endpoints
 from lfa.protocol.transport.zenoh_config import (
     LINK_LEASE_MS,
     SECURE_PROTOCOLS,
-    _config,
-    _insert,
-    _login,
-    _reason,
+    session_config,
+    insert_settings,
+    login_settings,
+    reason_of,
     answers,
     socket_path,
 )
@@ -46,18 +46,18 @@ def open_router(
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {ROUTER_RX_THREADS}))")
     for endpoint in listen:
         check_endpoints(endpoint, "listen")
-        _check_listen(endpoint, credentials, secure)
+        check_listen(endpoint, credentials, secure)
     for endpoint in connect:
         check_endpoints(endpoint, "connect")
-    config = _config("router", listen, connect, lease_ms, credentials)
+    config = session_config("router", listen, connect, lease_ms, credentials)
     if secure:
         assert credentials is not None
-        _insert(config, _guard(credentials))
+        insert_settings(config, _guard(credentials))
     mask = os.umask(0o077)  # for the unix socket: 0600
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
-        raise Refused(f"listen {' '.join(listen)}: {_reason(error)}") from None
+        raise Refused(f"listen {' '.join(listen)}: {reason_of(error)}") from None
     finally:
         os.umask(mask)
 
@@ -72,7 +72,7 @@ def open_router(
     return close
 
 
-def _check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:
+def check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:
     protocol = endpoint.partition("/")[0]
     if secure and protocol not in SECURE_PROTOCOLS:
         raise Refused(f"listen {endpoint}: not with --secure, must begin with {', '.join(SECURE_PROTOCOLS)}")
@@ -101,4 +101,4 @@ def _guard(credentials: Credentials) -> dict[str, Any]:
     except (OSError, msgspec.DecodeError) as error:
         raise Refused(f"{access}: {error}, must be the rules that `lfa keys` wrote") from None
     users_file = {"transport/auth/usrpwd/dictionary_file": str(users)}
-    return _login(credentials) | users_file | {"transport/link/protocols": SECURE_PROTOCOLS} | rules
+    return login_settings(credentials) | users_file | {"transport/link/protocols": SECURE_PROTOCOLS} | rules

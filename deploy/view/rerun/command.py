@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import rerun
 
     from lfa.world.description.scenario import Scenario
-from lfa.deploy.view.rerun.viewer import _display, _free, _need_rerun, _viewer
+from lfa.deploy.view.rerun.viewer import has_display, check_free_port, need_rerun, run_viewer
 
 RRD = "recording.rrd"
 PICTURE = "view.png"
@@ -43,14 +43,14 @@ def command(
     port: Annotated[int, typer.Option(help="Where viewers get their data.")] = PORT,
     web_port: Annotated[int, typer.Option(help="Where a browser gets the viewer.")] = WEB_PORT,
 ) -> int:
-    _need_rerun()
+    need_rerun()
     if serve_web:
-        _free(port, "--port")
-        _free(web_port, "--web-port")
+        check_free_port(port, "--port")
+        check_free_port(web_port, "--web-port")
     if folder is None:
         return _live(find(fleet, connect, keys), serve_web, screenshot, port, web_port)
     rrd = converted(folder)
-    if screenshot is None and not serve_web and not _display():
+    if screenshot is None and not serve_web and not has_display():
         print("no display here: a picture instead (--serve-web shows it in a browser)", file=sys.stderr, flush=True)
         screenshot = folder / PICTURE
     if screenshot is not None:
@@ -60,8 +60,8 @@ def command(
         return 0
     print(rrd, flush=True)
     if serve_web:
-        return _viewer(str(rrd), "--web-viewer", "--port", str(port), "--web-viewer-port", str(web_port))
-    return _viewer(str(rrd))
+        return run_viewer(str(rrd), "--web-viewer", "--port", str(port), "--web-viewer-port", str(web_port))
+    return run_viewer(str(rrd))
 
 
 def converted(folder: Path) -> Path:
@@ -118,9 +118,9 @@ def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: i
         return 0
     if serve_web:
         data = stream.serve_grpc(grpc_port=port, default_blueprint=plan)
-        rr.serve_web_viewer(web_port=web_port, open_browser=_display(), connect_to=data)
+        rr.serve_web_viewer(web_port=web_port, open_browser=has_display(), connect_to=data)
         print(f"http://127.0.0.1:{web_port}?url={data}", flush=True)
-    elif _display():
+    elif has_display():
         rr.spawn(port=port, connect=False)
         stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy", default_blueprint=plan)
     else:

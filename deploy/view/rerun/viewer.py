@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     pass
 
 
-def _viewer(*arguments: str) -> int:
+def run_viewer(*arguments: str) -> int:
     """The viewer as a child, until it is closed; Ctrl-C and SIGTERM end it and us."""
     child = subprocess.Popen(["rerun", *arguments], executable=viewer_path(), env=quiet())
     try:
@@ -36,18 +36,18 @@ def quiet() -> dict[str, str]:
     return {"RUST_LOG": "error", **os.environ}
 
 
-def _display() -> bool:
+def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _need_rerun() -> None:
+def need_rerun() -> None:
     try:
         import rerun  # noqa: F401
     except ImportError:
         raise Refused("view needs rerun: install with: pip install 'lfa[view]'") from None
 
 
-def _free(port: int, option: str) -> None:
+def check_free_port(port: int, option: str) -> None:
     with socket.socket() as probe:
         try:
             probe.bind(("127.0.0.1", port))

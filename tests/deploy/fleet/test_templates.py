@@ -196,4 +196,4 @@ def test_the_wheel_ships_the_templates() -> None:
 
     names = set(zipfile.ZipFile(io.BytesIO(pack()[1])).namelist())
     for path in TEMPLATES.rglob("*"):
-        assert path.is_dir() or str(path.relative_to(ROOT)) in names
+        assert path.is_dir() or f"lfa/{path.relative_to(ROOT)}" in names

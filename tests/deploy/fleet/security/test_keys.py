@@ -17,7 +17,7 @@ from lfa.deploy.fleet.security.access_rules import KeyPlan, rules, sayable
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import TOPICS, Topic, matches
 from lfa.protocol.transport.credentials import check_valid, credentials, validity
-from lfa.protocol.transport.zenoh_router import _check_listen
+from lfa.protocol.transport.zenoh_router import check_listen
 from tests.rigs.lfa_runs import lfa
 
 DAY_MS = 86_400_000
@@ -237,7 +237,7 @@ def test_a_truncated_certificate_is_refused(tmp_path: Path) -> None:
 
 def test_a_secure_router_listens_at_nothing_plain(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="not with --secure"):
-        _check_listen("tcp/127.0.0.1:7447", None, secure=True)
+        check_listen("tcp/127.0.0.1:7447", None, secure=True)
 
 
 # --- the command -----------------------------------------------------------------------------------------------------
