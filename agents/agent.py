@@ -1,4 +1,4 @@
-"""One event in, messages out: update what is known, run the lease, choose a role, drive, speak.
+"""One agent: it updates its state from one event, runs the lease, chooses a role, drives and publishes.
 
 Messages of the lease act on arrival; control runs at its own fixed rate, and computes from what is known at that
 moment. A robot that becomes leader commands at once.
@@ -43,11 +43,12 @@ if TYPE_CHECKING:
 
 ASK_S = 0.5
 EASE_S = 2.0 * CONTROL_PERIOD_S
-"""A lease that lasts longer needs no grant at once: each of a round's voters would wake the leader."""
+"""Lease time [s] left beyond which a grant may wait for the next control step: each voter of a round would wake the
+leader."""
 
 
 class Agent:
-    """A Node: one life of one robot. `floor` starts its terms (wall-clock milliseconds at boot)."""
+    """Node of one incarnation of one robot. `floor` starts its terms (wall-clock milliseconds at boot)."""
 
     def __init__(self, robot_id: int, incarnation: int, fleet: str, floor: int, mission: Mission | None = None) -> None:
         self._id = robot_id
@@ -68,11 +69,11 @@ class Agent:
         self._arrived = False
         self._pending_release = False
         self.defer_grants = False
-        """Grants can wait for the next control step: the lease lasts well beyond it."""
+        """True while grants can wait for the next control step: the lease lasts well beyond it."""
         self._interests = self._wanted()
         self.refusal: str | None = None
 
-    # --- what the shell sees ------------------------------------------------------------------------------------
+    # --- interface to the node runner -----------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
@@ -92,12 +93,12 @@ class Agent:
 
     @property
     def lease(self) -> Lease | None:
-        """What it holds and knows of the team; None before the mission."""
+        """Lease of this robot, with the config that it knows; None before the mission."""
         return self._lease
 
     @property
     def grid(self) -> Grid | None:
-        """The map of an explorer, as far as it has come."""
+        """Occupancy grid of an explorer, as far as mapped; None for other robots."""
         explore = None if self._driver is None else self._driver.explore
         return None if explore is None or explore.mapping is None else explore.mapping.grid
 
@@ -178,7 +179,7 @@ class Agent:
     def _hear_robot(
         self, robot: int, message: PoseStamped | TableRow | ObstacleNote | FormationNote, now: float, driver: Navigator
     ) -> None:
-        """What another robot tells the team."""
+        """Update the state from a message of another robot."""
         ahead = driver.predecessor if driver.predecessor is not None and driver.predecessor.robot == robot else None
         match message:
             case PoseStamped():
@@ -198,7 +199,8 @@ class Agent:
                     self._event("formation", now, {"number": message.number, "trace": message.trace})
 
     def _obey(self, note: OperatorNote, now: float, lease: Lease) -> None:
-        """An operator's word; only the leader changes the formation, or gives the lease to the next in the chain."""
+        """Obey an operator's command. Only the leader changes the formation, or hands the lease to the next in the
+        chain."""
         if note.command == "forget":
             self._forget(note, now, lease)
         if lease.role is not Role.LEADER:
@@ -210,7 +212,7 @@ class Agent:
             self._hand_over(lease, now)
 
     def _forget(self, note: OperatorNote, now: float, lease: Lease) -> None:
-        """Lives that are dead for good: the lease needs them no more for its next attempt (E20)."""
+        """Exclude incarnations that are dead for good from the lease's next attempt (E20)."""
         try:
             lost = msgspec.convert(note.arguments.get("lives"), tuple[Member, ...])
         except msgspec.ValidationError:
@@ -218,10 +220,10 @@ class Agent:
         self._event("forget", now, {"robots": [member.id for member in lost]})
         self._apply(lease.request_forget(lost, now), now)
 
-    # --- beginning and ending ---------------------------------------------------------------------------------------
+    # --- start and stop ---------------------------------------------------------------------------------------------
 
     def _begin(self, mission: Mission, now: float) -> None:
-        """The mission is known: from here on this robot votes, follows and may lead."""
+        """Start with the mission: from here on this robot votes, follows and may lead."""
         try:
             check_mission(mission)
             if self._id not in mission.robots:
@@ -241,7 +243,7 @@ class Agent:
         self._event("mission", now, {"version": mission.version, "robots": list(mission.robots)})
 
     def _stop(self, now: float) -> None:
-        """Brake, give the lease back, and be done when its last words are out."""
+        """Brake and release the lease; finished when the last messages are sent."""
         if self._pending_release:
             return
         self._pending_release = True
@@ -273,13 +275,13 @@ class Agent:
                     pass
 
     def _adopt(self, now: float) -> None:
-        """Follow whoever the newest config puts ahead."""
+        """Follow the robot that the newest config puts ahead."""
         assert self._lease is not None and self._driver is not None
         chain = self._chain(self._lease)
         place = chain.index(self._id) if self._id in chain else 0
         ahead = chain[place - 1] if place > 0 else None
         if self._id not in chain and chain and self._driver.stuck is not None:
-            ahead = chain[-1]  # E22: closed over, it tries to come behind the last
+            ahead = chain[-1]  # E22: the chain was closed over this robot; it tries to come behind the last one
         before = self._driver.predecessor
         self._driver.follow_robot(ahead, len(chain) - 1)
         if (before.robot if before is not None else None) != ahead:
@@ -290,7 +292,7 @@ class Agent:
     # --- control ----------------------------------------------------------------------------------------------------
 
     def _control(self, now: float) -> None:
-        """One control step: where am I, what am I, where to, and say it."""
+        """Run one control step: pose, role, command, then the reports."""
         assert self._lease is not None and self._driver is not None
         assert self._reports is not None and self._orders is not None and self._stuck_policy is not None
         lease, driver = self._lease, self._driver
@@ -330,13 +332,15 @@ class Agent:
         return Role.FOLLOWER if follows and self._id != (self._chain(lease) or (0,))[0] else Role.WAITING
 
     def _chain(self, lease: Lease) -> tuple[int, ...]:
-        """The lease's chain, asked for many times a step and made anew only when the config is another."""
+        """Return the ids of the lease's chain, computed anew only when the config has changed (called many times a
+        step)."""
         if lease.config is not self._config:
             self._config, self._chain_ids = lease.config, lease.chain
         return self._chain_ids
 
     def _command(self, twist: Twist, role: Role, now: float) -> None:
-        """The gateway's stamp is read before the lease is checked (lease.md section 5): no stamp, no command."""
+        """Publish a command. The gateway's stamp is read before the lease is checked (lease.md section 5): no stamp, no
+        command."""
         sensors = self._team.fresh_sensors(now)
         if sensors is None or self._lease is None:
             return
@@ -355,7 +359,7 @@ class Agent:
             term = self._lease.term
         self._outbox.event(kind, now, term, data)
 
-    # --- whom it hears ------------------------------------------------------------------------------------------------
+    # --- subscriptions ------------------------------------------------------------------------------------------------
 
     def _wanted(self) -> frozenset[str]:
         fleet, own = self._outbox.fleet, self._outbox.name
@@ -379,5 +383,5 @@ class Agent:
 
 
 def _next_on_grid(deadline: float, now: float, period: float) -> float:
-    """The first point of the grid through `deadline` that lies after `now`."""
+    """Return the first point after `now` of the grid with step `period` through `deadline`."""
     return deadline + period * (int((now - deadline) / period) + 1)

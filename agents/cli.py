@@ -1,6 +1,7 @@
-"""`lfa-agent`: one robot, or the witness, as one process.
+"""`lfa-agent`: runs one robot, or the witness, as one process.
 
-The command line is read by argparse: the library that reads `lfa`'s own would be half of an agent's resident memory.
+The command line is parsed by argparse: the library that parses the command line of `lfa` would take half of an agent's
+resident memory.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ RIGHT_MISSION = "must be the [mission] of a scenario in a file of its own, witho
 
 
 def main() -> None:
-    """Entry point of `lfa-agent`: 0 ended well, 2 refused."""
+    """Run the entry point of `lfa-agent`: exit code 0 after a normal end, 2 after a refusal."""
     try:
         sys.exit(start(_parser().parse_args()))
     except Refused as refused:
@@ -41,7 +42,7 @@ def main() -> None:
 
 
 def start(arguments: argparse.Namespace) -> int:
-    """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
+    """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raise `Refused`."""
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
     fleet, wall_ms = fleet_name(arguments.fleet), clock.wall_ms()
@@ -55,7 +56,7 @@ def start(arguments: argparse.Namespace) -> int:
 
 class _AgentParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """One line instead of usage and a line."""
+        """Raise `Refused` with one line, where argparse would print its usage and a line."""
         raise Refused(f"{message} ({EXAMPLE})")
 
 
@@ -63,17 +64,17 @@ def _parser() -> argparse.ArgumentParser:
     parser = _AgentParser(prog="lfa-agent", description="Run one robot of a fleet until it is stopped.", epilog=EXAMPLE)
     add = parser.add_argument
     # fmt: off
-    add("--role", required=True, help="place it starts in: leader, follower or witness; roles change at run time")
+    add("--role", required=True, help="initial role: leader, follower or witness; roles change at run time")
     add("--id", required=True, help="robot id from the mission (1, 2, ...), or w for the witness")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
-    add("--connect", metavar="ENDPOINT", help="the router, like tcp/127.0.0.1:7447 (default: this machine's); a,b: "
-        "the first that answers, the next when that is lost")
+    add("--connect", metavar="ENDPOINT", help="the router, such as tcp/127.0.0.1:7447 (default: this machine's); a,b: "
+        "the first that answers, the next one when it is lost")
     add("--keys", type=Path, metavar="DIR", help="this machine's folder of `lfa keys`, with the robot's certificate")
     add("--link", choices=sorted(LINK_LEASES_MS), default="std",
-        help="how soon a silent link counts as dead: fast (0.5 s), std (1 s) or wifi (2 s)")
-    add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; else it comes over Zenoh")
+        help="time after which a silent link counts as lost: fast (0.5 s), std (1 s) or wifi (2 s)")
+    add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; without it, received over Zenoh")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
-    add("--faults", action="store_true", help="obey an operator's radio weather (lfa fault cut, loss): for tests")
+    add("--faults", action="store_true", help="obey an operator's link conditions (lfa fault cut, loss): for tests")
     # fmt: on
     return parser
 
@@ -94,7 +95,7 @@ def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None)
 
 
 def read_mission(path: Path) -> Mission:
-    """A mission from a JSON or TOML file. Raises `Refused` with file, key and what would be right."""
+    """Return the mission of a JSON or TOML file. Raise `Refused` with the file, the key and what would be right."""
     try:
         data = path.read_bytes()
     except OSError as error:

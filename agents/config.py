@@ -1,6 +1,6 @@
-"""The follower's gains and bounds, with units, and the rules that they must keep (control.md sections 2 and 2.1).
+"""Gains and bounds of the follower, with units, and the rules that they must satisfy (control.md sections 2 and 2.1).
 
-`DEFAULT` obeys all of them. `SHARP` recovers faster and saturates the drive: for noise-free simulation only.
+`DEFAULT` satisfies all of them. `SHARP` recovers faster and saturates the drive: for noise-free simulation only.
 """
 
 from __future__ import annotations
@@ -17,34 +17,34 @@ CONTROL_PERIOD_S = 1.0 / CONTROL_HZ
 
 
 class Gains(Struct, frozen=True, forbid_unknown_fields=True, gc=False):
-    """Of the law (control.md section 2). Names in brackets are the derivation's."""
+    """Gains of the law (control.md section 2). Names in brackets are the derivation's."""
 
     k_per_s: float = 1.5
-    """[K] Feedback of the look-ahead error."""
+    """[K] Feedback gain of the look-ahead error."""
     b_m: float = 0.30
-    """[b] How far ahead of the centre the look-ahead point is."""
+    """[b] Distance of the look-ahead point ahead of the centre."""
     m_mps: float = 0.5
-    """[m] Largest feedback speed."""
+    """[m] Maximum feedback speed."""
     lambda_psi_per_s: float = 8.0
-    """[lambda_psi] How fast the desired heading follows the slot's direction of motion."""
+    """[lambda_psi] Rate at which the desired heading follows the slot's direction of motion."""
     feed_forward: float = 1.0
-    """[a] Part of the slot's velocity that is fed forward."""
+    """[a] Share of the slot's velocity that is fed forward."""
     chi_rate_max_radps: float = 0.4
-    """Largest rate of the filtered formation heading."""
+    """Maximum rate of the filtered formation heading."""
     phi_rate_max_radps: float = 0.35
-    """Largest swing of a slot around the predecessor when the commanded phi changes."""
+    """Maximum rate at which a slot swings around the predecessor when the commanded phi changes."""
     separation_rate_max_mps: float = 0.3
-    """Largest rate of the commanded separation."""
+    """Maximum rate of the commanded separation."""
     offset_rate_max_mps: float = 0.3
-    """How fast the gap between an old and a new slot closes after a change of predecessor."""
+    """Maximum rate at which the gap between an old and a new slot closes after a change of predecessor."""
     slot_speed_share: float = 0.9
-    """A swinging slot never asks for more than this share of v_max."""
+    """Share of v_max that the speed of a swinging slot never exceeds."""
     d_min_m: float = 0.45
-    """The collision guard keeps centres this far apart."""
+    """Minimum distance between centres that the collision guard keeps."""
     guard_per_s: float = 2.0
-    """Closing speed that the guard allows for each metre above `d_min_m`."""
+    """Closing speed that the collision guard allows for each metre above `d_min_m`."""
     dead_reckoning_max_s: float = 0.5
-    """[T_dr] An older predecessor state is not extrapolated: brake along the path and hold."""
+    """[T_dr] Age beyond which a predecessor state is not extrapolated: the follower brakes along the path and holds."""
 
 
 DEFAULT = Gains()
@@ -52,9 +52,9 @@ SHARP = Gains(k_per_s=2.0, b_m=0.2, m_mps=0.7)
 
 
 def check_gains(gains: Gains, limits: Limits, dt: float = CONTROL_PERIOD_S, *, allow_saturation: bool = False) -> Gains:
-    """`gains`, or `Refused` with the first rule that they break.
+    """Return `gains`; raise `Refused` with the first rule that they break.
 
-    `allow_saturation` (simulation only) accepts gains that ask for more acceleration than the drive has.
+    `allow_saturation` (simulation only) accepts gains that demand more acceleration than the drive has.
     """
     for field in gains.__struct_fields__:
         value = getattr(gains, field)

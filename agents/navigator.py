@@ -1,7 +1,7 @@
-"""The moving part of an agent: own pose, who is ahead, what stands in the way, and the twist that follows from it.
+"""Motion of one agent: own pose, predecessor, obstacles, and the twist that follows from them.
 
-One fat decision (`drive`): lead, follow or stand; then round what the scan shows; then the limits. Nothing here
-knows of terms or keys.
+One function decides (`drive`): lead, follow or stand; then avoid the obstacles of the scan; then apply the limits.
+Terms and keys may not be used here.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ if TYPE_CHECKING:
 
 CATCH_UP_PER_S = 0.8
 TRACK_EVERY = 5
-"""Control periods between a follower's looks at its place on the route."""
+"""Number of control periods between two updates of a follower's progress on the route."""
 DT_MIN_S = 0.002
 OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
-"""Wheels that obey are nearer than this to the command: several periods of full acceleration."""
+"""Maximum difference between command and measured twist while the wheels obey: several periods of full acceleration."""
 SLOT_AHEAD_S, SLOT_AHEAD_SHARE = 2.0, 0.4
-"""A follower's detour is to lead back to where its slot is so much later, but no more than this share of k^d ahead:
-there the predecessor would bar the way."""
+"""Time [s] by which the target of a follower's detour is ahead on its slot's motion, and the share of k^d that limits
+this distance: farther ahead the predecessor would block the way."""
 ON_TRACE_M = 0.3
-"""Nearer than this to its place on a trace, a follower goes where its predecessor has gone: no detour is better."""
+"""Distance [m] to its place on a trace below which a follower makes no detour: its predecessor's path is better."""
 FRESH_S = 0.5
 
 
 class Navigator:
-    """Of one robot with one mission."""
+    """Motion of one robot with one mission."""
 
     def __init__(self, robot_id: int, mission: Mission, team: TeamState) -> None:
-        """Raises `Refused` when the mission's gains or controller cannot be had."""
+        """Create a navigator. Raise `Refused` when the mission's gains or controller are invalid."""
         self._id = robot_id
         self._mission = mission
         self._team = team
@@ -80,17 +80,17 @@ class Navigator:
 
     @property
     def explore(self) -> Explore | None:
-        """A map of one's own and the route through it, where the mission asks for it."""
+        """Map and route of an explorer, where the mission requires them; otherwise None."""
         return self.leading.explore
 
     @property
     def stuck(self) -> str | None:
-        """Why this robot is stuck, None when it is not."""
+        """Reason why this robot is stuck; None when it is not."""
         return self._stuck_monitor.reason
 
     @property
     def decision(self) -> Decision | None:
-        """What is being done about the surroundings, None on the wanted way."""
+        """Present avoidance decision; None on the wanted motion."""
         return self._crossing.decision or self._detour.decision or self._ground_crossing.decision
 
     @property
@@ -98,9 +98,9 @@ class Navigator:
         return self._last
 
     def published(self, measured: Twist) -> Twist:
-        """What a successor is told: the command, which is what the wheels do next, so that no delay is added.
+        """Return the twist to publish: the command, which the wheels follow next, so that no delay is added.
 
-        Where they do not obey (a body in the way, a closed gateway): what they do.
+        Return the measured twist where the wheels do not obey (an obstacle in contact, a closed gateway).
         """
         off_mps, off_radps = self._last.linear_x - measured.linear_x, self._last.angular_z - measured.angular_z
         return self._last if abs(off_mps) < OBEYED_MPS and abs(off_radps) < OBEYED_RADPS else measured
@@ -109,13 +109,13 @@ class Navigator:
         known = self.estimator.pose_at(now)
         if known is not None:
             mates = self._mates(now)
-            # An explorer's map tells where it can go: what moves shows there and goes again.
+            # An explorer does not track obstacles: its map shows them while they are there.
             self._obstacles.see(scan, known[0], mates, now, track=self.explore is None)
             if self.explore is not None:
                 self.explore.see(scan, known[0], known[1], mates)
 
     def update_ground(self, profile: GroundProfile, now: float) -> None:
-        """Take a look at the floor ahead."""
+        """Update the ground map with a profile of the floor ahead."""
         known = self.estimator.pose_at(now)
         if known is not None:
             self._obstacles.update_ground(profile, known[0], now)
@@ -125,29 +125,29 @@ class Navigator:
         self._bar((note.x, note.y), now)
 
     def _bar(self, trap: Point, now: float) -> None:
-        """No more into `trap`; an explorer's map tells where it can go, and in a corner it would be barred in."""
+        """Block `trap` from now on, except for an explorer: it plans on its map, and would be enclosed in a corner."""
         if self.explore is None:
             self._obstacles.avoid_trap(*trap, now)
 
     def back_out(self, pose: Pose2D) -> None:
-        """Leave this place, in which the robot is stuck, the way that it came."""
+        """Start backing out of the place in which the robot is stuck."""
         if self.stuck is not None and not self._back_up_path.under_way:
             self._back_up_path.begin(pose)
             self._stuck_monitor.backing_out = True
 
     def nearest(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
-        """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
+        """Return the nearest obstacle of class `kind` that this robot itself sees, for its report to the others."""
         return self._obstacles.nearest(pose, kind, now)
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
-        """Whose successor this robot is from now on; None for nobody's."""
+        """Set the robot whose successor this robot is from now on; None for no predecessor."""
         current = None if self.predecessor is None else self.predecessor.robot
         if robot != current:
             before = self.predecessor
             self.predecessor = None if robot is None else predecessor_of(self._mission, robot, followers, before)
 
     def drive(self, role: Role, chain: tuple[int, ...], pose: Pose2D, twist: Twist, now: float) -> Twist:
-        """The command for the next control period."""
+        """Return the command for the next control period."""
         dt = CONTROL_PERIOD_S if self._driven_at is None else now - self._driven_at
         dt = min(max(dt, DT_MIN_S), 2.0 * CONTROL_PERIOD_S)
         self._driven_at = now
@@ -195,7 +195,7 @@ class Navigator:
             self.follower.rejoin(pose, twist)
 
     def _watch(self, role: Role, pose: Pose2D, wanted: Twist, now: float) -> None:
-        """Whether the robot is stuck on its way; not when it stands where it belongs or waits for its team."""
+        """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team."""
         waits = role is Role.LEADER and self.leading.waiting
         if role is Role.WAITING or waits or self.lead.arrived(pose, self._last):
             self._stuck_monitor.rest(pose, now)
@@ -206,7 +206,8 @@ class Navigator:
         self._stuck_monitor.watch(pose, wanted, action, self.estimator.age_s(now), now, leads=leads)
 
     def _mates(self, now: float) -> list[Pose2D]:
-        """Where the team-mates are, as far as known: the predecessor by its poses, the others by the table."""
+        """Return the known poses of the team-mates: the predecessor's from its pose messages, the others' from the
+        table."""
         places = [self._team.pose_of(robot, now) for robot in self._mission.robots if robot != self._id]
         if self.predecessor is not None:
             sighting = self.predecessor.at(now)
@@ -214,7 +215,8 @@ class Navigator:
         return [place for place in places if place is not None]
 
     def _strangers(self, pose: Pose2D, now: float) -> list[Point]:
-        """The team-mates that this robot does not follow, in `base_link`: nobody else keeps the two apart."""
+        """Return the team-mates that this robot does not follow, in `base_link`: no controller keeps a distance to
+        them."""
         ahead = None if self.predecessor is None else self.predecessor.robot
         c, s, mates = cos(pose.theta), sin(pose.theta), []
         for robot in self._mission.robots:
@@ -234,13 +236,13 @@ class Navigator:
     def _steer(
         self, points: list[Point], target: Point, wanted: Twist, speed: float, pose: Pose2D, now: float
     ) -> Twist | None:
-        """A detour, if one is needed."""
+        """Return the twist of a detour; None if none is needed."""
         return self._detour.steer(
             points, target, wanted, speed, now, lambda free_m: self._obstacles.blocking(pose, wanted, free_m, now)
         )
 
     def _back_out(self, points: list[Point], pose: Pose2D, wanted: Twist, now: float) -> Twist:
-        """Backwards out of a trap, which is kept out of from then on; `wanted` once that is done."""
+        """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out."""
         twist = self._back_up_path.step(points, pose, self._mission.radius_m)
         if twist is not None:
             self._detour.decision = Decision("back" if twist.linear_x else "blocked", inf, pi, "wall", "out of a trap")
@@ -263,7 +265,7 @@ class Navigator:
         slot_map = self.follower.readout.slot_map
         speed = abs(sighting.twist.linear_x) + CATCH_UP_PER_S * hypot(slot_map.x - pose.x, slot_map.y - pose.y)
         speed = min(self._mission.limits.v_max_mps, speed)
-        # To where the slot will be: the direction of one that the robot is in says nothing.
+        # The target is the slot's future place: in the slot itself its direction is undefined.
         ahead_m = min(SLOT_AHEAD_S * sighting.twist.linear_x, SLOT_AHEAD_SHARE * slot.separation_m)
         target = in_base(pose, (slot_map.x + ahead_m * cos(slot_map.theta), slot_map.y + ahead_m * sin(slot_map.theta)))
         was_detour = self._detour.decision is not None

@@ -1,8 +1,8 @@
-"""What a robot does about being stuck, its own plight and its team's (control.md section 7; rule E22).
+"""Policy for a stuck robot, for itself and for its team (control.md section 7; rule E22).
 
-A leader that is stuck gives the lease to the next in chain, once for each place; the mission fails when it is stuck
-there again. A follower says that it is stuck; when the leader has waited for it long enough, the chain closes over it.
-It goes on trying to come behind the last of the chain, and is taken in again there when it is free.
+A stuck leader hands the lease over to the next in the chain, once for each place; the mission fails when it is stuck
+there again. A follower reports that it is stuck; when the leader has waited for it long enough, the chain closes over
+it. The follower keeps trying to come behind the last of the chain, and is taken in again there when it is free.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.outbox import Outbox
 
 HANDOVER_S = 2.0
-"""At least between two hand-overs that a stuck leader asks for."""
+"""Minimum time [s] between two hand-overs that a stuck leader requests."""
 NEWS_S = 1.0
-"""Within this a new leader has heard that the one before it is stuck."""
+"""Time [s] within which a new leader has received that the former leader is stuck."""
 PLACE_M = 1.0
-"""Side of the cell within which being stuck twice is being stuck in the same place."""
+"""Side [m] of the cell within which being stuck twice counts as stuck in the same place."""
 
 
 class StuckPolicy:
-    """Of one robot; `step` after each control step."""
+    """Stuck policy of one robot; `step` is called after each control step."""
 
     def __init__(self, robot_id: int, mission: Mission, outbox: Outbox, team: TeamState) -> None:
         self._id = robot_id
@@ -41,11 +41,11 @@ class StuckPolicy:
         self._next_handover = 0.0
         self._given_up: list[tuple[int, int]] = []
         self._led_before: int | None = None
-        """Who gave the lease away, until it is out of its plight."""
+        """Robot that handed the lease over, until it is no longer stuck."""
         self._reign_from = 0.0
 
     def step(self, role: Role, pose: Pose2D, lease: Lease, driver: Navigator, now: float) -> bool:
-        """Say what has changed. True when the lease is to be handed over now."""
+        """Publish changes of the stuck state; return True when the lease is to be handed over now."""
         if driver.stuck != self._said:
             self._said = driver.stuck
             self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
@@ -63,8 +63,8 @@ class StuckPolicy:
         return driver.stuck is not None and now >= self._next_handover and self._gives_up(pose, lease, driver, now)
 
     def _left_out(self, lease: Lease, driver: Navigator, now: float) -> frozenset[int]:
-        """The stuck ones that are out stay out, and so does who gave the lease away; the others that are stuck go once
-        the leader has waited for them."""
+        """Return the robots left out of the chain: stuck robots outside of it stay out, also the former leader that
+        handed the lease over; the other stuck ones are left out once the leader has waited for them."""
         before = self._led_before
         if before is not None and now >= self._reign_from + NEWS_S and not self._team.stuck(before, now):
             self._led_before = None
@@ -76,9 +76,9 @@ class StuckPolicy:
         return frozenset(stuck)
 
     def _gives_up(self, pose: Pose2D, lease: Lease, driver: Navigator, now: float) -> bool:
-        """Hand over, or fail."""
+        """Return whether to hand over; otherwise the mission has failed, or the lease has no other robot."""
         self._next_handover = now + HANDOVER_S
-        if driver.stuck == POSE_LOST:  # no fault of the place: it comes back with the hardware that starts again
+        if driver.stuck == POSE_LOST:  # independent of the place: the pose returns when the hardware restarts
             return len(lease.chain) > 1
         place = (floor(pose.x / PLACE_M), floor(pose.y / PLACE_M))
         if place in self._given_up or len(lease.chain) == 1:
@@ -93,7 +93,7 @@ class StuckPolicy:
         return True
 
     def _fail(self, reason: str, lease: Lease, now: float) -> None:
-        """The mission has failed; said once."""
+        """Publish once that the mission has failed."""
         if not self._failed:
             self._failed = True
             self._event("failed", now, lease, {"reason": reason})

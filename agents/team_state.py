@@ -1,4 +1,4 @@
-"""What a robot has heard of others, with its age: the paper's table, and the clocks of those whose poses it uses."""
+"""State of the other robots as received, with its age: the paper's table, and the clock offsets of their senders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROBOTS_MAX = 512
 ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
-"""A robot is taken to go on as it went for so long after its last row."""
+"""Time [s] after its last row for which a robot's motion is extrapolated."""
 
 
 class TeamState:
@@ -23,19 +23,20 @@ class TeamState:
         self.sensors: Sensors | None = None
         self.sensors_at = -1.0
         self.rows_heard = self.rows_lost = 0
-        """Of the table, over all robots: a gap in a sender's numbers is rows that never came. How the radio is."""
+        """Numbers of table rows received and lost, over all robots; a gap in a sender's numbers counts as lost. They
+        show the quality of the radio link."""
         self._table: dict[int, tuple[TableRow, float]] = {}
         self._velocity: dict[int, tuple[float, float]] = {}
-        """From one row to the next, in `map`."""
+        """Velocity in `map`, from one row to the next."""
         self._clocks: dict[int, ClockOffset] = {}
         self.obstacles = SharedObstacles(self.poses)
-        """What other robots reported as moving."""
+        """Moving obstacles that other robots reported."""
 
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
         self.sensors, self.sensors_at = sensors, at
 
     def hear_row(self, robot: int, row: TableRow, at: float) -> None:
-        """Row of `robot`; an older one than the last of the same life is dropped."""
+        """Update with a row of `robot`; one older than the last of the same incarnation is dropped."""
         known = self._table.get(robot)
         if known is not None and _order(row) <= _order(known[0]):
             return
@@ -56,7 +57,7 @@ class TeamState:
         return self.sensors if now - self.sensors_at <= SENSORS_S_MAX else None
 
     def pose_of(self, robot: int, now: float) -> Pose2D | None:
-        """Where `robot` is in `map`: its last place, and on from there for a while; None when that is stale."""
+        """Return the pose of `robot` in `map`, extrapolated for `GOES_ON_S` at most; None when its row is stale."""
         known = self._table.get(robot)
         if known is None or now - known[1] > ROW_S_MAX:
             return None
@@ -68,12 +69,12 @@ class TeamState:
         return [self.pose_of(robot, now) for robot in self._table]
 
     def stuck(self, robot: int, now: float) -> bool:
-        """Whether `robot` says that it is stuck; what it said long ago does not count."""
+        """Return whether `robot` reports that it is stuck; a stale report does not count."""
         known = self._table.get(robot)
         return known is not None and known[0].stuck and now - known[1] <= ROW_S_MAX
 
     def delays(self, robots: tuple[int, ...], now: float) -> tuple[Delay, ...]:
-        """Least (receive - send) of these robots' rows: their half of a round trip (control.md 3.3)."""
+        """Return the least (receive - send) of these robots' rows, for their half of a round trip (control.md 3.3)."""
         clocks = [(robot, self._clocks.get(robot)) for robot in robots]
         return tuple(Delay(robot, clock.least(now)) for robot, clock in clocks if clock is not None and clock.known)
 

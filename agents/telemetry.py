@@ -1,4 +1,4 @@
-"""What an agent tells of itself: its place, how it stands to its slot, what it decided, how it fares."""
+"""Telemetry of one agent: its pose, slot error, decisions, plan and status."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ ROUTE_POINTS_MAX = 200
 OBSTACLE_S = 0.5
 TABLE_S = 0.5
 TABLE_ROBOTS_FULL_RATE = 16
-"""Larger teams say their rows less often: the table's traffic grows with their square."""
+"""Number of robots up to which table rows keep their full rate. Larger teams publish their rows less often, because the
+table's traffic grows with the square of their number."""
 FAR_M = 99.0
 
 
 class Reports:
-    """Keeps the rates of one robot's reports."""
+    """Publisher of one robot's reports, each at its own rate."""
 
     def __init__(self, outbox: Outbox, robots: int) -> None:
         self._outbox = outbox
@@ -42,7 +43,8 @@ class Reports:
         self, driver: Navigator, team: TeamState, near: tuple[int, ...], role: Role, term: Term,
         pose: Pose2D, twist: Twist, now: float,
     ) -> None:  # fmt: skip
-        """After each control step: pose; less often tracking and the table's row. `near` are its neighbours' ids."""
+        """Publish the pose after each control step; tracking and the table's row less often. `near` holds the ids of
+        the neighbours in the chain."""
         outbox, odometer_m = self._outbox, driver.estimator.odometer_m
         header = outbox.header("pose", now)
         outbox.publish("pose", PoseStamped(header, pose.x, pose.y, 0.0, pose.theta, twist, odometer_m, role, term))
@@ -55,7 +57,7 @@ class Reports:
             outbox.publish("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck))
 
     def decision(self, decision: Decision | None, term: Term, now: float) -> None:
-        """Each change of what a robot does about its surroundings, with the values that decided it."""
+        """Publish each change of the decision about the surroundings, with the values that decided it."""
         met = None if decision is None else (decision.kind, decision.action)
         if met == self._met:
             return
@@ -69,7 +71,8 @@ class Reports:
         self._outbox.event("decision", now, term, data)
 
     def obstacle(self, driver: Navigator, pose: Pose2D, now: float) -> None:
-        """What this robot is dealing with, for all: at once when it changes, and while it lasts twice a second."""
+        """Publish the obstacle that this robot deals with: at once when it changes, then twice a second while it
+        lasts."""
         decision = driver.decision
         if decision is None:
             self._next_obstacle = 0.0
@@ -84,7 +87,7 @@ class Reports:
             self._outbox.publish("obstacles", note)
 
     def plan(self, explore: Explore, pose: Pose2D, now: float) -> None:
-        """Of who leads through unknown ground: its route, and a tile of its map where there is news."""
+        """Publish an exploring leader's route and a tile of its map, if a tile has changed."""
         if self._steps % PLAN_EVERY:
             return
         tile = explore.shown(pose)
@@ -95,7 +98,7 @@ class Reports:
 
     def _tracking(self, driver: Navigator, predecessor: int, now: float) -> None:
         r = driver.follower.readout
-        if r.separation_m <= 0.0:  # no step of following was made yet: there is nothing to tell
+        if r.separation_m <= 0.0:  # no step of following yet: nothing to report
             return
         self._outbox.publish("tracking", Tracking(
             self._outbox.header("tracking", now), predecessor, r.separation_m, r.phi, r.chi, r.heading,
@@ -107,7 +110,8 @@ def status(
     outbox: Outbox, vitals: Vitals, team: TeamState, driver: Navigator | None, missing: tuple[int, ...],
     role: Role, term: Term, version: Version | None, now: float,
 ) -> None:  # fmt: skip
-    """Diagnostics in the sense of ROS. `driver` is None before the mission is known; `missing` stay away (E18)."""
+    """Publish the diagnostics (as in ROS). `driver` is None before the mission is known; `missing` lists the robots
+    that are absent (E18)."""
     counters: dict[str, float] = {
         "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
         "tick_p99_ms": round(1000.0 * vitals.tick_p99_s, 3),
@@ -118,7 +122,9 @@ def status(
         "rows_heard": team.rows_heard,
         "rows_lost": team.rows_lost,
     }
-    if version is not None:  # of the config, and so of the chain: who missed the event knows it by this
+    if (
+        version is not None
+    ):  # version of the config, and so of the chain: an observer that missed the event learns it here
         counters |= {"config_n": version.term.n, "config_seq": version.seq}
     text, level = "waiting for the mission", Level.WARN
     if driver is not None:

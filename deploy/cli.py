@@ -1,6 +1,7 @@
-"""`lfa`: a table of commands. The module of a command is imported when it is called, so `lfa --help` stays quick.
+"""The `lfa` script: a table of commands. A command's module is imported when it is called, to keep `lfa --help` fast.
 
-Every command module has a function `command`. Bad input, ours or the parser's, is one line on stderr and exit code 2.
+Every command module has a function `command`. Bad input, refused by the command or by the parser, is one line on
+stderr and exit code 2.
 """
 
 from __future__ import annotations
@@ -24,59 +25,68 @@ class Command(NamedTuple):
 
 
 COMMANDS = (
-    Command("run", "lfa.deploy.run.launch", "Start router, world and agents as processes here; write a run folder.",
+    Command("run", "lfa.deploy.run.launch", "Run a scenario as processes on this machine; write a run folder.",
           "lfa run paper_path1 --robots 4 --fault 'kill leader at 20 s'"),
-    Command("sim", "lfa.deploy.run.simulate", "The same in one process, in virtual time; the same run folder.",
+    Command("sim", "lfa.deploy.run.simulate", "Run a scenario in one process, in virtual time; write a run folder.",
           "lfa sim paper_path1 --seed 7 --set world.lidar.beams=90"),
-    Command("fuzz", "lfa.deploy.fuzz.command", "Hunt for schedules of faults that break the lease protocol.",
+    Command("fuzz", "lfa.deploy.fuzz.command", "Search for fault schedules that violate invariants of the lease.",
           "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v; lfa fuzz --whole"),
-    Command("up", "lfa.deploy.fleet.up", "Bring a fleet up on its machines, over ssh, and wait until all of it drives.",
+    Command("up", "lfa.deploy.fleet.up", "Start a fleet on its machines, over ssh; wait until all are in the chain.",
           "lfa up deploy/fleet.example.toml"),
-    Command("ps", "lfa.deploy.fleet.ps", "What runs on which machine of a fleet.",
+    Command("ps", "lfa.deploy.fleet.ps", "List the processes of a fleet by machine.",
           "lfa ps --json"),
-    Command("top", "lfa.deploy.fleet.top", "A fleet's machines and robots on one screen, live.",
+    Command("top", "lfa.deploy.fleet.top", "Show the machines and robots of a fleet on one screen, live.",
           "lfa top"),
-    Command("logs", "lfa.deploy.fleet.logs", "The log of one process of a fleet, or of all, wherever it runs.",
+    Command("logs", "lfa.deploy.fleet.logs", "Print the log of one process of a fleet, or of all, on any machine.",
           "lfa logs -f robot3"),
-    Command("restart", "lfa.deploy.fleet.restart", "End one process of a fleet and start it again, wherever it runs.",
+    Command("restart", "lfa.deploy.fleet.restart", "Restart one process of a fleet, on any machine.",
           "lfa restart robot3"),
-    Command("doctor", "lfa.deploy.fleet.doctor", "What keeps a fleet's machines, or this one, from running.",
+    Command("doctor", "lfa.deploy.fleet.doctor", "Check the machines of a fleet, or this one, for faults.",
           "lfa doctor deploy/fleet.example.toml"),
-    Command("down", "lfa.deploy.fleet.down", "End a fleet on all its machines.",
+    Command("down", "lfa.deploy.fleet.down", "Stop a fleet on all its machines.",
           "lfa down"),
-    Command("fault", "lfa.deploy.operate.fault", "Do something to a robot of a running fleet.",
+    Command("fault", "lfa.deploy.operate.fault", "Inject a fault into a running fleet: robots, world, router or links.",
           "lfa fault kill leader; lfa fault stop world; lfa fault restart 3; lfa fault cut 1>2"),
-    Command("forget", "lfa.deploy.operate.forget", "Robots lost for good: a fleet without memory waits for them no more.",
+    Command("forget", "lfa.deploy.operate.forget",
+          "Declare robots permanently lost, so that a fleet without a config can start.",
           "lfa forget 3"),
     Command("formation", "lfa.deploy.operate.formation", "Ask the leader of a running fleet for another formation.",
           "lfa formation column"),
-    Command("watch", "lfa.deploy.view.terminal.watch", "How a running fleet stands, live on the terminal; keys do things to it.",
+    Command("watch", "lfa.deploy.view.terminal.watch",
+          "Show the state of a running fleet live; keys inject faults and commands.",
           "lfa watch --once"),
-    Command("view", "lfa.deploy.view.rerun.command", "A recording or a running fleet in the rerun viewer, a browser, or a picture.",
+    Command("view", "lfa.deploy.view.rerun.command",
+          "Show a recording or a running fleet in rerun, in a browser, or as a picture.",
           "lfa view runs/paper_path1-20260101-120000 --screenshot run.png"),
-    Command("record", "lfa.deploy.fleet.record", "Record a fleet that runs already.",
+    Command("record", "lfa.deploy.fleet.record", "Record a running fleet.",
           "lfa record --seconds 60"),
-    Command("topic", "lfa.deploy.view.terminal.topic", "What travels in a running fleet: list, echo, hz.",
+    Command("topic", "lfa.deploy.view.terminal.topic", "Inspect the topics of a running fleet: list, echo, hz.",
           "lfa topic echo robot2/pose --count 1"),
-    Command("list", "lfa.deploy.config.scenarios", "The shipped scenarios.",
+    Command("list", "lfa.deploy.config.scenarios", "List the shipped scenarios.",
           "lfa list --json"),
-    Command("validate", "lfa.deploy.config.validate", "Check a scenario file, and say what a seed makes of it.",
+    Command("validate", "lfa.deploy.config.validate",
+          "Check a scenario or fleet file; print a scenario as drawn for a seed.",
           "lfa validate my_course.toml --set mission.leading.cruise_mps=0.3"),
-    Command("schema", "lfa.deploy.config.schema", "Every key of a scenario: JSON schema for editors, or a table.",
+    Command("schema", "lfa.deploy.config.schema",
+          "Print all keys of a scenario or fleet file, as JSON schema or as a table.",
           "lfa schema --markdown"),
     Command("plot", "lfa.deploy.view.figures.command", "Draw the figures of a run folder.",
           "lfa plot runs/paper_path1-20260101-120000"),
-    Command("report", "lfa.deploy.view.report.command", "One HTML page about a run, or about two side by side.",
+    Command("report", "lfa.deploy.view.report.command", "Write one HTML page about a run, or about two side by side.",
           "lfa report runs/paper_path1-20260101-120000"),
-    Command("replay", "lfa.deploy.analysis.verification.replay", "Run cores again on their journals and compare; or play a recording back.",
+    Command("replay", "lfa.deploy.analysis.verification.replay",
+          "Re-execute cores on their journals and compare, or play a recording back.",
           "lfa replay runs/paper_path1-20260101-120000 --robot 2"),
-    Command("verify", "lfa.deploy.analysis.verification.command", "Check runs: the lease's invariants, the shapes of the paper's figures.",
+    Command("verify", "lfa.deploy.analysis.verification.command",
+          "Check runs: the invariants of the lease, and the paper's figures.",
           "lfa verify runs/paper_path1-20260101-120000 runs/paper_path2-20260101-120100"),
-    Command("map", "lfa.deploy.analysis.verification.explored_map", "What an explorer came to know, as a ROS map.yaml and pgm.",
+    Command("map", "lfa.deploy.analysis.verification.explored_map",
+          "Export the map of an exploration run as a ROS map.yaml and pgm.",
           "lfa map runs/explore-20260101-120000 --out maps"),
-    Command("keys", "lfa.deploy.fleet.keys_command", "A fleet's certificates, and who may say what: init, rotate, revoke, show.",
+    Command("keys", "lfa.deploy.fleet.keys_command",
+          "Manage certificates and publish rights: init, rotate, revoke, show.",
           "lfa keys init keys --robots 12 --hosts a=10.0.0.1,b=10.0.0.2; lfa keys revoke keys robot3"),
-    Command("bench", "lfa.deploy.bench.command", "Measure, beside the bar to be reached.",
+    Command("bench", "lfa.deploy.bench.command", "Run a benchmark; each figure is printed beside its required value.",
           "lfa bench lidar --json"),
     Command("completion", "lfa.deploy.completion", "Print a script that completes commands and options in your shell.",
           "lfa completion bash > ~/.local/share/bash-completion/completions/lfa"),
@@ -87,17 +97,17 @@ EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
 }  # fmt: skip
-"""What is not in the base install, by the extra that brings it."""
+"""Modules outside the base install, each with the extra that installs it."""
 
 
 def main() -> None:
-    """The `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
+    """Run the `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
     if sys.argv[1:] == ["--version"]:
         from importlib.metadata import version
 
         print("lfa", version("lfa"))
         sys.exit(0)
-    if sys.argv[1:] in ([], ["-h"], ["--help"]):  # answered before the parser is imported, which takes the longest
+    if sys.argv[1:] in ([], ["-h"], ["--help"]):  # before the parser is imported: that import dominates
         print(overview())
         sys.exit(0)
     signal.signal(signal.SIGTERM, _end)
@@ -113,18 +123,18 @@ def main() -> None:
 
 
 def _end(*_: object) -> None:
-    """SIGTERM ends a command as Ctrl-C does: what it has started is ended, what it has laid out is removed."""
+    """Exit on SIGTERM as on Ctrl-C, so that a command terminates its processes and removes its temporary files."""
     sys.exit(128 + signal.SIGTERM)
 
 
 def overview() -> str:
-    """What `lfa --help` prints."""
+    """Return the text of `lfa --help`."""
     rows = (f"  {entry.name:<12}{entry.help}" for entry in COMMANDS)
     return "\n".join(["Usage: lfa COMMAND [ARGUMENTS]...", "", _ABOUT, "", *rows, "", _MORE])
 
 
 def build(called: Sequence[str]) -> typer.Typer:
-    """All commands; only those that are `called` are imported, the others are known by name and help."""
+    """Return the parser with all commands. Only the `called` ones are imported; the others have name and help only."""
     import typer
 
     app = typer.Typer(name="lfa", help=_ABOUT, no_args_is_help=True, **PLAIN)
@@ -135,9 +145,9 @@ def build(called: Sequence[str]) -> typer.Typer:
 
 
 def _absent() -> None:
-    """Stands for a command that was not called."""
+    """Stand in for a command that was not called."""
 
 
 _ABOUT = "A chain of robots, each its own process, that survives the loss of its leader."
 _MORE = """\
-Each has --help with an example: lfa run --help. For a first look: lfa run paper_path1 --fault 'kill leader at 20 s'"""
+Each command has --help with an example: lfa run --help. First run: lfa run paper_path1 --fault 'kill leader at 20 s'"""

@@ -1,4 +1,4 @@
-"""The frame of all `lfa` scripts: parse, run, turn refusals into one line and an exit code."""
+"""Common frame of all `lfa` scripts: parse the command line, run, map errors to one line and an exit code."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ if TYPE_CHECKING:
     import typer
 
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.EISDIR, errno.ENOTDIR)
-"""What a disk refuses in the midst of work: no fault of the program."""
+"""errno values of a file system that refuses a write during a run: not an error of the program (exit code 1)."""
 
 
 NAMES = (errno.ENAMETOOLONG, errno.ELOOP)
-"""What nothing can be called, whoever asks for it."""
+"""errno values of a path that cannot exist: bad input (exit code 2)."""
 
 
 def run_cli(name: str, app: typer.Typer) -> int:
-    """Run `app` on the command line; the exit code. Used by all scripts of `deploy`."""
+    """Run `app` on the command line and return the exit code. Used by all scripts of `deploy`."""
     import typer
 
     from lfa.protocol.errors import Refused
 
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal that knows no degree sign is no reason to stop
+        sys.stdout.reconfigure(errors="replace")  # a terminal without a degree sign must not fail
     try:
         code = app(standalone_mode=False, prog_name=name)
     except Refused as refused:
         return print_errors(name, *getattr(refused, "lines", (str(refused),)))
-    except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
+    except typer.TyperException as error:  # from the parser: unknown option, text for a number
         return print_errors(name, error.format_message())
     except typer.Abort:
         return 130
-    except BrokenPipeError:  # the reader of a pipe has gone: nobody is left to tell
+    except BrokenPipeError:  # the reader of the pipe has exited
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
@@ -51,7 +51,7 @@ def run_cli(name: str, app: typer.Typer) -> int:
 
 
 def command_app(function: Callable[..., Any], help_text: str, example: str) -> typer.Typer:
-    """A script of one command."""
+    """Return the parser of a script with a single command."""
     import typer
 
     app = typer.Typer(**PLAIN)
@@ -60,6 +60,7 @@ def command_app(function: Callable[..., Any], help_text: str, example: str) -> t
 
 
 def print_errors(name: str, *texts: str) -> int:
+    """Print each text as one line on stderr and return exit code 2."""
     for text in texts:
         print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
     return 2
@@ -71,3 +72,4 @@ PLAIN: dict[str, Any] = {
     "rich_markup_mode": None,
     "pretty_exceptions_enable": False,
 }
+"""Typer options of every `lfa` script: plain help text, `-h`, no decorated tracebacks."""

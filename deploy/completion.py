@@ -1,7 +1,6 @@
-"""`lfa completion`: a script for bash, zsh or fish that completes commands, options and scenarios.
+"""`lfa completion`: print a script for bash, zsh or fish that completes commands, options and scenarios.
 
-The words are in the script itself, as they are when it is printed: completing starts no process. Print it anew after
-an update.
+The words are stored in the script when it is printed: completing starts no process. Print it again after an update.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from lfa.world.description.load import shipped
 
 
 class Words(Struct, frozen=True):
-    """What may follow one command: its options, and the words that its argument is chosen from."""
+    """Completions of one command: its options, and the choices of its argument."""
 
     command: str
     help: str
@@ -28,14 +27,14 @@ class Words(Struct, frozen=True):
 
 
 def command(
-    shell: Annotated[Literal["bash", "zsh", "fish"], typer.Argument(help="Whose script.")],
+    shell: Annotated[Literal["bash", "zsh", "fish"], typer.Argument(help="Shell that the script is for.")],
 ) -> int:
     print({"bash": _bash, "zsh": _zsh, "fish": _fish}[shell](words()))
     return 0
 
 
 def words() -> list[Words]:
-    """Of every command, from its function's parameters."""
+    """Return the completions of every command, derived from the parameters of its function."""
     return [_words_of(entry, import_module(entry.module).command) for entry in COMMANDS]
 
 
@@ -47,7 +46,7 @@ def _words_of(entry: Command, function: Callable[..., Any]) -> Words:
             continue
         if isinstance(about[0], OptionInfo):
             plain = f"--{name.replace('_', '-')}"
-            named = (about[0].default, *(about[0].param_decls or ()))  # in Annotated the first name lies in `default`
+            named = (about[0].default, *(about[0].param_decls or ()))  # Annotated: first name in `default`
             said = [word for word in named if isinstance(word, str)] or (
                 (plain, f"--no-{plain[2:]}") if kind is bool else (plain,)
             )

@@ -1,4 +1,4 @@
-"""Load a scenario with overrides from the command line."""
+"""Loading of a scenario with overrides from the command line."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from lfa.world.description.load import Scenario, load
 
 
 def load_scenario(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
-    """`scenario` by name or path, its values overridden; also what only a robot could refuse (gains, controller).
+    """Return `scenario` (name or path) with its values overridden.
 
-    Raises Refused with one line.
+    Also checks what otherwise only a robot checks: gains and controller. Raises Refused with one line.
     """
     chosen = load(scenario, overrides, robots)
     try:

@@ -1,4 +1,4 @@
-"""A scenario from a notebook or a script:
+"""Run a scenario from a notebook or a script:
 
 from lfa.deploy.simulate import run
 
@@ -26,10 +26,10 @@ __all__ = ["Result", "run"]
 
 
 class Result(Run):
-    """A finished run: its data, and its figures for a notebook."""
+    """Data of a finished run, with its figures for a notebook."""
 
     def figure(self, name: str) -> Figure:
-        """Return the figure `name` of `catalogue.FIGURES`. Raises KeyError with the names that there are."""
+        """Return the figure `name` of `catalogue.FIGURES`. Raises KeyError that lists the known names."""
         from lfa.deploy.view.figures import catalogue
 
         if name not in (known := [known for known, *_ in catalogue.FIGURES]):
@@ -46,10 +46,10 @@ def run(
     faults: Sequence[str] = (),
     out: Path | None = None,
 ) -> Result:
-    """Run `scenario` (shipped name, file, or as loaded) in virtual time, as `lfa sim` does, and read the result.
+    """Run `scenario` (shipped name, file, or loaded) in virtual time, as `lfa sim` does, and return its result.
 
-    `set` holds texts `a.b=value` and `robots` a team's size, for a scenario given by name. The run folder is `out`,
-    or a new one in `runs/`. Raises Refused for what no world could be built from.
+    `set` (texts `a.b=value`) and `robots` (team size) override a scenario that is given by name. The run folder is
+    `out`, or a new one in `runs/`. Raises Refused for a scenario that no world can be built from.
     """
     chosen = load(scenario, set, robots) if isinstance(scenario, str) else scenario
     ended = simulate.run(chosen, seed, out, parse_all(chosen.mission, chosen.faults, faults))

@@ -1,6 +1,6 @@
-"""Real clocks, and the only import of `time` in `protocol` and `agents`.
+"""Real clocks; the only module of `protocol` and `agents` that imports `time`.
 
-CLOCK_BOOTTIME goes on in system suspend: a woken laptop must not believe in a lease that ran out while it slept.
+CLOCK_BOOTTIME also counts during system suspend: a resumed laptop must not use a lease that expired meanwhile.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ _BOOTTIME = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 
 
 def now() -> float:
-    """Seconds of this machine's boot clock: monotonic, with an arbitrary zero."""
+    """Return this machine's boot-clock time [s]: monotonic, with an arbitrary zero."""
     return time.clock_gettime(_BOOTTIME)
 
 
 def wall_ms() -> int:
-    """Wall-clock milliseconds: an ordering aid for incarnations and term numbers only, never for a lease."""
+    """Return the wall-clock time [ms], which only orders incarnations and term numbers; a lease never uses it."""
     return time.time_ns() // 1_000_000
 
 
 def cpu_s() -> float:
-    """Processor time used by this process so far [s]."""
+    """Return the processor time [s] used by this process so far."""
     return time.process_time()
 
 
 def thread_s() -> float:
-    """Processor time used by this thread so far [s]: what a computation costs, however busy the machine is."""
+    """Return the processor time [s] used by this thread so far: a computation's cost, independent of machine load."""
     return time.thread_time()
 
 

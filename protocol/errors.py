@@ -1,7 +1,7 @@
-"""`Refused`: the one exception for bad input, shown to the user as one line."""
+"""`Refused`, the one exception for invalid input; it is shown to the user as one line."""
 
 from __future__ import annotations
 
 
 class Refused(ValueError):
-    """A value given by a person that cannot be obeyed; the text is one line: what, where, what would be right."""
+    """Invalid value given by a person; the text is one line: what is wrong, where, and what would be right."""

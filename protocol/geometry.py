@@ -1,4 +1,4 @@
-"""SE(2): poses, twists and exact motion along arcs. SI units, radians, counter-clockwise (REP-103)."""
+"""Geometry in SE(2): poses, twists and exact motion along arcs. SI units, radians, counter-clockwise (REP-103)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from msgspec import Meta, Struct
 TAU = 2.0 * pi
 NUMBER_MAX = 1e9
 Number = Annotated[float, Meta(ge=-NUMBER_MAX, le=NUMBER_MAX)]
-"""A measure that a core computes with: what comes in bytes is refused beyond it, long before a sum has no end."""
+"""Number that a core computes with, bounded by NUMBER_MAX: decoding rejects larger ones, so that sums stay finite."""
 
 
 class Pose2D(Struct, frozen=True, array_like=True, gc=False):
-    """Position [m] and yaw [rad] of one frame in another; the frame is in the variable's name."""
+    """Position [m] and yaw [rad] of one frame in another; the variable's name contains the frame."""
 
     x: Number = 0.0
     y: Number = 0.0
@@ -22,7 +22,7 @@ class Pose2D(Struct, frozen=True, array_like=True, gc=False):
 
 
 class Twist(Struct, frozen=True, array_like=True, gc=False):
-    """Velocity of `base_link` in itself: forward [m/s] and yaw rate [rad/s]."""
+    """Velocity of `base_link`, expressed in `base_link`: forward [m/s] and yaw rate [rad/s]."""
 
     linear_x: Number = 0.0
     angular_z: Number = 0.0
@@ -32,30 +32,30 @@ STILL = Twist(0.0, 0.0)
 
 
 def wrap(angle: float) -> float:
-    """`angle` [rad] brought into (-pi, pi]."""
+    """Return `angle` [rad] wrapped into (-pi, pi]."""
     wrapped = (angle + pi) % TAU - pi
     return pi if wrapped == -pi else wrapped
 
 
 def compose(a_b: Pose2D, b_c: Pose2D) -> Pose2D:
-    """Pose of c in a, from b in a and c in b."""
+    """Return the pose of c in a, from b in a and c in b."""
     c, s = cos(a_b.theta), sin(a_b.theta)
     return Pose2D(a_b.x + c * b_c.x - s * b_c.y, a_b.y + s * b_c.x + c * b_c.y, wrap(a_b.theta + b_c.theta))
 
 
 def inverse(a_b: Pose2D) -> Pose2D:
-    """Pose of a in b, from b in a."""
+    """Return the pose of a in b, from b in a."""
     c, s = cos(a_b.theta), sin(a_b.theta)
     return Pose2D(-c * a_b.x - s * a_b.y, s * a_b.x - c * a_b.y, wrap(-a_b.theta))
 
 
 def between(a_b: Pose2D, a_c: Pose2D) -> Pose2D:
-    """Pose of c in b, from both in a."""
+    """Return the pose of c in b, from b and c in a."""
     return compose(inverse(a_b), a_c)
 
 
 def along_arc(pose: Pose2D, twist: Twist, duration_s: float) -> Pose2D:
-    """Where a unicycle is after `duration_s` of constant `twist`: equation (1) integrated exactly as an arc."""
+    """Return a unicycle's pose after `duration_s` of constant `twist`: equation (1) integrated exactly as an arc."""
     turn = twist.angular_z * duration_s
     chord = twist.linear_x * duration_s * sinc(0.5 * turn)
     middle = pose.theta + 0.5 * turn
@@ -63,7 +63,7 @@ def along_arc(pose: Pose2D, twist: Twist, duration_s: float) -> Pose2D:
 
 
 def part_of_arc(step: Pose2D, part: float) -> Pose2D:
-    """The first `part` (0 to 1) of a motion `step` (the end in the frame of the start) made with constant twist."""
+    """Return the first `part` (0 to 1) of `step`, a motion with constant twist (end pose in the frame of the start)."""
     rest = 0.5 * (part - 1.0) * step.theta
     length = part * sinc(0.5 * part * step.theta) / sinc(0.5 * step.theta)
     c, s = length * cos(rest), length * sin(rest)
@@ -71,17 +71,17 @@ def part_of_arc(step: Pose2D, part: float) -> Pose2D:
 
 
 def sinc(x: float) -> float:
-    """sin(x)/x, exact at zero."""
+    """Return sin(x)/x, exact at zero."""
     return sin(x) / x if abs(x) > 1e-6 else 1.0 - x * x / 6.0
 
 
 def distance(a: Pose2D, b: Pose2D) -> float:
-    """Straight-line distance [m] between two positions."""
+    """Return the straight-line distance [m] between two positions."""
     return hypot(a.x - b.x, a.y - b.y)
 
 
 def bearing(origin: Pose2D, target: Pose2D) -> float:
-    """Direction [rad] from `origin` to `target` in the frame that both are given in."""
+    """Return the direction [rad] from `origin` to `target`, in the frame of both."""
     return atan2(target.y - origin.y, target.x - origin.x)
 
 
@@ -89,7 +89,7 @@ Point = tuple[float, float]
 
 
 def in_base(pose: Pose2D, point: Point) -> Point:
-    """`point` (in `map`) as seen from `pose`."""
+    """Return `point` (x, y [m] in `map`) in the base frame of `pose`."""
     dx, dy = point[0] - pose.x, point[1] - pose.y
     c, s = cos(pose.theta), sin(pose.theta)
     return c * dx + s * dy, c * dy - s * dx

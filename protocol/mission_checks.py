@@ -1,4 +1,4 @@
-"""Checks of a `Mission`; each raises `Refused` with field, value and what would be right."""
+"""Checks of a `Mission`; each raises `Refused` with the field, its value and what would be right."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lfa.protocol.mission import KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
 
 
 def check_mission(mission: Mission) -> Mission:
-    """`mission`, or `Refused` with the first field that cannot be obeyed."""
+    """Return `mission`. Raises Refused for the first infeasible field."""
     ids = mission.robots
     repeated = next((i for n, i in enumerate(ids) if i in ids[:n]), None)
     _require(len(ids) >= 1, "mission.robots", list(ids), "at least one robot id")
@@ -42,7 +42,7 @@ def check_mission(mission: Mission) -> Mission:
 
 
 def _check_route(points: tuple[tuple[float, float], ...]) -> None:
-    """Way-points near enough that the way along them can be kept in memory."""
+    """Raise Refused for way-points too far apart to keep the path along them in memory."""
     where = "mission.leading.route_m"
     for point in points:
         near = all(isfinite(c) and abs(c) <= ROUTE_M_MAX for c in point)
@@ -52,7 +52,7 @@ def _check_route(points: tuple[tuple[float, float], ...]) -> None:
 
 
 def _check_known(leading: Leading) -> None:
-    """Known obstacles are circles, and only a route along way-points is led past them."""
+    """Raise Refused for known obstacles that are no circles, or without `path_following`, which alone avoids them."""
     where, followed = "mission.leading.known_m", leading.motion == "path_following"
     value = [list(circle) for circle in leading.known_m]
     _require(followed or not value, where, value, 'left out without motion = "path_following"')
@@ -63,7 +63,7 @@ def _check_known(leading: Leading) -> None:
 
 
 def _check_times(leading: Leading) -> None:
-    """A trajectory has a time for each way-point, and no leg that needs more than `cruise_mps`."""
+    """Raise Refused for a trajectory without a time per way-point, or with a leg that needs more than `cruise_mps`."""
     times, points, where = leading.times_s, leading.route_m, "mission.leading.times_s"
     if leading.motion != "trajectory":
         _require(not times, where, list(times), 'left out without motion = "trajectory"')

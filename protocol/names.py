@@ -1,4 +1,4 @@
-"""Names of robots on the wire: `robot3`, the witness, and how an id is read back."""
+"""Names of robots and of the witness in keys and messages, and the parsing of ids from them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ DIGITS_MAX = 18
 
 
 def robot_name(robot_id: int) -> str:
-    """The name of an id in keys and messages: `robot2`, or `witness` for the voter without a robot."""
+    """Return the name of an id in keys and messages: `robot2`, or `witness` for the voter without a robot."""
     return WITNESS_NAME if robot_id == WITNESS_ID else f"robot{robot_id}"
 
 
-@lru_cache(maxsize=1024)  # asked for each message; bounded: strangers may call themselves anything
+@lru_cache(maxsize=1024)  # called for each message; bounded: foreign senders may use any name
 def robot_id_of(name: str) -> int | None:
-    """The id behind a name, None when it names no robot and no witness."""
+    """Return the id of a name; None when it names neither a robot nor the witness."""
     if name == WITNESS_NAME:
         return WITNESS_ID
     digits = name.removeprefix("robot")
@@ -28,5 +28,5 @@ def robot_id_of(name: str) -> int | None:
 
 
 def whole_number(text: str) -> int | None:
-    """What `text` says in digits, so few of them that messages and journals can hold it; None when it is no such."""
+    """Return the number in `text`, of at most DIGITS_MAX digits so that messages and journals hold it; else None."""
     return int(text) if len(text) <= DIGITS_MAX and text.isascii() and text.isdecimal() else None

@@ -1,8 +1,8 @@
-"""The interface between a core and whatever runs it: real time, virtual time, or a replay.
+"""The interface between a core and its runner: real time, virtual time, or a replay.
 
-A Node never reads a clock, a socket, an environment variable or a global random generator. All that can change
-it comes in through `receive` and `tick`, with the receiver's own monotonic time; all that it does goes out
-as Envelopes. The same calls in the same order give the same answers: that is what `journal.py` records.
+A Node never reads a clock, a socket, an environment variable or a global random generator. All input comes
+through `receive` and `tick`, with the receiver's own monotonic time; all output is returned as Envelopes. The
+same calls in the same order give the same answers; `journal.py` records them.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from lfa.protocol.messages.codec import Message
 
 
 class PeerUp(Struct, frozen=True, array_like=True, tag="peer_up"):
-    """A liveliness token appeared. It does not yet mean that its owner can be reached."""
+    """Liveliness event: a token appeared. Its owner may still be unreachable."""
 
     name: str
     incarnation: int
 
 
 class PeerDown(Struct, frozen=True, array_like=True, tag="peer_down"):
-    """A liveliness token vanished: a hint, never a proof (lease.md section 4)."""
+    """Liveliness event: a token vanished. It suggests that its owner died and never proves it (lease.md section 4)."""
 
     name: str
     incarnation: int
 
 
 class RouterLost(Struct, frozen=True, array_like=True, tag="router_lost"):
-    """The own link to the router is gone: what follows from here says nothing about others."""
+    """Loss of this process's own link to the router; liveliness events after it say nothing about other processes."""
 
 
 class Vitals(Struct, frozen=True, array_like=True, tag="vitals"):
-    """What the shell knows about itself, once a second, so that the core can report it in `status`."""
+    """The runner's own measurements, delivered once a second so that the core can report them in `status`."""
 
     loop_lag_s: float
     dropped: int
@@ -41,18 +41,18 @@ class Vitals(Struct, frozen=True, array_like=True, tag="vitals"):
     cpu_percent: float
     rss_mib: float
     tick_p99_s: float = 0.0
-    """Processor time of a tick, the 99th percentile of the newest."""
+    """Processor time [s] of a tick, 99th percentile of the newest ticks."""
 
 
 class Stop(Struct, frozen=True, array_like=True, tag="stop"):
-    """SIGTERM or Ctrl-C: say the last words, then be `finished`."""
+    """SIGTERM or Ctrl-C: publish the final messages, then become `finished`."""
 
 
 Local = PeerUp | PeerDown | RouterLost | Vitals | Stop
 
 
 class Received(Struct, frozen=True, gc=False):
-    """Something came: a message from the network, or a local event (`key` is then empty)."""
+    """Input of a Node: a message from the network, or a local event (`key` is then empty)."""
 
     at: float
     key: str
@@ -60,44 +60,44 @@ class Received(Struct, frozen=True, gc=False):
 
 
 class Envelope(Struct, frozen=True, gc=False):
-    """A message and the key that it is to be published on."""
+    """Output of a Node: a message and the key to publish it on."""
 
     key: str
     message: Message
 
 
 class Node(Protocol):
-    """Agent, world, witness and drivers are Nodes."""
+    """Deterministic core of one process: agent, world, witness or driver."""
 
     @property
     def name(self) -> str:
-        """Unique in the fleet: `robot2`, `world`, `witness`."""
+        """Name, unique in the fleet: `robot2`, `world`, `witness`."""
 
     @property
     def incarnation(self) -> int:
-        """Which start of this name it is: grows from start to start."""
+        """Number of this start of the name; it grows from start to start."""
 
     @property
     def started_with(self) -> dict[str, Any]:
-        """As plain data, what it was started with: `kind` and what else a replay needs to start it again."""
+        """Start arguments as plain data: `kind`, and all else that a replay needs to start the node again."""
 
     @property
     def interests(self) -> frozenset[str]:
-        """Key expressions that it wants to hear at the moment; the shell follows changes."""
+        """Key expressions that the node subscribes to at the moment; the runner follows changes."""
 
     @property
     def finished(self) -> bool:
-        """True when the last words are spoken; the shell then ends the process."""
+        """True when the final messages are out; the runner then ends the process."""
 
     @property
     def refusal(self) -> str | None:
-        """One line that says why it cannot take part at all (the process then exits 2), or None."""
+        """Reason, in one line, why the node cannot take part at all (the process then exits with 2), or None."""
 
     def receive(self, received: Received) -> list[Envelope]:
-        """Something came."""
+        """Process one input and return the messages to publish."""
 
     def tick(self, now: float) -> list[Envelope]:
-        """The deadline passed."""
+        """Do what is due at `now` [s] and return the messages to publish."""
 
     def next_deadline(self) -> float:
-        """When to tick next, in the node's own monotonic time."""
+        """Return the time [s] of the next tick, in the node's own monotonic time."""

@@ -1,4 +1,4 @@
-"""How an agent speaks: headers, sequence numbers and keys, and what is still to be sent."""
+"""Outgoing messages of an agent: headers, sequence numbers, keys, and the envelopes still to be sent."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lfa.protocol.topics import TOPIC, key
 
 
 class Outbox:
-    """The sender's side of every message of one life of one robot."""
+    """Sender side of all messages of one incarnation of one robot."""
 
     def __init__(self, fleet: str, robot_id: int, incarnation: int) -> None:
         self.fleet = fleet
@@ -25,12 +25,12 @@ class Outbox:
         self._out: list[Envelope] = []
 
     def header(self, topic: str, now: float) -> Header:
-        """The next header on `topic`."""
+        """Return the next header on `topic`."""
         seq = self._seq[topic] = self._seq.get(topic, -1) + 1
         return Header(self.name, self.incarnation, seq, now)
 
     def key(self, topic: str) -> str:
-        """This robot's own key of `topic`."""
+        """Return this robot's own key of `topic`."""
         return self._keys[topic]
 
     def publish(self, topic: str, message: Message, to: str | None = None) -> None:
@@ -38,10 +38,10 @@ class Outbox:
         self._out.append(Envelope(own if to is None else f"{own}/{to}", message))
 
     def event(self, kind: str, now: float, term: Term | None, data: dict[str, Any]) -> None:
-        """A line for `events.jsonl`."""
+        """Publish an event, which becomes a line of `events.jsonl`."""
         self.publish("event", Event(self.header("event", now), kind, term, data))
 
     def drain(self) -> list[Envelope]:
-        """All that was said since the last call."""
+        """Return and clear the envelopes published since the last call."""
         out, self._out = self._out, []
         return out

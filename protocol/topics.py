@@ -1,6 +1,6 @@
-"""The table of topics. Keys, QoS, freshness, the recorder's channels and the access rules are all read from it.
+"""The table of topics: the source of keys, QoS, freshness, the recorder's channels and the access rules.
 
-A key is `lfa/<fleet>/<owner>/<topic>`, and `lease` and `alive` carry one more part: to whom, and which incarnation.
+A key is `lfa/<fleet>/<owner>/<topic>`; `lease` and `alive` carry one more part: the receiver, or the incarnation.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ WORLD_NAME = "world"
 OPERATOR_NAME = "operator"
 RECORDER_NAME = "recorder"
 DRIVER_PREFIX = "driver"
-"""The driver of the real robot `robot3` is `driver3`: it speaks on the robot's own keys what hardware says."""
+"""Prefix of a driver's name: the driver of robot `robot3` is `driver3`; it publishes hardware topics on robot keys."""
 HOST_PREFIX = "host-"
-"""The supervisor of machine `a` speaks as `host-a`."""
+"""Prefix of a supervisor's name: the supervisor of machine `a` publishes as `host-a`."""
 
 
 class Topic(Struct, frozen=True):
-    """One row: what travels under a name, how often, how urgently, how long it stays true, and who may say it."""
+    """Row of the table: message type of a name, its publishers, rate, QoS and freshness."""
 
     name: str
     type: type
     publishers: tuple[str, ...]
     rate_hz: float | None
-    """None: on events."""
+    """Publication rate [Hz]; None: on events."""
     state: bool
-    """Only the newest value counts: a receiver keeps one slot a key. False: each message counts."""
+    """True: only the newest value counts, and a receiver keeps one value per key. False: each message counts."""
     wakes: bool
-    """Acted on at arrival; otherwise read at the receiver's next deadline."""
+    """True: processed at arrival. False: read at the receiver's next deadline."""
     priority: Priority
     timeout_s: float | None
-    """Older than this is stale."""
+    """Age [s] beyond which a message is stale; None: never."""
 
 
 TEAM = ("agent", "witness", "driver")
@@ -89,32 +89,32 @@ TOPICS: tuple[Topic, ...] = (
 )  # fmt: skip
 
 NO_ECHO = frozenset({"lease", "table", "formation", "obstacles"})
-"""Said by those who follow what all say of it: nobody is given its own word back, which would only wake it."""
+"""Topics that their publishers also subscribe to; own samples are filtered out: they would only wake it."""
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
 TRUTH_OWNER = "sim"
 HARDWARE = ("sensors", "localization", "scan", "ground", "contact")
 
 
 def fleet_name(text: str) -> str:
-    """`text`, when it can be a part of keys that are one fleet's alone. Raises Refused."""
+    """Return `text` if it can be the fleet part of a key. Raises Refused."""
     if not text or not all(c.isalnum() or c in "-_." for c in text):
         raise Refused(f"--fleet {text!r}: must be letters, digits, '-', '_' or '.'")
     return text
 
 
 def key(fleet: str, owner: str, topic: str, to: str | None = None) -> str:
-    """`lfa/<fleet>/<owner>/<topic>[/<to>]`. Raises KeyError for a topic that the table does not hold."""
+    """Return `lfa/<fleet>/<owner>/<topic>[/<to>]`. Raises KeyError for a topic outside the table."""
     base = f"lfa/{fleet}/{owner}/{TOPIC[topic].name}"
     return base if to is None else f"{base}/{to}"
 
 
 def alive_key(fleet: str, owner: str, incarnation: int | str) -> str:
-    """The liveliness token of one start of one process; `*` for any."""
+    """Return the key of the liveliness token of one incarnation of a process; `*` stands for any."""
     return f"lfa/{fleet}/{owner}/alive/{incarnation}"
 
 
 class Address(Struct, frozen=True):
-    """What a key says: whose it is, which topic, and to whom when the topic names a receiver."""
+    """Parsed key: fleet, owner, topic, and the receiver or incarnation where the topic has one."""
 
     fleet: str
     owner: str
@@ -124,7 +124,7 @@ class Address(Struct, frozen=True):
 
 @lru_cache(maxsize=4096)
 def address(key: str) -> Address | None:
-    """The parts of a key, None when it is not one of ours. Cached, with a bound: strangers may send any key."""
+    """Return the parts of a key; None for a foreign key. The cache is bounded, as foreign senders may use any key."""
     parts = key.split("/")
     if len(parts) not in (4, 5) or parts[0] != "lfa":
         return None
@@ -134,10 +134,10 @@ def address(key: str) -> Address | None:
 
 
 def may_sign(where: Address, topic: Topic, sender: str) -> bool:
-    """Whether a message on the key `where` can be signed by `sender`.
+    """Return True if `sender` may be the header's sender of a message on the key `where`.
 
-    Routers judge by the key, cores by the header: both must name the same, or whoever may say something on a key of
-    its own could say it in another's name. Only hardware and ground truth are said by who plays them.
+    Routers check the key, cores the header: both must name the same process; otherwise a process could publish on
+    its own key in another's name. Only hardware topics and ground truth may come from the driver or the world instead.
     """
     if sender == where.owner:
         return True
@@ -146,7 +146,7 @@ def may_sign(where: Address, topic: Topic, sender: str) -> bool:
 
 
 def matches(expression: str, key: str) -> bool:
-    """Zenoh's key expressions as far as this project uses them: `*` for one part, a last `**` for any rest."""
+    """Return True if `key` matches `expression`: Zenoh's `*` for one part and a last `**` for any rest only."""
     if expression == key:
         return True
     wanted, parts = expression.split("/"), key.split("/")

@@ -44,7 +44,8 @@ def _trees() -> Iterator[tuple[Path, ast.Module]]:
 def docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Line and text of each docstring: of modules, classes, functions, and below constants and fields."""
     for node in ast.walk(tree):
-        for one in getattr(node, "body", None) or []:
+        body = getattr(node, "body", None)
+        for one in body if isinstance(body, list) else ():
             if isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant) and isinstance(one.value.value, str):
                 yield one.lineno, one.value.value
 

@@ -1,5 +1,5 @@
-"""Everything that is simulated: bodies, ground, sensors, weather, virtual time.
+"""Simulation: bodies, ground, sensors, actuator gateways and virtual time.
 
-Imports `protocol`, numpy and pymunk; never `agents`. A world speaks to a robot only in the words that the
-robot's own hardware would use.
+May import `protocol`, numpy and pymunk; no code of agents, deployment or analysis may live here. The world communicates
+with an agent only through the topics that the robot's own hardware would use.
 """

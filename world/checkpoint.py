@@ -1,7 +1,7 @@
-"""What a world remembers over its own death: a state file in the run folder, written ten times a second.
+"""Checkpoint of a simulated world: a state file in the run folder, written ten times a second.
 
-A world that resumes goes on from there: time, where everybody and everything pushable stands, what odometry has
-counted. Bodies are at rest then, as robots are whose driver died; gateways are new ones, and shut for T_grant.
+A resumed world restores its time, the poses of the robots and of the obstacles that are not fixed, and the odometry.
+Bodies start at rest, as robots do after their driver died; gateways are new and stay closed for T_grant.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ EVERY_S = 0.1
 
 
 def read(run: Path) -> Memory:
-    """The state last written of the run in that folder. Raises Refused when there is none."""
+    """Return the state last written for the run in that folder. Raises Refused if there is none."""
     path = run / STATE if run.is_dir() else run
     try:
         return msgspec.json.decode(path.read_bytes(), type=Memory)
@@ -37,7 +37,7 @@ def read(run: Path) -> Memory:
 
 
 def resumed(scenario: Scenario, memory: Memory) -> Scenario:
-    """The drawn `scenario` with everybody and everything where `memory` has it. Raises Refused for another team."""
+    """Return the drawn `scenario` with bodies at the poses in `memory`. Raises Refused for another team."""
     robots = scenario.mission.robots
     if set(robots) != {robot.id for robot in memory.robots}:
         ids = sorted(robot.id for robot in memory.robots)
@@ -59,7 +59,7 @@ def _put(obstacle: Obstacle, pose: Pose2D) -> Obstacle:
 
 
 class Remembering:
-    """A World whose state is kept in a file. Obeys the Node interface."""
+    """World that writes its state to a file. Implements the Node interface."""
 
     def __init__(self, world: World, run: Path) -> None:
         self._world = world
@@ -77,11 +77,11 @@ class Remembering:
         return sent
 
     def _keep(self) -> None:
-        """On a full disk the world goes on, with the state as last kept."""
+        """Write the state; on an I/O error (full disk) keep the last state and stop writing."""
         fresh = self._path.with_suffix(".new")
         try:
             fresh.write_bytes(msgspec.json.encode(self._world.memory()))
-            os.replace(fresh, self._path)  # whoever reads finds one whole state or the other
+            os.replace(fresh, self._path)  # atomic: a reader finds one complete state or the other
         except OSError as error:
             print(f"{self._path}: {error.strerror}: the state is kept no more", file=sys.stderr, flush=True)
             self._next_at = inf

@@ -1,4 +1,4 @@
-"""`lfa-world`: the simulated world of a scenario as one process, with the witness in it."""
+"""`lfa-world`: the simulated world of a scenario as one process, which also hosts the witness."""
 
 from __future__ import annotations
 
@@ -24,26 +24,24 @@ EXAMPLE = "Example: lfa-world paper_path1 --seed 7 --set world.lidar.beams=90"
 
 
 def start(
-    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or a file in TOML.")],
-    seed: Annotated[int, typer.Option(help="Draws noise, obstacle places and start poses.")] = 0,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", help="Override a field, a.b=value; again for more.")
-    ] = None,
-    robots: Annotated[int | None, typer.Option(help="Size of the team, ids 1 to N.")] = None,
-    fleet: Annotated[str, typer.Option(help="Name of the fleet: part of every key.")] = "fleet",
-    connect: Annotated[str | None, typer.Option(help="Router, like tcp/127.0.0.1:7447; a,b: or the next.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="This machine's folder of `lfa keys`.")] = None,
+    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")],
+    seed: Annotated[int, typer.Option(help="Seed of noise, obstacle positions and start poses.")] = 0,
+    set_: Annotated[list[str] | None, typer.Option("--set", help="Override a field, a.b=value; repeatable.")] = None,
+    robots: Annotated[int | None, typer.Option(help="Team size; the ids become 1 to N.")] = None,
+    fleet: Annotated[str, typer.Option(help="Name of the fleet, part of every key.")] = "fleet",
+    connect: Annotated[str | None, typer.Option(help="Router, as tcp/127.0.0.1:7447; a,b: tried in turn.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="This machine's key folder from `lfa keys`.")] = None,
     link: Annotated[
-        Literal["fast", "std", "wifi"], typer.Option(help="How soon a silent link counts as dead: 0.5, 1 or 2 s.")
+        Literal["fast", "std", "wifi"], typer.Option(help="Timeout of a silent link: 0.5, 1 or 2 s.")
     ] = "std",
     journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
-    witness: Annotated[bool, typer.Option(help="Hold the mission's witness here.")] = True,
-    state: Annotated[Path | None, typer.Option(help="Run folder to keep the bodies' state in, for --resume.")] = None,
-    resume: Annotated[Path | None, typer.Option(help="Run folder whose world goes on from its last state.")] = None,
-    faults: Annotated[bool, typer.Option("--faults", help="Obey an operator's radio weather: for tests.")] = False,
+    witness: Annotated[bool, typer.Option(help="Host the mission's witness here.")] = True,
+    state: Annotated[Path | None, typer.Option(help="Run folder for the checkpoint that --resume reads.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Run folder whose last checkpoint to continue from.")] = None,
+    faults: Annotated[bool, typer.Option("--faults", help="Obey `lfa fault cut` and `loss`; for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
-    from lfa.world import checkpoint  # what these need is not in the base install
+    from lfa.world import checkpoint  # these need packages that are not in the base install
     from lfa.world.world import World
 
     drawn = draw(load(scenario, set_ or (), robots), seed)
@@ -62,7 +60,7 @@ def start(
 
 
 def main() -> None:
-    """Entry point of `lfa-world`."""
+    """Run `lfa-world` (entry point)."""
     app = typer.Typer(
         context_settings={"help_option_names": ["-h", "--help"]},
         add_completion=False,
@@ -78,7 +76,7 @@ def main() -> None:
         if error.name not in EXTRA:
             raise
         _refuse(f"needs {error.name}: install with: pip install 'lfa[world]'")
-    except typer.TyperException as error:  # what the parser refuses: an unknown option, a word for a number
+    except typer.TyperException as error:  # parser errors: an unknown option, text for a number
         _refuse(error.format_message())
 
 

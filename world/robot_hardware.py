@@ -1,4 +1,4 @@
-"""One simulated robot's hardware: its gateway, its sensors, and the words they are said in."""
+"""Hardware of one simulated robot: its gateway, its sensors, and the messages they publish."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from lfa.world.sensors.lidar import ANGLE_MIN, Floats
 from lfa.world.sensors.noise import HeightNoise, Localizer, RangeNoise, WheelOdometry
 
 REFUSAL_EVERY_S = 0.2
-"""Between two events of a gateway about the same reason, however often the term changes."""
+"""Minimum interval [s] between two refusal events of a gateway for the same reason, also across terms."""
 
 
 class RobotHardware:
-    """What stands between an agent and its simulated body. `now` is the world's monotonic time [s] throughout."""
+    """Gateway and sensors between an agent and its simulated body. `now` is the world's monotonic time [s]."""
 
     def __init__(self, fleet: str, robot_id: int, scenario: Scenario, seed: int, incarnation: int, now: float) -> None:
         noise = scenario.world.noise
@@ -41,7 +41,7 @@ class RobotHardware:
         self._told: dict[str, tuple[Term, float]] = {}
 
     def command(self, cmd: CmdVel, now: float) -> tuple[str, dict[str, object]] | None:
-        """Give `cmd` to the gateway; what may be worth an event: an obeyed leader command, a new refusal."""
+        """Pass `cmd` to the gateway; return kind and data of an event for an obeyed leader command or a new refusal."""
         reason = self.gateway.command(cmd, now)
         if reason is None:
             return ("leader_command", {"robot": self.id}) if cmd.as_leader else None
@@ -52,13 +52,13 @@ class RobotHardware:
         return "refused", {"robot": self.id, "reason": reason, "count": self.gateway.refused[reason]}
 
     def fence(self, fence: Fence, now: float) -> Envelope:
-        """FENCED, as this robot's own gateway says it to all (lease.md section 5)."""
+        """Fence the gateway and return its FENCED, addressed to all (lease.md section 5)."""
         header = self._header("lease", now, sender=self.name)
         note = LeaseNote(header, self.gateway.fence(fence, now))
         return Envelope(key(self._fleet, self.name, "lease", TO_ALL), note)
 
     def sensors(self, stamp: float, now: float) -> Envelope:
-        """Odometry as of `stamp`; the gateway's own moment is `now`."""
+        """Return the odometry as of `stamp`, with the gateway's stamp of `now`."""
         odometry, gateway = self.odometry, self.gateway
         message = Sensors(
             self._header("sensors", stamp),
@@ -74,14 +74,14 @@ class RobotHardware:
         return self._envelope("sensors", message)
 
     def localization(self, stamp: float, pose_map: Pose2D) -> Envelope | None:
-        """A fix of the true `pose_map`, None when it drops out."""
+        """Return a localisation fix of the true `pose_map`, or None if it drops out."""
         fix = self._localizer.fix(pose_map)
         if fix is None:
             return None
         return self._envelope("localization", Localization(self._header("localization", stamp), fix))
 
     def scan(self, stamp: float, ranges: Floats) -> Envelope:
-        """The exact `ranges` [m], one a beam, as this robot's scanner measures them."""
+        """Return the scan that this robot's scanner measures from the exact `ranges` [m], one per beam."""
         lidar = self._lidar
         message = LaserScan(
             self._header("scan", stamp),
@@ -94,7 +94,7 @@ class RobotHardware:
         return self._envelope("scan", message)
 
     def ground(self, stamp: float, offsets_m: tuple[float, ...], heights: Floats) -> Envelope:
-        """The exact `heights` [m], one row a line at `offsets_m`, as this robot's ground sensor measures them."""
+        """Return the ground profile measured from the exact `heights` [m], one row per line at `offsets_m`."""
         message = GroundProfile(
             self._header("ground", stamp),
             self._ground.first_m,
@@ -105,7 +105,7 @@ class RobotHardware:
         return self._envelope("ground", message)
 
     def contact(self, stamp: float, pose_map: Pose2D, x: float, y: float) -> Envelope:
-        """The bumper was touched at (x, y) in `map`."""
+        """Return the message of a bumper contact at (x, y) in `map`, as a bearing in `base_link`."""
         bearing = wrap(atan2(y - pose_map.y, x - pose_map.x) - pose_map.theta)
         return self._envelope("contact", Contact(self._header("contact", stamp), bearing))
 

@@ -1,7 +1,7 @@
-"""Virtual time: a heap of deliveries and deadlines over any Nodes, with the codec and the journals of the real thing.
+"""Discrete-event simulator in virtual time: a heap of deliveries and deadlines over any Nodes, with codec and journals.
 
-The same seed gives the same run: chance comes from one generator, ties are broken by order of arrival, and nothing
-reads a clock. Each node has its own monotonic clock (offset and rate), as processes on several machines do.
+The same seed gives the same run: all randomness comes from one generator, ties are broken by order of insertion, and
+no real clock is read. Each node has its own monotonic clock (offset and rate), as processes on several machines do.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
 from lfa.protocol.transport.link_model import Link, LinkModel, Radio, link_of
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
-HINT_DELAY_S = (0.001, 0.005)  # a killed process's token goes within this (zenoh.md section 2)
+HINT_DELAY_S = (0.001, 0.005)  # after a kill the process's token vanishes within this [s] (zenoh.md section 2)
 LOCAL_DELAYS_S = (LOCAL_DELAY_S,)
 VITALS_S = 1.0
 FINISH_S_MAX = 1.0
@@ -31,7 +31,7 @@ Tap = Callable[[float, str, bytes, Message], None]
 
 
 class LocalClock(Struct, frozen=True):
-    """A node's own clock against true time: local = offset + rate * true."""
+    """Clock of a node relative to true time: local = offset + rate * true."""
 
     offset_s: float = 0.0
     rate: float = 1.0
@@ -44,7 +44,7 @@ class LocalClock(Struct, frozen=True):
 
 
 class _SimulatedNode:
-    """One living process: its host, its clock, what it follows, and what waits for it while it is stopped."""
+    """One running process: its host, its clock, its subscriptions, and the messages queued while it is stopped."""
 
     def __init__(self, host: NodeHost, clock: LocalClock) -> None:
         self.host = host
@@ -59,7 +59,7 @@ class _SimulatedNode:
 
 
 class Simulator:
-    """Runs Nodes in true time from 0. `now` is true time [s]; taps see every message as it is published."""
+    """Event loop that runs Nodes in true time from 0. `now` is true time [s]; taps get every published message."""
 
     def __init__(self, radio: Radio, seed: int) -> None:
         self.now = 0.0
@@ -70,7 +70,7 @@ class Simulator:
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = 0
         self._routes: dict[str, list[tuple[_SimulatedNode, Link | None]]] = {}
-        """Who hears what comes on a key, and over which link through the air."""
+        """Receivers of each key, and the radio link to each (None: not over radio)."""
         self._wanted: dict[tuple[frozenset[str], str], bool] = {}
 
     @property
@@ -78,7 +78,7 @@ class Simulator:
         return list(self._seats)
 
     def add(self, node: Node, journal: Journal, clock: LocalClock | None = None) -> None:
-        """A process starts now. Its token is told to the others, and theirs to it."""
+        """Start a process now. The others get a liveliness event for its token, and it gets theirs."""
         seat = _SimulatedNode(NodeHost(node, journal), clock or LocalClock())
         self._seats[node.name] = seat
         self._refresh(seat)
@@ -87,12 +87,12 @@ class Simulator:
         self.at(self.now + VITALS_S, self._vitals, seat)
 
     def lives(self, node: Node) -> bool:
-        """Whether this very life goes on."""
+        """Return True if this incarnation of the node is running."""
         seat = self._seats.get(node.name)
         return seat is not None and seat.node is node
 
     def kill(self, name: str, *, hinted: bool = True) -> None:
-        """SIGKILL: nothing more comes from it; the others' hints, if any, come within milliseconds."""
+        """Simulate SIGKILL: the process sends nothing more; if `hinted`, the others get PeerDown within 5 ms."""
         seat = self._seats[name]
         self._remove(seat)
         low, high = HINT_DELAY_S
@@ -100,16 +100,16 @@ class Simulator:
             self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
 
     def hint(self, event: PeerUp | PeerDown, observers: Sequence[str]) -> None:
-        """These are told that a token came or went, whatever is true."""
+        """Deliver a liveliness event to `observers`, true or false."""
         for seat in [self._seats[name] for name in observers if name in self._seats]:
             self._give(seat, "", event, b"")
 
     def pause(self, name: str) -> None:
-        """SIGSTOP: it does nothing, and what comes for it waits."""
+        """Simulate SIGSTOP: the process does nothing, and its messages are queued."""
         self._seats[name].paused = True
 
     def resume(self, name: str, *, shuffled: bool = False) -> None:
-        """SIGCONT: what waited comes at once; of states only the newest, as in a real inbox."""
+        """Simulate SIGCONT: deliver the queued messages at once; of state topics only the newest, as a real inbox."""
         seat = self._seats[name]
         seat.paused = False
         waiting, seat.waiting = seat.waiting, []
@@ -124,18 +124,18 @@ class Simulator:
         self._tick(seat, seat.node.next_deadline())
 
     def terminate(self, name: str) -> None:
-        """SIGTERM: the node says its last words and goes."""
+        """Simulate SIGTERM: the node gets Stop and may send for up to `FINISH_S_MAX` before it leaves."""
         seat = self._seats[name]
         seat.stop_by = self.now + FINISH_S_MAX
         self._give(seat, "", Stop(), b"")
 
     def at(self, when: float, action: Callable[..., None], *arguments: Any) -> None:
-        """Call `action` with `arguments` at true time `when`."""
+        """Schedule `action` with `arguments` at true time `when` [s]."""
         self._order += 1
         heapq.heappush(self._heap, (when, self._order, action, arguments))
 
     def say(self, key: str, payload: bytes) -> None:
-        """An outsider's message to all that follow `key`: an operator's, heard by the taps too."""
+        """Publish a message from outside the simulation, such as an operator's, to subscribers of `key` and to taps."""
         message = decode(payload, TOPIC[key.split("/")[3]].type)
         for tap in self.taps:
             tap(self.now, key, payload, message)
@@ -143,7 +143,7 @@ class Simulator:
             self.at(self.now + LOCAL_DELAY_S, self._give, seat, key, message, payload)
 
     def run(self, until: float, over: Callable[[], bool] | None = None) -> None:
-        """Advance to true time `until`, or until `over()` holds."""
+        """Advance to true time `until` [s], or until `over()` holds."""
         heap = self._heap
         while heap and heap[0][0] <= until:
             when, _, action, arguments = heapq.heappop(heap)
@@ -165,7 +165,7 @@ class Simulator:
         self._after(seat, seat.host.deliver(seat.clock.local(self.now), key, message, payload))
 
     def _tick(self, seat: _SimulatedNode, deadline: float) -> None:
-        """`deadline` is the node's own, as it said after its last call."""
+        """Call the node's tick if `deadline` [s, its own clock], from its last call, has come; else plan again."""
         if seat.gone or seat.paused:
             return
         now = seat.clock.local(self.now)
@@ -237,14 +237,14 @@ class Simulator:
         return routes
 
     def _wants(self, interests: frozenset[str], key: str) -> bool:
-        """Kept, since every life that begins or ends opens all routes anew."""
+        """Return True if `interests` match `key`; cached, since every process start or end clears all routes."""
         known = self._wanted.get((interests, key))
         if known is None:
             known = self._wanted[interests, key] = any(matches(e, key) for e in interests)
         return known
 
     def _refresh(self, seat: _SimulatedNode) -> None:
-        """The node's interests changed: it also hears of the tokens that already stand."""
+        """Apply the node's changed interests; it also gets liveliness events for tokens that already exist."""
         new = seat.node.interests
         added = sorted(new - seat.interests)
         seat.interests = new
@@ -269,5 +269,5 @@ def _token(node: Node) -> str:
 
 
 def _fleet(node: Node) -> str:
-    """The fleet that a node's interests speak of."""
+    """Return the fleet name in a node's interests."""
     return min(node.interests).split("/")[1]

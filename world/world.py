@@ -1,8 +1,8 @@
 """The simulated world as a Node: commands in through the gateways, bodies stepped together, sensors out.
 
-It speaks what robots' hardware speaks, and besides only the mission, events, and ground truth that no agent may
-hear. Its time runs on the grid t0 + n/physics_hz: sensors are stamped with the moment that their state belongs to,
-however late the tick comes. What comes too late to be caught up with slows the world down instead, and is counted.
+It publishes the topics of robot hardware, and besides only the mission, events, and ground truth, to which no agent may
+subscribe. Its time runs on the grid t0 + n/physics_hz: sensors are stamped with the time of their state, however late
+the tick comes. A delay too long to catch up with slows the world down instead, and is counted.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from lfa.world.sensors.ground_sensor import Profiler
 from lfa.world.sensors.lidar import Scanner
 
 CATCH_UP_STEPS_MAX = 20
-"""Steps in one tick: after a longer pause the world's time has stood still for the rest."""
+"""Largest number of steps in one tick; after a longer pause the world's time has stood still for the rest."""
 ROUNDING = 1e-6
-"""Of a step: a tick may come this much early."""
+"""Tolerance, as a fraction of a step, by which a tick may come early."""
 
 
 class Remembered(Struct, frozen=True):
-    """One robot at rest: where its body is, and what its odometry has counted so far."""
+    """Saved state of one robot at rest: the pose of its body, and its odometry."""
 
     id: int
     pose: Pose2D
@@ -45,20 +45,20 @@ class Remembered(Struct, frozen=True):
 
 
 class Memory(Struct, frozen=True):
-    """All of a world that outlives its process (`checkpoint.py`)."""
+    """Saved state of a world, which outlives its process (`checkpoint.py`)."""
 
     step: int
-    """Of the grid of time."""
+    """Index of the next point of the time grid."""
     robots: tuple[Remembered, ...]
     things: dict[int, Pose2D]
-    """Obstacles that are not nailed down, by their place in the scenario."""
+    """Poses in `map` of obstacles that are not fixed, by their index in the scenario."""
 
 
 class World:
-    """All of a drawn `scenario` but its agents; `seed` draws the sensors' noise. Obeys the Node interface.
+    """Simulation of a drawn `scenario` without its agents; `seed` draws the noise. Implements the Node interface.
 
-    Its time begins with its first tick, which is asked for at `start_at` or at once; with a `memory` of an earlier
-    life, whose places `scenario` must have (`memory.resumed`), it goes on from there.
+    Its time begins with its first tick, which is due at `start_at` or at once. With a `memory` of an earlier
+    incarnation it continues from there; `scenario` must then have the poses of that memory (`checkpoint.resumed`).
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class World:
         self.finished = False
         self.refusal: str | None = None
         self.slowed_s = 0.0
-        """How long [s] the world's time has stood still because ticks came too late."""
+        """Total time [s] for which the world's time has stood still because ticks came too late."""
         self.started_with = {
             "kind": "world",
             "scenario": msgspec.to_builtins(scenario),
@@ -95,16 +95,16 @@ class World:
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
         self._real = {robot_name(robot): self._place[robot_name(robot)] for robot in scenario.world.real_robots}
-        """Robots whose hardware speaks for itself, with their places."""
+        """Names of robots with a driver of their own, and their indices."""
         simulated = [robot for robot in scenario.mission.robots if robot_name(robot) not in self._real]
         self._simulated: list[tuple[int, RobotHardware]] = []
-        """All the others, with their places."""
+        """Simulated robots with their indices."""
         self._driven: dict[int, tuple[Twist, float]] = {}
-        """How such a robot said that it moves, and when, by its place."""
+        """Twist last reported by each real robot, and when [s], by its index."""
         self._cut_off = False
         self._dt_s = 1.0 / scenario.world.physics_hz
         self._step = 0 if memory is None else memory.step
-        """Number of the next point of the grid."""
+        """Index of the next point of the time grid."""
         self._first = self._step
         self._begun = False
         self._remembered = {} if memory is None else {robot.id: robot for robot in memory.robots}
@@ -112,7 +112,7 @@ class World:
         self._bodies.advance(self._step)
         self._seq: dict[str, int] = {}
         self._led: tuple[int, Term] | None = None
-        """Whose leader command was obeyed last, over all gateways: a change back to an older term shows (I2)."""
+        """Robot and term of the leader command obeyed last, over all gateways; shows a return to an older term (I2)."""
         self.interests = frozenset(
             {key(fleet, "*", "ask")}
             | {key(fleet, robot_name(robot_id), "cmd_vel") for robot_id in simulated}
@@ -123,7 +123,7 @@ class World:
 
     @property
     def gateways(self) -> dict[int, Gateway]:
-        """Of each robot, by its id; none before the first call."""
+        """Gateway of each robot by its id; empty before the first call."""
         return {robot.id: robot.gateway for robot in self._robots}
 
     def next_deadline(self) -> float:
@@ -132,7 +132,7 @@ class World:
         return self._t0 + self._step * self._dt_s
 
     def receive(self, received: Received) -> list[Envelope]:
-        """Commands, fences and asks count at once; what they do to bodies is seen from the next step on."""
+        """Process a message: commands, fences and asks take effect at once, on bodies from the next step on."""
         now, message = received.at, received.message
         if self.finished:
             return []
@@ -160,7 +160,7 @@ class World:
         return []
 
     def tick(self, now: float) -> list[Envelope]:
-        """Bring the bodies up to `now`, and say what happened and what the sensors see on the way."""
+        """Step the bodies up to `now` and return the events and sensor messages of each step."""
         if self.finished:
             return []
         sent: list[Envelope] = []
@@ -184,7 +184,7 @@ class World:
         return sent
 
     def memory(self) -> Memory:
-        """What a next life can go on from."""
+        """Return the state from which a next incarnation can continue."""
         robots = tuple(
             Remembered(robot.id, pose, robot.odometry.pose_odom, robot.odometry.odometer_m)
             for robot, pose in zip(self._robots, self._bodies.poses, strict=True)
@@ -192,7 +192,7 @@ class World:
         return Memory(self._step, robots, self._bodies.moved())
 
     def _switch_on(self, now: float) -> None:
-        """Gateways come to life with the first moment that the world is told of."""
+        """Create the robots' hardware at the first call: the gateways' time starts at `now`."""
         if not self._robots:
             mission = self._scenario.mission
             self._robots = [
@@ -237,7 +237,7 @@ class World:
 
     def _move(self, now: float) -> list[Touch]:
         wanted = [robot.gateway.twist(now) for robot in self._robots]
-        for place, (twist, at) in self._driven.items():  # a real one goes on as it last said, for a while
+        for place, (twist, at) in self._driven.items():  # a real robot keeps its last reported twist until the timeout
             wanted[place] = twist if now - at <= (TOPIC["sensors"].timeout_s or 0.0) else STILL
         touches = self._bodies.step(wanted)
         for robot, wheels in zip(self._robots, self._bodies.wheels, strict=True):
@@ -245,7 +245,7 @@ class World:
         return touches
 
     def _speak(self, stamp: float, now: float, touches: list[Touch]) -> list[Envelope]:
-        """What is due at this point of the grid."""
+        """Return the messages that are due at this point of the time grid."""
         sent: list[Envelope] = []
         poses = self._bodies.poses
         simulated = self._simulated
@@ -275,7 +275,7 @@ class World:
         return sent
 
     def _is_due(self, rate_hz: float | None) -> bool:
-        """Whether a point of a slower grid lies in the step that ends now."""
+        """Return True if a sample point at `rate_hz` lies in the step that ends now."""
         assert rate_hz is not None
         part = rate_hz * self._dt_s
         return floor(self._step * part + ROUNDING) > floor((self._step - 1) * part + ROUNDING)
@@ -306,5 +306,5 @@ class World:
 
 
 def _gateway_name(robot_id: int) -> str:
-    """The receiver that FENCE names in its key."""
+    """Return the receiver name of a FENCE in its key."""
     return f"gateway{robot_id}"

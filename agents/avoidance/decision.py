@@ -1,7 +1,7 @@
-"""The decision table of control.md section 7 as data: class of what is met, condition, action, what it updates.
+"""Decision table of control.md section 7 as data: obstacle class, condition, action, updated quantity.
 
-Rows are tried in order and the first whose condition holds is taken. An obstacle strategy updates
-speed and position, an environment strategy the angle; both end in a new trajectory (the paper's section 3.2).
+Rows are tried in order and the first whose condition holds is taken. An obstacle strategy updates speed and position,
+an environment strategy the angle; both end in a new trajectory (the paper's section 3.2).
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ Updates = Literal["speed and position", "angle"]
 
 
 class Situation(Struct, frozen=True):
-    """The values that a decision is taken by."""
+    """Values that a decision is based on."""
 
     kind: Class
     range_m: float
-    """rho: clear way in the direction of travel."""
+    """Free distance rho [m] in the direction of travel."""
     width_m: float = 0.0
-    """Of the thing as far as seen; inf when its end is out of sight."""
+    """Visible width [m] of the obstacle; inf when its end is out of sight."""
     left_m: float = inf
     right_m: float = inf
     rear_m: float = inf
     back_m: float = inf
-    """How far it could back off straight."""
+    """Free distance [m] straight backwards."""
     closest_m: float = inf
-    """Closest approach predicted, of what moves."""
+    """Predicted closest approach [m] of a moving obstacle."""
     crept: bool = False
-    """It was crept towards for as long as is worth it."""
+    """True when creeping towards the obstacle has used up its time."""
     crossable: bool = False
-    """The wheels can bridge or climb it."""
+    """True when the wheels can bridge or climb it."""
     room_m: float = 0.5
-    """W_r: the width that the robot needs beside it."""
+    """Width W_r [m] that the robot needs beside the obstacle."""
     swing_m: float = 0.2
-    """r_sw: what it needs to turn on the spot."""
+    """Radius r_sw [m] that the robot needs to turn on the spot."""
 
 
 class DecisionRow(Struct, frozen=True):
@@ -55,7 +55,7 @@ ANGLE: Updates = "angle"
 
 
 def _known(s: Situation) -> bool:
-    """The far edge is in sight, so that the dimension is known."""
+    """Return whether the far edge is in sight, so that the width is known."""
     return s.width_m < inf
 
 
@@ -71,7 +71,7 @@ def _turns(s: Situation) -> bool:
     return s.range_m > s.swing_m
 
 
-#   class, condition, when it holds, action, what it updates
+# class, condition, predicate, action, updated quantity
 TABLE: tuple[DecisionRow, ...] = (
     DecisionRow("moving", "it keeps its distance", lambda s: s.closest_m >= 0.6, "continue", MOTION),
     DecisionRow("moving", "it comes too near", lambda s: s.closest_m < 0.6, "give_way", MOTION),
@@ -95,22 +95,22 @@ TABLE: tuple[DecisionRow, ...] = (
 
 
 def decide(situation: Situation) -> DecisionRow | None:
-    """The first row of the situation's class that holds; None when the robot is stuck."""
+    """Return the first row of the situation's class that holds; None when the robot is stuck."""
     return next((row for row in TABLE if row.kind == situation.kind and row.holds(situation)), None)
 
 
 class Decision(Struct, frozen=True):
-    """What a detour does now, with the values that it was decided by, for the log."""
+    """Present action of a detour, with the values that decided it, for the log."""
 
     action: str
-    """`left`, `right`, `u_turn`, `back`, `creep`, `blocked`; of what moves: `slow`, `wait`, `back`, `ahead`;
-    on the ground: `overcome`, `climb`."""
+    """Action: `left`, `right`, `u_turn`, `back`, `creep`, `blocked`; for a moving obstacle `slow`, `wait`, `back`,
+    `ahead`; on the ground `overcome`, `climb`."""
     free_m: float
-    """Clear way along the motion that was wanted."""
+    """Free distance [m] along the wanted motion."""
     bearing: float
-    """Chosen direction in `base_link` [rad]."""
+    """Chosen direction [rad] in `base_link`."""
     kind: Class = "stationary"
-    """Class of what is met."""
+    """Class of the obstacle."""
     condition: str = ""
-    """The row of the decision table, by its condition, and what the decision updates (decisions.py)."""
+    """Condition of the chosen row of the decision table; `updates` is what that row updates."""
     updates: str = ""

@@ -1,7 +1,8 @@
-"""Round what the scan shows: when the wanted motion is not free, the nearest direction that is (control.md section 7).
+"""Detour around obstacles of the scan: if the wanted motion is blocked, the nearest free direction (control.md section
+7).
 
-A detour is a local override: the follower law or the leader's route is asked again each step, and takes over as soon as
-the way to its target has been free for a while.
+A detour is a local override: the follower law or the leader's route is computed again each step, and takes over as soon
+as the way to its target has been free for a while.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from lfa.agents.avoidance.openings import (
     BESIDE,
     NARROW_M,
     WIDE_M,
+    Openings,
     barring_point,
     first_open,
-    Openings,
 )
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.perception.obstacle import BlockingObstacle
@@ -30,39 +31,41 @@ from lfa.protocol.geometry import STILL, Twist, wrap
 from lfa.protocol.mission import Limits
 
 NEARER_M, LEAST_M = 0.005, safety.SKIN_M
-"""Who is nearer to a thing than `NARROW_M` already may go where it comes no nearer than it is but for so much, and not
-nearer than it would brake for anyway (safety.py)."""
+"""If already inside `NARROW_M`, a motion may reduce the clearance by at most NEARER_M [m], and never below LEAST_M [m],
+for which the robot would brake anyway (safety.py)."""
 NOISE_M = 0.02
-"""A reading of the scan may be so much too short: four standard deviations of the scanner in the paper's worlds."""
+"""Error [m] by which a scan reading may be too short: four standard deviations of the scanner in the paper's worlds."""
 REACH_M = 1.6
 HEADWAY_S = 0.8
 KEEP_SIDE_RAD = 0.6
-"""How much nearer a direction on the other side must be before the detour changes sides."""
+"""Angle [rad] by which a direction on the other side must be nearer before the detour changes sides."""
 CLEAR_S = 0.4
 HOLD_S = 1.0
-"""A decision is held at least this long."""
+"""Minimum time [s] that a decision is held."""
 TURN_GAIN = 2.5
 BACK, AHEAD = Twist(-0.15, 0.0), Twist(1.0, 0.0)
 SKIN_M = 0.03
 SWING_M = 0.05
-"""Beside the radius: what the robot needs to turn on the spot."""
+"""Margin [m] beside the radius that the robot needs to turn on the spot."""
 CREEP_MPS, CREEP_S, CREEP_FREE_M = 0.1, 2.0, 0.25
-"""Towards what has no visible end, to see it, for a bounded time."""
+"""Speed [m/s], longest time [s] and least free distance [m] of creeping towards an obstacle without a visible end, to
+see more of it."""
 IN_PLACE_RAD = 0.9
 
 
 class Detour:
-    """Whether a robot goes its wanted way or round something, by the decision table, with hysteresis."""
+    """Detour of one robot: its wanted motion or a way around an obstacle, by the decision table, with hysteresis."""
 
     def __init__(self, radius_m: float, limits: Limits) -> None:
         self._radius_m = radius_m
         self._limits = limits
         self.omega_max_radps = limits.omega_max_radps
-        """A leader turns more slowly than its drive could: its followers' slots swing with it."""
+        """Maximum turn rate [rad/s]; a leader's is lower than its drive allows, since its followers' slots swing with
+        it."""
         self.decision: Decision | None = None
-        """None while the wanted way is taken."""
+        """Present decision; None while the wanted motion is taken."""
         self._kept_m = NARROW_M
-        """`NARROW_M`, less where the robot is nearer to something already."""
+        """Kept clearance [m]: `NARROW_M`, or less where the robot is nearer to an obstacle already."""
         self._thing = BlockingObstacle()
         self._side = 0.0
         self._side_at = -inf
@@ -81,9 +84,10 @@ class Detour:
         now: float,
         thing: Callable[[float], BlockingObstacle] = lambda free_m: BlockingObstacle(),
     ) -> Twist | None:
-        """The twist of a detour towards `target` (both in `base_link`), or None: the wanted twist may go on.
+        """Return the twist of a detour towards `target` (both in `base_link`); None if the wanted twist may go on.
 
-        `thing` tells what bars the way so far ahead [m]; it is asked when the detour begins, and while it creeps.
+        `thing(free_m)` returns what blocks the way after that distance [m]. It is called when the detour begins, and
+        while the robot creeps.
         """
         blocked_m = self._blocked(points, wanted)
         if self.decision is None:
@@ -93,14 +97,14 @@ class Detour:
             self._side, self._crept_s = 0.0, 0.0
             self._thing = thing(inf if blocked_m is None else blocked_m)
         elif self.decision.action == "creep" and blocked_m is not None:
-            self._thing = thing(blocked_m)  # what it creeps for is to see more of it
+            self._thing = thing(blocked_m)  # creeping is meant to show more of it
         elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
             return None
         return self._round(points, target, speed_mps, inf if blocked_m is None else blocked_m, now)
 
     def _blocked(self, points: Sequence[Point], wanted: Twist) -> float | None:
-        """The free way along `wanted` when it is too short, None when it is long enough."""
+        """Return the free distance [m] along `wanted` when it is too short, None when it is long enough."""
         v = abs(wanted.linear_x)
         if v <= 0.01:
             return None
@@ -109,14 +113,14 @@ class Detour:
         return free_m if free_m < needed_m else None
 
     def _not_passed(self, points: Sequence[Point], wanted: Twist) -> list[Point]:
-        """`points` less those that the robot has beside it, nearer than it keeps by no more than a scan's noise: it
-        is about to have passed them."""
+        """Return `points` without those beside the robot that are inside its clearance by no more than the scan's
+        noise: it has nearly passed them."""
         sign = 1.0 if wanted.linear_x > 0.0 else -1.0
         kept_m = self._radius_m + NARROW_M - NOISE_M
         return [(x, y) for x, y in points if sign * x > BESIDE * abs(y) or hypot(x, y) < kept_m]
 
     def _clear(self, points: Sequence[Point], target: Point, now: float) -> bool:
-        """The straight way to the target has been free for `CLEAR_S`."""
+        """Return whether the straight way to the target has been free for `CLEAR_S`."""
         reach = min(hypot(*target), REACH_M)
         if barring_point(points, atan2(target[1], target[0]), reach, self._radius_m + NARROW_M) is not None:
             self._clear_since = None
@@ -126,7 +130,7 @@ class Detour:
         return now - self._clear_since >= CLEAR_S
 
     def _round(self, points: Sequence[Point], target: Point, speed_mps: float, free_m: float, now: float) -> Twist:
-        """The row of the table that holds, and the twist of its action."""
+        """Choose the row of the decision table and return the twist of its action."""
         near_m = min((hypot(x, y) for x, y in points), default=inf) - self._radius_m
         self._kept_m = max(LEAST_M, min(NARROW_M, near_m - NEARER_M))
         towards = atan2(target[1], target[0])
@@ -160,9 +164,10 @@ class Detour:
         return twist
 
     def _row(self, points: Sequence[Point], openings: Openings, free_m: float) -> DecisionRow | None:
-        """The table's row for what was met: an opening is as wide as the robot needs, whatever lies beside it."""
+        """Return the table's row for the obstacle. An opening counts as wide as the robot needs, whatever lies beside
+        it."""
         nose_m = free_along(points, AHEAD, self._radius_m)
-        # A bend that would lead nearer to what the robot has beside it says nothing of what is before its nose.
+        # A bend towards what is already beside the robot does not tell how far the way straight ahead is free.
         ahead_m = self._radius_m + (nose_m if self._kept_m < NARROW_M else min(free_m, nose_m))
         kind = "stationary" if self._thing.kind == "moving" else self._thing.kind
         return decide(
@@ -180,13 +185,13 @@ class Detour:
         )
 
     def _openings(self, points: Sequence[Point], towards: float, reach_m: float) -> Openings:
-        """With room to spare where there is, else just not touching."""
+        """Return the openings with a wide margin where there is room, else with the kept clearance."""
         for margin_m in dict.fromkeys((WIDE_M, NARROW_M, self._kept_m)):
             half_width_m = self._radius_m + margin_m
             left = first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             right = first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             if left is not None or right is not None:
-                unknown = self._thing.width_m == inf  # the table asks for the way back as well
+                unknown = self._thing.width_m == inf  # the table needs the rear opening as well
                 return Openings(left, right, self._rear(points, towards, reach_m) if unknown else None)
         return Openings(None, None, self._rear(points, towards, reach_m))
 
@@ -200,7 +205,7 @@ class Detour:
         return None
 
     def _chosen_side(self, openings: Openings, towards: float, now: float) -> float:
-        """The side that needs less turning; the one taken before counts as nearer, and is kept for a while."""
+        """Return the side that needs less turning. The present side gets a bonus and is held for a while."""
         left = inf if openings.left is None else abs(wrap(openings.left - towards))
         right = inf if openings.right is None else abs(wrap(openings.right - towards))
         if left == right == inf:
@@ -212,7 +217,7 @@ class Detour:
         return self._side
 
     def _barred_lately(self, now: float) -> bool:
-        """It was blocked, and a way out has not been open for long enough to be more than noise."""
+        """Return whether the robot was blocked and no opening has lasted long enough to be more than noise."""
         if self.decision is None or self.decision.action != "blocked":
             self._open_since = None
             return False
@@ -221,7 +226,8 @@ class Detour:
         return now - self._open_since < CLEAR_S
 
     def _say(self, action: str, free_m: float, bearing: float, row: DecisionRow | None, now: float) -> None:
-        """What is logged keeps its name for a while, unless there is no way at all."""
+        """Record the decision for the log. Its action keeps its name for a while, unless the robot is or was
+        blocked."""
         before = self.decision
         held = before is not None and now - self._acted_at < HOLD_S and "blocked" not in (action, before.action)
         if before is not None and (held or action == before.action):
@@ -237,11 +243,12 @@ class Detour:
         if abs(bearing) > IN_PLACE_RAD:
             return Twist(0.0, omega)
         braking = self._braking(points, NARROW_M)
-        if self._kept_m < NARROW_M:  # slowly past what it is too near to
+        if self._kept_m < NARROW_M:  # drive slowly past what is nearer than the clearance
             braking = max(braking, min(CREEP_MPS, self._braking(points, self._kept_m)))
         return Twist(min(speed_mps, braking) * cos(bearing), omega)
 
     def _braking(self, points: Sequence[Point], margin_m: float) -> float:
-        """Speed from which the robot stops before what is ahead of it, `margin_m` wider than it is."""
+        """Return the speed [m/s] from which the robot can stop before an obstacle ahead, with `margin_m` on either
+        side."""
         free_m = free_along(points, AHEAD, self._radius_m + margin_m)
         return sqrt(self._limits.a_max_mps2 * max(0.0, free_m - 0.1))

@@ -1,4 +1,4 @@
-"""Crossing of ground features: straight and slowly over what the wheels can cross."""
+"""Crossing of ground features: slow, straight driving over what the wheels can cross."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from lfa.protocol.geometry import Twist
 from lfa.protocol.mission import Limits
 
 CROSSING_MPS = 0.2
-"""Speed [m/s] that is slow enough for the wheels, whatever they meet (control.md section 7)."""
+"""Speed [m/s] that is slow enough for the wheels on any crossable feature (control.md section 7)."""
 LATE_S = 0.1
-"""Time [s] from a look at the floor until the robot brakes."""
+"""Delay [s] from a ground profile until the robot brakes."""
 NEAR_M = 0.5
 """Distance [m] to a feature's near edge below which the crossing begins."""
 BESIDE_M = 0.05
@@ -33,7 +33,7 @@ class GroundCrossing:
     def cross(self, wanted: Twist, now: float) -> Twist:
         """Return `wanted`, limited to a straight and slow motion until the whole robot is over the feature.
 
-        In a bend it is at any time slow enough to stop before what a look ahead shows first.
+        On a bend the speed always allows stopping before the ground that the floor sensor shows first.
         """
         ahead, wanted = self._ground.ahead, self._in_sight(wanted)
         if ahead is not None and ahead.near_m < NEAR_M and wanted.linear_x > 0.0:
@@ -49,10 +49,10 @@ class GroundCrossing:
         return Twist(CROSSING_MPS, wanted.angular_z * CROSSING_MPS / wanted.linear_x)
 
     def _in_sight(self, wanted: Twist) -> Twist:
-        """Limit the speed on a bend to what the floor sensor's look ahead allows.
+        """Limit the speed on a bend to what the floor sensor's range allows.
 
-        The lines look straight ahead: on a bend of radius R the floor before the inner wheel is `BESIDE_M` off its
-        line in a distance of sqrt(2 R BESIDE_M), and was never seen from farther away.
+        The sensor's lines point straight ahead. On a bend of radius R the floor before the inner wheel is `BESIDE_M`
+        off its line at a distance of sqrt(2 R BESIDE_M), and was not measured from farther away.
         """
         v, omega = wanted.linear_x, abs(wanted.angular_z)
         if v <= 0.0 or omega == 0.0 or not self._ground.looked:

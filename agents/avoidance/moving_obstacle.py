@@ -1,4 +1,5 @@
-"""What moves across the way: slow down, wait or make room, by the closest approach predicted (control.md 7)."""
+"""Avoidance of moving obstacles: slow down, wait or make room, by the predicted closest approach (control.md section
+7)."""
 
 from __future__ import annotations
 
@@ -10,41 +11,42 @@ from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
 CLEARANCE_M = 0.6
-"""From the robot's centre to the surface of what moves; nearer within the horizon is a conflict."""
+"""Least distance [m] from the robot's centre to the surface of a moving obstacle; less within the horizon is a
+conflict."""
 HORIZON_S = 3.0
 LOOK_S = 6.0
-"""When nothing keeps the distance within the horizon, so far ahead is looked at which keeps most of it: what comes on
-slowly from behind is not at a waiting robot yet when the horizon ends."""
+"""Prediction time [s] for choosing the action with the largest clearance when no action keeps `CLEARANCE_M` within the
+horizon: an obstacle that comes slowly from behind has not reached a waiting robot at the end of the horizon."""
 STEP_S = 0.25
 SLOW_SHARE = 0.4
 BACK_MPS = AHEAD_MPS = 0.25
 WAIT_S_MAX = 5.0
-"""After so long what moves is gone round as if it stood."""
+"""Maximum waiting time [s]; afterwards a moving obstacle is driven around like a stationary one."""
 HOLD_S = 1.0
-"""A robot takes less care only so long after the last conflict."""
+"""Time [s] after the last conflict before a robot may choose a less careful action."""
 CARE = {"slow": 0, "wait": 1, "ahead": 2, "back": 2}
 WORTH_M = 0.1
-"""Going out of the way, ahead or back, must win this much clearance over what is being done, or over waiting."""
+"""Clearance [m] that driving ahead or back must win over the present action, or over waiting."""
 
 
 class Crossing:
-    """Gives way to what moves, for a bounded time."""
+    """Give-way behaviour of one robot towards moving obstacles, for a bounded time."""
 
     def __init__(self) -> None:
         self.decision: Decision | None = None
         self._waiting_since: float | None = None
         self._held_until = 0.0
         self._near = inf
-        """Of the last conflict."""
+        """Closest approach [m] in the last conflict."""
         self._impatient = False
 
     @property
     def patient(self) -> bool:
-        """False once the longest wait is over: what moves is then gone round as if it stood."""
+        """False after the longest wait: a moving obstacle is then driven around like a stationary one."""
         return not self._impatient
 
     def give_way(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, now: float) -> Twist:
-        """`wanted`, or less of it. `moving` as of now, in `map` like `pose`."""
+        """Return `wanted`, or a slower or evading twist. `moving` holds as of now, in `map` like `pose`."""
         near = _closest(moving, pose, wanted)
         if near >= CLEARANCE_M and now >= self._held_until:
             self.decision, self._waiting_since, self._impatient = None, None, False
@@ -65,7 +67,7 @@ class Crossing:
         return _done(self.decision.action, wanted)
 
     def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist) -> str:
-        """The least that keeps the distance; what keeps most of it when nothing does."""
+        """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
         if _closest(moving, pose, _done("slow", wanted)) >= CLEARANCE_M:
             return "slow"
         if _closest(moving, pose, STILL) >= CLEARANCE_M:
@@ -85,9 +87,10 @@ def _done(action: str, wanted: Twist) -> Twist:
 
 
 def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: float = HORIZON_S) -> float:
-    """Least distance [m] between the robot's centre and a surface within so long from now on.
+    """Return the least distance [m] between the robot's centre and an obstacle's surface within `within_s` [s] from
+    now.
 
-    What is already that near and moves away is no conflict: only approaches count.
+    Only approaches count: an obstacle that is already near and moves away is no conflict.
     """
     least = inf
     for feature in moving:

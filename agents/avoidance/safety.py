@@ -1,5 +1,5 @@
-"""The last function before `cmd_vel`: whatever was decided, what goes out is finite, within the drive's limits, and
-slow enough to stop before what the scan shows."""
+"""Last function before `cmd_vel`: each published command is finite, within the drive's limits, and slow enough to stop
+before the obstacles of the scan."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.mission import Limits
 
 SKIN_M = 0.02
-"""Kept between the body and the nearest point when braking."""
+"""Distance [m] kept between the body and the nearest point when braking."""
 BRAKING_SHARE = 0.8
-"""Of the drive's deceleration, planned with: the rest is for what a 10 Hz scan has not seen yet."""
+"""Share of the drive's deceleration that is planned with; the rest covers what a 10 Hz scan has not shown yet."""
 
 SHARED_RAD = pi / 3
-"""Angle off the motion, now or where it turns to within `TURN_S`, within which a team-mate is ahead."""
+"""Angle [rad] off the motion, now or after turning for `TURN_S`, within which a team-mate counts as ahead."""
 TURN_S = 0.4
 
 
 def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, limits: Limits, dt: float) -> Twist:
-    """`wanted` made safe. `points` are in `base_link`; `last` is the command before, `dt` [s] ago."""
+    """Return `wanted` made safe. `points` are in `base_link`; `last` is the command before, `dt` [s] ago."""
     if not (isfinite(wanted.linear_x) and isfinite(wanted.angular_z)):
         wanted = STILL
     v, omega = within(wanted, limits)
@@ -36,8 +36,8 @@ def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, l
 
 
 def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits) -> Twist:
-    """`wanted`, slow enough towards each of `mates` (centres in `base_link`) to stop within half of the room between:
-    the other one may be coming, and the same holds for it."""
+    """Return `wanted`, slowed towards each of `mates` (centres in `base_link`) to stop within half of the room between:
+    the other robot may approach under the same rule."""
     v = wanted.linear_x
     sign = 1.0 if v >= 0.0 else -1.0
     turn = wanted.angular_z * TURN_S
@@ -53,7 +53,7 @@ def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limi
 
 
 def within(twist: Twist, limits: Limits) -> tuple[float, float]:
-    """`twist` scaled into the drive's limits with v/omega kept, so that the path keeps its shape."""
+    """Return `twist` scaled into the drive's limits with v/omega kept, so that the path keeps its shape."""
     v, omega = twist.linear_x, twist.angular_z
     v_max = limits.v_max_mps if v >= 0.0 else limits.v_reverse_max_mps
     scale = max(abs(v) / max(v_max, 1e-9), abs(omega) / limits.omega_max_radps, 1.0)

@@ -1,1 +1,4 @@
-"""Other controllers than the law, for comparison, found through the entry points `lfa.controllers`."""
+"""Alternative follower controllers for comparison with `Law`, found through the entry points `lfa.controllers`.
+
+The default law may not live here (`following/controller.py`), nor what all controllers share (`following/follower.py`).
+"""

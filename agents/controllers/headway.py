@@ -1,7 +1,7 @@
 """Constant time headway: the slot falls back by `HEADWAY_S` of its own speed.
 
-Tolerates delay without a buffer (|G| <= 1 when the headway is at least the latency, control.md 5.1), and pays
-with a gap that grows with speed.
+Tolerates delay without a buffer (|G| <= 1 when the headway is at least the latency, control.md 5.1), at the price of a
+gap that grows with speed.
 """
 
 from __future__ import annotations

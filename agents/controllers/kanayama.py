@@ -1,6 +1,6 @@
 """Kanayama's tracker (1990) on the slot: v = v_r cos th_e + K_x x_e, omega = w_r + v_r (K_y y_e + K_th sin th_e).
 
-Needs a reference that moves and its turn rate, which is taken from the slot's heading between two steps.
+Needs a moving reference and its turn rate, which is computed from the slot's heading of two successive steps.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from lfa.protocol.mission import Limits
 KX_PER_S = 1.5
 KY_PER_M2 = 6.0
 KTHETA_PER_M = 4.0
-"""Critically damped sideways: K_theta^2 >= 4 K_y / 1.5."""
+"""Gains with critically damped lateral motion: K_theta^2 >= 4 K_y / 1.5."""
 
 
 class Kanayama:

@@ -1,8 +1,8 @@
-"""A* from the goal to the robot, a few cells at a time.
+"""A* search from the goal to the robot, a few cells at a time.
 
-Backwards, because a goal that is walled in is then found out after its own small room, not after the rest of the
-world. A search is a generator that gives the number of cells it has looked at, so it goes on in the next tick where
-the budget ended this one.
+It searches backwards: an enclosed goal is then detected after its own small region, not after the rest of the map. A
+search is a generator that yields the number of cells expanded, so it continues in the next tick where the budget ended
+this one.
 """
 
 from __future__ import annotations
@@ -14,14 +14,18 @@ from lfa.agents.exploration.costmap import DIAGONAL, FREE, STRAIGHT, UNSEEN, Cos
 from lfa.agents.exploration.occupancy_grid import REACH
 
 GUESS = 11
-"""Of the way still to go, a step: a little above `FREE`, so that unknown ground is not searched in its whole width."""
+"""Heuristic cost of a step: a little above `FREE`, so that unknown ground is not searched in its whole width."""
 LOOKED_PER_YIELD = 16
 LONG_CELLS, ROOM_CELLS_MAX = 12_000, 60_000
-"""A search that has looked at so many cells asks whether the robot is walled in, in a room of at most so many."""
+"""Number of expanded cells after which a search checks whether the robot is enclosed, and the size in cells of the
+largest region for which that is checked."""
 
 
 def search(footing: Costmap, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
-    """Whether there is a way; each `toward[cell]` becomes the number, from 1, of the step by which it was reached."""
+    """Search a way from `goal` to `start`; yield cells expanded, return True if there is one.
+
+    Each `toward[cell]` becomes the number, from 1, of the step by which the cell was reached.
+    """
     looked_at, asked = 0, False
     for looked in _spread(footing, goal, start, toward):
         looked_at += abs(looked)
@@ -36,7 +40,7 @@ def search(footing: Costmap, start: int, goal: int, toward: bytearray) -> Genera
 
 
 def chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
-    """The cells from `start` to `goal`, each step of the search taken back."""
+    """Return the cells from `start` to `goal`, by reversing each step of the search."""
     offsets, cells = _offsets(columns), [start]
     while cells[-1] != goal:
         cells.append(cells[-1] - offsets[toward[cells[-1]] - 1])
@@ -44,8 +48,8 @@ def chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
 
 
 def _spread(footing: Costmap, goal: int, start: int, toward: bytearray) -> Iterator[int]:
-    """A* from `goal`: `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. Ends
-    with a negative number when `start` is reached, else when nothing is left."""
+    """Expand A* from `goal`. `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. The
+    last number yielded is negative when `start` was reached; otherwise no cell is left."""
     grid, near, prices = footing.grid, footing.near, footing.prices
     columns, scores = grid.columns, grid.scores
     steps = tuple(
@@ -97,7 +101,7 @@ def _spread(footing: Costmap, goal: int, start: int, toward: bytearray) -> Itera
 
 
 def _closed_in(footing: Costmap, start: int, goal: int) -> Generator[int, None, bool]:
-    """Whether the ground around the robot ends before the goal: a long search would find that out last."""
+    """Return whether the region around the robot ends before the goal, which a long search would find out last."""
     near, prices, columns, rows = footing.near, footing.prices, footing.grid.columns, footing.grid.rows
     seen = bytearray(len(near))
     seen[start] = 1

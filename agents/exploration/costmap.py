@@ -1,7 +1,7 @@
-"""What a step costs: the ground as a search takes it, while the map itself may change.
+"""Costmap of one search: the cost of each step, fixed for the search while the map itself may change.
 
-Ground that nobody has seen can be driven at a price; near what is known to be occupied the price grows, so that a way
-keeps to the middle where there is room.
+Unknown ground can be driven at an extra cost. Near occupied cells the cost grows, so that a path keeps to the middle
+where there is room.
 """
 
 from __future__ import annotations
@@ -13,39 +13,40 @@ from math import ceil, hypot, inf
 from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, REACH, Grid, Point
 
 FREE, UNSEEN = 10, 13
-"""Price of a straight step; a diagonal one costs `DIAGONAL` / `STRAIGHT` as much."""
+"""Cost of a straight step on free and on unknown ground; a diagonal step costs `DIAGONAL` / `STRAIGHT` as much."""
 STRAIGHT, DIAGONAL = 5, 7
 SKIN_M = 0.04
-"""The way's middle stays so much farther than the radius from an occupied cell's centre than half a cell."""
+"""Margin [m] beyond the radius and half a cell between the path and the centre of an occupied cell."""
 CLOSE = 60
-"""Added to the price of a step just not touching, falling with the square of the clearance gained."""
+"""Extra cost of a step just not touching an obstacle; it falls with the square of the clearance gained."""
 ROOM_M = 0.45
-"""Clearance beyond which more is worth nothing."""
+"""Clearance [m] beyond which the cost does not fall any more."""
 BARRED = 1000
-"""Price of a point where no robot can be."""
+"""Cost of a point where no robot can be."""
 SETTLE_CELLS = 6
-"""How far from a barred start or goal a free cell is looked for."""
+"""Distance [cells] up to which a free cell is searched around a blocked start or goal."""
 
 Box = tuple[float, float, float, float]
-"""x1, y1, x2, y2 in `map` [m]."""
+"""Box x1, y1, x2, y2 [m] in `map`."""
 
 
 class Costmap:
-    """Of one search. `near` is a copy of the grid's nearness, so what is barred here is barred for this search only."""
+    """Costmap of one search. `near` is a copy of the grid's nearness, so that cells are blocked for this search
+    only."""
 
     def __init__(self, grid: Grid, prices: bytes) -> None:
-        """`prices` as `prices_of` gives them."""
+        """Create a costmap of `grid` with `prices` as returned by `prices_of`."""
         self.grid = grid
         self.prices = prices
         self.near = bytearray(grid.near)
 
     def bar_runs(self, runs: Sequence[tuple[int, int]]) -> None:
-        """No way through the cells of `runs` (`runs_of`)."""
+        """Block the cells of `runs` (`runs_of`)."""
         for low, high in runs:
             self.near[low:high] = bytes([NEAR_PER_CELL * REACH]) * (high - low)
 
     def bar(self, center: Point, apart_m: float, own: Point) -> None:
-        """No way within `apart_m` of `center`, but for where the robot itself stands, at `own`."""
+        """Block the cells within `apart_m` [m] of `center`, except around the robot itself at `own`."""
         grid, cell = self.grid, self.grid.cell(*center)
         if cell is None:
             return
@@ -59,7 +60,8 @@ class Costmap:
                         self.near[place] = NEAR_PER_CELL * REACH
 
     def settled(self, point: Point) -> int | None:
-        """The nearest cell to `point` that a robot can stand in, within `SETTLE_CELLS`."""
+        """Return the nearest cell to `point` in which a robot can stand, within `SETTLE_CELLS`; None if there is
+        none."""
         cell = self.grid.cell(*point)
         if cell is None:
             return None
@@ -70,13 +72,13 @@ class Costmap:
         return min((pair for pair in around if self.prices[self.near[pair[1]]] > 0), default=(0, None))[1]
 
     def price(self, point: Point) -> int:
-        """Of a step there; `BARRED` where none can be."""
+        """Return the cost of a step to `point`; `BARRED` where no robot can be."""
         cell = self.grid.cell(*point)
         price = 0 if cell is None else self.prices[self.near[cell]]
         return price or BARRED
 
     def price_of_cells(self, cells: Sequence[int]) -> int:
-        """Of a chain of neighbours, as the search counts."""
+        """Return the cost of a chain of neighbouring cells, as the search computes it."""
         near, prices, scores, straight = self.near, self.prices, self.grid.scores, (1, self.grid.columns)
         return sum(
             (prices[near[cell]] + (UNSEEN - FREE if scores[cell] == 0 else 0))
@@ -85,7 +87,7 @@ class Costmap:
         )
 
     def price_of_line(self, a: Point, b: Point) -> float:
-        """Of the straight way, by its length; inf when it is barred."""
+        """Return the cost of the straight line, in proportion to its length; inf when it is blocked."""
         total, count = 0, 0
         for x, y in between(a, b):
             cell = self.grid.cell(x, y)
@@ -98,7 +100,7 @@ class Costmap:
 
 
 def prices_of(radius_m: float) -> bytes:
-    """Price of a straight step by nearness; 0: barred."""
+    """Return the cost of a straight step for each nearness; 0 is blocked."""
     barred_m = radius_m + 0.5 * CELL_M + SKIN_M
     prices = []
     for near in range(256):
@@ -109,13 +111,13 @@ def prices_of(radius_m: float) -> bytes:
 
 
 def between(a: Point, b: Point) -> Iterator[Point]:
-    """Points from `a` to `b`, one every cell's length."""
+    """Return points from `a` to `b`, one every cell's length, without `a`."""
     steps = max(1, ceil(hypot(b[0] - a[0], b[1] - a[1]) / CELL_M))
     return ((a[0] + (b[0] - a[0]) * n / steps, a[1] + (b[1] - a[1]) * n / steps) for n in range(1, steps + 1))
 
 
 def runs_of(grid: Grid, box: Box) -> Iterator[tuple[int, int]]:
-    """The cells of a box as runs of indices."""
+    """Yield the cells of a box as runs of indices."""
     x1, y1, x2, y2 = box
     low = max(0, int((x1 - grid.x0_m) / CELL_M)), max(0, int((y1 - grid.y0_m) / CELL_M))
     high = min(grid.columns, ceil((x2 - grid.x0_m) / CELL_M)), min(grid.rows, ceil((y2 - grid.y0_m) / CELL_M))

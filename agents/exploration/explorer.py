@@ -1,4 +1,5 @@
-"""Unknown ground: every robot maps all the time, so that a new leader starts warm; who leads also plans."""
+"""Exploration of unknown ground: every robot maps all the time, so that a new leader has a map; the leader also
+plans."""
 
 from __future__ import annotations
 
@@ -12,18 +13,18 @@ from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.mission import Mission
 
 MARGIN_M = 15.0
-"""Around start and goal: what lies farther out is not mapped, and no route leads through it."""
+"""Margin [m] around start and goal: ground farther out is not mapped, and no route leads through it."""
 MAP_CELLS = 400
 PLAN_CELLS = 160
-"""Budgets of one control step, in cells."""
+"""Budgets [cells] of one control step."""
 TURNING_RADPS = 1.0
-"""A scan made while the robot turns faster than this is not mapped: its beams have no one pose."""
+"""Turn rate [rad/s] above which a scan is not mapped: its beams do not share one pose."""
 GIVE_UP_SEARCHES = 3
-"""A goal counts as unreachable when so many searches in a row, each on a newer map, have found no way."""
+"""Number of successive searches, each on a newer map, without a way after which a goal counts as unreachable."""
 
 
 class Explore:
-    """Of one robot with one goal. `route` is in `map`; empty while there is none."""
+    """Map and planner of one robot with one goal. `route` is in `map`; empty while there is none."""
 
     def __init__(self, mission: Mission) -> None:
         self._mission = mission
@@ -33,7 +34,7 @@ class Explore:
         self._tiles: Tiles | None = None
 
     def shown(self, pose: Pose2D) -> Shown | None:
-        """A tile of the map, for views (agents/exploration/map_tiles.py)."""
+        """Return a tile of the map for views (agents/exploration/map_tiles.py); None if nothing is new."""
         if self.mapping is None:
             return None
         if self._tiles is None:
@@ -46,11 +47,11 @@ class Explore:
 
     @property
     def failure(self) -> str | None:
-        """Why the goal cannot be reached, once that is certain."""
+        """Reason why the goal cannot be reached, once that is certain; otherwise None."""
         return self.planner.unreachable if self.planner is not None and self._failures >= GIVE_UP_SEARCHES else None
 
     def see(self, scan: LaserScan, pose: Pose2D, twist: Twist, mates: Sequence[Pose2D]) -> None:
-        """Take a scan made at `pose` into the map."""
+        """Update the map with a scan made at `pose`."""
         if self.mapping is None:
             self._begin(pose)
         assert self.mapping is not None
@@ -58,7 +59,7 @@ class Explore:
             self.mapping.scan(scan, pose, [(mate.x, mate.y) for mate in mates])
 
     def work(self, leading: bool, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> bool:
-        """One step's share of mapping and, for who leads, planning; True when there is a new route."""
+        """Do one step's share of mapping and, if leading, of planning; return True when there is a new route."""
         if self.mapping is None or self.planner is None:
             return False
         self.mapping.work(MAP_CELLS)

@@ -1,7 +1,6 @@
-"""What a leader shows of its map: a tile of it at a time, so that a message has a bound and a step of control no work
-that grows with the ground. What changed around the robot comes first, every other time; in between goes all that is
-known, round and round, for views that come late.
-"""
+"""Tiles of a leader's map for views: one tile at a time, so that a message is bounded and the work of a control step
+does not grow with the map. Every other tile is one near the robot that has changed; in between, all known tiles are
+sent in turn, for views that join late."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from lfa.agents.exploration.occupancy_grid import CELL_M, OCCUPIED, Grid, Point
 
 TILE_CELLS = 64
 LOOKED_MAX = 24
-"""Tiles looked at, in one call, for one that holds something."""
+"""Maximum number of tiles that one call checks for content."""
 SHOWN = bytes(0 if score == 0 else 1 if score < OCCUPIED else 2 for score in range(256))
 AROUND = tuple((dx, dy) for dy in (0, 1, -1) for dx in (0, 1, -1))
 
@@ -22,18 +21,18 @@ Shown = tuple[float, Point, int, bytes]
 
 
 class Tiles:
-    """Of one grid; `next` gives one tile a call."""
+    """Tiles of one grid; `next` returns one tile per call."""
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
         self._columns, self._rows = -(-grid.columns // TILE_CELLS), -(-grid.rows // TILE_CELLS)
         self._sums: dict[Tile, int] = {}
-        """Of each tile as it was shown last."""
+        """Checksum of each tile as it was sent last."""
         self._swept = 0
         self._sweeps = False
 
     def next(self, x: float, y: float) -> Shown | None:
-        """A tile, for a robot at (x, y) in `map`; None: nothing is new."""
+        """Return a tile for a robot at (x, y) in `map`; None if nothing is new."""
         self._sweeps = not self._sweeps
         tile = self._sweep() if self._sweeps else self._changed(x, y)
         if tile is None:
@@ -45,7 +44,7 @@ class Tiles:
         return CELL_M, corner, columns, cells
 
     def _changed(self, x: float, y: float) -> Tile | None:
-        """One near the robot that differs from what was shown."""
+        """Return a tile near the robot that differs from what was sent; None if there is none."""
         side_m = TILE_CELLS * CELL_M
         column, row = floor((x - self._grid.x0_m) / side_m), floor((y - self._grid.y0_m) / side_m)
         for dx, dy in AROUND:
@@ -57,7 +56,7 @@ class Tiles:
         return None
 
     def _sweep(self) -> Tile | None:
-        """The next one that holds anything."""
+        """Return the next tile that is not empty; None if none was found."""
         for _ in range(min(LOOKED_MAX, self._columns * self._rows)):
             row, column = divmod(self._swept, self._columns)
             self._swept = (self._swept + 1) % (self._columns * self._rows)

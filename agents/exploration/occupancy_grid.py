@@ -1,9 +1,9 @@
-"""What a robot knows of the ground: an occupancy grid from its own scans, with the clearance kept beside it.
+"""Occupancy grid of one robot, from its own scans, with the clearance of each cell.
 
-Each cell has a score: 0 nobody has looked, 1..7 free, 8..15 occupied. A beam that ends in a cell adds `HIT`, one that
-passes takes 1 away, so that what has moved on is forgotten and a stray reading too. Clearance is a distance transform
-up to `REACH` cells, stamped around a cell when it becomes occupied and made anew around one that becomes free.
-All work is done in `work`, by a budget in cells: nothing here takes longer because the world is larger.
+Each cell has a score: 0 unknown, 1..7 free, 8..15 occupied. A beam that ends in a cell adds `HIT`, one that passes
+subtracts 1, so that obstacles that moved away and stray readings are forgotten. Clearance is a distance transform up to
+`REACH` cells, stamped around a cell when it becomes occupied and computed anew around one that becomes free. All work
+is done in `work`, by a budget in cells: no call takes longer because the map is larger.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from lfa.protocol.messages.robot import LaserScan
 
 CELL_M = 0.1
 SIDE_CELLS_MAX = 1200
-"""Of a grid; a larger ground is cut off there."""
+"""Maximum side [cells] of a grid; larger ground is cut off there."""
 REACH = 8
-"""Clearance is known up to so many cells."""
+"""Maximum clearance [cells] that is computed."""
 NEAR_PER_CELL = 10
 OCCUPIED = 8
 HIT, FIRST_HIT, FIRST_MISS, SCORE_MAX = 4, 9, 4, 15
 SIGHT_M = 6.0
 SHORT_OF_HIT_M = 0.2
-"""A beam frees nothing in the last part before what it hit: along a wall it would take the wall away."""
+"""Length [m] of a beam's last part, which frees no cell: a beam along a wall would otherwise erase the wall."""
 RAYS_MAX = 180
 MATE_M = 0.5
-"""Round a team-mate's last known place nothing is marked."""
+"""Radius [m] around a team-mate's last known position in which no cell is marked occupied."""
 REMAKE_COST = 1500
-"""Of making the clearance anew around one freed cell, in cells of the budget."""
+"""Cost [cells of the budget] of computing the clearance anew around one freed cell."""
 CHANGES_MAX = 4096
 
 Point = tuple[float, float]
@@ -40,20 +40,21 @@ _MISS = bytes([FIRST_MISS, *(max(1, score - 1) for score in range(1, 256))])
 
 
 class Grid:
-    """Bounded, with `REACH` cells at the rim that stay unknown. Untouched memory costs nothing."""
+    """Bounded grid whose outer `REACH` cells stay unknown. Untouched memory costs nothing."""
 
     def __init__(self, low: Point, high: Point) -> None:
-        """Covers the box from `low` to `high` in `map` [m], cut to `SIDE_CELLS_MAX` cells a side."""
+        """Create a grid over the box from `low` to `high` in `map` [m], cut to `SIDE_CELLS_MAX` cells a side."""
         self.x0_m, self.y0_m = floor(low[0] / CELL_M) * CELL_M, floor(low[1] / CELL_M) * CELL_M
         self.columns = min(ceil((high[0] - self.x0_m) / CELL_M) + 1, SIDE_CELLS_MAX)
         self.rows = min(ceil((high[1] - self.y0_m) / CELL_M) + 1, SIDE_CELLS_MAX)
         self.scores = bytearray(self.columns * self.rows)
         self.near = bytearray(self.columns * self.rows)
-        """`NEAR_PER_CELL` (REACH - distance to the nearest occupied cell's centre in cells); 0: nothing so near."""
+        """Nearness: `NEAR_PER_CELL` (REACH - distance to the nearest occupied cell's centre in cells); 0: none in
+        reach."""
         self.stamp = _stamp(self.columns)
 
     def cell(self, x: float, y: float) -> int | None:
-        """Index of the cell of a point in `map`; None in the rim and beyond."""
+        """Return the index of the cell of a point in `map`; None in the rim and beyond."""
         column, row = floor((x - self.x0_m) / CELL_M), floor((y - self.y0_m) / CELL_M)
         inside = REACH <= column < self.columns - REACH and REACH <= row < self.rows - REACH
         return row * self.columns + column if inside else None
@@ -66,12 +67,12 @@ class Grid:
         return self.scores[cell] >= OCCUPIED
 
     def clearance_m(self, cell: int) -> float:
-        """Distance [m] to the nearest occupied cell's centre, at most `REACH` cells."""
+        """Return the distance [m] to the nearest occupied cell's centre, at most `REACH` cells."""
         return (REACH - self.near[cell] / NEAR_PER_CELL) * CELL_M
 
 
 class Mapping:
-    """Of one robot, fed with its scans; `grid` is what it knows so far."""
+    """Mapping of one robot from its scans; `grid` is the map so far."""
 
     def __init__(self, low: Point, high: Point) -> None:
         self.grid = Grid(low, high)
@@ -80,14 +81,15 @@ class Mapping:
         self._freed: deque[int] = deque()
 
     def scan(self, scan: LaserScan, pose_map: Pose2D, mates: Sequence[Point]) -> bool:
-        """Take a scan made at `pose_map`; False, and nothing done, while the last one is still being worked in."""
+        """Accept a scan made at `pose_map`; return False, without effect, while the last one is still being
+        processed."""
         if self._rays is not None:
             return False
         self._rays = self._trace(scan, pose_map, tuple(mates))
         return True
 
     def work(self, cells: int) -> None:
-        """Go on with what is to be done, for about so many cells."""
+        """Continue the pending work, for about `cells` cells."""
         grid = self.grid
         while cells > 0 and self._taken:
             _raise(grid.near, grid.stamp, self._taken.popleft())
@@ -103,7 +105,7 @@ class Mapping:
                 cells -= done
 
     def _trace(self, scan: LaserScan, pose: Pose2D, mates: tuple[Point, ...]) -> Iterator[int]:
-        """One beam a step; gives the number of cells that it went through."""
+        """Process one beam per step; yield the number of cells that it passed."""
         count = len(scan.ranges_m)
         for n in range(0, count, max(1, ceil(count / RAYS_MAX))):
             r = scan.ranges_m[n]
@@ -113,7 +115,7 @@ class Mapping:
             c, s = cos(angle), sin(angle)
             hits = r < min(scan.range_max_m, SIGHT_M)
             if r == inf and min(scan.ranges_m[n - 1], scan.ranges_m[(n + 1) % count]) < SIGHT_M:
-                continue  # a beam that did not come back, among others that did: nothing is known of its way
+                continue  # no echo between beams with one: the cells along it stay unknown
             free_m = r - SHORT_OF_HIT_M if hits else min(scan.range_max_m, SIGHT_M)
             if hits:
                 x, y = pose.x + r * c, pose.y + r * s
@@ -133,7 +135,7 @@ class Mapping:
             self._taken.append(cell)
 
     def _free(self, x: float, y: float, c: float, s: float, length_m: float) -> int:
-        """The cells along a beam are free so far; those outside of the grid are passed over."""
+        """Mark the cells along a beam free; return its length in cells. Cells outside of the grid are skipped."""
         grid, scores, columns = self.grid, self.grid.scores, self.grid.columns
         steps = int(length_m / CELL_M)
         if steps <= 0 or grid.cell(x, y) is None:
@@ -152,7 +154,7 @@ class Mapping:
 
 
 def bounds(points: Sequence[Point], margin_m: float) -> tuple[Point, Point]:
-    """Lower left and upper right corner of the box around `points`, wider by `margin_m`."""
+    """Return the lower left and upper right corner of the box around `points`, enlarged by `margin_m`."""
     xs, ys = [point[0] for point in points], [point[1] for point in points]
     return (min(xs) - margin_m, min(ys) - margin_m), (max(xs) + margin_m, max(ys) + margin_m)
 
@@ -162,7 +164,7 @@ def _beside(x: float, y: float, mates: tuple[Point, ...]) -> bool:
 
 
 def _inside(grid: Grid, px: float, py: float, c: float, s: float) -> int:
-    """How many steps of one cell along (c, s) stay within the rim."""
+    """Return how many steps of one cell along (c, s) stay within the rim."""
     most = float(grid.columns + grid.rows)
     for place, step, side in ((px, c, grid.columns), (py, s, grid.rows)):
         if step > 1e-9:
@@ -173,7 +175,7 @@ def _inside(grid: Grid, px: float, py: float, c: float, s: float) -> int:
 
 
 def _stamp(columns: int) -> tuple[tuple[int, int], ...]:
-    """Offset and nearness of each cell nearer than `REACH`."""
+    """Return offset and nearness of each cell nearer than `REACH`."""
     side = range(-REACH, REACH + 1)
     values = (
         (row * columns + column, round(NEAR_PER_CELL * (REACH - hypot(row, column)))) for row in side for column in side
@@ -188,7 +190,7 @@ def _raise(near: bytearray, stamp: Sequence[tuple[int, int]], cell: int) -> None
 
 
 def _remake(grid: Grid, cell: int) -> None:
-    """The clearance around a cell that is free again: forget it, and stamp what is still occupied nearby."""
+    """Recompute the clearance around a freed cell: reset it, and stamp the cells nearby that are still occupied."""
     if grid.occupied(cell):
         return
     for offset, _ in grid.stamp:

@@ -1,7 +1,7 @@
-"""A route through ground that is known in part: when to search for one, and when the one there is has to go.
+"""Planner of a route through partly known ground: when to search, and when to replace the present route.
 
-When the map comes to contradict the route, or knows a clearly cheaper one, the search (search.py) begins anew: out of
-a dead end too. What a step costs says footing.py, what becomes of the cells shaping.py.
+If the map contradicts the route, or shows a clearly cheaper one, the search (astar.py) starts anew, also from within a
+dead end. costmap.py holds the cost of a step, path_smoothing.py turns cells into a route.
 """
 
 from __future__ import annotations
@@ -17,25 +17,26 @@ from lfa.agents.exploration.path_smoothing import PIECE_M, smoothed, straightene
 from lfa.protocol.geometry import Pose2D
 
 MATE_GAP_M = 0.10
-"""Kept from the skin of a team-mate that is gone round: out of a dead end the way leads past those behind."""
+"""Clearance [m] to the body of a team-mate that is passed: the way out of a dead end leads past the robots behind."""
 MATE_AHEAD_M = 0.8
-"""A team-mate counts as standing all along so far before it: it comes on while it is passed."""
+"""Distance [m] ahead of a team-mate over which it counts as standing everywhere: it drives on while it is passed."""
 MATE_STEP_M = 0.2
 MATE_NEAR_M = 4.0
 CONFLICT_M = 1.5
-"""A team-mate on the next part of the route, of this length, is gone round."""
+"""Length [m] of the next part of the route on which a team-mate causes a new search around it."""
 CONFLICT_S = 0.4
 IMPROVED = 0.85
-"""Share of the old route's price below which a new one is taken although the old one is still open."""
+"""Share of the present route's cost below which a new one replaces it although the present one is still free."""
 RENEW_S = 4.0
 RETRY_S = 1.0
-"""Between two searches that find nothing."""
+"""Time [s] between two searches that find nothing."""
 CHECK_S = 0.2
-"""Between two looks at whether the map still agrees with the route."""
+"""Period [s] of the check whether the map still agrees with the route."""
 
 
 class Planner:
-    """Of one robot with one goal. `route` is the newest, in `map`; `unreachable` says why there is none."""
+    """Planner of one robot with one goal. `route` is the newest, in `map`; `unreachable` is the reason if there is
+    none."""
 
     def __init__(self, grid: Grid, goal: Point, radius_m: float, keepout: Sequence[Box] = ()) -> None:
         self._grid = grid
@@ -49,13 +50,13 @@ class Planner:
         self._pose: Point = goal
         self.route: tuple[Point, ...] = ()
         self.number = 0
-        """Grows with each new route."""
+        """Number of the route; grows with each new one."""
         self.searches = 0
-        """Ended so far, with or without a route."""
+        """Number of searches that have ended, with or without a route."""
         self.unreachable: str | None = None
 
     def work(self, cells: int, here: Point, mates: Sequence[Pose2D], now: float) -> bool:
-        """Look at about so many cells more; True when there is a new `route` from `here`."""
+        """Search on for about `cells` cells; return True when there is a new `route` from `here`."""
         self._pose = here
         if self._search is None:
             if now - self._checked_at < CHECK_S:
@@ -79,11 +80,11 @@ class Planner:
         return self.number != number
 
     def forget(self) -> None:
-        """Begin anew at the next `work`."""
+        """Drop the route and the search; the next `work` starts anew."""
         self.route, self._search = (), None
 
     def blocked_m(self, here: Point) -> float | None:
-        """How far along the rest of the route the map bars it; None when it does not."""
+        """Return the distance [m] along the rest of the route at which the map blocks it; None when it does not."""
         grid, prices = self._grid, self._prices
         first = _nearest(self.route, here)
         along = 0.0
@@ -96,7 +97,7 @@ class Planner:
         return None
 
     def _conflict(self, here: Point, mates: Sequence[Pose2D]) -> bool:
-        """A team-mate stands on the next part of the route."""
+        """Return whether a team-mate stands on the next part of the route."""
         first = _nearest(self.route, here)
         ahead = self.route[first + 1 : first + 1 + ceil(CONFLICT_M / PIECE_M)]
         line = [point for a, b in pairwise((here, *ahead)) for point in between(a, b)]
@@ -105,7 +106,7 @@ class Planner:
     # --- one search -------------------------------------------------------------------------------------------------
 
     def _plan(self, mates: tuple[Pose2D, ...], needed: bool) -> Iterator[int]:
-        """Search, then make a route of the cells; set `route` or `unreachable`."""
+        """Search, then turn the cells into a route; set `route` or `unreachable`."""
         footing = self._footing(mates)
         goal, start = footing.settled(self._goal), footing.settled(self._pose)
         if goal is None:
@@ -122,7 +123,7 @@ class Planner:
         if not reached:
             self._fail("the goal is walled in: no way to it is left", needed)
             return
-        here = footing.settled(self._pose)  # it has driven on since
+        here = footing.settled(self._pose)  # the robot has driven on since the search began
         reachable = here is not None and (toward[here] or here == goal)
         cells = chain(toward, self._grid.columns, here if here is not None and reachable else start, goal)
         yield len(cells)
@@ -132,7 +133,7 @@ class Planner:
             yield from self._shape(footing, cells)
 
     def _shape(self, footing: Costmap, cells: Sequence[int]) -> Iterator[int]:
-        """Make `route` of the cells."""
+        """Set `route` from the cells."""
         points: list[Point] = []
         for looked, so_far in straightened(footing, cells):
             yield looked
@@ -145,7 +146,7 @@ class Planner:
         self.number += 1
 
     def _footing(self, mates: tuple[Pose2D, ...]) -> Costmap:
-        """Ground as it is now, less what is kept out of and where team-mates are and come to."""
+        """Return the costmap of the present map, without the keep-out areas and where team-mates are and drive to."""
         footing = Costmap(self._grid, self._prices)
         footing.bar_runs(self._keepout)
         for mate in mates:

@@ -1,6 +1,6 @@
-"""From the cells of a search to a route that can be driven: straight where that costs nothing, round at its corners.
+"""Smoothing of a search's cells into a drivable route: straight where that costs nothing, with rounded corners.
 
-Generators, like the search: each step gives the work done so far.
+The functions are generators, like the search: each step yields the work done so far.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from lfa.agents.exploration.costmap import FREE, STRAIGHT, Costmap
 from lfa.agents.exploration.occupancy_grid import Point
 
 PIECE_M = 0.4
-"""Between the points of a route; a cut corner is rounded over several."""
+"""Distance [m] between the points of a route; a cut corner is rounded over several of them."""
 SMOOTHINGS = 12
 CUT_MAX = 48
-"""A shortcut replaces at most so many cells of path."""
+"""Maximum number of path cells that one shortcut replaces."""
 
 
 def straightened(footing: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, list[Point]]]:
-    """Shortcuts where the straight line is not dearer than the cells it replaces; work and points so far."""
+    """Replace cells by straight shortcuts that do not cost more; yield the work and the points so far."""
     grid = footing.grid
     at = 0
     points = [grid.center(cells[0])]
@@ -40,7 +40,8 @@ def straightened(footing: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, 
 
 
 def smoothed(footing: Costmap, points: list[Point]) -> Iterator[list[Point]]:
-    """Each point drawn to the middle of its neighbours, as far as that brings it no nearer to a wall."""
+    """Move each point to the middle of its neighbours, as far as that does not bring it nearer to a wall; yield the
+    points."""
     for _ in range(SMOOTHINGS):
         for n in range(1, len(points) - 1):
             (ax, ay), (x, y), (bx, by) = points[n - 1 : n + 2]

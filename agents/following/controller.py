@@ -1,7 +1,7 @@
-"""What a formation controller is, and the law of control.md section 2 (steps 4 to 7) as the default one.
+"""Controller interface for followers, and the law of control.md section 2 (steps 4 to 7) as the default controller.
 
-Everything else is shared by all controllers and lives in `follower.py`: the moving slot (steps 2, 3), the drive's
-limits (8, 9), stale data, the stop. A controller is found by name among the entry points `lfa.controllers`.
+`follower.py` holds what all controllers share: the moving slot (steps 2, 3), the drive's limits (8, 9), stale data, the
+stop. A controller is found by name among the entry points `lfa.controllers`.
 """
 
 from __future__ import annotations
@@ -19,61 +19,64 @@ from lfa.protocol.mission import Limits
 ENTRY_POINTS = "lfa.controllers"
 DEFAULT_CONTROLLER = "law"
 SLOT_SPEED_MIN_MPS = 0.05
-"""A slower slot has no direction: the desired heading is held."""
+"""Slot speed [m/s] below which the slot has no direction: the desired heading is held."""
 FLIP_RAD = 2.0
-"""A reversing predecessor does not turn the desired heading by more than this."""
+"""Maximum angle [rad] by which a reversing predecessor turns the desired heading."""
 
 
 class Reference(Struct, frozen=True, gc=False):
-    """Where the follower belongs now, in `map`: [m], [rad], [m/s], [rad/s]."""
+    """Present target of the follower, in `map`: [m], [rad], [m/s], [rad/s]."""
 
     x: float
-    """r, the slot."""
+    """Position r of the slot."""
     y: float
     vx: float
-    """The slot's velocity."""
+    """Velocity of the slot."""
     vy: float
     heading: float
-    """psi_r: the heading of a robot that drives with the slot (backwards when `direction` is -1)."""
+    """Heading psi_r of a robot that drives with the slot (backwards when `direction` is -1)."""
     turn_rate: float
-    """Of the formation heading: feed-forward for the follower's own turning."""
+    """Turn rate of the formation heading: feed-forward for the follower's own turning."""
     direction: int
-    """sigma: 1 forwards, -1 while the predecessor reverses."""
+    """Direction sigma: 1 forwards, -1 while the predecessor reverses."""
     predecessor: Pose2D
     predecessor_twist: Twist
     separation_m: float
-    """Commanded k and phi, as blended by now."""
+    """Commanded k and phi, as blended so far."""
     phi: float
     guarded: bool
-    """False while the bodies overlap, which only simulated ones can."""
+    """False while the bodies overlap, which is possible in simulation only."""
 
     @property
     def speed(self) -> float:
-        """Of the slot, positive [m/s]."""
+        """Speed of the slot, positive [m/s]."""
         return hypot(self.vx, self.vy)
 
 
 class Controller(Protocol):
-    """From slot to twist. `step` is called at `config.CONTROL_HZ`; the caller keeps the drive's limits."""
+    """Controller from slot to twist. `step` is called at `config.CONTROL_HZ`; the caller enforces the drive's
+    limits."""
 
     def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
-        """Begin from here: at the start, after an override, when data were stale."""
+        """Restart from the present state: at the start, after an override, when data were stale."""
 
     def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
-        """The twist that is wanted now; may exceed the limits."""
+        """Return the wanted twist; it may exceed the limits."""
 
 
 class MakeController(Protocol):
-    """What an entry point names: a class or function with this call."""
+    """Class or function that an entry point names."""
 
     def __call__(self, gains: Gains, limits: Limits) -> Controller: ...
 
 
 def find_controller(name: str) -> MakeController:
-    """The controller called `name` among the installed ones. Raises `Refused`. Read once, at the start."""
+    """Return the installed controller called `name`. Raise `Refused`. Entry points are read once, at the start."""
     if name == DEFAULT_CONTROLLER:
         return Law
-    from importlib.metadata import entry_points  # 3 MB of a robot's memory, for those who want another one
+    from importlib.metadata import (
+        entry_points,
+    )  # costs 3 MB of memory: imported only for a controller other than the default
 
     known = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
     if name not in known:
@@ -89,7 +92,7 @@ class Law:
         self._gains = gains
         self._omega_max = limits.omega_max_radps
         self.heading = 0.0
-        """psi_d, the desired heading: a filter's state, so its rate is known without anybody's acceleration."""
+        """Desired heading psi_d: a filter's state, so that its rate is known without any robot's acceleration."""
         self._direction = 1
 
     def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
@@ -123,7 +126,7 @@ class Law:
         return Twist(cf * ux + sf * uy, sigma * (cf * uy - sf * ux) / gains.b_m)
 
     def _turn(self, reference: Reference, psi: float) -> float:
-        """Step 4: rate of the desired heading."""
+        """Return the rate of the desired heading [rad/s] (step 4)."""
         if reference.vx * reference.vx + reference.vy * reference.vy <= SLOT_SPEED_MIN_MPS**2:
             return 0.0
         ahead = wrap(reference.heading - psi)
@@ -135,7 +138,7 @@ class Law:
 
 
 def guard(ux: float, uy: float, reference: Reference, own_pose: Pose2D, gains: Gains) -> tuple[float, float]:
-    """Step 7: a velocity [m/s] towards the predecessor no greater than its own plus 2 (D - d_min)."""
+    """Limit the velocity [m/s] towards the predecessor to the predecessor's own plus 2 (D - d_min) (step 7)."""
     nx, ny = reference.predecessor.x - own_pose.x, reference.predecessor.y - own_pose.y
     apart = hypot(nx, ny)
     if apart < 1e-9:

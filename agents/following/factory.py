@@ -1,4 +1,4 @@
-"""A follower made to a mission's orders: gains, controller, observer and buffer."""
+"""Construction of a follower from a mission: gains, controller, observer and buffer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfa.protocol.mission import Mission
 
 
 def gains_of(mission: Mission) -> Gains:
-    """The mission's gains. Raises `Refused` for an unknown name or a broken rule."""
+    """Return the mission's gains. Raise `Refused` for an unknown name or a broken rule."""
     following = mission.following
     try:
         gains = msgspec.convert(following.gains, Gains)
@@ -24,7 +24,7 @@ def gains_of(mission: Mission) -> Gains:
 
 
 def follower_of(mission: Mission) -> Follower:
-    """Raises `Refused` when the mission's gains or controller cannot be had."""
+    """Return the mission's follower. Raise `Refused` when its gains or its controller are invalid."""
     gains, following = gains_of(mission), mission.following
     return Follower(
         gains,
@@ -38,12 +38,12 @@ def follower_of(mission: Mission) -> Follower:
 
 
 def predecessor_of(mission: Mission, robot: int, followers: int, previous: Predecessor | None = None) -> Predecessor:
-    """`robot` as predecessor in a chain of `followers`; `previous` is the one that it takes the place of."""
+    """Return `robot` as predecessor in a chain of `followers`; `previous` is the predecessor that it replaces."""
     following = mission.following
     delay_s = following.delay_s
     if delay_s is None and followers <= DEAD_RECKONING_FOLLOWERS_MAX:
         delay_s = 0.0
-    # The paper's observer does not predict over latency: it takes each pose as it came.
+    # The paper's observer does not predict over latency: it uses each pose as received.
     paper = following.observer == "paper"
     return Predecessor(
         robot,

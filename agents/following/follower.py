@@ -1,8 +1,8 @@
-"""One control step of a follower: predecessor, commanded slot and own pose in, a twist that the drive can do out.
+"""One control step of a follower: from predecessor, commanded slot and own pose to a twist that the drive can execute.
 
-Around whichever `Controller` is chosen stand the parts that all share (control.md section 2): the moving slot,
-the direction switch, stop, stale data, limits that keep v/omega, acceleration limits. Whatever comes in, what
-goes out is finite and within the limits.
+The chosen `Controller` is surrounded by the parts that all controllers share (control.md section 2): the moving slot,
+the direction switch, stop, stale data, limits that keep v/omega, acceleration limits. For any input the output is
+finite and within the limits.
 """
 
 from __future__ import annotations
@@ -24,48 +24,48 @@ from lfa.protocol.mission import Limits
 
 REVERSE_BELOW_MPS = -0.05
 FORWARD_ABOVE_MPS = 0.02
-"""The direction switch, with hysteresis between the two."""
+"""Predecessor speeds [m/s] of the direction switch, with hysteresis between the two."""
 STOP_ERROR_M = 0.002
 STOP_RATE = 1e-3
-"""[m/s, rad/s] Nearer than this and slower than that: stand."""
+"""Error [m] and rates [m/s, rad/s] below which the follower stands."""
 IDLE_MPS, IDLE_RADPS = 0.003, 0.01
-"""A controller that asks for less than this has brought the robot as near as its held heading allows."""
+"""Speeds below which the controller has brought the robot as near as its held heading allows."""
 LEAVE_M = 0.010
-"""A standing robot starts again when its slot is this much farther off than it was: noise alone does not move it."""
+"""Increase of the slot's distance [m] at which a standing robot starts again: noise alone does not move it."""
 ASTRAY_M = 0.10
-"""Idle, but farther off than this: the controller begins anew from the robot's own heading."""
+"""Distance [m] of an idle robot from its slot above which the controller restarts from the robot's own heading."""
 DT_MIN_S, DT_MAX_S = 0.001, 0.1
-"""A step outside of these (time stood still, ran backwards, jumped) is taken as the nearer one, and counted."""
+"""Bounds [s] of a step. A step outside of them (time stood still, ran backwards, jumped) is clamped and counted."""
 
 
 class State(StrEnum):
-    """What a follower is doing, for `Tracking.state` and `status`."""
+    """State of a follower, for `Tracking.state` and `status`."""
 
     HOLD = "hold"
-    """Nothing fresh to follow: braked along the path, standing."""
+    """No fresh predecessor state: braked along the path, standing."""
     BLEND = "blend"
-    """The slot is still moving to where it is commanded."""
+    """The slot is still moving to its commanded place."""
     FOLLOW = "follow"
     STAND = "stand"
-    """In the slot of a standing predecessor."""
+    """The robot stands in the slot of a standing predecessor."""
 
 
 class Readout(Struct, frozen=True, gc=False):
-    """How the follower stands to its slot, as of the last step: what `Tracking` tells."""
+    """Slot and errors of the follower's last step, as published in `Tracking`."""
 
     slot_map: Pose2D
     chi: float
     heading: float
-    """psi_r [rad]."""
+    """Heading psi_r [rad]."""
     error_m: float
     separation_m: float
-    """Commanded k and phi, as blended by now."""
+    """Commanded k and phi, as blended so far."""
     phi: float
     state: State
 
 
 class Follower:
-    """Of one robot, whoever its predecessor is."""
+    """Follower of one robot, for any predecessor."""
 
     def __init__(
         self,
@@ -78,9 +78,9 @@ class Follower:
         radius_m: float = 0.15,
         paper_observer: bool = False,
     ) -> None:
-        """`cruise_mps` is the leader's nominal speed: a reference known to be old is shifted ahead by it (5.2).
+        """Create a follower. `cruise_mps` is the leader's nominal speed, which shifts an old reference ahead (5.2).
 
-        With `paper_observer` the slot's velocity is what form A of the observer makes of the slot's positions.
+        With `paper_observer` the slot's velocity is the estimate of form A of the observer from the slot's positions.
         """
         self._gains = gains
         self._limits = limits
@@ -100,7 +100,7 @@ class Follower:
         self._error_m = 0.0
         self._state = State.HOLD
         self.refused = 0
-        """Steps whose input or result was not finite or absurd."""
+        """Number of steps whose input or result was not finite or was implausible."""
 
     def step(
         self,
@@ -112,7 +112,7 @@ class Follower:
         *,
         on_trace: bool = False,
     ) -> Twist:
-        """Command for the next `dt`.
+        """Return the command for the next `dt`.
 
         Without a sighting, or with one older than `dead_reckoning_max_s`: brake along the path and hold.
         """
@@ -148,16 +148,17 @@ class Follower:
         return self._drive(wanted, dt)
 
     def rejoin(self, own_pose: Pose2D, own_twist: Twist) -> None:
-        """After an override (an obstacle, a spell as leader): the next step begins from here, without a jump.
+        """Resume following after an override (an obstacle, a time as leader): the next step starts from here without a
+        jump.
 
-        The target starts at the own position and moves to the slot at `offset_rate_max_mps`. A robot that has
-        followed nobody yet has nothing to rejoin: it goes straight for its slot.
+        The target starts at the own position and moves to the slot at `offset_rate_max_mps`. A robot that has not
+        followed yet has nothing to rejoin: it drives straight to its slot.
         """
         self._holding, self._rejoining = True, self._source is not None
         self._last = own_twist if plausible(own_pose, own_twist) else STILL
 
     def overridden(self, twist: Twist) -> None:
-        """Another twist than `step`'s was sent: acceleration limits count from it."""
+        """Record that another twist than `step`'s was sent: acceleration limits count from it."""
         self._last = twist
 
     @property
@@ -173,7 +174,7 @@ class Follower:
         return sighting.age_s <= self._gains.dead_reckoning_max_s
 
     def _move_slot(self, sighting: Sighting, slot: Slot, own_pose: Pose2D, on_trace: bool, dt: float) -> None:
-        """Steps 2 and 3. When what the slot hangs on has changed, the target goes on from where it was."""
+        """Move the slot (steps 2 and 3). When its source has changed, the target continues from where it was."""
         motion = self._motion
         source = (sighting.robot, sighting.epoch, on_trace)
         changed = source != self._source or self._rejoining
@@ -211,7 +212,7 @@ class Follower:
         )  # fmt: skip
 
     def _stands(self, sighting: Sighting, wanted: Twist) -> bool:
-        """The stop dead-band, with hysteresis: a resting target, and nothing to gain by moving on."""
+        """Return whether to stand: stop dead-band with hysteresis, for a resting target and no gain from moving on."""
         if not self._target_rests(sighting):
             self._standing_m = -1.0
         elif self._standing_m < 0.0:
@@ -227,7 +228,7 @@ class Follower:
         return abs(twist.linear_x) < STOP_RATE and abs(twist.angular_z) < STOP_RATE and self._motion.settled
 
     def _drive(self, wanted: Twist, dt: float) -> Twist:
-        """Steps 8 and 9: the drive's limits with v/omega kept, then its accelerations."""
+        """Apply the drive's limits with v/omega kept, then its acceleration limits (steps 8 and 9)."""
         limits, last = self._limits, self._last
         v, omega = wanted.linear_x, wanted.angular_z
         v_max = limits.v_max_mps if v >= 0.0 else limits.v_reverse_max_mps
@@ -252,7 +253,8 @@ class Follower:
 
 
 class PaperVelocity:
-    """Form A in the loop: replaces the slot's velocity, and knows nothing of the predecessor's turning."""
+    """Form A of the observer in the loop: replaces the slot's velocity, and does not use the predecessor's turn
+    rate."""
 
     def __init__(self) -> None:
         self._observer = SlotVelocityObserver()
@@ -262,7 +264,7 @@ class PaperVelocity:
         self._observer.reset()
 
     def observe(self, motion: SlotMotion, sighting: Sighting, own_pose: Pose2D, own_twist: Twist, dt: float) -> None:
-        """`own_twist` is what was driven for the last `dt`."""
+        """Update the slot's velocity; `own_twist` is the twist driven for the last `dt`."""
         c, s = cos(own_pose.theta), sin(own_pose.theta)
         dx, dy = motion.x - own_pose.x, motion.y - own_pose.y
         measured = (c * dx + s * dy, c * dy - s * dx) if sighting.age_s < self._age_s + 0.5 * dt else None

@@ -1,10 +1,9 @@
-"""A predecessor's pose and velocity from its sampled poses (control.md section 3).
+"""Observers of a predecessor's pose and velocity from its sampled poses (control.md section 3).
 
 Form B (`Observer`) is an alpha-beta observer of a unicycle with the poles of the paper's gain matrix
-[[4, 6], [-11.9, 9]], -6.5 +- 8.07i, exact for any sampling interval. Form A (`SlotVelocityObserver`) is that
-matrix taken literally: output injection on the slot's position in the follower's frame, with the slot's velocity
-as unknown input.
-All stamps here are of the sender's clock; who calls converts.
+[[4, 6], [-11.9, 9]], -6.5 +- 8.07i, exact for any sampling interval. Form A (`SlotVelocityObserver`) is that matrix
+taken literally: output injection on the slot's position in the follower's frame, with the slot's velocity as unknown
+input. All stamps here are of the sender's clock; the caller converts.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ L = ((4.0, 6.0), (-11.9, 9.0))
 """The paper's observer values, row by row [1/s]."""
 
 JUMP_M = 0.15
-"""A position this far from the predicted one is a fault; two in a row are a jump."""
+"""Distance [m] from the prediction above which a position is a fault; two in a row are a jump."""
 JUMP_MPS2 = 1.0
-"""What an honest predecessor may add to it by accelerating unseen."""
+"""Acceleration [m/s^2] that a sound predecessor may have between two samples; it widens `JUMP_M`."""
 
 
 class Observer:
-    """Form B. `velocity` mode takes the published twist and keeps the innovations as a fault monitor only."""
+    """Form B. In `velocity` mode it uses the published twist, and the innovations only as a fault monitor."""
 
     def __init__(self, mode: Mode = "velocity", extrapolation_max_s: float = 0.5) -> None:
         self._with_velocity = mode == "velocity"
@@ -41,17 +40,18 @@ class Observer:
         self._twist = STILL
         self._suspect: Pose2D | None = None
         self.jumps = 0
-        """How often the predecessor turned out to be elsewhere: each one starts a new life of the estimate."""
+        """Number of jumps of the predecessor; each one restarts the estimate."""
         self.suspects = 0
         self.refused = 0
 
     @property
     def stamp(self) -> float | None:
-        """Of the newest accepted message; None before the first."""
+        """Stamp of the newest accepted message; None before the first."""
         return self._stamp
 
     def heard(self, stamp: float, pose: Pose2D, twist: Twist) -> bool:
-        """Take a sampled pose; False when it is refused: not finite, absurd, not newer, or an outlier."""
+        """Update with a sampled pose; return False when it is refused: not finite, implausible, not newer, or an
+        outlier."""
         if not (isfinite(stamp) and plausible(pose, twist)):
             self.refused += 1
             return False
@@ -76,7 +76,7 @@ class Observer:
         return True
 
     def at(self, stamp: float) -> tuple[Pose2D, Twist, float]:
-        """(pose, twist, age [s]) at `stamp`, along the arc for at most `extrapolation_max_s`.
+        """Return (pose, twist, age [s]) at `stamp`, along the arc for at most `extrapolation_max_s`.
 
         Call only after a message was accepted.
         """
@@ -92,7 +92,7 @@ class Observer:
         return residual_m <= JUMP_M + JUMP_MPS2 * h * h + unseen * speed
 
     def _suspicious(self, stamp: float, pose: Pose2D, twist: Twist) -> bool:
-        """One message that is far from the prediction waits for a second one to agree with it."""
+        """Hold back a message far from the prediction; accept a second one that agrees with it."""
         self.suspects += 1
         previous, self._suspect = self._suspect, pose
         if previous is None or hypot(pose.x - previous.x, pose.y - previous.y) > JUMP_M:
@@ -117,9 +117,9 @@ class Observer:
 
 
 class SlotVelocityObserver:
-    """Form A, the literal paper observer: the slot's velocity as unknown input of the slot's position.
+    """Form A, the literal observer of the paper: the slot's velocity as unknown input of the slot's position.
 
-    Both are seen in the follower's frame. Exact for any constant own turn rate over a sampling interval.
+    Both are in the follower's frame. Exact for any constant own turn rate over a sampling interval.
     """
 
     def __init__(self) -> None:
@@ -131,9 +131,9 @@ class SlotVelocityObserver:
         self._w = (0.0, 0.0)
 
     def step(self, z: tuple[float, float] | None, own_twist: Twist, h: float) -> tuple[float, float]:
-        """Slot velocity in the follower's frame [m/s].
+        """Return the slot's velocity in the follower's frame [m/s].
 
-        `z` is the slot's position there, `own_twist` what was driven for the last `h` seconds. Without a new
+        `z` is the slot's position in that frame, `own_twist` the twist driven for the last `h` seconds. Without a new
         measurement (`z` None) the estimate coasts.
         """
         if self._z is None:
@@ -161,14 +161,14 @@ class SlotVelocityObserver:
 
 
 def _integral(turn: float, h: float) -> tuple[float, float]:
-    """Gamma = integral over h of exp(-omega J s) = [[g1, g2], [-g2, g1]]."""
+    """Return Gamma = integral over h of exp(-omega J s) = [[g1, g2], [-g2, g1]] as (g1, g2)."""
     if abs(turn) < 1e-6:
         return h, 0.5 * turn * h
     return h * sin(turn) / turn, h * (1.0 - cos(turn)) / turn
 
 
 def _decay(h: float) -> tuple[float, float, float, float]:
-    """exp(-L h), row by row."""
+    """Return exp(-L h), row by row."""
     decay = exp(-REAL * h)
     c, s = decay * cos(IMAGINARY * h), decay * sin(IMAGINARY * h) / IMAGINARY
     return c - (L[0][0] - REAL) * s, -L[0][1] * s, -L[1][0] * s, c - (L[1][1] - REAL) * s

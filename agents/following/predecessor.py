@@ -1,7 +1,7 @@
-"""All that a follower knows of its predecessor: its messages in, its state at a time of one's own clock out.
+"""Estimate of a follower's predecessor: its messages in, its state at a time of the follower's own clock out.
 
-Joins the clock offset, the observer, and for long chains the jitter buffer and the trace. A short chain looks at the
-predecessor now (dead reckoning, no lag); a long one at what it did `delay_s` ago (control.md 5.2).
+Joins the clock offset, the observer, and for long chains the jitter buffer and the trace. A short chain uses the
+predecessor's present state (dead reckoning, no lag); a long one its state `delay_s` ago (control.md 5.2).
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.team import PoseStamped
 
 DEAD_RECKONING_FOLLOWERS_MAX = 3
-"""More followers than this use the buffer (control.md 5.1: dead reckoning amplifies along a chain)."""
+"""Number of followers above which the buffer is used (control.md 5.1: dead reckoning amplifies along a chain)."""
 TRACE_MARGIN_M = 2.0
 DELAY_MIN_S = 0.04
 DELAY_MAX_S = 0.4
 DELAY_SPARE_S = 0.04
-"""Two message periods: the buffer outlives two losses in a row."""
+"""Margin [s] of two message periods: the buffer bridges two losses in a row."""
 DELAY_RATE = 0.05
-"""How fast the delay is drawn out or in: a change is a change of the predecessor's apparent speed."""
+"""Rate [s/s] at which the delay changes: a change alters the predecessor's apparent speed."""
 AGE_WINDOW_S = 10.0
 
 
 class Sighting(Struct, frozen=True):
-    """The predecessor as the law takes it."""
+    """State of the predecessor as the follower uses it."""
 
     robot: int
     epoch: int
-    """Changes when the estimate starts anew: the predecessor jumped or restarted."""
+    """Number that changes when the estimate restarts: the predecessor jumped or restarted."""
     pose: Pose2D
     twist: Twist
     age_s: float
-    """How far the state had to be extrapolated beyond the newest message."""
+    """Time [s] by which the state was extrapolated beyond the newest message."""
     delay_s: float
-    """How old the state is on purpose."""
+    """Age [s] of the state that is intended."""
     travelled_m: float
-    """Arc length of `pose` on `trace`."""
+    """Arc length [m] of `pose` on `trace`."""
     trace: PoseHistory
 
 
 class Predecessor:
-    """One robot as predecessor; make another one when the chain changes."""
+    """Estimate of one robot as predecessor; create a new one when the chain changes."""
 
     def __init__(
         self,
@@ -59,9 +59,9 @@ class Predecessor:
         trace_m: float = 4.0,
         trace: PoseHistory | None = None,
     ) -> None:
-        """`delay_s` 0 dead-reckons, None chooses a buffer by what the messages' ages turn out to be.
+        """Create an estimate. `delay_s` 0 dead-reckons; None adapts a buffer to the measured ages of the messages.
 
-        `trace` is the path of the predecessor before this one, when a follower closes over it.
+        `trace` is the path of the former predecessor, when the chain closes over it.
         """
         self.robot = robot
         self.clock = ClockOffset()
@@ -79,14 +79,15 @@ class Predecessor:
         self._jumps = 0
         self.epoch = 0
         self.refused = 0
-        """Messages that were not finite, absurd, from the future, of an older life, or alone far off."""
+        """Number of messages that were not finite, implausible, from the future, of an older incarnation, or single
+        outliers."""
 
     @property
     def delay_s(self) -> float:
         return self._delay_s
 
     def heard(self, message: PoseStamped, received_at: float) -> bool:
-        """Take a published pose; False when it is refused."""
+        """Update with a published pose; return False when it is refused."""
         header = message.header
         if header.incarnation != self._incarnation and not self._restart(header.incarnation):
             self.refused += 1
@@ -110,7 +111,7 @@ class Predecessor:
         return True
 
     def at(self, now: float) -> Sighting | None:
-        """The predecessor as of `now` (own clock), or as of `now - delay_s`; None before the first message."""
+        """Return the predecessor as of `now` (own clock), or as of `now - delay_s`; None before the first message."""
         newest = self._observer.stamp
         if newest is None:
             return None
@@ -131,7 +132,7 @@ class Predecessor:
         )
 
     def _restart(self, incarnation: int) -> bool:
-        """Another life of the same robot has another clock; an older life is not listened to."""
+        """Restart for another incarnation, which has another clock; return False for an older incarnation."""
         if incarnation < self._incarnation:
             return False
         if self._incarnation >= 0:
@@ -156,7 +157,7 @@ class Predecessor:
         self._buffer.add(Sample(stamp, pose, twist, self.trace.travelled_m))
 
     def _adapt(self, now: float) -> None:
-        """Draw the delay towards the worst recent age plus what two losses in a row need."""
+        """Move the delay towards the worst recent age plus what two losses in a row need."""
         elapsed = 0.0 if self._asked_at is None else now - self._asked_at
         self._asked_at = now
         wanted = min(DELAY_MAX_S, max(DELAY_MIN_S, self._oldest.value + DELAY_SPARE_S))
@@ -165,7 +166,7 @@ class Predecessor:
 
 
 class _WindowedMaximum:
-    """Of the last one to two windows."""
+    """Maximum of the last one to two windows."""
 
     def __init__(self) -> None:
         self._now = self._before = 0.0

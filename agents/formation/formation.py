@@ -1,8 +1,8 @@
-"""Where a follower belongs: commanded slots, their orientation and change, and the way they move.
+"""Slots of the followers: commanded place, orientation, change, and motion.
 
 phi is the bearing of the follower's slot in its predecessor's formation frame, counter-clockwise, pi straight behind
-(control.md sections 0 and 4). A change of (k, phi) is blended in polar form through the rear, a change of what the
-slot hangs on (another predecessor, a trace, a rejoin) by an offset that shrinks: the target never jumps.
+(control.md sections 0 and 4). A change of (k, phi) is blended in polar form through the rear; a change of the slot's
+reference (another predecessor, a trace, a rejoin) by a shrinking offset: the target never jumps.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from lfa.protocol.mission import FormationSpec, Limits, Mission, Side
 
 SEPARATION_MAX_M = 100.0
 BLEND_SHARE_MIN = 0.1
-"""A swing goes on at least this fast (of its rate limit), however fast the predecessor drives."""
+"""Minimum rate of a blend, as a share of its rate limit, however fast the predecessor drives."""
 OFFSET_PER_S, OFFSET_LAST_MPS = 2.0, 0.01
-"""The offset's last part is taken back more slowly, by this share of it and so much at least: a robot that comes into
-its slot at an angle and finds it at rest there all at once swings past it."""
+"""Rate of the offset's last part, as a share of the offset [1/s] plus a minimum [m/s]. It is slow, because a robot that
+enters its slot at an angle swings past a slot that comes to rest at once."""
 SPEED_MARGIN = 0.9
 PLANNED_MARGIN = 0.8
 SLOT_SPEED_MIN_MPS = 0.05
-"""Below this speed a slot has no direction: the heading is not controlled (control.md 2.2)."""
+"""Speed [m/s] below which a slot has no direction: the heading is not controlled (control.md 2.2)."""
 COLUMN_BELOW_MPS = 0.15
-"""A leader that would have to drive slower than this in a bend orders column first."""
+"""Leader speed [m/s] in a bend below which the leader orders column first."""
 
 
 # --- commanded slots -----------------------------------------------------------------------------------------
 
 
 def phi_of(side: Side, angle_rad: float, index: int) -> float:
-    """phi^d of the `index`-th follower (from 0): the corrected (32) and (33), in (-pi, pi].
+    """Return phi^d of the `index`-th follower (from 0): the corrected (32) and (33), in (-pi, pi].
 
     `angle_rad` is alpha in [0, pi/2], off the predecessor's rear axis. Zigzag alternates left and right.
     """
@@ -48,7 +48,8 @@ def phi_of(side: Side, angle_rad: float, index: int) -> float:
 
 
 def paper_phi(side: Side, phi: float) -> float:
-    """The paper's input phi in [0, pi], with (32) and (33) corrected. Raises `Refused` at pi/2, where they jump."""
+    """Return phi^d for the paper's input phi in [0, pi], with (32) and (33) corrected. Raise `Refused` at pi/2, where
+    they jump."""
     if not 0.0 <= phi <= pi or phi == pi / 2:
         raise Refused(f"phi = {phi:g}: must be in [0, pi] and not pi/2, where (32) and (33) jump by pi/2")
     if phi < pi / 2:
@@ -58,7 +59,7 @@ def paper_phi(side: Side, phi: float) -> float:
 
 
 def slots_of(spec: FormationSpec, followers: Sequence[int]) -> tuple[Slot, ...]:
-    """The commanded place of each follower, in the order of the chain."""
+    """Return the commanded slot of each follower, in the order of the chain."""
     return tuple(
         Slot(robot, spec.separation_m, phi_of(spec.side, spec.angle_rad, index))
         for index, robot in enumerate(followers)
@@ -66,7 +67,7 @@ def slots_of(spec: FormationSpec, followers: Sequence[int]) -> tuple[Slot, ...]:
 
 
 def named(name: str, spec: FormationSpec) -> FormationSpec:
-    """`spec` with another side: what an operator says (`lfa formation column`). Raises `Refused`."""
+    """Return `spec` with the side that an operator names (`lfa formation column`). Raise `Refused`."""
     sides: dict[str, Side] = {"left": "left", "right": "right", "column": "column", "zigzag": "zigzag"}
     if name not in sides:
         raise Refused(f"formation = {name}: must be one of left, right, column, zigzag")
@@ -74,7 +75,7 @@ def named(name: str, spec: FormationSpec) -> FormationSpec:
 
 
 def check_slot(slot: Slot, separation_min_m: float) -> Slot:
-    """`slot`, or `Refused` when no follower can take it."""
+    """Return `slot`; raise `Refused` when no follower can take it."""
     where = f"slot of robot{slot.robot}"
     if not (isfinite(slot.separation_m) and separation_min_m <= slot.separation_m <= SEPARATION_MAX_M):
         right = f"must be from {separation_min_m:g} (robots' size and margin) to {SEPARATION_MAX_M:g}"
@@ -87,17 +88,19 @@ def check_slot(slot: Slot, separation_min_m: float) -> Slot:
 
 
 class Formation:
-    """The orientation requests: the highest (term, number) counts, whatever comes late, twice or never."""
+    """Orientation requests of one team: the highest (term, number) counts, whether messages are late, repeated or
+    lost."""
 
     def __init__(
         self, spec: FormationSpec, robots: Sequence[int], separation_min_m: float, *, trace: bool = False
     ) -> None:
-        """`robots` in the order of the first chain; `spec` and `trace` count until a leader asks otherwise."""
+        """Create with `robots` in the order of the first chain; `spec` and `trace` hold until a leader requests
+        otherwise."""
         self._separation_min_m = separation_min_m
         self._spec = spec
         self._slots = {slot.robot: slot for slot in slots_of(spec, robots[1:])}
         self.trace = trace
-        """Whether followers keep to the path of their predecessor, k^d of it behind."""
+        """True when followers drive on the path of their predecessor, k^d of it behind."""
         self.version: tuple[Term, int] = (NO_TERM, -1)
         self.refused = 0
 
@@ -108,7 +111,7 @@ class Formation:
         return formation
 
     def request(self, note: FormationNote) -> bool:
-        """Take a leader's request. False for an old one, a repetition, or one that cannot be obeyed (counted)."""
+        """Apply a leader's request; return False if it is old, repeated, or cannot be obeyed (counted)."""
         if (note.term, note.number) <= self.version:
             return False
         try:
@@ -122,7 +125,7 @@ class Formation:
         return True
 
     def slot_of(self, robot: int) -> Slot:
-        """The commanded place of `robot`; one that no request has named stands straight behind."""
+        """Return the commanded slot of `robot`; straight behind if no request has named it."""
         return self._slots.get(robot) or Slot(robot, self._spec.separation_m, pi)
 
 
@@ -130,10 +133,9 @@ class Formation:
 
 
 def speed_factors(slots: Iterable[Slot], curvature: float) -> list[float]:
-    """f of each robot of the chain: its steady speed over the leader's in a bend of `curvature` [1/m], left > 0.
+    """Return f of each robot of the chain: steady speed over the leader's in a bend of `curvature` [1/m], left > 0.
 
-    All turn at the leader's rate, so R' = f R and each hop's own factor is that of the bend that its
-    predecessor drives.
+    All robots turn at the leader's rate, so R' = f R, and each hop's own factor is that of its predecessor's bend.
     """
     factors: list[float] = []
     total = 1.0
@@ -147,9 +149,9 @@ def speed_factors(slots: Iterable[Slot], curvature: float) -> list[float]:
 
 
 def leader_speed_cap(slots: Sequence[Slot], curvature: float, limits: Limits, margin: float = SPEED_MARGIN) -> float:
-    """Fastest leader speed [m/s] in a bend at which f v stays within `margin` of the limits for all robots.
+    """Return the maximum leader speed [m/s] in a bend at which f v stays within `margin` of the limits for all robots.
 
-    Followers on a trace have f = 1: give no slots then.
+    Followers on a trace have f = 1: pass no slots then.
     """
     fastest = max([1.0, *speed_factors(slots, curvature)])
     cap = margin * limits.v_max_mps / fastest
@@ -159,13 +161,15 @@ def leader_speed_cap(slots: Sequence[Slot], curvature: float, limits: Limits, ma
 
 
 def leader_speed_floor(slots: Sequence[Slot], curvature: float) -> float:
-    """Slowest leader speed [m/s] at which every slot still has a direction of motion; inf when one stands still."""
+    """Return the minimum leader speed [m/s] at which every slot has a direction of motion; inf when one stands
+    still."""
     slowest = min([1.0, *speed_factors(slots, curvature)])
     return SLOT_SPEED_MIN_MPS / slowest if slowest > 1e-6 else float("inf")
 
 
 def radius_min(slots: Sequence[Slot], factor_max: float) -> float:
-    """Smallest leader radius [m], in both turn directions, at which no robot needs more than `factor_max` times v."""
+    """Return the minimum leader radius [m], for both turn directions, at which no robot needs more than `factor_max`
+    v."""
     low, high = 0.01, 1e4
     for _ in range(60):
         middle = sqrt(low * high)
@@ -178,7 +182,7 @@ def radius_min(slots: Sequence[Slot], factor_max: float) -> float:
 
 
 class SlotMotion:
-    """Steps 2 and 3 of the law: chi, the blended (k, phi) and the offset o; gives r and its velocity.
+    """Moving slot (steps 2 and 3 of the law): chi, the blended (k, phi) and the offset o yield r and its velocity.
 
     After `step` the attributes x, y [m], vx, vy [m/s] (in `map`), chi, chi_rate, separation_m and phi are valid.
     """
@@ -193,7 +197,7 @@ class SlotMotion:
         self._limit_mps = gains.slot_speed_share * limits.v_max_mps
         self.heading_filter_m = heading_filter_m
         self.lead_m = 0.0
-        """Forward shift of the slot along chi, that makes up for a reference known to be old (5.2)."""
+        """Forward shift [m] of the slot along chi that compensates a reference known to be old (5.2)."""
         self.separation_m = 0.0
         self.phi = pi
         self.chi = 0.0
@@ -209,13 +213,13 @@ class SlotMotion:
         self.offset_x = self.offset_y = 0.0
 
     def hang_at(self, x: float, y: float) -> None:
-        """Right after a step: keep the target at (x, y) now, and let the offset shrink from there."""
+        """Keep the target at (x, y), right after a step, and let the offset shrink from there."""
         self.offset_x += x - self.x
         self.offset_y += y - self.y
         self.x, self.y = x, y
 
     def step(self, slot: Slot, predecessor: Pose2D, twist: Twist, dt: float) -> None:
-        """Move on by `dt`, towards the commanded `slot`; `predecessor` is where it is at the end of that time."""
+        """Advance by `dt` towards the commanded `slot`; `predecessor` is its pose at the end of that time."""
         theta, v = predecessor.theta, twist.linear_x
         if self.heading_filter_m > 0.0:
             self.chi = wrap(self.chi + self.chi_rate * dt)
@@ -239,7 +243,7 @@ class SlotMotion:
     def step_on(
         self, trace: PoseHistory, travelled_m: float, slot: Slot, predecessor: Pose2D, v: float, dt: float
     ) -> None:
-        """Move on by `dt` along the predecessor's trace, `slot.separation_m` of path behind it (5.5)."""
+        """Advance by `dt` on the predecessor's trace, `slot.separation_m` of path behind it (5.5)."""
         point = trace.at(travelled_m - self.separation_m + self.lead_m)
         c, s = cos(point.theta), sin(point.theta)
         self.vx, self.vy = v * c, v * s
@@ -249,7 +253,7 @@ class SlotMotion:
         self.settled = self._blend(Slot(slot.robot, slot.separation_m, pi), -c, -s, dt)
 
     def _blend(self, slot: Slot, c: float, s: float, dt: float) -> bool:
-        """Let (k, phi) and the offset approach their targets; True when they are there."""
+        """Move (k, phi) and the offset towards their targets; return True when they are reached."""
         dk = slot.separation_m - self.separation_m
         dphi = slot.phi % TAU - self.phi
         ox, oy = self.offset_x, self.offset_y
@@ -275,19 +279,19 @@ class SlotMotion:
 
 
 def _towards(rest: float, rate_max: float, dt: float) -> float:
-    """Rate that removes `rest`, at most `rate_max`, without passing the end within `dt`."""
+    """Return the rate that removes `rest`, at most `rate_max`, without overshoot within `dt`."""
     rate = rest / dt
     return rate_max if rate > rate_max else -rate_max if rate < -rate_max else rate
 
 
 def _approach(value: float, step: float, target: float) -> float:
-    """`value` + `step`, or exactly `target` when that is as near as numbers allow."""
+    """Return `value` + `step`, or exactly `target` when they agree within numerical precision."""
     moved = value + step
     return target if abs(target - moved) < 1e-9 else moved
 
 
 def _share(ax: float, ay: float, bx: float, by: float, limit: float) -> float:
-    """Largest s in [0, 1] with |a + s b| <= limit; 0 when |a| alone is more."""
+    """Return the largest s in [0, 1] with |a + s b| <= limit; 0 when |a| alone exceeds it."""
     if hypot(ax + bx, ay + by) <= limit:
         return 1.0
     rest = limit * limit - ax * ax - ay * ay

@@ -1,7 +1,7 @@
-"""What a predecessor did lately: its states over time (control.md 5.2), and its path over arc length (5.5).
+"""History of a predecessor: its states over time (control.md 5.2), and its path over arc length (5.5).
 
-The buffer answers "where was it at time t", interpolated between received stamps, so that a loss only acts when a gap
-is longer than the buffer. The trace answers "where is its path k behind it".
+The buffer returns the state at a time t, interpolated between received stamps, so that a loss has an effect only if a
+gap is longer than the buffer. The trace returns the point of the path at a distance k behind the predecessor.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SAME_PLACE_M = 0.15
 
 
 class Sample(Struct, frozen=True, gc=False):
-    """A state at `stamp` of the sender's clock, and how far along its path it was."""
+    """State at `stamp` of the sender's clock, with its arc length on the path."""
 
     stamp: float
     pose: Pose2D
@@ -30,7 +30,7 @@ class Sample(Struct, frozen=True, gc=False):
 
 
 class JitterBuffer:
-    """The newest samples in the order of their stamps, whatever the order in which they came."""
+    """Newest samples in the order of their stamps, for any order of arrival."""
 
     def __init__(self, *, with_velocity: bool) -> None:
         self._with_velocity = with_velocity
@@ -44,11 +44,11 @@ class JitterBuffer:
         return self._samples[-1]
 
     def add(self, sample: Sample) -> None:
-        """Of the newest stamp so far."""
+        """Append a sample with the newest stamp so far."""
         self._samples.append(sample)
 
     def insert_late(self, stamp: float, pose: Pose2D, twist: Twist) -> bool:
-        """A sample that others overtook; False when it does not fit between its neighbours."""
+        """Insert a sample that others overtook; return False when it does not fit between its neighbours."""
         samples = self._samples
         for index in range(len(samples) - 1, 0, -1):
             if samples[index - 1].stamp < stamp < samples[index].stamp:
@@ -63,10 +63,10 @@ class JitterBuffer:
         return False
 
     def at(self, stamp: float) -> Sample | None:
-        """State at `stamp`; None when that is later than all samples.
+        """Return the state at `stamp`; None when that is later than all samples.
 
-        From poses alone, the velocity is that of the control period which begins at `stamp`: a follower that drives
-        it is where its target is at the end. A slope of the past would be late, and grow along the chain.
+        From poses alone, the velocity is that of the control period which begins at `stamp`: a follower that drives it
+        is where its target is at the end. A slope of the past would lag, and the lag would grow along the chain.
         """
         sample = self._find(stamp)
         if self._with_velocity or sample is None:
@@ -90,7 +90,7 @@ class JitterBuffer:
 
 
 def _between(a: Sample, b: Sample, stamp: float, with_velocity: bool) -> Sample:
-    """On the arc from `a` to `b`; in time as the published speeds say, or evenly when only poses are known."""
+    """Interpolate on the arc from `a` to `b`: by the published speeds, or evenly when only poses are known."""
     h = b.stamp - a.stamp
     part = (stamp - a.stamp) / h
     step = between(a.pose, b.pose)
@@ -112,7 +112,7 @@ def _mean_twist(a: Sample, b: Sample) -> Twist:
 
 
 def _before(oldest: Sample, stamp: float) -> Sample:
-    """Nothing so old was received: as if the oldest state had been reached with its own twist."""
+    """Extrapolate before the oldest sample, as if it had been reached with its own twist."""
     back = max(stamp - oldest.stamp, -1.0)
     travelled_m = oldest.travelled_m + oldest.twist.linear_x * back
     return Sample(stamp, along_arc(oldest.pose, oldest.twist, back), oldest.twist, travelled_m)
@@ -126,7 +126,7 @@ class TracePoint(Struct, frozen=True, gc=False):
 
 
 class PoseHistory:
-    """A path by arc length, [m]. Where the predecessor reverses, its path is taken back."""
+    """Path by arc length [m]. Where the predecessor reverses, the path is shortened."""
 
     def __init__(self, length_m: float) -> None:
         self._length_m = length_m
@@ -136,7 +136,7 @@ class PoseHistory:
         self.travelled_m = 0.0
 
     def add(self, pose: Pose2D) -> float:
-        """The predecessor is at `pose` now; its arc length there."""
+        """Add the predecessor's present pose; return its arc length there."""
         if self._last is None:
             self._last = pose
             self._push(pose)
@@ -151,7 +151,7 @@ class PoseHistory:
         return self.travelled_m
 
     def jump(self, pose: Pose2D) -> None:
-        """The predecessor is elsewhere, or is another robot: join the old path to it with a straight line."""
+        """Join the path by a straight line to `pose`, where the predecessor jumped or another robot takes over."""
         if self._last is None:
             self.add(pose)
             return
@@ -160,7 +160,8 @@ class PoseHistory:
         self._push(pose)
 
     def at(self, s: float) -> TracePoint:
-        """Point at arc length `s`; beyond either end the path goes on straight. Needs one `add` before."""
+        """Return the point at arc length `s`; beyond either end the path is extended straight. Needs one `add`
+        before."""
         index = bisect_right(self._s, s)
         if index == 0:
             return _straight(self._poses[0], s - self._s[0])
@@ -177,7 +178,7 @@ class PoseHistory:
 
 
 def arc_length(a: Pose2D, b: Pose2D) -> float:
-    """Signed way [m] from `a` to `b`, driven as an arc: negative when it was backwards."""
+    """Return the signed distance [m] from `a` to `b`, driven as an arc: negative when backwards."""
     half = 0.5 * wrap(b.theta - a.theta)
     middle = a.theta + half
     return (cos(middle) * (b.x - a.x) + sin(middle) * (b.y - a.y)) / sinc(half)
@@ -188,7 +189,7 @@ def _straight(pose: Pose2D, s: float) -> TracePoint:
 
 
 def _hermite(a: Pose2D, b: Pose2D, sa: float, sb: float, s: float) -> TracePoint:
-    """Cubic between two poses, with their headings as tangents."""
+    """Interpolate by a cubic between two poses, with their headings as tangents."""
     h = sb - sa
     u = (s - sa) / h
     turn = wrap(b.theta - a.theta)

@@ -1,7 +1,7 @@
-"""The leader's orientation requests: which formation, when, with its term and a number (control.md section 4).
+"""Orientation requests of a leader: formation, time, term and number (control.md section 4).
 
-The mission's own changes come as the route comes to them; an operator may ask; and before a bend in which the outermost
-robot could not keep up, the chain falls into column. Where obstacles are known the chain is in column all along.
+Requests come from the mission at points of the route, and from an operator. Before a bend in which the outermost robot
+could not keep up, the chain changes to column. With known obstacles the chain stays in column all the time.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from lfa.protocol.outbox import Outbox
 REPEAT_S = 1.0
 BEND_CHECK_S = 0.5
 FOLD_S = 6.0
-"""Between two hops' falling into column: each takes half of it, and then comes to rest. All at once the last would be
-swung by all before it, and go a longer way."""
+"""Time [s] between the column orders of two hops: each swings for half of it, then comes to rest. If all changed at
+once, the last slot would swing with all before it and go a longer way."""
 BEND_AHEAD_M = 5.0
-"""Far enough ahead for a chain of four to fall into column at cruise speed."""
+"""Distance [m] ahead within which bends are checked: enough for a chain of four to form a column at cruise speed."""
 
 
 class FormationCommands:
-    """One robot's side of it while it leads; `begin` starts a reign."""
+    """Formation requests of one robot while it leads; `begin` starts its term as leader."""
 
     def __init__(self, outbox: Outbox, mission: Mission, formation: Formation) -> None:
         self._outbox = outbox
@@ -39,12 +39,13 @@ class FormationCommands:
         self._check_at = self._fold_at = 0.0
 
     def begin(self, progress_m: float, now: float) -> None:
-        """What the route asked for so far has been asked for; requests of this term count from 0."""
+        """Start a term: skip what the route has asked for so far; requests of this term count from 0."""
         self._number, self._repeat_at = 0, now
         self._next = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
 
     def lead(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
-        """One control step of the leader: what is due by the route, and the standing request once a second."""
+        """Run one control step of the leader: requests that are due on the route, and the present request once a
+        second."""
         orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
         while self._next < len(orientations) and orientations[self._next].at_m <= lead.progress_m:
             self.order(orientations[self._next].side, "mission", followers, term, now)
@@ -56,7 +57,7 @@ class FormationCommands:
             self._say(tuple(self._formation.slot_of(robot) for robot in followers), term, now)
 
     def order(self, side: str, reason: str, followers: Sequence[int], term: Term, now: float) -> None:
-        """A new request to all followers; an unknown side is ignored."""
+        """Publish a new request to all followers; an unknown side is ignored."""
         try:
             spec = named(side, self._mission.formation)
         except Refused:
@@ -66,7 +67,8 @@ class FormationCommands:
         self._outbox.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
 
     def _column_where_narrow(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
-        """Before a bend that the formation cannot follow, and where obstacles are known: the route is past them."""
+        """Order column before a bend that the formation cannot follow, and where obstacles are known (the route passes
+        them)."""
         slots = [self._formation.slot_of(robot) for robot in followers]
         if self._formation.trace or all(map(_behind, slots)):
             return
@@ -78,7 +80,7 @@ class FormationCommands:
             self.order("column", f"bend in {ahead_m:.1f} m", followers, term, now)
 
     def _fold(self, slots: Sequence[Slot], followers: Sequence[int], term: Term, now: float) -> None:
-        """Into column past known obstacles, the last hop that is not yet there first."""
+        """Order column past known obstacles, starting with the last hop that is not yet in column."""
         if now < self._fold_at:
             return
         self._fold_at = now + FOLD_S

@@ -1,8 +1,8 @@
-"""Obstacles that are known from an earlier run (the paper's iteration 2): a route past them, for a team in column.
+"""Route past obstacles known from an earlier run (the paper's iteration 2), for a team in column.
 
-The route is shifted sideways, by so much at each station that the team comes near as few known obstacles as can be: the
-cheapest sequence of shifts, where way costs what it is long, and a station that is barred what a detour there would
-cost. Found by dynamic programming, backwards from the goal.
+At each station the route is shifted sideways so that the team approaches as few known obstacles as possible. The
+sequence of shifts has the least cost: distance costs its length, a blocked station what a detour there would cost. It
+is found by dynamic programming, backwards from the goal.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from lfa.protocol.geometry import Pose2D
 
 STATION_M = 0.5
 SHIFT_M = 0.1
-"""From station to station the shift changes by this or not at all: a gentle bend, which followers can keep up with."""
+"""Change [m] of the shift between two stations, at most: a gentle bend that followers can follow."""
 SHIFTS = 20
-"""To either side."""
+"""Number of shifts to either side."""
 ROOM_M = 0.35
-"""Between a body and a known obstacle: where it was seen is uncertain, and detours begin when they come nearer."""
+"""Clearance [m] between a body and a known obstacle: its position is uncertain, and detours begin at less."""
 BARRED_COST_M = 1.0
 SHIFTED_COST = 0.02
-"""Of each station, for each metre of shift: back to the route where nothing is in the way."""
+"""Cost of each station per metre of shift: leads back to the route where nothing is in the way."""
 
 Point = tuple[float, float]
 Circle = tuple[float, float, float]
 
 
 def past_known(points: Sequence[Point], known: Sequence[Circle], radius_m: float) -> list[Point]:
-    """Way-points from the first of `points` to the last; `known` are x, y, radius [m] in `map`."""
+    """Return way-points from the first of `points` to the last; `known` are x, y, radius [m] in `map`."""
     stations = _stations(points)
     barred = [[_barred(s, n * SHIFT_M, known, radius_m) for n in range(-SHIFTS, SHIFTS + 1)] for s in stations]
     shifts = _cheapest(barred)
@@ -55,7 +55,7 @@ def _stations(points: Sequence[Point]) -> list[Pose2D]:
 
 
 def _cheapest(barred: Sequence[Sequence[bool]]) -> list[int]:
-    """The shift at each station, in steps; none at the first and the last."""
+    """Return the shift at each station, in steps; 0 at the first and the last."""
     sides = range(-SHIFTS, SHIFTS + 1)
     costs = {n: 0.0 if n == 0 else inf for n in sides}
     chosen: list[dict[int, int]] = []

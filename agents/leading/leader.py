@@ -1,7 +1,7 @@
-"""What a leader wants: the mission's motion, slowed for the team behind it.
+"""Motion of a leader: the mission's motion, slowed for the team behind it.
 
-Which motion it is (along a route, to a point, by a timetable, reactively, through unknown ground) is the mission's;
-that the team keeps up is the same for all (control.md sections 2.2 and 7).
+The mission chooses the motion (along a route, to a point, by a timetable, reactively, through unknown ground). The
+slowing that lets the team keep up is the same for all (control.md sections 2.2 and 7).
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 
 GAP_SLOW = 1.5
 GAP_WAIT = 2.0
-"""Of k^d: the leader slows, to half its speed, and then waits, as a gap of its chain grows wider."""
+"""Gaps of the chain, in units of k^d, from which the leader slows, down to half its speed, and above which it waits."""
 GAP_WAIT_S_MAX = 15.0
 LOOK_M = 2.0
 LEADER_OMEGA_MAX_RADPS = 0.6
-"""A slot at k^d = 1.2 m then swings at 0.7 m/s."""
+"""Maximum turn rate of a leader: a slot at k^d = 1.2 m then swings at 0.7 m/s."""
 SWING_S, SWING_SHARE = 10.0, 0.7
-"""After an orientation request the leader goes at this share of its cruise speed for so long."""
+"""Time [s] after an orientation request, and the share of its cruise speed that the leader drives during it."""
 DETOUR_SHARE = 0.7
 NOSE_M, NOSE_RAD, NOSE_RADPS, NOSE_MPS = 0.05, 0.2, 0.5, 0.1
-"""Free way ahead, bearing of the route, and speeds when an explorer's nose is at a wall."""
+"""Free distance ahead, bearing of the route, turn rate and speed for an explorer that faces a wall."""
 LOOK_ROUND_M = 0.35
 
 
 class Leadership:
-    """One robot's side of it; `begin` starts a reign."""
+    """Leading behaviour of one robot; `begin` starts its term as leader."""
 
     def __init__(self, mission: Mission, formation: Formation, team: TeamState) -> None:
         self._mission = mission
@@ -49,7 +49,9 @@ class Leadership:
         self.explore: Explore | None = None
         self._timetable: Timetable | None = None
         if mission.leading.motion == "explore":
-            from lfa.agents.exploration.explorer import Explore  # a map and a planner: memory that only explorers need
+            from lfa.agents.exploration.explorer import (
+                Explore,
+            )  # loads a map and a planner: only explorers pay that memory
 
             self.explore = Explore(mission)
         elif mission.leading.motion == "trajectory":
@@ -60,33 +62,33 @@ class Leadership:
         self._asked: dict[int, float] = {}
         self._swings_until = 0.0
         self.waited_out = False
-        """It has waited for its team as long as is allowed."""
+        """True when the leader has waited for its team for the longest time allowed."""
         self._speed_mps = 0.0
 
     @property
     def under_way(self) -> bool:
-        """It is to go: it knows where to, and neither its team nor its timetable has it wait."""
+        """True while the leader should move: it has a target, and neither its team nor its timetable lets it wait."""
         return self._speed_mps > 0.0 and (self.explore is None or bool(self.explore.route))
 
     @property
     def waiting(self) -> bool:
-        """It stands, for its team to come up."""
+        """True while the leader stands until its team catches up."""
         return self._waiting_since is not None and not self.waited_out
 
     def begin(self, pose: Pose2D, now: float) -> None:
-        """Leadership starts here."""
+        """Start leading at `pose`."""
         self._waiting_since, self.waited_out = None, False
         self.lead.begin(pose)
         if self._timetable is not None and self.lead.route is not None:
             self._timetable.begin(self.lead.route, self.lead.progress_m, now)
 
     def work(self, leads: bool, pose: Pose2D, mates: Callable[[float], Sequence[Pose2D]], now: float) -> None:
-        """One step's share of mapping and planning, where the ground is unknown."""
+        """Do one step's share of mapping and planning, where the ground is unknown."""
         if self.explore is not None and self.explore.work(leads, pose, mates(now), now):
             self.lead.take(self.explore.route, pose)
 
     def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
-        """The wanted twist, and the speed that a detour may have."""
+        """Return the wanted twist, and the maximum speed [m/s] of a detour."""
         slots = [] if self._formation.trace else [self._formation.slot_of(robot) for robot in chain[1:]]
         speed = self._mission.leading.cruise_mps
         if self._timetable is not None:
@@ -96,11 +98,11 @@ class Leadership:
         return self.lead.step(pose, last, slots, speed), DETOUR_SHARE * speed
 
     def target(self, pose: Pose2D) -> Point:
-        """Where a detour is to lead back to, in `base_link`."""
+        """Return the point in `base_link` to which a detour leads back."""
         return self.lead.ahead(pose, min(LOOK_M, self.lead.remaining_m(pose)))
 
     def exploring(self, points: list[Point], pose: Pose2D, wanted: Twist) -> Twist:
-        """Along the planned route; where the nose is at a wall, turned towards the route first, or backed away."""
+        """Follow the planned route; in front of a wall, first turn towards the route, or back up."""
         if self.explore is None or not self.explore.route:
             return STILL
         half_width_m = self._mission.radius_m + SKIN_M
@@ -112,9 +114,9 @@ class Leadership:
         return Twist(-NOSE_MPS, 0.0) if free_along(points, Twist(-1.0, 0.0), half_width_m) > NOSE_M else STILL
 
     def _swing(self, slots: Sequence[Slot], now: float) -> float:
-        """Share of the cruise speed while the formation opens: the last robot's slot swings with all before it.
+        """Return the share of the cruise speed while the formation opens: the last slot swings with all before it.
 
-        Falling back into column needs none: the slots swing to the rear, and only lag.
+        Falling back into column needs no slowing: the slots swing to the rear, and only lag.
         """
         asked = {slot.robot: slot.phi for slot in slots}
         for robot, phi in asked.items():
@@ -125,7 +127,7 @@ class Leadership:
         return SWING_SHARE if now < self._swings_until else 1.0
 
     def _patience(self, chain: tuple[int, ...], pose: Pose2D, now: float) -> float:
-        """Share of the cruise speed that lets the team keep up: less while a gap is wide, 0 for a bounded time."""
+        """Return the share of the cruise speed that lets the team keep up: less at a wide gap, 0 for a bounded time."""
         ahead: Pose2D | None = pose
         widest = 0.0
         for robot in chain[1:]:

@@ -1,7 +1,6 @@
-"""How a leader drives: along way-points, point to point or straight for the goal, to rest there.
+"""Path follower of a leader: along way-points, point to point or straight to the goal, and to rest there.
 
-The route is known to every robot, and each keeps its own progress on it, so that whoever leads next goes on from
-where the team is.
+Every robot knows the route and keeps its own progress on it, so that the next leader continues from where the team is.
 """
 
 from __future__ import annotations
@@ -22,20 +21,20 @@ SPACING_M = 0.1
 LOOK_AHEAD_M = 0.6
 PLANNED_LOOK_AHEAD_M = 0.35
 PLANNED_CORNER_RADIUS_M = 0.8
-"""A planned route is already round, and its clearance holds for the way itself."""
+"""Corner radius of a planned route: it is already smooth, and its clearance holds for the path itself."""
 DETOUR_AHEAD_M = 2.0
 WINDOW_M = 0.5
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
 IN_PLACE_RADPS = 0.4
 SLOWEST_SHARE = 0.25
-"""Of the speed, where a planned route bends away: it is kept to, at walking pace if need be."""
+"""Minimum fraction of the cruise speed on a planned route's bends, so that the path is tracked and not cut."""
 ARRIVED_MPS = 0.02
 LATERAL_GAIN = 1.2
 
 
 class Route:
-    """A polyline in `map` with rounded corners, its arc length and curvature."""
+    """Polyline in `map` with rounded corners, its arc length and curvature."""
 
     def __init__(self, points: Sequence[Point], corner_radius_m: float = CORNER_RADIUS_M) -> None:
         self.points = _resampled(_rounded(points, corner_radius_m), SPACING_M)
@@ -47,14 +46,14 @@ class Route:
         self.curvature = _curvatures(self.points)
 
     def point(self, s: float) -> Point:
-        """The point at arc length `s` [m], clamped to the ends."""
+        """Return the point at arc length `s` [m], clamped to the ends."""
         i = self.segment(s)
         (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
         share = (min(max(s, 0.0), self.length_m) - self.at_m[i]) / max(self.at_m[i + 1] - self.at_m[i], 1e-9)
         return ax + share * (bx - ax), ay + share * (by - ay)
 
     def nearest(self, x: float, y: float, low_m: float = 0.0, high_m: float = inf) -> float:
-        """Arc length of the point nearest to (x, y) between `low_m` and `high_m`."""
+        """Return the arc length of the point nearest to (x, y) between `low_m` and `high_m`."""
         first, last = self.segment(low_m), self.segment(min(high_m, self.length_m))
         best, nearest, share_of_it = inf, -1, 0.0
         for i, (ax, ay, dx, dy, square) in enumerate(self._legs[first : last + 1], first):
@@ -69,15 +68,16 @@ class Route:
         return self.at_m[nearest] + share_of_it * (self.at_m[nearest + 1] - self.at_m[nearest])
 
     def segment(self, s: float) -> int:
-        """Index of the point that arc length `s` [m] lies on or behind."""
+        """Return the index of the point at or before arc length `s` [m]."""
         return min(max(bisect_right(self.at_m, s) - 1, 0), len(self.points) - 2)
 
 
 class PathFollower:
-    """One robot's progress along the route, and its twist when it leads."""
+    """Progress of one robot along the route, and its twist when it leads."""
 
     def __init__(self, leading: Leading, limits: Limits, radius_m: float = 0.15) -> None:
-        """`radius_m` is how much room a robot needs beside what is known (`Leading.known_m`)."""
+        """Create a path follower; `radius_m` is the room that a robot needs beside known obstacles
+        (`Leading.known_m`)."""
         self._leading = leading
         self._radius_m = radius_m
         self._limits = limits
@@ -89,7 +89,7 @@ class PathFollower:
         self._s = 0.0
 
     def track(self, pose: Pose2D) -> None:
-        """Keep the progress up, leader or not."""
+        """Update the progress; called for leaders and followers."""
         if self._reactive:
             straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
             self._from_m = straight if self._from_m is None else self._from_m
@@ -103,14 +103,14 @@ class PathFollower:
             self._s = self._route.nearest(pose.x, pose.y, self._s - WINDOW_M, self._s + 2.0 * WINDOW_M)
 
     def begin(self, pose: Pose2D) -> None:
-        """Leadership starts here: point to point goes straight from where the robot stands."""
+        """Start leading; point to point drives straight from the present pose."""
         self.track(pose)
         if self._leading.motion == "point_to_point":
             self._route = Route([(pose.x, pose.y), self.goal])
             self._s = 0.0
 
     def take(self, points: Sequence[Point], pose: Pose2D) -> None:
-        """Go on along a route of one's own making (`explore`), from the point of it that is nearest."""
+        """Replace the route by an own one (`explore`), starting at its nearest point."""
         self._route = Route(points, PLANNED_CORNER_RADIUS_M)
         self._s = self._route.nearest(pose.x, pose.y, 0.0, 2.0 * WINDOW_M)
         self._profile_of = None
@@ -121,16 +121,17 @@ class PathFollower:
 
     @property
     def route(self) -> Route | None:
-        """None before the own pose is known, and for who drives without one."""
+        """Present route; None before the own pose is known, and for a motion without a route."""
         return self._route
 
     @property
     def progress_m(self) -> float:
-        """Arc length of the route so far, or how much nearer the goal is; 0 before the own pose is known."""
+        """Arc length [m] driven on the route, or distance gained to the goal; 0 before the own pose is known."""
         return self._s
 
     def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
-        """How far ahead the nearest bend is in which `slots` would hold the leader below `COLUMN_BELOW_MPS`."""
+        """Return the distance [m] to the next bend in which `slots` would slow the leader below `COLUMN_BELOW_MPS`, or
+        None."""
         if self._route is None:
             return None
         first, last = self._route.segment(self._s), self._route.segment(self._s + within_m)
@@ -141,17 +142,17 @@ class PathFollower:
         return None
 
     def remaining_m(self, pose: Pose2D) -> float:
-        """Way to the goal: along the route, or straight once the route is at its end."""
+        """Return the distance [m] to the goal: along the route, or straight at the route's end."""
         straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
         return max(self._route.length_m - self._s, straight) if self._route is not None else straight
 
     def arrived(self, pose: Pose2D, twist: Twist) -> bool:
-        """At rest within the goal's tolerance."""
+        """Return whether the robot is at rest within the goal's tolerance."""
         near = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y) <= self._leading.goal_tolerance_m
         return near and abs(twist.linear_x) < ARRIVED_MPS
 
     def ahead(self, pose: Pose2D, by_m: float = DETOUR_AHEAD_M) -> Point:
-        """The point of the route `by_m` ahead, in `base_link`: where a detour is to lead back to."""
+        """Return the route's point `by_m` ahead, in `base_link`: a detour leads back to it."""
         if self._route is not None:
             return in_base(pose, self._route.point(self._s + by_m))
         x, y = in_base(pose, self.goal)
@@ -159,7 +160,7 @@ class PathFollower:
         return share * x, share * y
 
     def step(self, pose: Pose2D, twist: Twist, slots: Sequence[Slot], speed_max_mps: float) -> Twist:
-        """The wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
+        """Return the wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
         self.track(pose)
         if self._route is None and not self._reactive:
             return Twist(0.0, 0.0)
@@ -174,7 +175,7 @@ class PathFollower:
         v = min(self._cruise(slots), braking, speed_max_mps)
         if self._planned:
             v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
-        # Last of all: a share of what the last step allows would be a share of a share in the next one.
+        # This limit is last: a share of it would be taken again in each following step.
         v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S)
         if near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing)
@@ -188,10 +189,11 @@ class PathFollower:
         return Twist(0.0, IN_PLACE_RADPS if bearing > 0.0 else -IN_PLACE_RADPS)
 
     def _cruise(self, slots: Sequence[Slot]) -> float:
-        """Fastest speed here from which every bend ahead can be met at the speed that its outermost robot keeps.
+        """Return the maximum speed [m/s] from which the robot can brake to the outermost robot's speed limit of each
+        bend ahead.
 
-        Backwards over the way that braking from cruise takes: nothing further ahead can matter, and a new leader's
-        first command does not wait for the whole route.
+        Computed backwards over the braking distance from cruise speed: bends further ahead do not matter, and a new
+        leader's first command does not wait for the whole route.
         """
         route, cruise = self._route, self._leading.cruise_mps
         if route is None:
@@ -211,7 +213,9 @@ class PathFollower:
         if hypot(points[0][0] - points[-1][0], points[0][1] - points[-1][1]) < 1e-6 and len(points) == 2:
             points[0] = (points[0][0] - 0.01, points[0][1])
         if self._leading.known_m:
-            from lfa.agents.leading.known_obstacles import past_known  # only in an iteration 2
+            from lfa.agents.leading.known_obstacles import (
+                past_known,
+            )  # imported only with obstacles known from an earlier run
 
             if hypot(points[0][0] - pose.x, points[0][1] - pose.y) > CORNER_RADIUS_M:
                 points = [(pose.x, pose.y), *points]
@@ -220,13 +224,13 @@ class PathFollower:
 
 
 def _leg(a: Point, b: Point) -> tuple[float, float, float, float, float]:
-    """Where it begins, whereto it leads, and its length squared."""
+    """Return a leg's start, its direction and length as (dx, dy), and its length squared."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     return *a, dx, dy, max(dx * dx + dy * dy, 1e-12)
 
 
 def _rounded(points: Sequence[Point], radius_m: float) -> list[Point]:
-    """Corners replaced by arcs of `radius_m`, smaller where the legs are short."""
+    """Replace corners by arcs of `radius_m`, smaller where the legs are short."""
     rounded = [points[0]]
     for a, corner, b in zip(points, points[1:], points[2:], strict=False):
         leg_in, leg_out = hypot(corner[0] - a[0], corner[1] - a[1]), hypot(b[0] - corner[0], b[1] - corner[1])
@@ -249,7 +253,7 @@ def _rounded(points: Sequence[Point], radius_m: float) -> list[Point]:
 
 
 def _resampled(points: Sequence[Point], spacing_m: float) -> list[Point]:
-    """The polyline with no segment longer than `spacing_m` and no two points in one place."""
+    """Return the polyline with segments of at most `spacing_m` and without repeated points."""
     out = [points[0]]
     for a, b in pairwise(points):
         length = hypot(b[0] - a[0], b[1] - a[1])
@@ -261,7 +265,7 @@ def _resampled(points: Sequence[Point], spacing_m: float) -> list[Point]:
 
 
 def _curvatures(points: Sequence[Point]) -> list[float]:
-    """Signed curvature [1/m] at each point from its neighbours half a metre on either side, left > 0."""
+    """Return the signed curvature [1/m] at each point, from the points 0.3 m before and after it, left > 0."""
     reach = max(1, round(0.3 / SPACING_M))
     out = [0.0] * len(points)
     for i in range(reach, len(points) - reach):

@@ -1,7 +1,7 @@
 """Trajectory tracking: a route whose way-points are due at given times (the paper's second type of motion).
 
-Where the leader should be is a point that moves along the route; its speed is that point's, plus a share of how far the
-leader is behind it. A detour costs time that is made up for, as far as `cruise_mps` allows.
+The leader's reference is a point that moves along the route. The leader drives at that point's speed plus a share of
+its distance behind the point. The time lost in a detour is made up for as far as `cruise_mps` allows.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from lfa.protocol.mission import Leading
 
 GAIN_PER_S = 0.5
 LAG_M_MAX = 5.0
-"""Farther behind than this, hurrying on has no more effect."""
+"""Lag [m] beyond which the speed does not increase any more."""
 
 
 class Timetable:
-    """Of one leader. Its clock starts when it begins to lead, at the time that is due where it stands."""
+    """Timetable of one leader. Its clock starts when it begins to lead, at the time that is due at its present
+    place."""
 
     def __init__(self, leading: Leading) -> None:
         self._leading = leading
@@ -26,7 +27,7 @@ class Timetable:
         self._zero = 0.0
 
     def begin(self, route: Route, progress_m: float, now: float) -> None:
-        """Take the trajectory up at `progress_m` along `route`."""
+        """Start the trajectory at `progress_m` along `route`."""
         self._at_m, low = [], 0.0
         for x, y in self._leading.route_m:
             low = route.nearest(x, y, low)
@@ -34,11 +35,11 @@ class Timetable:
         self._zero = now - _between(progress_m, self._at_m, self._leading.times_s)
 
     def due_m(self, now: float) -> float:
-        """Arc length [m] of the point where the leader should be."""
+        """Return the arc length [m] of the point where the leader should be."""
         return _between(now - self._zero, self._leading.times_s, self._at_m)
 
     def speed(self, progress_m: float, now: float) -> float:
-        """Speed [m/s] for the next step, from 0 to `cruise_mps`."""
+        """Return the speed [m/s] for the next step, from 0 to `cruise_mps`."""
         if not self._at_m:
             return 0.0
         due_m = self.due_m(now)
@@ -48,7 +49,7 @@ class Timetable:
 
 
 def _between(x: float, xs: Sequence[float], ys: Sequence[float]) -> float:
-    """Piecewise linear from `xs` to `ys`, clamped to the ends."""
+    """Interpolate linearly from `xs` to `ys`, clamped to the ends."""
     if x <= xs[0]:
         return ys[0]
     if x >= xs[-1]:

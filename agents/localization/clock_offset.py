@@ -1,10 +1,10 @@
-"""What a sender's clock reads compared with one's own: only differences of stamps mean anything between machines.
+"""Clock offset of a sender relative to the own clock: between machines only differences of stamps have a meaning.
 
-Receive minus send is the clock offset plus the message's latency, so its windowed minimum is the offset plus
-the least latency. The least values of windows of one second form a lower envelope; the line below it that touches
-at the middle (the edge of the lower convex hull there) gives offset and drift together, so that 200 ppm do not
-age a minimum. When the peer reports its own least delay of us, half the difference of the two is the
-offset without the common latency: only the path's asymmetry is left.
+Receive minus send is the clock offset plus the message's latency, so its windowed minimum is the offset plus the least
+latency. The least values of windows of one second form a lower envelope; the line below it that touches at the middle
+(the edge of the lower convex hull there) gives offset and drift together, so that a drift of 200 ppm does not age a
+minimum. When the peer reports its own least delay of our messages, half the difference of the two is the offset without
+the common latency: only the path's asymmetry is left.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from math import isfinite
 BUCKET_S = 1.0
 BUCKETS_MAX = 16
 DRIFT_MAX = 250e-6
-"""Crystals are within 100 ppm each; two of them and a margin."""
+"""Maximum drift: crystals are within 100 ppm each; two of them and a margin."""
 DRIFT_SPAN_S = 6.0
-"""A slope is believed when the envelope is at least this long."""
+"""Minimum length [s] of the envelope for a drift estimate."""
 FUTURE_MAX_S = 0.1
-"""A stamp that lies further ahead of the estimate than this is refused, until so many in a row agree:"""
+"""Time [s] ahead of the estimate beyond which a stamp is refused, until `FUTURES_TO_RESET` in a row agree."""
 FUTURES_TO_RESET = 10
 REPORT_TIMEOUT_S = 10.0
 
 
 class ClockOffset:
-    """Of one sender in one of its lives. Make a new one when its incarnation changes."""
+    """Clock offset of one sender in one incarnation. Create a new one when its incarnation changes."""
 
     def __init__(self) -> None:
         self._buckets: deque[tuple[float, float]] = deque(maxlen=BUCKETS_MAX)
@@ -40,9 +40,9 @@ class ClockOffset:
         self.resets = 0
 
     def heard(self, stamp: float, received_at: float) -> bool:
-        """A message stamped `stamp` came.
+        """Update with a message that was stamped `stamp`.
 
-        False when the stamp is not finite or lies in the future, or when one's own time ran backwards.
+        Return False when the stamp is not finite or lies in the future, or when the own time ran backwards.
         """
         delay = received_at - stamp
         if not isfinite(delay) or (self._buckets and received_at < self._buckets[-1][0]):
@@ -65,7 +65,7 @@ class ClockOffset:
         return True
 
     def reported(self, least_s: float, received_at: float) -> None:
-        """The peer's own least (receive - send) of our messages, from its `TableRow.delays`."""
+        """Update with the peer's own least (receive - send) of our messages, from its `TableRow.delays`."""
         if isfinite(least_s):
             self._report = (received_at, least_s)
 
@@ -74,11 +74,11 @@ class ClockOffset:
         return bool(self._buckets)
 
     def least(self, now: float) -> float:
-        """Least (receive - send) as of `now` [s]: what `TableRow.delays` reports to this sender."""
+        """Return the least (receive - send) as of `now` [s], which `TableRow.delays` reports to this sender."""
         return self._value + self._drift * (now - self._anchor)
 
     def offset(self, now: float) -> float:
-        """What to add to the sender's stamps to have them on one's own clock [s]."""
+        """Return the time [s] to add to the sender's stamps to convert them to the own clock."""
         least = self._value + self._drift * (now - self._anchor)
         if self._report is None or now - self._report[0] > REPORT_TIMEOUT_S:
             return least
@@ -88,7 +88,7 @@ class ClockOffset:
 
     @property
     def drift(self) -> float:
-        """How much slower the sender's clock runs, as a fraction."""
+        """Fraction by which the sender's clock runs slower."""
         return self._drift
 
     def _begin(self, now: float, delay: float) -> None:
@@ -109,7 +109,7 @@ class ClockOffset:
         return True
 
     def _refit(self, now: float) -> None:
-        """The line below all windows' minima that is nearest to them on average."""
+        """Fit the line below all windows' minima that is nearest to them on average."""
         points = list(self._buckets)
         first, last = points[0][0], points[-1][0]
         self._anchor = now

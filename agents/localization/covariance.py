@@ -6,7 +6,7 @@ from math import sqrt
 
 
 class Covariance:
-    """Symmetric 3x3: the error of a pose in `map` axes [m, m, rad]."""
+    """Symmetric 3x3 covariance: the error of a pose in `map` axes [m, m, rad]."""
 
     __slots__ = ("_rows",)
 
@@ -14,7 +14,7 @@ class Covariance:
         self._rows = [[position, 0.0, 0.0], [0.0, position, 0.0], [0.0, 0.0, heading]]
 
     def move(self, dx: float, dy: float) -> None:
-        """The pose moved by (dx, dy): a heading error before it is a sideways error after it."""
+        """Propagate a motion by (dx, dy): a heading error before it is a lateral error after it."""
         p = self._rows
         xt, yt, tt = p[0][2], p[1][2], p[2][2]
         p[0][0] += -2.0 * dy * xt + dy * dy * tt
@@ -32,7 +32,7 @@ class Covariance:
         p[2][2] += heading
 
     def admits(self, innovation: tuple[float, float, float], variances: tuple[float, float], sigma: float) -> bool:
-        """Whether each component of a measured pose error is within `sigma` standard deviations."""
+        """Return whether each component of a measured pose error is within `sigma` standard deviations."""
         position, heading = variances
         noise = (position, position, heading)
         return all(abs(innovation[i]) <= sigma * sqrt(self._rows[i][i] + noise[i]) for i in range(3))
@@ -40,7 +40,7 @@ class Covariance:
     def update(
         self, innovation: tuple[float, float, float], variances: tuple[float, float]
     ) -> tuple[float, float, float]:
-        """Correction of the pose for a measured error whose variances are (position, heading)."""
+        """Update with a measured error whose variances are (position, heading); return the correction of the pose."""
         position, heading = variances
         correction = [0.0, 0.0, 0.0]
         for i, variance in enumerate((position, position, heading)):

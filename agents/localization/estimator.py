@@ -1,9 +1,9 @@
 """Own pose in `map` from wheel odometry (50 Hz, smooth, drifting) and localisation (10 Hz, noisy, with gaps).
 
-The state is where `odom` stands in `map`: it only moves when a fix corrects it, so between fixes the pose is as
-smooth as the wheels. A fix is compared with the odometry at the fix's own stamp. Gains are those of a Kalman
-filter over (x, y, theta) whose uncertainty grows with the way travelled and the angle turned; without noise the
-first fix is exact and all later corrections are zero.
+The state is the pose of `odom` in `map`: it changes only when a fix corrects it, so between fixes the pose is as smooth
+as the odometry. A fix is compared with the odometry at the fix's own stamp. Gains are those of a Kalman filter over (x,
+y, theta) whose uncertainty grows with the distance travelled and the angle turned; without noise the first fix is exact
+and all later corrections are zero.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from lfa.protocol.messages.robot import Localization, Sensors
 ODOMETRY_KEPT = 64
 GATE_SIGMA = 5.0
 OUTLIERS_TO_RELOCATE = 5
-"""So many fixes in a row that contradict the odometry: the robot was carried, or the wheels slipped."""
+"""Number of successive fixes that contradict the odometry after which the robot counts as carried or slipped."""
 EXTRAPOLATION_MAX_S = 0.2
 
 
 class EstimatorNoise(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the filter assumes: standard deviations of a fix, and of odometry after one metre, radian or second."""
+    """Assumed standard deviations of a fix, and of odometry after one metre, radian or second."""
 
     fix_m: float = 0.005
     fix_rad: float = 0.0087
@@ -49,7 +49,8 @@ class _Odometry(Struct, frozen=True, gc=False):
 
 
 class Estimator:
-    """Of one robot. All stamps are of the driver's clock; its offset to one's own is estimated here."""
+    """Pose estimator of one robot. All stamps are of the driver's clock; its offset to the own clock is estimated
+    here."""
 
     def __init__(self, noise: EstimatorNoise = NOISE) -> None:
         self._noise = noise
@@ -68,7 +69,7 @@ class Estimator:
         self.last_fix_at: float | None = None
 
     def sensors(self, sensors: Sensors, received_at: float) -> bool:
-        """Take wheel odometry; False when it is refused (not finite, absurd, out of order)."""
+        """Update with wheel odometry; return False when it is refused (not finite, implausible, out of order)."""
         header = sensors.header
         if header.incarnation != self._incarnation:
             self._restart(header.incarnation)
@@ -87,7 +88,7 @@ class Estimator:
         return True
 
     def localization(self, fix: Localization, received_at: float) -> bool:
-        """Take a fix; it acts as soon as the odometry reaches its stamp. False when it is refused."""
+        """Accept a fix, applied as soon as the odometry reaches its stamp; return False when it is refused."""
         stamp = fix.header.stamp
         if not (isfinite(stamp) and plausible(fix.pose_map, Twist())):
             self.refused += 1
@@ -104,7 +105,7 @@ class Estimator:
 
     @property
     def ready(self) -> bool:
-        """True from the first fix on that the odometry could be joined to."""
+        """True from the first fix on that could be joined to the odometry."""
         return self._map_odom is not None
 
     @property
@@ -112,7 +113,7 @@ class Estimator:
         return self._history[-1].odometer_m if self._history else 0.0
 
     def pose_at(self, now: float) -> tuple[Pose2D, Twist] | None:
-        """Own pose in `map`, extrapolated along the arc to `now`, and own twist; None before it is `ready`."""
+        """Return own pose in `map`, extrapolated along the arc to `now`, and own twist; None before it is `ready`."""
         if self._map_odom is None:
             return None
         newest = self._history[-1]
@@ -122,11 +123,11 @@ class Estimator:
         return along_arc(here, newest.twist, age), newest.twist
 
     def age_s(self, now: float) -> float:
-        """Of the newest odometry [s]; infinite before the first."""
+        """Return the age of the newest odometry [s]; infinite before the first."""
         return now - self._history[-1].stamp - self._clock.offset(now) if self._history else float("inf")
 
     def _restart(self, incarnation: int) -> None:
-        """A new driver has a new clock and a new `odom`."""
+        """Restart for a new driver, which has a new clock and a new `odom`."""
         self._incarnation = incarnation
         self._clock = ClockOffset()
         self._history.clear()
@@ -157,7 +158,7 @@ class Estimator:
         self._map_odom = compose(corrected, inverse(odometry.pose_odom))
 
     def _grow(self, odometry: _Odometry, predicted: Pose2D) -> None:
-        """Uncertainty of the way since the last fix."""
+        """Add the uncertainty of the motion since the last fix."""
         last, noise = self._fix_at, self._noise
         assert last is not None
         assert self._map_odom is not None
@@ -176,7 +177,7 @@ class Estimator:
         return self._noise.fix_m**2, self._noise.fix_rad**2
 
     def _refuse_outlier(self, pose_map: Pose2D, odometry: _Odometry) -> None:
-        """Believe the fixes when several in a row agree with each other and not with the wheels."""
+        """Count an outlier; relocate when several in a row agree with each other and not with the odometry."""
         self.outliers += 1
         self._outliers_in_a_row += 1
         if self._outlier is not None and not _near(between(self._outlier, pose_map), self._noise):
@@ -195,12 +196,12 @@ class Estimator:
 
 
 def _near(step: Pose2D, noise: EstimatorNoise) -> bool:
-    """Two fixes one period apart can both be of one robot: half a metre, half a radian."""
+    """Return whether two fixes one period apart can be of one robot: within half a metre and half a radian."""
     return abs(step.x) + abs(step.y) < 0.5 + 10.0 * noise.fix_m and abs(step.theta) < 0.5
 
 
 def _at(history: deque[_Odometry], stamp: float) -> _Odometry:
-    """Odometry at `stamp`, between the two samples around it along their arc. `stamp` lies within `history`."""
+    """Return the odometry at `stamp`, interpolated along the arc between two samples. `stamp` lies within `history`."""
     later = history[-1]
     for sample in reversed(history):
         if sample.stamp <= stamp:

@@ -8,11 +8,11 @@ POSITION_MAX_M = 1e6
 
 
 SPEED_MAX = 50.0
-"""[m/s, rad/s] More is no robot of ours."""
+"""Maximum plausible speed [m/s, rad/s]: no robot of the fleet is faster."""
 
 
 def plausible(pose: Pose2D, twist: Twist) -> bool:
-    """Whether a robot of ours can be there and so fast. Anything that is not finite is not (nan compares false)."""
+    """Return whether a robot of the fleet can have this pose and twist; False if not finite (nan compares false)."""
     return (
         abs(pose.x) < POSITION_MAX_M
         and abs(pose.y) < POSITION_MAX_M

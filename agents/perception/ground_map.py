@@ -1,7 +1,7 @@
-"""The floor ahead: what can be crossed, and what bars the way.
+"""Ground map of one robot: the floor features that can be crossed, and those that block the way.
 
-What cannot be crossed is remembered as points in `map`, so that a detour treats its edge like an obstacle's. What a
-single look shows is `ground_profile.py`.
+Features that cannot be crossed are stored as points in `map`, so that a detour treats their edge like an obstacle's.
+The features of a single profile are found in `ground_profile.py`.
 """
 
 from __future__ import annotations
@@ -22,38 +22,39 @@ BarKind = Literal["pothole", "bump", "ditch", "wall"]
 CELL_M = 0.05
 CELLS_MAX = 4000
 MOVED_M = 0.3
-"""What is barred near the robot is looked up anew when it has moved so far, or something new bars the way."""
+"""Distance [m] the robot drives before the blocked points near it are looked up anew; a new blocked cell has the same
+effect."""
 NOWHERE = (inf, inf, 0.0)
 JUDGE_M = 0.5
-"""Nearer than this, what has no visible end has none."""
+"""Distance [m] below which a feature without a visible end is treated as endless."""
 SEEN_MIN = 4
 AGAIN_S = 0.3
-"""A cell counts when so many looks showed it, each within so long of the last: a bad reading or two are no hole."""
+"""Maximum time [s] between two of the `SEEN_MIN` profiles that confirm a cell: single bad readings are no hole."""
 
 
 class GroundMap:
-    """Of one robot: the features of the newest profile, and the floor that it must not drive on."""
+    """Ground map of one robot: the features of the newest profile, and the floor that it must not drive on."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._cells: dict[tuple[int, int], int] = {}
         self._seen_at: dict[tuple[int, int], float] = {}
         self._crossable: dict[tuple[int, int], float] = {}
-        """Near edges of what can be crossed, and when they were seen last."""
+        """Near edges of crossable features, with the time when they were seen last."""
         self._near: list[Point] = []
         self._looked_at = NOWHERE
-        """Where `_near` was looked up, and how far around."""
+        """Position and range for which `_near` was looked up."""
         self._kinds: dict[tuple[int, int], tuple[BarKind, float]] = {}
-        """Class and width [m] of the floor that bars a cell."""
+        """Class and width [m] of the floor feature that blocks a cell."""
         self.ahead: GroundFeature | None = None
-        """The nearest feature that can be crossed and lies ahead."""
+        """Nearest crossable feature ahead."""
         self._doubtful: list[Point] = []
-        """In `map`, where the newest profile shows what may be a hole and is none yet."""
+        """Points in `map` where the newest profile shows a possible hole that is not confirmed."""
         self.looked = False
-        """Whether a profile has come."""
+        """True once a profile was received."""
 
     def profile(self, profile: GroundProfile, pose_map: Pose2D, now: float) -> None:
-        """Take a profile that was made at `pose_map`."""
+        """Update with a profile that was made at `pose_map`."""
         features = [(line, feature) for line in range(len(profile.heights_m)) for feature in runs(profile, line)]
         ditch = is_ditch([feature for _, feature in features], len(profile.heights_m))
         self.ahead, self.looked, self._doubtful = None, True, []
@@ -75,7 +76,7 @@ class GroundMap:
                     self.ahead = feature
 
     def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind, now: float) -> None:
-        """Nobody of this robot's size gets into the circle about (x, y) in `map` any more."""
+        """Block the circle about (x, y) in `map` for this robot."""
         count = ceil(2.0 * pi * radius_m / CELL_M)
         for n in range(count):
             angle = 2.0 * pi * n / count
@@ -83,7 +84,7 @@ class GroundMap:
             self._bar_cell(cell, kind, 2.0 * radius_m, SEEN_MIN, now)
 
     def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
-        """What bars the way nearer than `within_m`, in `base_link`."""
+        """Return the blocked points nearer than `within_m`, in `base_link`."""
         barred = self._barred_near(pose_map, within_m)
         if not barred:
             return []
@@ -93,12 +94,14 @@ class GroundMap:
         ]
 
     def doubtful(self, pose_map: Pose2D) -> list[Point]:
-        """Edges, in `base_link`, that the newest profile shows and that may bar the way: braked for before they are
-        believed, since a robot that waits for the next looks does not stop before them any more."""
+        """Return unconfirmed edges of the newest profile that may block the way, in `base_link`.
+
+        The robot brakes for them at once: if it waited for the next profiles, it could not stop before them.
+        """
         return [in_base(pose_map, point) for point in self._doubtful]
 
     def nearest(self, x: float, y: float, within_m: float) -> tuple[BarKind, float] | None:
-        """Class and width of the barred floor nearest to (x, y) in `map`."""
+        """Return class and width [m] of the blocked floor nearest to (x, y) in `map`."""
         best, found = within_m * within_m, None
         for (i, j), seen in self._cells.items():
             apart = ((i + 0.5) * CELL_M - x) ** 2 + ((j + 0.5) * CELL_M - y) ** 2
@@ -107,7 +110,7 @@ class GroundMap:
         return found
 
     def _barred_near(self, pose_map: Pose2D, within_m: float) -> list[Point]:
-        """All barred points nearer than `within_m` and some farther ones, looked up anew where the robot moved on."""
+        """Return all blocked points nearer than `within_m` and some farther ones, looked up anew after a move."""
         x, y, reach_m = self._looked_at
         if reach_m != within_m or abs(pose_map.x - x) > MOVED_M or abs(pose_map.y - y) > MOVED_M:
             self._looked_at = x, y, _ = pose_map.x, pose_map.y, within_m
@@ -118,7 +121,7 @@ class GroundMap:
         return self._near
 
     def _confirmed(self, y: float, feature: GroundFeature, pose_map: Pose2D, now: float) -> bool:
-        """Whether the near edge was seen hereabouts a moment ago too."""
+        """Return whether the near edge was also seen near here a moment ago."""
         i, j = _cell(at(pose_map, feature.near_m, y))
         around = [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]
         before = any(0.0 < now - self._crossable.get(cell, -inf) <= AGAIN_S for cell in around)
@@ -128,12 +131,12 @@ class GroundMap:
         return before
 
     def _bar(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D, now: float) -> None:
-        """The cells of the feature's readings on this line, each seen once, however many of the readings it holds."""
+        """Block the cells of the feature's readings on this line, counting each cell once per profile."""
         for cell in dict.fromkeys(map(_cell, readings_of(profile, line, feature, pose_map))):
             self._bar_cell(cell, feature.kind, feature.width_m, 1, now)
 
     def _free(self, profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> None:
-        """A gap that wheels bridge seems too wide to one who looks at it askew: seen like this it bars nothing more."""
+        """Unblock a gap that the wheels bridge: seen at an angle it had seemed too wide."""
         for i, j in map(_cell, readings_of(profile, line, feature, pose_map)):
             for cell in [(i + di, j + dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]:
                 if self._cells.get(cell) and self._kinds[cell][0] in ("pothole", "ditch"):
@@ -151,5 +154,5 @@ class GroundMap:
 
 
 def _cell(point: Point) -> tuple[int, int]:
-    """The cell of the memory that a point in `map` lies in."""
+    """Return the map cell of a point in `map`."""
     return floor(point[0] / CELL_M), floor(point[1] / CELL_M)

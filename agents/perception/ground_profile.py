@@ -1,7 +1,7 @@
-"""What one look at the floor shows: potholes, bumps and ditches, and which of them wheels can cross.
+"""Features of one floor profile: potholes, bumps and ditches, and which of them the wheels can cross.
 
-Lengths in m; heights as in `GroundProfile`, relative to what the robot stands on. What is remembered of many looks is
-`ground_map.py`.
+Lengths in m; heights as in `GroundProfile`, relative to the floor that the robot stands on. `ground_map.py` keeps the
+features of many profiles.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from lfa.protocol.mission import Limits
 GroundKind = Literal["pothole", "bump", "ditch"]
 
 FLAT_M = 0.004
-"""Lower than this over the floor around is noise, and no wheel feels it."""
+"""Height [m] relative to the floor around below which a reading is noise, and no wheel is affected."""
 STRAIGHT_M = 0.08
-"""A hole whose near edge is this straight over all three lines is a ditch."""
+"""Straightness [m] of the near edge over all three lines below which a hole is a ditch."""
 
 
 class GroundFeature(Struct, frozen=True, gc=False):
-    """One thing on the floor ahead, as far as seen."""
+    """One feature of the floor ahead, as far as seen."""
 
     kind: GroundKind
     near_m: float
-    """Way to its near edge."""
+    """Distance [m] to the near edge."""
     width_m: float
-    """Along the direction of travel; inf when the far edge is out of sight."""
+    """Width [m] along the direction of travel; inf when the far edge is out of sight."""
     size_m: float
-    """Depth of a hole, height of a bump."""
+    """Depth [m] of a hole or height [m] of a bump."""
 
     def crossable(self, limits: Limits) -> bool:
-        """Wheels bridge the gap, or climb the step; what has no visible end is neither."""
+        """Return whether the wheels bridge the gap or climb the step; a bump without a visible end is not crossable."""
         if self.kind == "bump":
             return self.width_m < inf and self.size_m <= limits.climb_step_m
         return self.width_m <= limits.bridge_gap_m or self.size_m <= limits.climb_step_m
 
 
 def readings_of(profile: GroundProfile, line: int, feature: GroundFeature, pose_map: Pose2D) -> list[Point]:
-    """The feature's readings on `line`, in `map`."""
+    """Return the feature's readings on `line`, in `map`."""
     last_m = profile.first_m + (len(profile.heights_m[line]) - 1) * profile.increment_m
     x, readings = feature.near_m, []
     while x <= min(feature.near_m + feature.width_m, last_m) + 1e-9:
@@ -54,15 +54,15 @@ def readings_of(profile: GroundProfile, line: int, feature: GroundFeature, pose_
 
 
 def at(pose_map: Pose2D, x: float, y: float) -> Point:
-    """(x, y) of `base_link` in `map`."""
+    """Return the point (x, y) of `base_link` in `map`."""
     c, s = cos(pose_map.theta), sin(pose_map.theta)
     return pose_map.x + c * x - s * y, pose_map.y + s * x + c * y
 
 
 def runs(profile: GroundProfile, line: int) -> list[GroundFeature]:
-    """Runs of readings off the floor on one line; a missing reading neither begins nor ends one.
+    """Return the runs of readings off the floor on one line; a missing reading neither begins nor ends one.
 
-    A run's size is its median reading: the largest one would be noise's.
+    A run's size is its median reading: the largest one would be dominated by noise.
     """
     heights, features = profile.heights_m[line], []
     start, sign = 0, 0.0
@@ -83,7 +83,7 @@ def runs(profile: GroundProfile, line: int) -> list[GroundFeature]:
 
 
 def is_ditch(features: Sequence[GroundFeature], lines: int) -> bool:
-    """A hole on every line, with a straight near edge."""
+    """Return whether there is a hole on every line, with a straight near edge."""
     edges = [feature.near_m for feature in features if feature.kind == "pothole"]
     if len(edges) != lines or lines < 3:
         return False
@@ -91,6 +91,7 @@ def is_ditch(features: Sequence[GroundFeature], lines: int) -> bool:
 
 
 def bridged_lines(features: Sequence[tuple[int, GroundFeature]], limits: Limits) -> set[int]:
-    """The lines on which a gap is that wheels bridge and that a line beside shows too: no round hole's rim is."""
+    """Return the lines with a gap that wheels bridge and that a neighbouring line shows too, unlike a round hole's
+    rim."""
     narrow = {line for line, f in features if f.kind == "pothole" and f.width_m <= limits.bridge_gap_m}
     return {line for line in narrow if line - 1 in narrow or line + 1 in narrow}

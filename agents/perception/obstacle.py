@@ -1,4 +1,4 @@
-"""One obstacle as the avoidance rules see it: class, place and extent, in `base_link`."""
+"""Obstacle that blocks the way, as the avoidance rules use it: class and width."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ Class = Literal["stationary", "moving", "wall", "pothole", "bump", "ditch"]
 
 
 class BlockingObstacle(Struct, frozen=True):
-    """What bars the way."""
+    """Obstacle that blocks the way."""
 
     kind: Class = "stationary"
     width_m: float = 0.0
-    """As far as seen; inf when its end is out of sight."""
+    """Visible width [m]; inf when its end is out of sight."""

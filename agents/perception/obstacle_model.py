@@ -1,6 +1,6 @@
-"""What is around one robot: the points that a scan shows, what they belong to, and the floor that bars the way.
+"""Obstacle model of one robot: scan points, the obstacles that they belong to, and blocking floor.
 
-Perception in one place: the driver asks how far a way is free, what moves, and what it is that bars the way.
+The interface of perception for the navigator: free distance, moving obstacles, and the obstacle that blocks the way.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from lfa.protocol.mission import Limits
 
 LOOK_M = 2.0
 TRAP_M = 0.8
-"""Radius of the place in which a leader got stuck."""
+"""Radius [m] of the place in which a leader got stuck."""
 MATE_M = 0.6
-"""A thing nearer than this to where a team-mate should be is that team-mate: the table's rows are half a second old."""
+"""Distance [m] to a team-mate's expected position below which an obstacle is that team-mate: table rows are half a
+second old."""
 OWN_M = 0.15
-"""A point nearer than this to the surface of what moves belongs to it."""
+"""Distance [m] to the surface of a moving obstacle below which a scan point belongs to it."""
 NEAR_M = 0.3
-"""What bars the way is the thing nearer than this to where the way ends."""
+"""Distance [m] to the end of the free way below which an obstacle is the one that blocks it."""
 TURN_MPS = 0.05
 
 
 class ObstacleModel:
-    """Of one robot. `ground` is the floor as far as felt."""
+    """Obstacle model of one robot. `ground` is the floor as far as sensed."""
 
     def __init__(self, radius_m: float, limits: Limits, shared: SharedObstacles) -> None:
         self._radius_m = radius_m
@@ -40,32 +41,32 @@ class ObstacleModel:
         self.ground = GroundMap(limits)
 
     def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float, *, track: bool) -> None:
-        """Take a scan made at `pose`; with `track`, tell what its points belong to."""
+        """Update with a scan made at `pose`; with `track`, assign its points to obstacles."""
         self._scan.scan(scan, pose, now)
         if track:
             places = [(mate.x, mate.y) for mate in mates]
             self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now)
 
     def update_ground(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
-        """Take a look at the floor ahead, made at `pose`."""
+        """Update with a profile of the floor ahead, made at `pose`."""
         self.ground.profile(profile, pose, now)
 
     def avoid_trap(self, x: float, y: float, now: float) -> None:
-        """Keep out of a place in which a robot got stuck."""
+        """Block a place in which a robot got stuck."""
         self.ground.bar_circle(x, y, TRAP_M, "wall", now)
 
     def points(self, pose: Pose2D) -> list[Point]:
-        """What bars the way near `pose`, in `base_link`."""
+        """Return the points that block the way near `pose`, in `base_link`."""
         floor = self.ground.points(pose, LOOK_M)
         seen = self._scan.points(pose, LOOK_M)
         return seen + floor if floor else seen
 
     def moving(self, pose: Pose2D, now: float) -> list[Feature]:
-        """What moves, as seen by this robot and as told by others."""
+        """Return the moving obstacles, as seen by this robot and as reported by others."""
         return self._shared.moving(self._tracker.moving(now), pose, now, self._tracker.shows)
 
     def blocking(self, pose: Pose2D, wanted: Twist, free_m: float, now: float) -> BlockingObstacle:
-        """What ends the way along `wanted` after `free_m`."""
+        """Return the obstacle that ends the way along `wanted` after `free_m` [m]."""
         v = max(abs(wanted.linear_x), TURN_MPS)
         end = along_arc(pose, wanted, min(free_m, LOOK_M) / v)
         x, y = end.x + self._radius_m * cos(end.theta), end.y + self._radius_m * sin(end.theta)
@@ -78,13 +79,13 @@ class ObstacleModel:
         return BlockingObstacle(seen[0].kind, 2.0 * seen[0].radius_m if seen[0].whole else inf)
 
     def nearest(self, pose: Pose2D, kind: str, now: float) -> Feature | None:
-        """The nearest thing of class `kind` that this robot itself sees: what it tells the others."""
+        """Return the nearest obstacle of class `kind` that this robot itself sees, for its report to the others."""
         of_kind = [feature for feature in self._tracker.features(now) if feature.kind == kind]
         return min(of_kind, key=lambda f: hypot(f.x - pose.x, f.y - pose.y) - f.radius_m, default=None)
 
 
 def resting(points: list[Point], pose: Pose2D, moving: Sequence[Feature]) -> list[Point]:
-    """`points` (in `base_link`) less those that belong to what moves."""
+    """Return `points` (in `base_link`) without those that belong to moving obstacles."""
     if not moving:
         return points
     c, s = cos(pose.theta), sin(pose.theta)

@@ -1,4 +1,4 @@
-"""What the points of a scan belong to: stationary obstacles, walls, and obstacles that move, with their velocity."""
+"""Obstacle tracker: assigns scan points to stationary obstacles, walls, and moving obstacles with their velocity."""
 
 from __future__ import annotations
 
@@ -13,32 +13,37 @@ from lfa.agents.perception.scan import SIGHT_M, Point
 Kind = Literal["stationary", "moving", "wall"]
 
 GAP_M = 0.3
-"""Neighbouring beams' points farther apart than this belong to two things."""
+"""Distance [m] between points of neighbouring beams above which they belong to two obstacles."""
 WALL_M = 1.0
-"""What is wider than this is a wall."""
+"""Width [m] above which an obstacle is a wall."""
 FLAT_WALL_M = 0.45
 FLAT_SHARE = 0.1
-"""So is what is wider than this and bulges by less than this share of its width."""
+"""Depth as a share of the width: an obstacle wider than `FLAT_WALL_M` and flatter than this is a wall too."""
 SMALL_M = 0.08
-"""Of less than this radius only a piece is seen."""
+"""Radius [m] below which only a part of an obstacle is visible."""
 NEXT_M, NEXT_MPS, NEXT_M_MAX = 0.15, 1.0, 0.5
-"""A thing is taken for the one that should be nearer than this by now: so much for the eye, the rest for its motion."""
+"""Association gate [m] around a track's predicted position: a measurement error, plus a speed [m/s] for its motion, up
+to a maximum."""
 FORGET_S, HIDDEN_S = 1.0, 3.0
-"""What is unseen for so long is gone; what moved is known again for longer, where it comes out from behind a thing."""
+"""Times [s] after which an unseen track is deleted; longer for a moving one, which may reappear from behind another
+obstacle."""
 ALPHA, BETA = 0.5, 0.25
 MOVING_MPS = 0.12
 ANCHOR_S = 1.0
-"""It moves when it is that fast now and was so on average over at least this long."""
+"""Minimum time [s] over which the mean speed must reach `MOVING_MPS`, as the present one must, for a moving
+obstacle."""
 EDGE_M = 0.1
-"""What reaches to within this of the end of sight is seen in part only: its centre would seem to move."""
+"""Distance [m] to the sensor's range limit within which an obstacle counts as partly visible: its centre would seem to
+move."""
 TOUCH_M = 0.35
 HIDDEN_RAD = 0.09
-"""Neighbouring beams of a scan of 180 are less than half of this apart."""
+"""Angle [rad] within which a nearer obstacle may hide an end; neighbouring beams of a scan of 180 are less than half of
+this apart."""
 TRACKS_MAX = 64
 
 
 class Feature(Struct, frozen=True, gc=False):
-    """One thing in `map`: centre [m], radius of the circle that holds it [m], velocity [m/s]."""
+    """Obstacle in `map`: centre [m], radius of the enclosing circle [m], velocity [m/s]."""
 
     kind: Kind
     x: float
@@ -47,10 +52,10 @@ class Feature(Struct, frozen=True, gc=False):
     vx: float = 0.0
     vy: float = 0.0
     whole: bool = True
-    """Both its ends are in sight: its width is known."""
+    """True when both ends are in sight, so that the width is known."""
 
     def at(self, later_s: float) -> Point:
-        """Where it is `later_s` from now."""
+        """Return the position `later_s` [s] from now."""
         return self.x + self.vx * later_s, self.y + self.vy * later_s
 
 
@@ -60,9 +65,9 @@ class _Track(Struct):
     radius_m: float
     seen_at: float
     ends: tuple[Point, Point]
-    """The first and the last of its points."""
+    """First and last point."""
     anchors: list[tuple[float, tuple[Point, ...]]]
-    """When it was where, centre and ends: now and then, the newest last."""
+    """Time, centre and ends at intervals, the newest last."""
     vx: float = 0.0
     vy: float = 0.0
     moves: bool = False
@@ -71,9 +76,10 @@ class _Track(Struct):
         return ((self.x, self.y), *self.ends)
 
     def has_moved(self) -> bool:
-        """All of it has: of what comes out from behind a thing, or seems to join one, an end stays.
+        """Return whether all of it has moved; an end stays when it comes out from behind an obstacle or seems to join
+        one.
 
-        What is known to move and then passes a thing loses an end to it as well: of that the centre is enough.
+        A moving obstacle that passes another one can lose an end to it as well: for a moving one the centre is enough.
         """
         at, before = self.anchors[0]
         lasted = self.seen_at - at
@@ -83,17 +89,18 @@ class _Track(Struct):
 
 
 class Tracker:
-    """Features of the newest scan, and the tracks of what may move."""
+    """Features of the newest scan, and the tracks of obstacles that may move."""
 
     def __init__(self) -> None:
         self._tracks: list[_Track] = []
         self._seen: list[tuple[list[Point], Feature | _Track]] = []
-        """The newest scan's things with their points."""
+        """Obstacles of the newest scan with their points."""
 
     def update(
         self, points_map: Sequence[Point], eye: Point, mates: Sequence[Point], mate_m: float, now: float
     ) -> None:
-        """Points of one scan in beam order, seen from `eye`; what is within `mate_m` of a team-mate is left out."""
+        """Update with one scan's points in beam order, seen from `eye`; points within `mate_m` of a team-mate are left
+        out."""
         self._seen = []
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
         clusters = _clusters(points_map)
@@ -108,7 +115,7 @@ class Tracker:
             ):
                 continue
             elif not whole or radius_m < SMALL_M or _flat(cluster):
-                # What comes out from behind another thing, and a wall that is seen end on, would seem to move.
+                # An obstacle partly behind another one, and a wall seen end on, would seem to move.
                 self._seen.append((cluster, Feature("stationary", x, y, radius_m, whole=whole)))
             else:
                 track = self._follow((x, y, radius_m), (cluster[0], cluster[-1]), now)
@@ -116,7 +123,8 @@ class Tracker:
                     self._seen.append((cluster, track))
 
     def nearest(self, x: float, y: float, now: float) -> tuple[Feature, float] | None:
-        """The thing of the newest scan that comes nearest to (x, y) in `map`, and how near that is [m]."""
+        """Return the obstacle of the newest scan nearest to (x, y) in `map`, and its distance [m]; None if there is
+        none."""
         apart = [
             (min((px - x) ** 2 + (py - y) ** 2 for px, py in points), n) for n, (points, _) in enumerate(self._seen)
         ]
@@ -127,12 +135,13 @@ class Tracker:
         return thing if isinstance(thing, Feature) else _feature(thing, now), sqrt(square)
 
     def shows(self, x: float, y: float, within_m: float) -> bool:
-        """A thing of the newest scan, and no wall, has its centre within so much of (x, y) in `map`."""
+        """Return whether an obstacle of the newest scan, not a wall, has its centre within `within_m` of (x, y) in
+        `map`."""
         things = (thing for _, thing in self._seen if isinstance(thing, _Track) or thing.kind != "wall")
         return any(hypot(thing.x - x, thing.y - y) < within_m for thing in things)
 
     def features(self, now: float) -> list[Feature]:
-        """All things as of `now`."""
+        """Return all obstacles as of `now`."""
         walls = [thing for _, thing in self._seen if isinstance(thing, Feature)]
         return walls + [_feature(track, now) for track in self._tracks if now - track.seen_at <= FORGET_S]
 
@@ -165,7 +174,7 @@ class Tracker:
 
 
 def _clusters(points: Sequence[Point]) -> list[list[Point]]:
-    """Runs of neighbouring points; the last run joins the first when they touch."""
+    """Return the runs of neighbouring points; the last run joins the first when they touch."""
     runs: list[list[Point]] = []
     run: list[Point] = []
     last_x = last_y = inf
@@ -187,7 +196,7 @@ def _at_the_edge(cluster: Sequence[Point], eye: Point) -> bool:
 
 
 def _touches(cluster: Sequence[Point], x: float, y: float) -> bool:
-    """Some of it may be a team-mate at (x, y): as that one moves on, the rest would seem to move."""
+    """Return whether a part may be a team-mate at (x, y): when that robot drives on, the rest would seem to move."""
     limit = TOUCH_M * TOUCH_M
     for px, py in cluster:  # noqa: SIM110 (a generator within `any` takes twice as long)
         if (dx := px - x) * dx + (dy := py - y) * dy < limit:
@@ -196,7 +205,7 @@ def _touches(cluster: Sequence[Point], x: float, y: float) -> bool:
 
 
 def _hidden(end: Point, beside: Point, eye: Point) -> bool:
-    """A thing may go on behind another one that is nearer and hardly apart from its end as the eye sees them."""
+    """Return whether the obstacle may continue behind a nearer one that is next to its end, seen from `eye`."""
     far, near = hypot(end[0] - eye[0], end[1] - eye[1]), hypot(beside[0] - eye[0], beside[1] - eye[1])
     if near > far - GAP_M:
         return False
@@ -205,7 +214,7 @@ def _hidden(end: Point, beside: Point, eye: Point) -> bool:
 
 
 def _circle(cluster: Sequence[Point], eye: Point) -> tuple[float, float, float]:
-    """Centre and radius of the thing behind the visible points: half their width, as far behind the nearest one."""
+    """Return centre and radius of the visible points' obstacle: half their width, as far behind the nearest one."""
     (ax, ay), (bx, by) = cluster[0], cluster[-1]
     radius_m = max(0.5 * hypot(bx - ax, by - ay), 0.02)
     mx, my = 0.5 * (ax + bx) - eye[0], 0.5 * (ay + by) - eye[1]
@@ -218,7 +227,7 @@ def _circle(cluster: Sequence[Point], eye: Point) -> tuple[float, float, float]:
 
 
 def _extent(cluster: Sequence[Point]) -> float:
-    """Diagonal of the box that holds the visible points: also a pocket seen from inside is wide."""
+    """Return the diagonal [m] of the visible points' bounding box: a pocket seen from inside is wide as well."""
     xs, ys = [x for x, _ in cluster], [y for _, y in cluster]
     return hypot(max(xs) - min(xs), max(ys) - min(ys))
 

@@ -1,4 +1,4 @@
-"""From a scan to what stands in the way: points in `map`, and how far a motion is free of them."""
+"""Laser scan as points in `map`, and the free distance of a motion among them."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.robot import LaserScan
 
 SIGHT_M = 2.5
-"""Farther points do not matter to a robot that stops within half a metre."""
+"""Range [m] beyond which points do not matter to a robot that stops within half a metre."""
 STRAIGHT_RADPS = 1e-3
 ROUNDED = 1.0 + 1e-9
-"""A square may be so much off."""
+"""Factor that covers the rounding error of a square."""
 
 Point = tuple[float, float]
 
 
 class Surroundings:
-    """What the newest scan shows, kept in `map` so that it stays where it is while the robot moves on."""
+    """Points of the newest scan, kept in `map` so that they stay in place while the robot moves on."""
 
     def __init__(self) -> None:
         self._points_map: list[Point] = []
         self.seen_at: float | None = None
 
     def scan(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
-        """Take a scan that was made at `pose_map`. Out-of-range and bad readings are no points (REP-117)."""
+        """Update with a scan made at `pose_map`. Out-of-range and bad readings give no points (REP-117)."""
         x, y, angle, step = pose_map.x, pose_map.y, pose_map.theta + scan.angle_min, scan.angle_increment
         low, high = scan.range_min_m, min(SIGHT_M, scan.range_max_m)
         self._points_map = [
@@ -37,11 +37,11 @@ class Surroundings:
 
     @property
     def points_map(self) -> list[Point]:
-        """The newest scan's points in `map`, in beam order."""
+        """Points of the newest scan in `map`, in beam order."""
         return self._points_map
 
     def points(self, pose_map: Pose2D, within_m: float = SIGHT_M) -> list[Point]:
-        """The points nearer than `within_m`, in `base_link`."""
+        """Return the points nearer than `within_m`, in `base_link`."""
         x, y, c, s = pose_map.x, pose_map.y, cos(pose_map.theta), sin(pose_map.theta)
         limit = within_m * within_m
         return [
@@ -52,15 +52,16 @@ class Surroundings:
 
 
 def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Point]:
-    """`points` less those within `radius_m` of `center`: a team-mate that is known to stand there."""
+    """Return `points` without those within `radius_m` of `center`, where a team-mate is known to stand."""
     x, y, limit = center[0], center[1], radius_m * radius_m
     return [p for p in points if (dx := p[0] - x) * dx + (dy := p[1] - y) * dy > limit]
 
 
 def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> float:
-    """How far [m] a robot of `half_width_m` gets along the arc of `twist` before it meets a point; inf if never.
+    """Return the distance [m] that a robot of `half_width_m` can drive along the arc of `twist` before it meets a
+    point.
 
-    Points that already lie within the half width count only when the motion goes towards them.
+    Return inf if it meets none. Points already within the half width count only when the motion leads towards them.
     """
     v, omega = twist.linear_x, twist.angular_z
     if v == 0.0:
@@ -73,7 +74,7 @@ def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> fl
     left = 1.0 if omega * sign > 0.0 else -1.0
     center_y, inner_m, outer_m = left * radius, radius - half_width_m, radius + half_width_m
     free_m, far, near = inf, outer_m * outer_m * ROUNDED, inner_m * abs(inner_m) / ROUNDED
-    for x, y in points:  # most points are off the bend: they are passed over without a call
+    for x, y in points:  # most points are off the bend: they are skipped without a call
         beside = y - center_y
         if near < x * x + beside * beside < far:
             from_center = hypot(x, beside)
@@ -83,18 +84,18 @@ def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> fl
 
 
 def _straight(x: float, y: float, half_width_m: float) -> float:
-    """The way along the x axis until the body's edge meets a point that is less than `half_width_m` off it."""
+    """Return the distance along the x axis until the body meets a point less than `half_width_m` off it."""
     if x <= 0.0:
         return inf
     return max(0.0, x - sqrt(half_width_m * half_width_m - y * y))
 
 
 def _bent(x: float, y: float, from_center: float, radius: float, half_width_m: float) -> float:
-    """Forward motion on a left bend about (0, radius); the way until the body's edge meets the point, which is
-    `from_center` away from that centre and on the bend."""
+    """Return the distance on a left bend about (0, radius), driven forwards, until the body meets the point, which is
+    on the bend and `from_center` away from that centre."""
     if hypot(x, y) < half_width_m:
         return inf if x <= 0.0 else 0.0
-    # The body touches the point while the angle between them, seen from the bend's centre, is at most this.
+    # The body touches the point while the angle between them, seen from the bend's centre, is at most `touching`.
     reach = (radius * radius + from_center * from_center - half_width_m * half_width_m) / (2.0 * radius * from_center)
     touching = acos(max(-1.0, min(1.0, reach)))
     return radius * ((atan2(x, radius - y) - touching) % (2.0 * pi))

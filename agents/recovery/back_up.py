@@ -1,4 +1,4 @@
-"""Backing out: a robot that gave up a place goes back the way that it came, as far as that is free, until it is out."""
+"""Backing up: a robot that gave up a place drives back along its trail, as far as that is free, until it is out."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
 
 STEP_M, TRAIL_M = 0.1, 6.0
 OUT_M = 1.6
-"""Way back after which the robot counts as free."""
+"""Distance [m] driven backwards after which the robot counts as free."""
 AHEAD_M = 0.4
 BACK_MPS = 0.2
 ROOM_M = 0.05
 
 
 class BackUp:
-    """Of one robot: its trail, and the way back along it once `begin` was called."""
+    """Trail of one robot, and the way back along it once `begin` was called."""
 
     def __init__(self) -> None:
         self._trail: deque[Point] = deque(maxlen=round(TRAIL_M / STEP_M))
         self._left_m: float | None = None
         self._at: Point | None = None
         self.trap: Point | None = None
-        """Where the robot was stuck last."""
+        """Position in `map` where the robot was stuck last."""
 
     @property
     def under_way(self) -> bool:
         return self._left_m is not None
 
     def keep(self, pose: Pose2D) -> None:
-        """One control step on any other way: the trail grows."""
+        """Extend the trail; call it in each control step without a back-up."""
         if not self._trail or hypot(pose.x - self._trail[-1][0], pose.y - self._trail[-1][1]) >= STEP_M:
             self._trail.append((pose.x, pose.y))
 
     def begin(self, pose: Pose2D) -> None:
-        """Out of here."""
+        """Start backing up from `pose`."""
         self._left_m, self._at = OUT_M, (pose.x, pose.y)
         self.trap = self._at
 
     def step(self, points: Sequence[Point], pose: Pose2D, radius_m: float) -> Twist | None:
-        """Backwards along the trail; still while something stands there; None when the robot is out."""
+        """Return the twist backwards along the trail; still while it is blocked; None when the robot is out."""
         if self._left_m is None or self._at is None:
             return None
         self._left_m -= hypot(pose.x - self._at[0], pose.y - self._at[1])

@@ -1,4 +1,4 @@
-"""When a robot is stuck: conditions S1 to S5 of control.md section 7, each with the reason in words; and until when."""
+"""Stuck detection: conditions S1 to S5 of control.md section 7, each with its reason as text, and the release."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from lfa.protocol.geometry import Pose2D, Twist, distance
 
 STILL_S, STILL_M = 3.0, 0.10
 STANDS_S = 20.0
-"""A leader that has somewhere to go stands no longer than this, whatever it is that its command stays small for: more
-than it waits for its team, or for what moves."""
+"""Maximum time [s] that a leader with a target stands, whatever keeps its command small: longer than it waits for its
+team or for a moving obstacle."""
 WANTED_MPS = 0.05
 BLOCKED_S = 1.5
 TURNS, TURNS_S = 3, 10.0
@@ -20,28 +20,28 @@ WAITING_S = 10.0
 POSE_LOST_S = 1.0
 POSE_LOST = "S5: own pose lost"
 TURN_S_MIN = 1.0
-"""U-turns nearer together are one: an action that flickers."""
+"""Minimum time [s] between two U-turns; nearer ones count as one, since the action flickers."""
 FREED_M = 0.5
-"""So far from where it got stuck, a robot is free again,"""
+"""Distance [m] from the place where it got stuck at which a robot is free again."""
 CALM_S = 5.0
-"""or when nothing has held it for so long."""
+"""Time [s] without any condition after which a robot is free again."""
 
 
 class StuckMonitor:
-    """Whether one robot is stuck: from the first condition that holds until it is free again."""
+    """Stuck state of one robot: from the first condition that holds until it is free again."""
 
     def __init__(self, *, again: bool = True) -> None:
         self._stuck = StuckConditions(again=again)
         self._at: Pose2D | None = None
         self._held_at = 0.0
         self._stands: tuple[float, Pose2D] | None = None
-        """Since when, and where, a leader that is to go has stood."""
+        """Time since which, and pose at which, a leader that should move has stood."""
         self.reason: str | None = None
         self.backing_out = False
-        """It stays stuck until it is out of the place."""
+        """True while the robot backs out: it stays stuck until it is out of the place."""
 
     def begin(self, *, leading: bool) -> None:
-        """A new role. Whoever leads starts anew; who was stuck as leader is so still as a follower."""
+        """Start a new role. A leader starts anew; a robot that was stuck as leader stays stuck as a follower."""
         self._stuck.reset()
         self._stands = None
         if leading:
@@ -50,7 +50,8 @@ class StuckMonitor:
     def watch(
         self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool
     ) -> None:
-        """One control step on the way; arguments as of `StuckConditions.watch`. `leads`: it is a leader, and is to go."""
+        """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
+        move."""
         if self.backing_out:
             return
         held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
@@ -66,18 +67,18 @@ class StuckMonitor:
         self.reason, self._held_at = held, now
 
     def rest(self, pose: Pose2D, now: float) -> None:
-        """One control step in which nothing is wanted."""
+        """Update in a control step in which no motion is wanted."""
         self._stuck.reset()
         self._stands = None
         self._ease(pose, now)
 
     def out(self) -> None:
-        """It has left the place."""
+        """Release the robot: it has left the place."""
         self.reason, self._at, self.backing_out = None, None, False
         self._stuck.reset()
 
     def _stands_for_s(self, pose: Pose2D, now: float) -> float:
-        """How long it has been within `STILL_M` of one place."""
+        """Return how long [s] the robot has been within `STILL_M` of one place."""
         if self._stands is None or distance(pose, self._stands[1]) >= STILL_M:
             self._stands = now, pose
         return now - self._stands[0]
@@ -91,10 +92,11 @@ class StuckMonitor:
 
 
 class StuckConditions:
-    """Watches one robot on its way; `reset` when it arrives, waits for its team, or starts anew."""
+    """Conditions S1 to S5 of one robot on its way; `reset` on arrival, while it waits for its team, and on a
+    restart."""
 
     def __init__(self, *, again: bool = True) -> None:
-        """Without `again`, turning round and coming back (S3) are no signs: an explorer does both."""
+        """Create the conditions. Without `again`, U-turns and coming back (S3) do not count: an explorer does both."""
         self._again = again
         self._moved: deque[tuple[float, float, float]] = deque()
         self._action: str | None = None
@@ -102,14 +104,15 @@ class StuckConditions:
         self._turns: deque[float] = deque(maxlen=TURNS)
         self._cell: tuple[int, int] | None = None
         self._entered: tuple[float, float] | None = None
-        """Where the cell was entered: who stands on a border does not enter with every bit of noise."""
+        """Position where the cell was entered: noise on a border does not count as a new entry."""
         self._entries: dict[tuple[int, int], deque[float]] = {}
 
     def reset(self) -> None:
         self.__init__(again=self._again)  # type: ignore[misc]
 
     def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> str | None:
-        """The reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before limits."""
+        """Return the reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before
+        limits."""
         self._note(pose, action, now)
         if pose_age_s > POSE_LOST_S:
             return POSE_LOST
@@ -139,7 +142,8 @@ class StuckConditions:
                 self._entries.pop(next(iter(self._entries)))
 
     def _comes_back(self, now: float) -> bool:
-        """It entered its cell `CELL_ENTRIES` times lately: so many are kept, the oldest first."""
+        """Return whether the robot entered its cell `CELL_ENTRIES` times lately: that many are kept, the oldest
+        first."""
         entries = self._entries.get(self._cell) if self._cell is not None else None
         return entries is not None and len(entries) == CELL_ENTRIES and now - entries[0] <= CELL_S
 
@@ -153,4 +157,4 @@ class StuckConditions:
         first_at, x, y = self._moved[0]
         if now - first_at < STILL_S - 0.1 or hypot(pose.x - x, pose.y - y) >= STILL_M:
             return False
-        return all(hypot(px - x, py - y) < STILL_M for _, px, py in self._moved)  # nor went there and back
+        return all(hypot(px - x, py - y) < STILL_M for _, px, py in self._moved)  # nor did it go there and back

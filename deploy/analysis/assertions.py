@@ -1,7 +1,7 @@
-"""`[assert]` of a scenario against what a run came to: a judgement for each key that was given, with numbers.
+"""Evaluation of a scenario's `[assert]` table against the results of a run: one assertion for each given key.
 
-A bound on what never happened (a failover, a contact) holds. A bound on an error fails when there is no such error
-to judge: a follower that never settled has not kept its distance.
+A bound on an event that never happened (a failover, a contact) holds. A bound on an error fails when the run has no
+value for it: a follower that never settled has not kept its distance.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from lfa.deploy.analysis.summary import Assertion
 
 
 def judge(wanted: Assert, summary: Summary, seen: RecordedRun, followed: Iterable[TrackingErrors]) -> list[Assertion]:
-    """One for each bound that `wanted` gives. `followed`: the errors of all that followed at the end, too."""
+    """Return one assertion for each bound in `wanted`. `followed`: errors of the followers alive at the end."""
     errors = list(followed)
     followers = [robot for robot in summary.robots if robot.settled_after_s is not None or robot.final_distance_error_m]
     #    name                   bound                         found                                                 unit
@@ -57,7 +57,7 @@ def judge(wanted: Assert, summary: Summary, seen: RecordedRun, followed: Iterabl
 
 
 def separation_min_m(seen: RecordedRun) -> float:
-    """Least distance between the centres of two robots at any time [m]; inf for a single one."""
+    """Return the minimum distance [m] between the centres of any two robots over the run; inf for a single robot."""
     nearest = inf
     for a, b in combinations(seen.truth.values(), 2):
         n = min(a.shape[0], b.shape[0])
@@ -66,13 +66,13 @@ def separation_min_m(seen: RecordedRun) -> float:
 
 
 def check_junit(path: Path) -> None:
-    """Raises Refused when nothing could be written there: said before a run, not after it."""
+    """Raise Refused when `path` is not writable; checked before a run, so that it does not fail afterwards."""
     if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
         raise Refused(f"--junit {path}: cannot be written, must be a file in a folder that is there")
 
 
 def junit(path: Path, summary: Summary) -> None:
-    """Write the judgements as JUnit XML, as CI systems read it. Raises Refused when it cannot be written."""
+    """Write the assertions as JUnit XML for CI systems. Raises Refused when the file cannot be written."""
     suite = quoteattr(f"lfa.{summary.scenario}")
     failed = sum(not assertion.ok for assertion in summary.assertions)
     cases = "".join(_case(assertion, suite) for assertion in summary.assertions)
@@ -99,7 +99,7 @@ def _at_most(name: str, found: float, bound: float, unit: str) -> Assertion:
 
 
 def _most(values: Iterable[float | None]) -> float:
-    """The largest; inf when one is missing, 0 of none."""
+    """Return the maximum of `values`; inf when one is None, 0 when there are none."""
     return max((inf if value is None else value for value in values), default=0.0)
 
 

@@ -1,10 +1,10 @@
-"""Spikes of an error, and the episodes of a run that they belong to (control.md 7.1).
+"""Spikes of a tracking error, and the avoidance episodes and other events of a run that cause them (control.md 7.1).
 
-A spike is an excursion: it begins where the error leaves its baseline, ends where it is back, and its peak is above
-the bar; two that are less than `APART_S` apart are one. An episode is a stretch during which a robot did something
-besides following: it avoided, its place in the formation changed, the chain had a new leader, or it was still on
-its way into the chain at the start. What a robot does is felt by those behind it, so a spike belongs to episodes of
-the robot itself and of those ahead of it.
+A spike is an excursion of the error: it begins where the error leaves its baseline, ends where the error is back, and
+its peak exceeds the bar; two spikes less than `APART_S` apart count as one. An episode is an interval in which a robot
+did something besides following: it avoided an obstacle, its place in the formation changed, the chain got a new
+leader, or the robot was still moving to its slot at the start. A disturbance propagates down the chain, so a spike is
+attributed to episodes of the robot itself and of the robots ahead of it.
 """
 
 from __future__ import annotations
@@ -20,20 +20,25 @@ from lfa.deploy.recording import event_log
 from lfa.deploy.recording.mcap_reader import Array
 
 APART_S = 1.0
+"""Gap [s] up to which two spikes, or two intervals, count as one."""
 BASE_M, SPIKE_M = 0.02, 0.05
+"""Baseline and bar [m] of a spike of the distance error."""
 BASE_RAD, SPIKE_RAD = 0.05, 0.10
+"""Baseline and bar [rad] of a spike of the bearing error."""
 FELT_S = 3.0
-"""An episode shows within this in the own error, on the way back, and in those of the robots behind."""
+"""Maximum delay [s] from the end of an episode to a spike that it causes, in the own error or down the chain."""
 START_S = 0.5
-"""After its first command a follower is on its way into its place."""
+"""Duration [s] after its first command in which a follower counts as moving to its slot."""
 
 
 class Spike(Struct, frozen=True):
+    """Excursion of one robot's tracking error from its baseline, with its times [s]."""
+
     robot: int
     from_s: float
     until_s: float
     peak: float
-    """Largest magnitude, in the error's unit."""
+    """Largest magnitude, in the unit of the error."""
 
     @property
     def width_s(self) -> float:
@@ -41,10 +46,12 @@ class Spike(Struct, frozen=True):
 
 
 class Episode(Struct, frozen=True):
+    """Interval [s] in which a robot, or the team, did something besides following."""
+
     robot: int | None
-    """None: it concerns all."""
+    """Id of the robot; None when the episode concerns the whole team."""
     kind: str
-    """`avoidance`, `formation`, `switch` or `start`."""
+    """Kind of the episode: `avoidance`, `formation`, `switch` or `start`."""
     from_s: float
     until_s: float
 
@@ -53,14 +60,14 @@ class Episode(Struct, frozen=True):
 
 
 def stretches(t: Array, mask: Mask, apart_s: float = 0.0) -> list[tuple[float, float]]:
-    """First and last time [s] of each stretch of True; stretches at most `apart_s` apart are one."""
+    """Return the first and last time [s] of each interval of True; intervals at most `apart_s` apart are joined."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     found = zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True)
     return merged(found, apart_s)
 
 
 def merged(spans: Iterable[tuple[float, float]], apart_s: float = 0.0) -> list[tuple[float, float]]:
-    """Spans [s] in order, those at most `apart_s` apart as one."""
+    """Return the spans [s] sorted by time, with those at most `apart_s` apart joined."""
     found: list[tuple[float, float]] = []
     for from_s, until_s in sorted(spans):
         if found and from_s - found[-1][1] <= apart_s:
@@ -71,7 +78,7 @@ def merged(spans: Iterable[tuple[float, float]], apart_s: float = 0.0) -> list[t
 
 
 def spikes(robot: int, t: Array, error: Array, base: float, bar: float) -> list[Spike]:
-    """The excursions of `error` from its baseline that exceed `bar`."""
+    """Return the excursions of `error` from its baseline `base` whose peak exceeds `bar`."""
     size = np.abs(error)
     found = []
     for from_s, until_s in stretches(t, size > base, APART_S):
@@ -90,7 +97,7 @@ def bearing_spikes(run: Run) -> list[Spike]:
 
 
 def episodes(run: Run) -> list[Episode]:
-    """All of a run, as its log tells them, in the order of their beginnings."""
+    """Return all episodes of a run, from its event log and its tracking errors, ordered by start time."""
     found = [Episode(robot, "avoidance", *span) for robot in run.robots for span in avoidances(run, robot)]
     for robot, e in run.errors.items():
         found += [Episode(robot, "formation", *span) for span in stretches(e.t, e.changing, APART_S)]
@@ -101,12 +108,12 @@ def episodes(run: Run) -> list[Episode]:
 
 
 def requests(run: Run) -> list[float]:
-    """When the leader asked for another orientation [s]; not what an operator made it ask for."""
+    """Return the times [s] of the leader's orientation requests; those that an operator caused are left out."""
     return [line["t"] for line in event_log.of_kind(run.events, "formation") if event_log.asked_by_leader(line)]
 
 
 def avoidances(run: Run, robot: int) -> list[tuple[float, float]]:
-    """From the first decision to the `resume` that ends it, by the robot's own log [s]."""
+    """Return the avoidances [s] of a robot from its event log: from the first decision to the `resume` that ends it."""
     spans: list[tuple[float, float]] = []
     since: float | None = None
     for line in event_log.of_kind(run.events, "decision"):
@@ -123,7 +130,7 @@ def avoidances(run: Run, robot: int) -> list[tuple[float, float]]:
 
 
 def upstream(run: Run, robot: int, at_s: float) -> set[int]:
-    """`robot` and all that were ahead of it in the chain at that moment."""
+    """Return the ids of `robot` and of all robots ahead of it in the chain at time `at_s` [s]."""
     found = {robot}
     while (e := run.errors.get(robot)) is not None and e.t[0] <= at_s:
         robot = int(e.predecessor[max(0, int(np.searchsorted(e.t, at_s, side="right")) - 1)])
@@ -134,7 +141,7 @@ def upstream(run: Run, robot: int, at_s: float) -> set[int]:
 
 
 def causes(run: Run, spike: Spike, known: Sequence[Episode]) -> list[Episode]:
-    """The episodes that overlap `spike` or ended within `FELT_S` before it, of the robot itself and of those ahead."""
+    """Return the episodes of the robot or of robots ahead that overlap `spike` or ended within `FELT_S` before it."""
     ahead = upstream(run, spike.robot, spike.from_s) | upstream(run, spike.robot, spike.until_s)
     return [
         one
@@ -144,7 +151,7 @@ def causes(run: Run, spike: Spike, known: Sequence[Episode]) -> list[Episode]:
 
 
 def felt(run: Run, episode: Episode, found: Sequence[Spike]) -> bool:
-    """Whether any spike of the robot itself or of one behind it overlaps `episode`, or follows it at once."""
+    """Return True if a spike of the robot or of one behind it overlaps `episode` or follows it within `FELT_S`."""
     return any(
         episode.touches(spike.from_s - FELT_S, spike.until_s)
         and (episode.robot is None or episode.robot in upstream(run, spike.robot, spike.from_s))
@@ -153,9 +160,10 @@ def felt(run: Run, episode: Episode, found: Sequence[Spike]) -> bool:
 
 
 def quiet(run: Run, robot: int, e: TrackingErrors, known: Sequence[Episode]) -> Mask:
-    """The moments of a follower outside of episodes, its own and of those ahead, and of what came of them.
+    """Return a mask of a follower's samples that no episode of the robot itself or of a robot ahead disturbs.
 
-    An excursion from the baseline comes of an episode that it overlaps, or that ended within `RECOVERY_S_MAX` before.
+    An episode also disturbs each excursion from the baseline that it overlaps, or that it precedes by at most
+    `RECOVERY_S_MAX`.
     """
     calm = np.ones(e.t.size, dtype=bool)
     about = [one for one in known if one.robot is None or one.robot in upstream(run, robot, one.from_s)]
@@ -168,7 +176,7 @@ def quiet(run: Run, robot: int, e: TrackingErrors, known: Sequence[Episode]) -> 
 
 
 def rank_correlation(a: Sequence[float], b: Sequence[float]) -> float:
-    """Spearman's, ties ranked by their mean; nan where one of both is constant or there are fewer than three."""
+    """Return Spearman's rank correlation, ties ranked by their mean; nan below three values or if one is constant."""
     if len(a) < 3:
         return float("nan")
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,4 +1,4 @@
-"""What the robots of a run told each other that they met and that stood still: the known obstacles of iteration 2."""
+"""Static obstacles that the robots of a run reported to each other: the known obstacles of iteration 2."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from lfa.protocol.topics import TOPIC
 
 STANDING = ("stationary", "pothole", "trap")
 STILL_MPS = 0.05
+"""Maximum reported speed [m/s] of a static obstacle."""
 SAME_M = 0.4
-"""Told of by different robots, or again, nearer than this it is the same thing."""
+"""Distance [m] below which two reports are of the same obstacle."""
 MATE_M = 0.5
-"""Nearer than this to where a robot said it was, it was that robot."""
+"""Distance [m] to another robot's reported position below which the reported obstacle is that robot."""
 TOLD_MIN = 2
-"""What was told of only once may have been noise."""
+"""Minimum number of reports of an obstacle; a single report may be noise."""
 
 Circle = tuple[float, float, float]
+"""Position x, y and radius [m] in `map`."""
 
 
 def known_obstacles(folder: Path) -> tuple[Circle, ...]:
-    """x, y, radius [m] in `map` of each. Raises Refused when `folder` is no run."""
+    """Return x, y, radius [m] in `map` of at most `KNOWN_MAX` static obstacles. Raises Refused if no run folder."""
     if not (folder / "recording.mcap").is_file():
         raise Refused(f"--map-from {folder}: no run folder, it has no recording.mcap")
     places: dict[str, tuple[float, float]] = {}
@@ -41,7 +43,7 @@ def known_obstacles(folder: Path) -> tuple[Circle, ...]:
 
 
 def _take(found: list[list[Circle]], one: Circle, *, alone: bool) -> None:
-    """Add `one` to the sightings of the same thing; `alone` it counts as told of often enough."""
+    """Add `one` to the reports of the same obstacle; with `alone` a single report counts as `TOLD_MIN` reports."""
     for seen in found:
         x, y, _ = _middle(seen)
         if hypot(one[0] - x, one[1] - y) < SAME_M:
@@ -51,7 +53,7 @@ def _take(found: list[list[Circle]], one: Circle, *, alone: bool) -> None:
 
 
 def _middle(seen: list[Circle]) -> Circle:
-    """The middle of all sightings, with the largest radius."""
+    """Return the mean position of all reports, with the largest radius."""
     many = len(seen)
     x, y = sum(one[0] for one in seen) / many, sum(one[1] for one in seen) / many
     return round(x, 3), round(y, 3), round(max(one[2] for one in seen), 3)

@@ -1,4 +1,4 @@
-"""A run folder in numbers: ground truth, errors and events, read once and kept."""
+"""Data of one run folder: ground truth, tracking errors and events, read once and cached."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ from lfa.world.description.load import Scenario
 
 
 class Run:
-    """`truth`: by robot, in `map`, rows of t [s], x, y [m], theta [rad], v [m/s], omega [rad/s].
-    `errors`: by follower (deploy/analysis/tracking_errors.py). `events`: the lines of events.jsonl."""
+    """Data of one recorded run.
+
+    `truth`: by robot, rows of t [s], x, y [m], theta [rad], v [m/s], omega [rad/s] in `map`. `errors`: by follower
+    (deploy/analysis/tracking_errors.py). `events`: the lines of events.jsonl.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -41,7 +44,7 @@ class Run:
 
     @cached_property
     def errors(self) -> dict[int, TrackingErrors]:
-        """Of every robot that ever followed."""
+        """Tracking errors of every robot that ever followed, by its id."""
         found = {robot: tracking_errors.of_follower(self.seen, robot) for robot in self.robots}
         return {robot: of for robot, of in found.items() if of is not None}
 
@@ -50,7 +53,7 @@ class Run:
         return event_log.reigns(self.events)
 
     def led(self, robot: int, t: Array) -> Mask:
-        """Which of the moments `t` [s] fall into a reign of `robot`."""
+        """Return a mask of the times `t` [s] at which `robot` was the leader."""
         led = np.zeros(t.size, dtype=bool)
         for reign in self.reigns:
             if reign.robot_id == robot:

@@ -1,4 +1,4 @@
-"""Compute the summary of a run folder."""
+"""Computation of the summary of a run folder."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, scenario_of
 
 LEFT_BEHIND_M = 0.5
+"""Distance error [m] at the end of a run above which a follower counts as left behind."""
 
 
 OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
 
 
 def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, faults_left: Sequence[str]) -> Summary:
-    """Read the run in `folder` back and say what it came to. `faults_left`: those that the run ended before."""
+    """Return the summary of the run in `folder`. `faults_left`: planned faults that the run ended too early for."""
     seen, events, scenario = mcap_reader.read(folder), event_log.lines(folder), scenario_of(folder)
     robots = [_robot(robot, seen, events) for robot in scenario.mission.robots]
     chain = event_log.last_chain(events)
@@ -107,7 +108,7 @@ def _rms(values: Array) -> float | None:
 
 
 def _alive(own: Sequence[Line]) -> bool:
-    """False when it was last seen to die, by a fault or by itself, and not started again."""
+    """Return False if the last event is the process's end, by a fault or by itself, with no restart after it."""
     alive = True
     for line in own:
         if line["kind"] == "died" or (line["kind"] == "fault" and line["deed"] in ("kill", "terminate")):
@@ -118,7 +119,7 @@ def _alive(own: Sequence[Line]) -> bool:
 
 
 def _obstacles_met(own: Sequence[Line]) -> dict[str, int]:
-    """Encounters by class: from a decision to the `resume` that ends it is one, whatever is decided in between."""
+    """Count encounters by obstacle class; several decisions before one `resume` count once for each class."""
     met = dict.fromkeys(OBSTACLE_CLASSES, 0)
     busy: set[str] = set()
     for line in event_log.of_kind(own, "decision"):

@@ -1,4 +1,4 @@
-"""`summary.json`: what a run came to. Its shape is these types; fields may be added, none renamed."""
+"""Types of `summary.json`, the results of a run; fields may be added, but not renamed."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ ENDED_WELL = ("goal_reached", "time_limit")
 
 
 class RobotSummary(Struct, kw_only=True):
-    """Errors are a follower's; None where it never followed or never settled. Rms values are taken from
-    `settled_after_s` on, with avoidance and formation changes (`excused_s` in all) left out."""
+    """Results of one robot.
+
+    Errors are those of a follower, None for a robot that never followed or never settled. Rms values cover the time
+    from `settled_after_s` on, without avoidance and formation changes (`excused_s` in total).
+    """
 
     id: int
     alive: bool
     role_at_end: str
     final_pose: tuple[float, float, float, float] | None
-    """x, y, z [m], theta [rad] in `map`."""
+    """Position x, y, z [m] and heading theta [rad] in `map`."""
     final_speed_mps: float | None
     distance_error_rms_m: float | None = None
     distance_error_max_m: float | None = None
-    """Largest magnitude once settled, with nothing left out."""
+    """Largest magnitude [m] after settling, with nothing left out."""
     bearing_error_rms_rad: float | None = None
     bearing_error_body_rms_rad: float | None = None
     heading_error_rms_rad: float | None = None
@@ -44,35 +47,40 @@ class RobotSummary(Struct, kw_only=True):
 
 
 class Summary(Struct, kw_only=True):
+    """Results of one run."""
+
     scenario: str
     mode: str
-    """`processes` or `simulated`."""
+    """Execution of the run: `processes` or `simulated`."""
     seed: int
     outcome: Outcome
     reason: str | None
     duration_s: float
-    """Of the run alone, by the wall clock."""
+    """Wall-clock duration [s] of the run itself."""
     sim_duration_s: float
     real_time_factor: float
     robots: list[RobotSummary]
     left_behind: list[int] = []
-    """Alive at the end, but out of the chain or more than `LEFT_BEHIND_M` out of place in it."""
+    """Robots alive at the end, but not in the chain or with a distance error above `LEFT_BEHIND_M`."""
     leaders: list[LeaderTerm]
     failovers: list[Failover]
     faults: list[FaultDone]
     assertions: list[Assertion]
     violations: list[TermViolation]
     recording: Recording | None = None
-    """None when its recorder died before it could count."""
+    """Counts of the recorder; None when the recorder died before it wrote them."""
 
     @property
     def exit_code(self) -> int:
-        """0 only for a run that ended by itself with all assertions ok; the goal is one of them by default."""
+        """Return 0 if the run ended at the goal or the time limit with all assertions ok, else 1.
+
+        Reaching the goal is an assertion by default.
+        """
         return 0 if self.outcome in ENDED_WELL and all(a.ok for a in self.assertions) else 1
 
 
 def write(folder: Path, summary: Summary) -> None:
-    """All of it or, on a full disk, nothing."""
+    """Write the summary atomically: on a full disk the old file stays."""
     fresh = (folder / SUMMARY).with_suffix(".new")
     try:
         fresh.write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=1) + b"\n")
@@ -82,7 +90,7 @@ def write(folder: Path, summary: Summary) -> None:
 
 
 def read(folder: Path) -> Summary:
-    """Raises FileNotFoundError when the run in `folder` has no summary, Refused when it is none of this version's."""
+    """Return the summary of a run. Raises FileNotFoundError if there is none, Refused if it is of another version."""
     try:
         return msgspec.json.decode((folder / SUMMARY).read_bytes(), type=Summary)
     except msgspec.DecodeError as error:
@@ -92,7 +100,9 @@ def read(folder: Path) -> Summary:
 
 
 class Assertion(Struct):
+    """Result of one assertion about a run."""
+
     name: str
     ok: bool
     text: str = ""
-    """What was found and what was asked for, with units."""
+    """Measured and required value, with units."""

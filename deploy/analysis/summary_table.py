@@ -1,4 +1,4 @@
-"""A summary as a few lines for a terminal."""
+"""Formatting of a summary as a few lines for a terminal."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def text(summary: Summary, folder: Path) -> str:
 
 
 def lfa() -> str:
-    """The command as it can be typed here: by its name, or as it was called when the shell would not find it."""
+    """Return the command to type: `lfa` if it is on the PATH, else the relative path of the called program."""
     return "lfa" if shutil.which("lfa") or not sys.argv[0].endswith("lfa") else os.path.relpath(sys.argv[0])
 
 

@@ -1,9 +1,9 @@
-"""How well each follower kept its place, from ground truth at equal times and from what it was commanded to keep.
+"""Tracking errors of each follower, from ground truth at equal times and the commanded place in the formation.
 
-`distance` = D - k^d, `bearing` against the slot as it is blended (chi + phi), `bearing_asked` against the one that the
-leader asked for last (chi + phi^d), `bearing_body` against theta_P + phi (the paper's), `heading` = wrap(psi_r -
-theta_F) (control.md, equation table). What was commanded comes from the follower's `tracking` messages and the leader's
-requests; where it truly stood comes from the world.
+`distance` = D - k^d, `bearing` relative to the blended slot (chi + phi), `bearing_asked` relative to the slot of the
+leader's last request (chi + phi^d), `bearing_body` relative to theta_P + phi (the paper's), `heading` = wrap(psi_r -
+theta_F) (control.md, equation table). Commanded values come from the follower's `tracking` messages and the leader's
+requests, true poses from the world.
 """
 
 from __future__ import annotations
@@ -16,15 +16,18 @@ from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 
 Mask = NDArray[np.bool_]
 
-TRACKING_AGE_MAX_S = 0.2  # five periods: an older command says nothing about now
+TRACKING_AGE_MAX_S = 0.2
+"""Maximum age [s] of a `tracking` message that is compared with ground truth: five periods."""
 SETTLED_M = 0.05
-RECOVERY_S_MAX = 8.0  # a change of place must be made good within this (control.md section 6)
+"""Distance error [m] below which a follower has settled."""
+RECOVERY_S_MAX = 8.0
+"""Maximum time [s] to recover from an avoidance or a change of place in the formation (control.md section 6)."""
 _CHANGED_PHI = 1e-6
 _CHANGED_M = 1e-6
 
 
 class TrackingErrors(Struct):
-    """Of one follower, one entry a ground truth during which it followed somebody; [s], [m], [rad]."""
+    """Errors of one follower in [s], [m], [rad]: one entry for each ground truth record while it followed a robot."""
 
     t: Array
     predecessor: Array
@@ -35,13 +38,13 @@ class TrackingErrors(Struct):
     heading: Array
     avoiding: Mask
     changing: Mask
-    """Its place in the formation was changing: another predecessor, separation or angle."""
+    """Samples with a changing place in the formation: another predecessor, separation or angle."""
     excused: Mask
-    """Avoiding or changing, and not yet back within `SETTLED_M`, for `RECOVERY_S_MAX` at most."""
+    """Samples while avoiding or changing, and until back within `SETTLED_M`, for `RECOVERY_S_MAX` at most."""
 
     @property
     def settled_after_s(self) -> float | None:
-        """When the distance error came within `SETTLED_M` for good, excused times left out; None: never."""
+        """Time [s] after which the distance error stays within `SETTLED_M`, excused times left out; None if never."""
         bad = np.flatnonzero((np.abs(self.distance) >= SETTLED_M) & ~self.excused)
         if bad.size == 0:
             return float(self.t[0]) if self.t.size else None
@@ -49,17 +52,17 @@ class TrackingErrors(Struct):
 
     @property
     def steady(self) -> Mask:
-        """Where rms values are taken: settled, and not excused."""
+        """Mask of the samples for rms values: settled and not excused."""
         settled = self.settled_after_s
         return (self.t >= settled) & ~self.excused if settled is not None else np.zeros(self.t.size, dtype=bool)
 
 
 def of_follower(trace: RecordedRun, robot: int) -> TrackingErrors | None:
-    """The errors of `robot`, None when it never followed anybody."""
+    """Compute the tracking errors of `robot`; None when it never followed another robot."""
     own, said = trace.truth.get(robot), trace.tracking.get(robot)
     if own is None or said is None:
         return None
-    said = said[np.isin(said[:, 1], list(trace.truth)) & (said[:, 2] > 0.0)]  # before its first slot it keeps none
+    said = said[np.isin(said[:, 1], list(trace.truth)) & (said[:, 2] > 0.0)]  # no separation before the first slot
     if said.shape[0] == 0:
         return None
     at = np.searchsorted(said[:, 0], own[:, 0], side="right") - 1
@@ -90,17 +93,17 @@ def of_follower(trace: RecordedRun, robot: int) -> TrackingErrors | None:
 
 
 def wrap(angle: Array) -> Array:
-    """Angles [rad] brought into [-pi, pi)."""
+    """Return the angles [rad] wrapped to [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def runs(mask: Mask) -> int:
-    """How many separate stretches of True there are."""
+    """Return the number of separate intervals of True."""
     return int(np.count_nonzero(np.diff(mask.astype(np.int8), prepend=0) == 1))
 
 
 def _predecessors(trace: RecordedRun, t: Array, ids: Array) -> Array:
-    """The truth of robot `ids[i]` at `t[i]`, one row each; all robots of one ground truth have the same time."""
+    """Return the ground truth of robot `ids[i]` at `t[i]`, shape (n, 6); robots of one record share the same time."""
     rows = np.empty((t.size, 6))
     for robot in np.unique(ids):
         mine = ids == robot
@@ -110,7 +113,7 @@ def _predecessors(trace: RecordedRun, t: Array, ids: Array) -> Array:
 
 
 def _asked(trace: RecordedRun, robot: int, t: Array, blended: Array) -> Array:
-    """phi^d [rad] that the leader last asked for; until it has asked, what the follower keeps."""
+    """Return phi^d [rad] of the leader's last request; before the first request, the follower's blended phi."""
     requests = trace.commanded.get(robot)
     if requests is None:
         return blended
@@ -119,12 +122,12 @@ def _asked(trace: RecordedRun, robot: int, t: Array, blended: Array) -> Array:
 
 
 def _angle_at(t: Array, said: Array, column: int) -> Array:
-    """An angle between two messages, on the straight line between them."""
+    """Return the angle [rad] at `t` [s], linearly interpolated between two messages."""
     return np.asarray(np.interp(t, said[:, 0], np.unwrap(said[:, column])))
 
 
 def _changes(said: Array) -> Mask:
-    """Per message: predecessor, separation or angle differ from the message before; the first is no change."""
+    """Return per message if predecessor, separation or angle differ from the message before; False for the first."""
     before, after = said[:-1], said[1:]
     other = before[:, 1] != after[:, 1]
     moved = np.abs(after[:, 2] - before[:, 2]) > _CHANGED_M
@@ -133,7 +136,7 @@ def _changes(said: Array) -> Mask:
 
 
 def _held(of_message: Mask, at: NDArray[np.intp]) -> Mask:
-    """What a message says, held over the ground truths until the next message."""
+    """Return the value of each message, held for the ground truth records until the next message."""
     return np.asarray(of_message[at])
 
 

@@ -1,4 +1,4 @@
-"""Find the agents, worlds and routers that run on this machine, by their command lines."""
+"""Discovery of agents on this machine by the command lines of this user's processes."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.names import whole_number
 from lfa.protocol.transport.zenoh_config import default_endpoint
 
-LISTEN_S = 1.0  # 50 poses of a leader
+LISTEN_S = 1.0  # time to listen [s]: 50 poses of a leader
 
 
 DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7447")
-"""Where a router listens that was told nothing."""
+"""Endpoints on which a router without `--listen` listens."""
 
 
 class Running(Struct, frozen=True):
-    """One agent's process."""
+    """Running process of one agent."""
 
     robot: int
     fleet: str
     endpoint: str
     identity: Identity
     keys: Path | None = None
-    """What it was told with --keys."""
+    """Value of its option --keys."""
 
 
 def agents() -> list[Running]:
-    """The agents of this user that run on this machine."""
+    """Return this user's agents that run on this machine."""
     found = (_agent(identity) for identity in processes.own_processes())
     return [agent for agent in found if agent is not None]
 
@@ -51,7 +51,7 @@ def _agent(identity: Identity) -> Running | None:
 
 
 def option(words: Sequence[str], name: str, default: str) -> str:
-    """The value of `--name value` or `--name=value`."""
+    """Return the value of `--name value` or `--name=value` in `words`, else `default`."""
     for word, following in zip(words, [*words[1:], ""], strict=True):
         if word == name:
             return following
@@ -61,6 +61,7 @@ def option(words: Sequence[str], name: str, default: str) -> str:
 
 
 def one_fleet(running: Sequence[Running], fleet: str | None) -> list[Running]:
+    """Return the agents of `fleet`, or of the only fleet that runs here. Raises Refused if that is not unique."""
     fleets = sorted({agent.fleet for agent in running})
     if not fleets:
         raise Refused("no agent of yours runs on this machine: start one with lfa run, or lfa-agent")

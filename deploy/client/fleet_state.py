@@ -1,4 +1,4 @@
-"""How a running fleet stands, from what it says on the bus: for progress on a terminal, and to know who leads."""
+"""State of a running fleet from its messages: for progress on a terminal, and to know which robot leads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from lfa.protocol.names import robot_id_of
 
 
 class FleetState:
-    """Feed it messages as they come; `line` and `rows` say what a person wants to see. Times are world time [s]."""
+    """State of each robot, updated from messages by `see`, as text in `rows` and `line`. Times are world time [s]."""
 
     def __init__(self, robots: tuple[int, ...]) -> None:
         self._robots = robots
@@ -23,6 +23,7 @@ class FleetState:
         self.gone: set[int] = set()
 
     def see(self, message: Message) -> None:
+        """Update the state from one message."""
         robot = robot_id_of(message.header.sender)
         match message:
             case Truth():
@@ -47,11 +48,11 @@ class FleetState:
         return f"{self.time_s:7.1f} s  {who}"
 
     def rows(self) -> list[tuple[str, str, str, str]]:
-        """Robot, role, distance error and state of each."""
+        """Return name, role, distance error and state of each robot."""
         return [(f"robot{robot}", self._role(robot), self._error(robot), self._state(robot)) for robot in self._robots]
 
     def line(self, leader: int | None) -> str:
-        """All on one line."""
+        """Return the headline and all rows on one line."""
         cells = (" ".join(cell for cell in row if cell) for row in self.rows())
         return "  |  ".join([self.headline(leader), *cells])
 
@@ -59,7 +60,7 @@ class FleetState:
         return "gone" if robot in self.gone else self._roles.get(robot, "starting")
 
     def _error(self, robot: int) -> str:
-        """D - k^d from the last ground truth, for one that follows."""
+        """Return D - k^d [m] from the last ground truth, as text; empty unless the robot follows."""
         tracking, truth = self._tracking.get(robot), self._truth
         if tracking is None or truth is None or self._role(robot) != "follower":
             return ""
@@ -70,7 +71,7 @@ class FleetState:
         return f"{hypot(x - px, y - py) - tracking.separation_m:+.3f} m"
 
     def _state(self, robot: int) -> str:
-        """What a follower is doing, or what else a robot has to say about itself."""
+        """Return a follower's tracking state, or else the text of the robot's last status."""
         tracking, role = self._tracking.get(robot), self._role(robot)
         if role == "follower" and tracking is not None:
             return tracking.state

@@ -1,4 +1,4 @@
-"""What the operator's side says on its own topics: that a run starts and ends, what was done to whom, and orders."""
+"""Messages of the operator on its own topics: events about the run and its faults, and commands to the fleet."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lfa.protocol.topics import OPERATOR_NAME, key
 
 
 class Operator:
-    """Numbers the events and orders of one operator; `stamp` is its own clock [s]."""
+    """Source of one operator's events and commands, with sequence numbers; `stamp` is its own clock [s]."""
 
     def __init__(self, fleet: str, incarnation: int) -> None:
         self.key = key(fleet, OPERATOR_NAME, "event")

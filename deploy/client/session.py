@@ -1,4 +1,4 @@
-"""Looking at a running fleet: which one, where its router is, and what comes from it."""
+"""Observer session with a running fleet: finding the fleet and its router, and receiving its messages."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ INBOX_SIZE_MAX = 65536
 
 
 class FleetAddress(Struct, frozen=True):
-    """A fleet, the endpoint where it meets, and those of its agents that are this user's own and run here."""
+    """Address of a fleet: its name, its router's endpoint, and this user's agents of it that run here."""
 
     name: str
     endpoint: str
     team: tuple[Running, ...]
     keys: Path | None = None
-    """Folder with the operator's certificate, for a fleet that wants to see one."""
+    """Folder with the operator's certificate, for a fleet that requires one."""
 
 
 def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> FleetAddress:
-    """The fleet that is meant: one that runs here, or any by its name, its router and its keys. Raises Refused."""
+    """Return the address of a fleet that runs here, or of any given by name, router and keys. Raises Refused."""
     running = agents()
     if connect is None and running and (fleet is None or any(agent.fleet == fleet for agent in running)):
         team = one_fleet(running, fleet)
@@ -46,9 +46,9 @@ def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> Fl
 
 
 class Subscriber:
-    """What comes from one fleet, also after links between its routers went and came back.
+    """Subscription to one fleet; it resubscribes after links between the fleet's routers failed and returned.
 
-    `wait` sleeps until something wakes it or the time is over.
+    `wait` sleeps until a message wakes it or the timeout is over.
     """
 
     def __init__(self, fleet: FleetAddress, bus: ZenohBus, inbox: Inbox, wake: Wake) -> None:
@@ -67,7 +67,7 @@ class Subscriber:
         self._wake.wait(timeout_s)
 
     def take(self) -> list[tuple[Arrival, Message]]:
-        """What has come since the last call; what is no message of ours is left out."""
+        """Return the messages received since the last call; payloads that do not decode are dropped."""
         now, arrivals = clock.now(), self._inbox.take()
         for arrival in arrivals:
             if not isinstance(arrival.payload, bytes):
@@ -80,13 +80,13 @@ class Subscriber:
 
     @property
     def living(self) -> set[str]:
-        """Whose tokens stood when `take` was last called."""
+        """Names with a liveliness token at the last call of `take`."""
         return {owner for owner, _ in self._tokens}
 
     def lives(self, name: str) -> bool:
-        """Whether a token of `name` stood when `take` was last called.
+        """Return True if `name` had a liveliness token at the last call of `take`.
 
-        Not asked of the router: of a session that follows the tokens too, some such questions come back empty.
+        The router is not queried: in a session that also subscribes to the tokens, some such queries return nothing.
         """
         return name in self.living
 
@@ -100,8 +100,11 @@ class Subscriber:
 
 @contextmanager
 def listen(fleet: FleetAddress, topics: frozenset[str], *, every: bool = False) -> Iterator[Subscriber]:
-    """An ear for the key expressions `topics` (`*/pose`) of `fleet`; `every`: all values of states, not the newest."""
-    fleet_name(fleet.name)  # what is said to `*` would be said to every fleet
+    """Subscribe to the key expressions `topics` (as `*/pose`) of `fleet`. Raises Refused if no router answers.
+
+    `every`: receive all values of state topics, not only the newest.
+    """
+    fleet_name(fleet.name)  # a fleet named `*` would address every fleet
     wake = Wake()
     inbox = Inbox(wake, INBOX_SIZE_MAX, every=every)
     known = None if fleet.keys is None else credentials(fleet.keys, OPERATOR_NAME, clock.wall_ms())
@@ -128,7 +131,7 @@ def _message(arrival: Arrival) -> Message | None:
 
 
 def scenario_of_fleet(fleet: FleetAddress) -> Scenario | None:
-    """The scenario that the fleet's world was started with, when that is one of this user's processes here."""
+    """Return the drawn scenario of the fleet's world, if that is one of this user's processes here; else None."""
     for identity in own_processes():
         words = list(identity.arguments)
         module = next(

@@ -1,5 +1,7 @@
-"""What `lfa watch` shows: how every robot of a fleet stands, who led in the last minute, and what happened. Pure: times
-come with the messages, by the onlooker's own clock."""
+"""Data of `lfa watch`: the state of every robot, the leaders of the last minutes, and recent events.
+
+Pure: times are passed in with the messages, on the observer's own clock.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
 from lfa.protocol.names import robot_id_of
 
-STALE_S = 1.0  # an older pose is not a robot's present one
+STALE_S = 1.0  # age [s] above which a pose counts as outdated
 LEADER_STEP_S = 1.0
 LEADERS_KEPT = 300
 EVENTS_KEPT = 50
@@ -23,16 +25,16 @@ DULL = ("peer_up", "peer_down")
 
 
 class RobotStatus(Struct, frozen=True):
-    """One robot. None: it has not said."""
+    """Status of one robot; None: not reported."""
 
     robot: int
     role: str
     term: int | None
     predecessor: int | None
     error_m: float | None
-    """How far from its slot, by its own knowledge."""
+    """Distance [m] from its slot, by its own estimate."""
     heading_error_rad: float | None
-    """Between the heading that would keep it there and its own, by its own knowledge."""
+    """Difference [rad] between the heading that keeps it in its slot and its own, by its own estimate."""
     speed_mps: float | None
     pose_age_s: float | None
     state: str
@@ -42,13 +44,15 @@ class RobotStatus(Struct, frozen=True):
 
 
 class Happened(Struct, frozen=True):
+    """One event as a line for people; `at` is the observer's time [s]."""
+
     at: float
     who: str
     what: str
 
 
 class Board:
-    """Feed it what comes; read `rows`, `leaders` and `events`."""
+    """Status of a fleet, updated from messages by `see` and `sample`, read from `rows`, `leaders` and `events`."""
 
     def __init__(self, robots: tuple[int, ...] = ()) -> None:
         self._poses: dict[int, tuple[float, PoseStamped]] = {}
@@ -57,10 +61,11 @@ class Board:
         self._robots = set(robots)
         self._sampled_at: float | None = None
         self.leaders: deque[int | None] = deque(maxlen=LEADERS_KEPT)
-        """Who led, a sample each `LEADER_STEP_S`, newest last; None: nobody."""
+        """Leader's id, a sample each `LEADER_STEP_S`, newest last; None: no leader."""
         self.events: deque[Happened] = deque(maxlen=EVENTS_KEPT)
 
     def see(self, at: float, message: Message) -> None:
+        """Update the status from one message received at `at` [s]."""
         robot = robot_id_of(message.header.sender)
         if isinstance(message, Event):
             self._happened(at, message)
@@ -76,13 +81,13 @@ class Board:
                 self._status[robot] = message
 
     def sample(self, now: float) -> None:
-        """Note who leads at the moment, once each step of the timeline."""
+        """Append the present leader to `leaders`, once each `LEADER_STEP_S`."""
         if self._sampled_at is None or now >= self._sampled_at + LEADER_STEP_S:
             self._sampled_at = now
             self.leaders.append(self.leader(now))
 
     def leader(self, now: float) -> int | None:
-        """Of those who call themselves leader and are heard, the one of the highest term."""
+        """Return the robot with the highest term among those whose recent pose claims leadership; None if none does."""
         claims = [
             (pose.term, robot)
             for robot, (at, pose) in self._poses.items()
@@ -127,7 +132,7 @@ class Board:
 
 
 def told(who: str, kind: str, data: dict[str, Any]) -> str | None:
-    """An event as a line for people; None for what says nothing to them."""
+    """Format an event as a line for people; None for an event that is not shown."""
     if kind in DULL:
         return None
     facts = ", ".join(

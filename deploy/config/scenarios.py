@@ -1,4 +1,4 @@
-"""`lfa list`: the shipped scenarios, and what each is about."""
+"""`lfa list`: print the shipped scenarios with team size and title."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""`lfa schema`: every key of a scenario or a fleet file, for editors (JSON schema) and people (a table).
+"""`lfa schema`: print every key of a scenario or a fleet file, as a JSON schema for editors or as a table.
 
-What a key means stands below its field in the source, as everywhere in this project; that text is read from there.
+The description of a key is the string below its field in the source; it is read from there.
 """
 
 from __future__ import annotations
@@ -28,19 +28,23 @@ UNITS = {
 
 
 class Key(Struct, frozen=True):
-    """One key that a scenario file may hold."""
+    """One key of a scenario or fleet file."""
 
     path: str
     type: str
     unit: str
     default: str
-    """In TOML; empty: must be given."""
+    """Default value in TOML; empty if the key is required."""
     text: str
 
 
 def command(
-    markdown: Annotated[bool, typer.Option("--markdown", help="A table for people instead of a JSON schema.")] = False,
-    fleet: Annotated[bool, typer.Option("--fleet", help="Of a fleet file (lfa up) instead of a scenario.")] = False,
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="Print a Markdown table instead of a JSON schema.")
+    ] = False,
+    fleet: Annotated[
+        bool, typer.Option("--fleet", help="Describe a fleet file (lfa up) instead of a scenario.")
+    ] = False,
 ) -> int:
     kind = FleetFile if fleet else Scenario
     print(table(kind) if markdown else msgspec.json.format(msgspec.json.encode(schema(kind)), indent=1).decode())
@@ -48,7 +52,7 @@ def command(
 
 
 def schema(kind: type[Struct] = Scenario) -> dict[str, Any]:
-    """JSON schema of a scenario file, or of another `kind` of file, with the texts of the keys."""
+    """Return the JSON schema of a scenario file, or of another `kind` of file, with the descriptions of the keys."""
     made = msgspec.json.schema(kind)
     for name, struct in {kind.__name__: kind for kind in _structs(kind)}.items():
         properties = made["$defs"].get(name, {}).get("properties", {})
@@ -62,11 +66,12 @@ def schema(kind: type[Struct] = Scenario) -> dict[str, Any]:
 
 
 def documented(kind: type[Struct] = Scenario) -> list[Key]:
-    """Every key, in the order of the types; `[]` stands for one of a list, `NAME` for one of a table."""
+    """Return every key, in the order of the types; `[]` stands for an item of a list, `NAME` for one of a table."""
     return list(_keys(kind, ""))
 
 
 def table(kind: type[Struct] = Scenario) -> str:
+    """Return all keys of `kind` as a Markdown table."""
     rows = ["| key | type | unit | default | what |", "| --- | --- | --- | --- | --- |"]
     rows += [
         f"| `{key.path}` | {_cell(key.type)} | {key.unit} | {f'`{_cell(key.default)}`' if key.default else 'required'} "
@@ -106,7 +111,7 @@ def _structs_of(kind: Any) -> Iterator[type[Struct]]:
 
 @cache  # bounded by the number of types in the program
 def _texts(struct: type[Struct]) -> dict[str, str]:
-    """The string below each field, on one line."""
+    """Return the string below each field, joined to one line."""
     body = ast.parse(textwrap.dedent(inspect.getsource(struct))).body[0]
     assert isinstance(body, ast.ClassDef)
     found = {}
@@ -118,7 +123,7 @@ def _texts(struct: type[Struct]) -> dict[str, str]:
 
 
 def _unit(name: str) -> str:
-    """Units end names: `separation_m`, or `v_max_mps`."""
+    """Return the unit from the suffix of a name, such as `separation_m` or `v_max_mps`; empty if it has none."""
     return UNITS.get(name.rpartition("_")[2], "") if "_" in name else ""
 
 

@@ -1,4 +1,4 @@
-"""`lfa validate`: a scenario is read, checked and drawn; of a fleet file every mistake is said; nothing starts."""
+"""`lfa validate`: read, check and draw a scenario, or list every mistake of a fleet file. Starts nothing."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from lfa.world.description.load import draw
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list), a scenario's or a fleet's .toml.")],
-    seed: Annotated[int, typer.Option(help="Show what this seed makes of it.")] = 0,
-    overrides: Annotated[list[str] | None, typer.Option("--set", help="Any field: world.lidar.beams=90.")] = None,
-    robots: Annotated[int | None, typer.Option(help="A team of 1..N instead of the scenario's.")] = None,
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list), a scenario file or a fleet file.")],
+    seed: Annotated[int, typer.Option(help="Seed that the scenario is drawn for.")] = 0,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="Override a field: world.lidar.beams=90.")
+    ] = None,
+    robots: Annotated[int | None, typer.Option(help="Use a team of robots 1..N instead of the scenario's.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON instead of TOML.")] = False,
 ) -> int:
     if is_fleet_file(Path(scenario)):
@@ -36,7 +38,7 @@ def command(
 
 
 def _fleet(path: Path, *, as_json: bool) -> int:
-    """What runs where. Raises Refused with a line a mistake."""
+    """Print the hosts with their processes. Raises Refused with one line for each mistake."""
     plan = load(path)
     if as_json:
         print(msgspec.json.encode(plan.file).decode())

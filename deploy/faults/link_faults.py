@@ -1,9 +1,9 @@
-"""What an operator orders of the air: whom a cut parts, how much is lost. Sides are ids joined by commas; `w` is the
-world with its witness, which is on nobody's robot.
+"""Parsing of link faults: which links a cut disables, which share of messages is lost. Sides are comma-separated ids;
+`w` is the world with its witness, which runs on no robot.
 
-    3       robot 3 from everybody else      1-2      1 and 2 from each other
+    3       robot 3 from all others          1-2      1 and 2 from each other
     1,2     both of them from the rest       1,2-3,w  one side from the other
-    1>2     2 does not hear 1
+    1>2     2 does not receive from 1
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SIDES = re.compile(r"(?P<one>[\dw,]+)(?:(?P<way>[->])(?P<other>[\dw,]+))?", re.A
 
 
 def links(text: str, robots: tuple[int, ...]) -> tuple[Link, ...]:
-    """The links, one a direction, that the cut `text` parts in a team of `robots`. Raises Refused."""
+    """Return the directed links that the cut `text` disables in a team of `robots`. Raises Refused."""
     match = SIDES.fullmatch(text)
     right = f"such as 3, 1-2, 1,2-3,w or 1>2, of ids {', '.join(map(str, robots))} and w for the world"
     if match is None:
@@ -46,7 +46,7 @@ def _side(text: str, robots: tuple[int, ...], right: str) -> list[str]:
 
 
 def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, dict[str, Any]]:
-    """The operator's command and its arguments for `cut`, `heal`, `loss` and `handover`. Raises Refused."""
+    """Return the operator's command and its arguments for `cut`, `heal`, `loss` and `handover`. Raises Refused."""
     text = str(target)
     match deed:
         case "cut":
@@ -60,6 +60,7 @@ def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, d
 
 
 def note(operator: Operator, now: float, deed: str, target: int | str, robots: tuple[int, ...]) -> OperatorNote:
+    """Return the operator's message for a fault, stamped `now` [s]. Raises Refused."""
     command, arguments = order(deed, target, robots)
     return operator.orders(command, now, **arguments)
 

@@ -1,7 +1,7 @@
-"""What can be done to a running fleet, said as one would say it: 'kill leader at 20 s', 'cut 1,2 at 5 s for 3 s'.
+"""Grammar and schedule of faults on a running fleet: 'kill leader at 20 s', 'cut 1,2 at 5 s for 3 s'.
 
-One grammar for a scenario's `faults`, `--fault` and `lfa fault`; what a fault then is, a signal or a node taken out
-of virtual time, is the business of whoever runs the fleet.
+One grammar serves a scenario's `faults`, `--fault` and `lfa fault`. Execution does not live here: the launcher sends a
+signal, the simulator removes a node from virtual time.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from lfa.protocol.names import whole_number
 
 FaultAction = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
 
-#            deed          what it is
+#            action        effect
 DEEDS: dict[str, str] = {
-    "kill":      "SIGKILL: gone without a word",
-    "stop":      "SIGSTOP: frozen, with its messages waiting",
-    "continue":  "SIGCONT: wakes up with old beliefs",
-    "terminate": "SIGTERM: leaves in good order",
+    "kill":      "SIGKILL: ends at once, without any message",
+    "stop":      "SIGSTOP: frozen, with its messages queued",
+    "continue":  "SIGCONT: continues with an outdated state",
+    "terminate": "SIGTERM: orderly shutdown",
     "restart":   "starts again after a kill or terminate, with a new incarnation",
     "cut":       "no radio between sides: 3, or 1-2, or 1,2-3,w, or one way 1>2 (w: the world with its witness)",
-    "heal":      "ends a cut, or all of them and all loss",
-    "loss":      "every receiver loses this share of messages: 0.2; without a share as at first",
-    "handover":  "the leader gives its lease to the next in the chain",
+    "heal":      "ends a cut, or all cuts and all loss",
+    "loss":      "every receiver loses this share of messages: 0.2; without a share: the initial value",
+    "handover":  "the leader hands its lease to the next in the chain",
 }  # fmt: skip
 
 SIGNALS: dict[str, signal.Signals] = {
@@ -41,17 +41,17 @@ SIGNALS: dict[str, signal.Signals] = {
 }
 
 ORDERS = ("cut", "heal", "loss", "handover")
-"""Deeds that are an operator's word to all, and no signal to one."""
+"""Fault actions sent as an operator's message to all, not as a signal to one process."""
 LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "loss"}
-"""What can be for a while, and what ends it."""
+"""Fault actions that may have a duration, and the action that ends each."""
 
 LEADER = "leader"
 RESTART: FaultAction = "restart"
-"""Done by whoever started the fleet: to one that runs already, an operator's word asks for it."""
+"""Fault action carried out by the launcher; in a fleet that already runs, an operator's message requests it."""
 COMMON = ("router", "world")
-"""What can be killed, stopped and continued besides robots, where the fleet runs as processes."""
+"""Processes besides robots that can be killed, stopped and continued, where the fleet runs as processes."""
 TIME_S_MAX = 1e6
-"""A scenario's longest time limit."""
+"""Longest time limit [s] of a scenario."""
 RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"
 _SENTENCE = re.compile(
     r"(?P<deed>\w+)(?: +(?!at )(?P<target>[\w.,>-]+))?"
@@ -62,8 +62,10 @@ _SENTENCE = re.compile(
 
 
 class Fault(Struct, frozen=True):
-    """`target` is a robot's id, or `leader` for whoever leads at that moment, or what an order says; `at_s` is world
-    time."""
+    """One fault: an action on a target at world time `at_s` [s].
+
+    `target` is a robot's id, `leader` for the leader at that moment, or the argument of an operator command.
+    """
 
     deed: FaultAction
     target: int | str
@@ -76,7 +78,7 @@ class Fault(Struct, frozen=True):
 
 
 def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
-    """The fault that `text` says. Raises Refused when it is none, or speaks of a robot that is not in the mission."""
+    """Parse one fault. Raises Refused if `text` is not a fault, or names a robot that is not in the mission."""
     match = _SENTENCE.fullmatch(text.strip())
     if match is None or match["deed"] not in DEEDS or match["at"] is None:
         raise Refused(f"{where} {text!r}: must be like {RIGHT}")
@@ -95,19 +97,19 @@ def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
 
 
 def parse_all(mission: Mission, from_scenario: Sequence[str], from_operator: Sequence[str]) -> list[Fault]:
-    """The faults of a run, the scenario's own and those given by hand. Raises Refused."""
+    """Return the faults of a run: the scenario's own and those given on the command line. Raises Refused."""
     faults = [parse(text, mission, "scenario.faults") for text in from_scenario]
     return faults + [parse(text, mission) for text in from_operator]
 
 
 class FaultSchedule:
-    """Faults that are still to come, in the order of their times."""
+    """Pending faults, in the order of their times."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
         self.pending = sorted(faults, key=_at_s)
 
     def due(self, now: float, leader: int | None) -> list[tuple[FaultAction, int | str]]:
-        """What to do to whom at world time `now` [s]. One that means the leader waits until somebody leads."""
+        """Return the actions and targets due at world time `now` [s]; a fault on the leader waits until one exists."""
         deeds: list[tuple[FaultAction, int | str]] = []
         while self.pending and self.pending[0].at_s <= now:
             fault = self.pending[0]
@@ -128,7 +130,7 @@ def _at_s(fault: Fault) -> float:
 
 
 def _ordered(deed: str, word: str, text: str, mission: Mission, where: str) -> int | str:
-    """What an order is about: nothing, whoever leads, one robot, or its own words."""
+    """Return the target of an operator command: empty, `leader`, one robot's id, or its argument. Raises Refused."""
     if deed == "handover" and word not in ("", LEADER):
         raise Refused(f"{where} {text!r}: only the leader hands over")
     if deed == "handover" or (deed == "cut" and word == LEADER):

@@ -1,1 +1,4 @@
-"""Several machines, and the one process that each of them needs: its router."""
+"""Fleets on several machines: the fleet file, the commands on it, supervisors, routers, ssh and certificates.
+
+No code of agents, lease or world belongs here; each runs as a process that a supervisor starts.
+"""

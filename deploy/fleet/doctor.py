@@ -1,4 +1,4 @@
-"""`lfa doctor`: what keeps a fleet, or this machine, from running: each check on a line, with what would be right."""
+"""`lfa doctor`: check the machines of a fleet, or this one; print one line per check, with the required value."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KNOCK_S = 3.0
 
 
 class Diagnosis(Struct, frozen=True):
-    """One check."""
+    """Result of one check on one host."""
 
     host: str
     check: str
@@ -41,10 +41,12 @@ class Diagnosis(Struct, frozen=True):
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="A fleet file: all its machines. Without: this one.")] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="Fleet file, to check all its machines. Default: this machine.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
-    """1 when something is wrong."""
+    """Run `lfa doctor`; return 1 when a check fails."""
     found = this_machine() if file is None else asyncio.run(examine(load(file)))
     if as_json:
         print(msgspec.json.encode({"ok": all(one.ok for one in found), "findings": found}).decode())
@@ -58,7 +60,7 @@ def command(
 
 
 def this_machine() -> list[Diagnosis]:
-    """Python, `lfa` and what it needs, and the routers of the fleets that run here."""
+    """Check Python, `lfa`, its extras, and the routers of the fleets that run on this machine."""
     is_ = ".".join(map(str, sys.version_info[:3]))
     found = [_finding("here", "python", sys.version_info >= PYTHON_MIN, is_, "3.11 or newer")]
     try:
@@ -80,7 +82,7 @@ def this_machine() -> list[Diagnosis]:
 
 
 def _own_part(part: HostPlan) -> list[Diagnosis]:
-    """The router here, and those of the other machines as they are seen from here."""
+    """Check the router of this machine, and those of the other machines as reachable from here."""
     try:
         known = part.known_as(f"{HOST_PREFIX}{part.host}")
     except Refused as refused:
@@ -95,7 +97,7 @@ def _own_part(part: HostPlan) -> list[Diagnosis]:
 
 
 async def examine(plan: FleetPlan) -> list[Diagnosis]:
-    """Every machine of `plan`, all at once. Starts nothing, but for a moment's listening where a router would."""
+    """Check all machines of `plan` concurrently. Starts nothing except a short listener at the router's port."""
     shares = parts.parts(plan, "", "")
     each = await asyncio.gather(*(_examine(name, plan, shares[name]) for name in plan.hosts))
     return [finding for found in each for finding in found]
@@ -134,7 +136,7 @@ def _probed(name: str, probed: Probed, part: HostPlan, here_ms: float) -> list[D
 
 
 async def _place(name: str, shell: Shell, plan: FleetPlan, part: HostPlan) -> list[Diagnosis]:
-    """Folder, router, certificates and port; whether the port is open is tried from here."""
+    """Check folder, router, certificates and port of a machine; the port is tested from this machine."""
     machine = plan.hosts[name]
     try:
         state: Found = await ask(shell, machine, "check", part)
@@ -154,7 +156,7 @@ async def _place(name: str, shell: Shell, plan: FleetPlan, part: HostPlan) -> li
 
 
 async def _knock(shell: Shell, machine: Machine, part: HostPlan) -> bool:
-    """Somebody listens there for a moment; whether we get through."""
+    """Start a short listener on the machine and return True if a connection from here reaches it."""
     listening = asyncio.create_task(ask(shell, machine, "listen", part))
     until = clock.now() + KNOCK_S
     through = False
@@ -174,7 +176,7 @@ async def _knock(shell: Shell, machine: Machine, part: HostPlan) -> bool:
 
 
 def _knock_udp(machine: Machine) -> None:
-    """Raises OSError when nothing comes back."""
+    """Send a UDP packet to the router's port and wait for the echo. Raises OSError when none arrives."""
     where = socket.getaddrinfo(machine.address, machine.router_port, type=socket.SOCK_DGRAM)[0]
     with socket.socket(where[0], socket.SOCK_DGRAM) as knocking:
         knocking.settimeout(0.5)

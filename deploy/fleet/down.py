@@ -1,4 +1,4 @@
-"""`lfa down`: everything of a fleet ends, on every machine; also where its router is dead."""
+"""`lfa down`: end all processes of a fleet on every machine, also where its router is dead."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ POLL_S = 0.05
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
-    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
-    keep: Annotated[Path | None, typer.Option(help="Bring its journals into this folder (lfa replay).")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
+    file: Annotated[Path | None, typer.Argument(help="The fleet file. Default: the fleet that runs here.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router of the fleet, when none runs here.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Copy the fleet's journals into this folder (lfa replay).")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     began = clock.now()
     seen = find(file, fleet, connect)
@@ -48,7 +48,7 @@ def command(
 
 
 def _bring(seen: Seen, keep: Path) -> list[str]:
-    """The journals of all machines, or without a fleet file of this one; what went wrong."""
+    """Copy the journals of all machines (without a fleet file: of this one) to `keep`; return a line per failure."""
     keep.mkdir(parents=True, exist_ok=True)
     if seen.plan is not None:
         return journals.fetch(seen.plan, keep)[1]
@@ -57,7 +57,7 @@ def _bring(seen: Seen, keep: Path) -> list[str]:
 
 
 async def _by_shell(plan: FleetPlan) -> tuple[list[str], list[str]]:
-    """Each machine is asked to end its part, and answers when nothing of it is left."""
+    """End each machine's part over ssh; return the machines that ended, and a line per failure."""
     fleet = FleetHosts(plan, parts(plan, "", ""))
     try:
         await fleet.reach()
@@ -68,7 +68,7 @@ async def _by_shell(plan: FleetPlan) -> tuple[list[str], list[str]]:
 
 
 def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
-    """The others hear it over Zenoh; this machine's own supervisor, if any, by a signal and last of all."""
+    """Order the other machines down over Zenoh, then end this machine's supervisor, if any, by a signal."""
     own = seen.part
     ended: list[str] = []
     wrong: list[str] = []
@@ -94,7 +94,10 @@ def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
 
 
 def _order_down(view: FleetView, names: list[str]) -> tuple[list[str], list[str]]:
-    """Those that ended, and those that did not. Whose router the word came through goes last: it may be any."""
+    """Order `names` down; return those that ended and those that did not.
+
+    The order is repeated: it may pass through the router of any of these machines.
+    """
     orders = {name: view.order("down", name) for name in names}
     left = set(names)
     until, say_at = clock.now() + GONE_S, 0.0

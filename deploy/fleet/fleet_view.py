@@ -1,4 +1,4 @@
-"""A fleet of several machines seen from any of them: where it is, what its supervisors say, a word to them."""
+"""View of a fleet from any of its machines: its routers, the status of its supervisors, and orders to them."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ SILENT_S = 3.0
 
 
 class Seen(Struct, frozen=True):
-    """A fleet that is meant."""
+    """A fleet that a command addresses, and how to reach it."""
 
     name: str
     endpoint: str
     hosts: tuple[str, ...]
-    """Empty: not known."""
+    """Names of its machines; empty: unknown."""
     part: HostPlan | None = None
-    """This machine's own, when it is one of them."""
+    """Plan of this machine, if it belongs to the fleet."""
     plan: FleetPlan | None = None
     keys: Path | None = None
-    """Where the operator's certificate lies, for a fleet that wants to see one."""
+    """Folder of the operator's certificate, for a fleet that requires one."""
 
 
 def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
-    """From its file, from its supervisor on this machine, or by name and router. Raises Refused."""
+    """Find a fleet by its file, by its supervisor on this machine, or by name and router. Raises Refused."""
     if file is not None:
         plan = load(file)
         own = next((part for part in here() if part.fleet == plan.name), None)
@@ -70,7 +70,7 @@ def _keys(part: HostPlan | None) -> Path | None:
 
 
 def here() -> list[HostPlan]:
-    """The parts of this user's supervisors on this machine."""
+    """Return the plans of this user's supervisors on this machine."""
     found = []
     for identity in own_processes():
         words = identity.arguments
@@ -83,7 +83,7 @@ def here() -> list[HostPlan]:
 
 
 class FleetView:
-    """What has been heard, newest first in mind: feed it by `hear`."""
+    """State of a fleet from the newest messages of its hosts and robots, updated by `hear`."""
 
     def __init__(self, ear: Subscriber, seen: Seen) -> None:
         self._ear = ear
@@ -93,16 +93,16 @@ class FleetView:
         self.hosts: dict[str, HostStatus] = {}
         self.heard_at: dict[str, float] = {}
         self.texts: dict[str, str] = {}
-        """What each robot says about itself."""
+        """Status text of each robot, by name."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Known by the fleet's file, else all that have spoken or whose tokens stand."""
+        """Names of the machines: from the fleet's file, else all with a liveliness token or a received status."""
         there = {name.removeprefix(HOST_PREFIX) for name in self._ear.living if name.startswith(HOST_PREFIX)}
         return self.seen.hosts or tuple(sorted(there | self.hosts.keys()))
 
     def hear(self) -> list[tuple[float, Message]]:
-        """All that has come, with the moments; what is the hosts' is remembered."""
+        """Take in all received messages and return them with their arrival times [s]."""
         heard = []
         for arrival, message in self._ear.take():
             heard.append((arrival.at, message))
@@ -114,6 +114,7 @@ class FleetView:
         return heard
 
     def silent(self, now: float) -> list[str]:
+        """Return the machines without a status in the last SILENT_S."""
         return [name for name in self.names if now - self.heard_at.get(name, -SILENT_S) >= SILENT_S]
 
     def host_of(self, process: str) -> str | None:
@@ -123,7 +124,7 @@ class FleetView:
         return None
 
     def order(self, deed: str, target: str = "", lines: int = 0) -> HostOrder:
-        """A new word; `say` it until it is obeyed."""
+        """Return a new order with its own sequence number; repeat it by `say` until it is obeyed."""
         self._seq += 1
         return HostOrder(Header(OPERATOR_NAME, self._life, self._seq, clock.now()), deed, target, lines)
 
@@ -131,6 +132,7 @@ class FleetView:
         self._ear.bus.publish(key(self.seen.name, OPERATOR_NAME, "order"), encode(order))
 
     def obeyed(self, order: HostOrder, host: str) -> bool:
+        """Return True if the last status of `host` confirms the order."""
         status = self.hosts.get(host)
         return status is not None and status.obeyed == (order.header.incarnation, order.header.seq)
 
@@ -141,7 +143,10 @@ class FleetView:
         within_s: float,
         see: Callable[[float, Message], None] = lambda _at, _message: None,
     ) -> bool:
-        """Say it again and again until `holds`, False when that does not come within the time."""
+        """Publish `order` every SAY_S until `holds()`; return False if that takes longer than `within_s` [s].
+
+        `see` receives every message that arrives meanwhile, with its arrival time [s].
+        """
         until, say_at = clock.now() + within_s, 0.0
         while not holds():
             now = clock.now()
@@ -161,15 +166,15 @@ class FleetView:
 
 @contextmanager
 def sight(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[FleetView]:
-    """Raises Refused when no router answers."""
+    """Open a session and provide a view of the fleet. Raises Refused when no router answers."""
     with listen(FleetAddress(seen.name, seen.endpoint, (), seen.keys), topics) as ear:
         yield FleetView(ear, seen)
 
 
 def await_first_status(view: FleetView, within_s: float) -> None:
-    """Until every known host has told its state, or the time is over."""
+    """Wait until every known host has reported its status, for at most `within_s` [s]."""
     order = view.order("report")
     view.say_until(order, lambda: bool(view.names) and all(view.obeyed(order, n) for n in view.names), within_s)
 
 
-__all__ = ["LogLines", "Seen", "FleetView", "await_first_status", "find", "here", "sight"]
+__all__ = ["FleetView", "LogLines", "Seen", "await_first_status", "find", "here", "sight"]

@@ -1,4 +1,4 @@
-"""Whether a fleet is healthy, judged by progress: poses flow, and they make one chain. Pure: times come in."""
+"""Health of a fleet by its progress: every robot sends poses, all are in one chain. Pure: times are arguments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ GIVEN_UP = ("failed", "refused", "ended")
 
 
 class Health:
-    """Feed it what comes; `missing` says what is not yet as it should be."""
+    """Health monitor: `see` takes in messages, `missing` and `lost` return what is wrong."""
 
     def __init__(self, robots: tuple[int, ...], hosts: tuple[str, ...]) -> None:
         self._robots = robots
@@ -23,9 +23,10 @@ class Health:
         self._texts: dict[int, str] = {}
         self._status: dict[str, tuple[float, HostStatus]] = {}
         self._namesakes: dict[int, float] = {}
-        """When a process that is not the fleet's own last spoke as that robot."""
+        """Time [s] of the last message from a process outside the fleet under that robot's name."""
 
     def see(self, at: float, message: Message) -> None:
+        """Update the state by a message that arrived at `at` [s]."""
         robot = robot_id_of(message.header.sender)
         match message:
             case HostStatus():
@@ -41,7 +42,7 @@ class Health:
                 self._texts[robot] = message.text
 
     def lost(self) -> list[str]:
-        """What will not come any more, whatever time it is given: ended processes, and why."""
+        """Return a line for each process that has ended and will not be restarted, with the cause."""
         return [
             f"host {host}: {report.ended or report.name}"
             for host, (_, status) in sorted(self._status.items())
@@ -50,7 +51,10 @@ class Health:
         ]
 
     def missing(self, now: float) -> list[str]:
-        """Empty: every robot sends poses, one of them leads, and the others follow each other in one chain."""
+        """Return a line for each deficiency.
+
+        Empty: every robot sends poses, one of them leads, and the others follow each other in one chain.
+        """
         silent = [f"host {name}: nothing is heard of it" for name in self._hosts if not self._speaks(name, now)]
         unheard = [
             f"{robot_name(robot)}: no pose{self._text(robot)}" for robot in self._robots if not self._moves(robot, now)
@@ -60,7 +64,7 @@ class Health:
         return self._chain(now)
 
     def chain(self, now: float) -> tuple[int, ...]:
-        """From the leader on, as far as each follows one that is in it."""
+        """Return the chain from the leader on, as far as each robot follows a member of it."""
         leaders = [
             (pose.term, robot) for robot, (at, pose) in self._poses.items() if self._leads(pose) and now - at < FRESH_S
         ]
@@ -93,7 +97,7 @@ class Health:
         return not spoken_for and robot in self._poses and now - self._poses[robot][0] < FRESH_S
 
     def _own(self, robot: int, incarnation: int) -> bool:
-        """Of the process that its supervisor has started, as far as that is known; not of a namesake's elsewhere."""
+        """Return False if a message comes from another process than the one that the robot's supervisor started."""
         reports = [r for _, status in self._status.values() for r in status.processes if r.name == robot_name(robot)]
         return all(report.state == "running" and incarnation >= report.began_ms for report in reports)
 

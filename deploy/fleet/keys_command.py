@@ -1,4 +1,4 @@
-"""`lfa keys`: the fleet's certificates, and who may say what."""
+"""`lfa keys`: create, renew, revoke and show a fleet's certificates and publish rights."""
 
 from __future__ import annotations
 
@@ -25,18 +25,21 @@ DAYS_MAX = 36500.0
 
 def command(
     action: Annotated[Literal["init", "rotate", "revoke", "show"], typer.Argument(help="What to do.")],
-    folder: Annotated[Path, typer.Argument(help="Where the keys are (machine a's in hosts/a), or a fleet file.")],
-    names: Annotated[list[str] | None, typer.Argument(help="Of rotate, revoke, show: robot3, world, host-a.")] = None,
-    robots: Annotated[int, typer.Option(help="init: ids 1 to N.")] = 4,
-    hosts: Annotated[str, typer.Option(help="init: machines, with addresses: a=10.0.0.1+a.lan,b=10.0.0.2.")] = "local",
+    folder: Annotated[Path, typer.Argument(help="Folder of the keys (machine a's in hosts/a), or a fleet file.")],
+    names: Annotated[
+        list[str] | None, typer.Argument(help="rotate, revoke, show: members, such as robot3, world, host-a.")
+    ] = None,
+    robots: Annotated[int, typer.Option(help="init: number of robots N, with ids 1 to N.")] = 4,
+    hosts: Annotated[str, typer.Option(help="init: machines with addresses: a=10.0.0.1+a.lan,b=10.0.0.2.")] = "local",
     place: Annotated[
-        list[str] | None, typer.Option(help="init: at whose routers one joins, home first: robot3=b+a; again for more.")
+        list[str] | None,
+        typer.Option(help="init: machines whose routers a member may join, home first: robot3=b+a; repeatable."),
     ] = None,
     driver: Annotated[
-        list[int] | None, typer.Option(help="init: a robot with hardware of its own; again for more.")
+        list[int] | None, typer.Option(help="init: id of a robot with a hardware driver; repeatable.")
     ] = None,
-    fleet: Annotated[str, typer.Option(help="init: name of the fleet, part of every key.")] = "fleet",
-    days: Annotated[float, typer.Option(help="init, rotate: how long certificates are valid.")] = keys.DAYS,
+    fleet: Annotated[str, typer.Option(help="init: name of the fleet, part of every key expression.")] = "fleet",
+    days: Annotated[float, typer.Option(help="init, rotate: validity of certificates [days].")] = keys.DAYS,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
     chosen = names or []
@@ -66,7 +69,7 @@ def _change(
     plan: FleetPlan | None,
     as_json: bool,
 ) -> int:
-    """Then the machines get to know: over ssh where there is a fleet file, else it is said what is to be done."""
+    """Rotate or revoke keys, then distribute them over ssh if there is a fleet file, else print what is to be done."""
     if action == "rotate":
         changed, text = keys.rotate(folder, chosen, days), "renewed (whoever runs shows it from its next start on)"
     else:
@@ -83,7 +86,7 @@ def _change(
 
 
 def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: list[int]) -> KeyPlan:
-    """The plan that the options say. Raises Refused."""
+    """Return the key plan given by the options. Raises Refused."""
     if not 1 <= robots <= ROBOTS_MAX:
         raise Refused(f"--robots {robots}: must be from 1 to {ROBOTS_MAX}")
     machines: dict[str, tuple[str, ...]] = {}

@@ -1,4 +1,4 @@
-"""`lfa logs`: the last lines of a process's log, or of all, from whichever machine it runs on; `-f` goes on."""
+"""`lfa logs`: print the last lines of a process's log, or of all, from any machine; `-f` follows."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ AGAIN_S = FOLLOW_S / 2.0
 
 
 def command(
-    process: Annotated[str, typer.Argument(help="robot3 (or 3), world, witness, a/router; all when not given.")] = "",
-    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
-    follow: Annotated[bool, typer.Option("-f", "--follow", help="Go on with what comes, until Ctrl-C.")] = False,
-    lines: Annotated[int, typer.Option("-n", "--lines", min=1, help="How many of the last lines.")] = 20,
-    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+    process: Annotated[str, typer.Argument(help="robot3 (or 3), world, witness, a/router. Default: all.")] = "",
+    file: Annotated[Path | None, typer.Argument(help="The fleet file. Default: the fleet that runs here.")] = None,
+    follow: Annotated[bool, typer.Option("-f", "--follow", help="Print new lines until Ctrl-C.")] = False,
+    lines: Annotated[int, typer.Option("-n", "--lines", min=1, help="Number of last lines.")] = 20,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router of the fleet, when none runs here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object per line.")] = False,
 ) -> int:
     if process.endswith(".toml") and file is None:
         process, file = "", Path(process)

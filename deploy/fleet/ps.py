@@ -1,4 +1,4 @@
-"""`lfa ps`: what runs on which machine of a fleet, as its supervisors tell it."""
+"""`lfa ps`: list the processes of a fleet by machine, as reported by its supervisors."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 HEAR_S = 2.5
-STATUS_S = 1.2  # each process has told its status by then
+STATUS_S = 1.2  # each process has published its status by then
 WIDTH_MIN = 80
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
-    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
+    file: Annotated[Path | None, typer.Argument(help="The fleet file. Default: the fleet that runs here.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router of the fleet, when none runs here.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
-    """1 when a host is silent, or a process does not run."""
+    """Run `lfa ps`; return 1 when a host is silent or a process does not run."""
     seen = find(file, fleet, connect)
     with sight(seen, frozenset({"*/host", "*/status"})) as view:
         began = clock.now()
@@ -50,13 +50,13 @@ def command(
 
 
 def _all_have_spoken(view: FleetView) -> bool:
-    """Each running robot has told how it is."""
+    """Return True if each running robot has published its status."""
     running = [report.name for status in view.hosts.values() for report in status.processes if report.pid]
     return all(name in view.texts for name in running if robot_id_of(name))
 
 
 def rows(view: FleetView) -> list[dict[str, Any]]:
-    """One a process, hosts and processes in their order."""
+    """Return one row per process, ordered by host and robot id."""
     return [
         {
             "host": host,

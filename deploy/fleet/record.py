@@ -1,4 +1,4 @@
-"""`lfa record`: a recording of a fleet that runs already, however it was started; ends with Ctrl-C or SIGTERM."""
+"""`lfa record`: record a running fleet, however it was started, until Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
@@ -27,15 +27,19 @@ SPLIT_MB = 256.0
 
 
 def command(
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder; default runs/<fleet>-<time>.")] = None,
-    seconds: Annotated[float, typer.Option(help="End after so long; 0 goes on.")] = 0.0,
-    split_mb: Annotated[float, typer.Option(help="Go on in a new file once one has so many MB; 0: never.")] = SPLIT_MB,
-    keep: Annotated[int, typer.Option(help="Keep the first and the newest files, so many in all; 0: all.")] = 0,
-    hosts: Annotated[Path | None, typer.Option(help="A fleet file: bring its machines' journals too.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was recorded as JSON.")] = False,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, when several run here.")] = None,
+    connect: Annotated[
+        str | None, typer.Option(help="Endpoint of another router than the fleet's own on this machine.")
+    ] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, for a secured fleet.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder. Default: runs/<fleet>-<time>.")] = None,
+    seconds: Annotated[float, typer.Option(help="Duration of the recording [s]; 0: no limit.")] = 0.0,
+    split_mb: Annotated[
+        float, typer.Option(help="Size of a file [MB] at which a new one is started; 0: never.")
+    ] = SPLIT_MB,
+    keep: Annotated[int, typer.Option(help="Number of files to keep, the first and the newest; 0: all.")] = 0,
+    hosts: Annotated[Path | None, typer.Option(help="Fleet file: also copy the journals of its machines.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     if not 0.0 <= seconds < inf:
         raise Refused(f"--seconds {seconds:g}: must be above 0, or 0 for no end")
@@ -71,7 +75,7 @@ def command(
 
 
 def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, begun: float) -> None:
-    """Times are the world's, or since the start of the recording where no world tells its own."""
+    """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
     for arrival, message in ear.take():
         if isinstance(message, Truth):
             seen.see(arrival.at, message.time_s)
@@ -79,7 +83,7 @@ def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, begun: float) -
 
 
 def _folder(fleet: FleetAddress, out: Path | None) -> Path:
-    """With the scenario in it where the world runs here, so that the views know walls and obstacles."""
+    """Create and return the folder; it contains the scenario (walls, obstacles) if the world runs on this machine."""
     scenario = scenario_of_fleet(fleet)
     path = out or RUNS / f"{fleet.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     if scenario is not None:

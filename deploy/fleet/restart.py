@@ -1,4 +1,4 @@
-"""`lfa restart`: one process of a fleet ends in order and starts again, wherever it runs."""
+"""`lfa restart`: terminate one process of a fleet in order and start it again, on any machine."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ AGAIN_S = 10.0
 
 def command(
     process: Annotated[str, typer.Argument(help="robot3 (or 3), world, witness, router.")],
-    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
-    host: Annotated[str | None, typer.Option(help="Which one's, for a router.")] = None,
-    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
+    file: Annotated[Path | None, typer.Argument(help="The fleet file. Default: the fleet that runs here.")] = None,
+    host: Annotated[str | None, typer.Option(help="Machine of the process, for a router.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router of the fleet, when none runs here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     name = f"robot{process}" if process.isdecimal() else process
     seen = find(file, fleet, connect)

@@ -1,4 +1,4 @@
-"""`lfa top`: a fleet's robots and machines on one screen, live: who runs where, who leads, what it costs."""
+"""`lfa top`: show the processes of a fleet by machine on one screen, live, with leader, errors, CPU and memory."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 HEAR_S = 2.5
-FIRST_S = 1.3  # each process has told its status by then
+FIRST_S = 1.3  # each process has published its status by then
 REFRESH_S = 0.5
 WIDTH_MIN = 80
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="The fleet file; without it, the fleet that runs here.")] = None,
-    fleet: Annotated[str | None, typer.Option(help="Needed when several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="A router of the fleet, when none runs here.")] = None,
+    file: Annotated[Path | None, typer.Argument(help="The fleet file. Default: the fleet that runs here.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router of the fleet, when none runs here.")] = None,
     once: Annotated[bool, typer.Option("--once", help="Print once and end.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print once, as JSON.")] = False,
 ) -> int:

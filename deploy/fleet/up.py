@@ -1,6 +1,6 @@
-"""`lfa up`: a fleet file becomes processes on its machines, all of them or none; ends when every robot is in the chain.
+"""`lfa up`: start the processes of a fleet file on its machines, all or none; return when all robots are in the chain.
 
-Whoever runs it is not needed afterwards. Run again it starts what is missing, such as a machine that came back.
+The machine that runs it is not needed afterwards. A second run starts what is missing, such as a returned machine.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from lfa.protocol.errors import Refused
 
 POLL_S = 0.05
 HEALTHY_S = 0.3
-"""So long in one piece."""
+"""Duration [s] for which the fleet must be healthy without interruption."""
 
 
 class NotUp(Exception):
-    """The fleet was not brought up; nothing of it is left. A line each, and the exit code."""
+    """Failure to bring the fleet up, with a line for each cause and the exit code; no process of it is left."""
 
     def __init__(self, lines: list[str], code: int) -> None:
         super().__init__("\n".join(lines))
@@ -46,11 +46,13 @@ class NotUp(Exception):
 
 def command(
     file: Annotated[Path, typer.Argument(help="A fleet file (deploy/fleet.example.toml is one).")],
-    install: Annotated[bool, typer.Option("--install", help="Put this lfa onto the machines first.")] = False,
-    secure: Annotated[
-        bool, typer.Option("--secure", help="Everybody shows a certificate, and what the rules do not allow is denied.")
+    install: Annotated[
+        bool, typer.Option("--install", help="Install this version of lfa on the machines first.")
     ] = False,
-    wait: Annotated[float, typer.Option(help="Give up when it is not healthy after so many seconds.")] = 60.0,
+    secure: Annotated[
+        bool, typer.Option("--secure", help="Require certificates of every process; deny all that is not allowed.")
+    ] = False,
+    wait: Annotated[float, typer.Option(help="Time limit [s] for the fleet to become healthy.")] = 60.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
 ) -> int:
     if not 0.0 < wait < inf:
@@ -81,7 +83,7 @@ def _secured(plan: FleetPlan) -> FleetPlan:
 
 
 async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
-    """Raises NotUp, with all that was started here ended again."""
+    """Bring the fleet up and return its chain and hosts. Raises NotUp, after ending everything started here."""
     digest, keys = _digest(plan), bundles(plan)
     fleet = FleetHosts(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest, keys))
     try:
@@ -103,7 +105,7 @@ async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool
 
 
 async def _take_down(fleet: FleetHosts, names: list[str]) -> list[str]:
-    """End what this very `lfa up` has started; a line for each machine where that did not go well."""
+    """End the machines' parts that this `lfa up` has started; return a line for each machine where that failed."""
     if not names:
         return []
     before, fleet.wrong = fleet.wrong, {name: "" for name in fleet.parts if name not in names}
@@ -121,7 +123,7 @@ def _all_well(fleet: FleetHosts) -> None:
 def _join_those_that_run(
     plan: FleetPlan, fleet: FleetHosts, found: dict[str, Found], digest: str, keys: dict[str, Bundle]
 ) -> None:
-    """Machines that run already set the run that the others join; they must have been told the same file."""
+    """Make the others join the run of the machines that run already, which must have the same digest (NotUp)."""
     for name, one in found.items():
         if one.run and one.digest != digest:
             fleet.wrong[name] = f"runs fleet {plan.name} from another file, or an older state of it: lfa down first"
@@ -135,7 +137,7 @@ def _join_those_that_run(
 def _await_health(
     plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float
 ) -> dict[str, Any]:
-    """Listens as an onlooker until the judge has nothing to say for a moment. Raises NotUp."""
+    """Observe the fleet until it has been healthy for HEALTHY_S; return its chain and hosts. Raises NotUp."""
     own = next((part for part in sights.here() if part.fleet == plan.name), None)
     endpoints = [own.socket] if own is not None else []
     endpoints += [end for part in shares.values() for end in part.others[:1]]
@@ -165,7 +167,7 @@ def _await_health(
 
 
 def _progress(missing: list[str], shown: str) -> str:
-    """Each new state of things once."""
+    """Print each change of the missing items once; return the text shown last."""
     text = f"waiting: {missing[0]}{f', and {len(missing) - 1} more' if len(missing) > 1 else ''}" if missing else ""
     if text and text != shown:
         _say(text)

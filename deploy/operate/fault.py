@@ -1,8 +1,8 @@
-"""`lfa fault`: do something to a robot, the world, the router or the air of a fleet that runs on this machine, however
-it was started.
+"""`lfa fault`: inject a fault into a robot, the world, the router or the links of a fleet that runs on this machine.
 
-Processes are found in the process table by what they were told (`--id`, `--fleet`, `--listen`); the signal goes only
-to exactly the process that was found: same pid, start time, user and command line.
+It does not matter how the fleet was started. Processes are found in the process table by their options (`--id`,
+`--fleet`, `--listen`); the signal goes only to exactly the process that was found: same pid, start time, user and
+command line.
 """
 
 from __future__ import annotations
@@ -31,18 +31,19 @@ from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent
 
-SENT_S = 0.05  # the word about a fault leaves before the fault
+SENT_S = 0.05  # delay [s] so that the event about a fault leaves before the fault
 
 
 def command(
     deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(DEEDS)}.")],
     target: Annotated[
         str,
-        typer.Argument(help="A robot's id, leader, world, router; of a cut 3, 1-2, 1,2-3,w or 1>2; of loss a share."),
+        typer.Argument(help="A robot's id, leader, world, router; for cut: 3, 1-2, 1,2-3,w or 1>2; for loss: a share."),
     ] = "",
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was done as JSON.")] = False,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
+    """Inject a fault into a fleet that runs on this machine. Raises Refused."""
     if deed not in DEEDS:
         raise Refused(f"{deed!r}: must be one of {', '.join(DEEDS)}")
     team = one_fleet(agents(), fleet)
@@ -70,7 +71,7 @@ def command(
 
 
 def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
-    """An operator's word to all of the fleet. Raises Refused when it makes no sense, or nobody would obey it."""
+    """Send an operator's message to all of the fleet. Raises Refused if it is invalid, or the fleet ignores faults."""
     fleet, robots = team[0].fleet, tuple(sorted(agent.robot for agent in team))
     try:
         if deed != "handover" and not all("--faults" in agent.identity.arguments for agent in team):
@@ -92,7 +93,7 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
 
 
 def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
-    """Ask the fleet's launcher for it, and wait until it says that it did. Raises Refused when nobody does."""
+    """Ask the fleet's launcher to restart a robot, and wait for its event. Raises Refused if none answers."""
     robot = robot_id_of(target if target.startswith("robot") else f"robot{target}")
     operator = Operator(fleet, clock.wall_ms())
     try:
@@ -122,7 +123,7 @@ def _is_done(arrival: Arrival, robot: int) -> bool:
 
 
 def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> tuple[int | str, Identity]:
-    """The robot or the common process that is meant, and its process. Raises Refused."""
+    """Return the robot, or world or router, that `target` names, and its process. Raises Refused."""
     if target not in COMMON:
         victim = _victim(target, team, bus, inbox)
         return victim.robot, victim.identity
@@ -133,7 +134,7 @@ def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> 
 
 
 def _is_common(name: str, words: Sequence[str], agent: Running) -> bool:
-    """Whether a command line is that of the world, or of the router, of the agent's fleet."""
+    """Return True if a command line is that of the world, or of the router, of the agent's fleet."""
     called = {word.rpartition("/")[2] for word in words[:3]}
     if name == "world":
         return bool(called & {"lfa.world.cli", "lfa-world"}) and option(words, "--fleet", "fleet") == agent.fleet
@@ -154,7 +155,7 @@ def _victim(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -
 
 
 def _leader(fleet: str, bus: ZenohBus, inbox: Inbox) -> int | None:
-    """Whoever calls itself leader in the highest term, listening for a second."""
+    """Listen for a second and return the robot that claims leadership in the highest term, or None."""
     bus.follow(frozenset({key(fleet, "*", "pose")}))
     clock.sleep(LISTEN_S)
     leaders = []

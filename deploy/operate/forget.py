@@ -1,4 +1,4 @@
-"""`lfa forget`: robots that are lost for good, so that a fleet without its memory need not wait for them (E20)."""
+"""`lfa forget`: declare robots permanently lost, so that a fleet without its config need not wait for them (E20)."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.topics import OPERATOR_NAME, key
 
 LISTEN_S = 1.2
-"""Long enough to hear a leader's pose and everybody's status."""
+"""Time [s] to listen, long enough to receive a leader's pose and each robot's status."""
 ANSWER_S_MAX = 6.0
-"""Two attempts of the slowest profile."""
+"""Longest time [s] to wait for a leader: two attempts of the slowest profile."""
 
 
 def command(
-    robots: Annotated[list[int], typer.Argument(help="Ids whose processes are dead, and stay off until it is done.")],
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what came of it as JSON.")] = False,
+    robots: Annotated[list[int], typer.Argument(help="Ids of dead robots; they must stay off until this is done.")],
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
+    """Declare robots permanently lost and wait for a leader; return 0 if one leads, else 1. Raises Refused."""
     for robot in robots:
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
@@ -61,7 +62,7 @@ def command(
 
 
 def _say(ear: Subscriber, robots: list[int]) -> None:
-    """Every life that began before this moment is meant; one that begins later may join."""
+    """Publish the command; it covers every incarnation started before this moment, a later one may join."""
     now_ms = clock.wall_ms()
     operator = Operator(ear.fleet.name, now_ms)
     lives = [[robot, now_ms] for robot in robots]
@@ -69,8 +70,10 @@ def _say(ear: Subscriber, robots: list[int]) -> None:
 
 
 def _listen(ear: Subscriber, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:
-    """Who leads, what is said about waiting for others, and the mission's robots, where it was told; with `until_led`,
-    no longer than needed."""
+    """Return the leader, the status of a robot that waits for others, and the mission's robots, as far as received.
+
+    With `until_led`, return as soon as a robot leads.
+    """
     leader: int | None = None
     waits, team = "", tuple[int, ...]()
     until = clock.now() + seconds

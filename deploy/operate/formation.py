@@ -1,4 +1,4 @@
-"""`lfa formation`: the operator asks the leader for another formation, and waits for its word that it was ordered."""
+"""`lfa formation`: ask the leader for another formation, and wait for its acknowledgement."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from lfa.protocol.messages.team import Event
 from lfa.protocol.mission import FormationSpec
 
 ANSWER_S_MAX = 2.0
-JOINED_S = 0.2  # a subscription that was just declared hears what is said from here on
+JOINED_S = 0.2  # time [s] until a newly declared subscription receives messages
 
 
 def command(
     side: Annotated[str, typer.Argument(help="left, right, column or zigzag.")],
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the leader's answer as JSON.")] = False,
 ) -> int:
+    """Ask the leader for the formation `side`; return 0 if it acknowledged, else 1. Raises Refused."""
     named(side, FormationSpec())
     with listen(find(fleet, connect, keys), frozenset({"*/event"})) as ear:
         clock.sleep(JOINED_S)
@@ -42,7 +43,7 @@ def command(
 
 
 def ask(ear: Subscriber, side: str) -> Event | None:
-    """Say it to `ear`'s fleet; the event by which a leader acknowledges it, None when none does in time."""
+    """Send the request to the fleet; return the leader's acknowledging event, or None if none comes in time."""
     say(ear, side)
     until = clock.now() + ANSWER_S_MAX
     while clock.now() < until:

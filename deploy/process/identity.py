@@ -1,7 +1,7 @@
-"""Processes of this machine, known by more than their number: a pid may belong to somebody else by now.
+"""Processes of this machine, identified by more than the pid, since the kernel may reuse a pid.
 
-Linux only: /proc and pidfd. Whoever signals takes a pidfd first and then checks who is behind it; from then on the
-kernel itself keeps the number from meaning another process.
+Linux only: /proc and pidfd. `send` opens a pidfd first and then checks the identity behind it; from then on the kernel
+guarantees that the pidfd refers to that process.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TETHER = Path(__file__).with_name("parent_death.py")
 
 
 class Identity(Struct, frozen=True):
-    """What a process is, as long as it lives: when it started (ticks since boot), whose it is, what it was told."""
+    """Properties that identify a process while it runs: pid, start time [ticks since boot], user id, command line."""
 
     pid: int
     started: int
@@ -29,7 +29,7 @@ class Identity(Struct, frozen=True):
 
 
 def identify(pid: int) -> Identity | None:
-    """Who `pid` is at the moment, None when there is no such process or it is a zombie."""
+    """Return the identity of the process that has `pid` now; None when there is none or it is a zombie."""
     proc = Path(f"/proc/{pid}")
     try:
         state, *rest = (proc / "stat").read_text().rpartition(")")[2].split()
@@ -41,13 +41,13 @@ def identify(pid: int) -> Identity | None:
 
 
 def cpu_s(identity: Identity) -> float:
-    """Processor time [s] that a process has used so far, of all its threads. Raises OSError when it has gone."""
+    """Return the processor time [s] used so far by all threads of a process. Raises OSError when it has ended."""
     fields = Path(f"/proc/{identity.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def send(identity: Identity, number: signal.Signals) -> bool:
-    """Signal exactly that process; False when it has gone."""
+    """Signal exactly that process; return False when it has ended."""
     try:
         handle = os.pidfd_open(identity.pid)
     except ProcessLookupError:
@@ -64,7 +64,7 @@ def send(identity: Identity, number: signal.Signals) -> bool:
 
 
 def own_processes() -> Iterator[Identity]:
-    """All processes of this user."""
+    """Yield all processes of this user, by pid."""
     for entry in sorted(Path("/proc").glob("[0-9]*"), key=lambda path: int(path.name)):
         identity = identify(int(entry.name))
         if identity is not None and identity.user == os.getuid():
@@ -78,11 +78,12 @@ def start(
     stdin: int = subprocess.DEVNULL,
     inside: Sequence[str] = (),
 ) -> subprocess.Popen[bytes]:
-    """`python -P -m ARGUMENTS` as a child that hears of our death, out of reach of the terminal's Ctrl-C.
+    """Start `python -P -m ARGUMENTS` as a child in its own session, which the terminal's Ctrl-C does not reach.
 
-    `inside` is a command that becomes another in a place of its choice, such as `/sbin/ip netns exec NAME`.
+    The child receives `on_parent_death` when this process dies. `inside` is a command prefix that executes the child
+    elsewhere, such as `/sbin/ip netns exec NAME`.
 
-    Call it from the main thread: the kernel means the thread that started a child when it speaks of its parent.
+    Call it from the main thread: for the kernel, the parent of a child is the thread that started it.
     """
     python = sys.executable
     tether = [python, "-I", "-S", str(TETHER), str(os.getpid()), str(int(on_parent_death))]

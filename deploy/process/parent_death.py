@@ -1,7 +1,7 @@
-"""Run as a file: become a command that does not outlive its parent. `parent_death.py PARENT_PID SIGNAL COMMAND...`
+"""Executable file `parent_death.py PARENT_PID SIGNAL COMMAND...`: run COMMAND and signal it when the parent dies.
 
-The kernel sends SIGNAL when the parent dies, however it dies, and also to a child that is stopped: a pipe that the
-child would have to watch cannot do that. Replaces itself by COMMAND, so the process table shows only that.
+The kernel sends SIGNAL however the parent dies, and also to a stopped child, which a pipe watched by the child cannot
+achieve. The process replaces itself by COMMAND, so that the process table shows only COMMAND.
 """
 
 import ctypes
@@ -18,11 +18,11 @@ def main() -> None:
 
 
 def die_with_parent(parent: int, signal: int) -> None:
-    """Have the kernel send `signal` to this process when `parent` dies; ends it when that is so already."""
+    """Make the kernel send `signal` to this process when `parent` dies; exit if `parent` has died already."""
     if ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal) != 0:
         sys.exit(f"prctl: {os.strerror(ctypes.get_errno())}")
     if os.getppid() != parent:
-        sys.exit(1)  # it died before we asked to be told
+        sys.exit(1)  # the parent died before prctl took effect
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The processes of one run: a table, started in order, watched, and ended whatever happens."""
+"""Process group of one run: child processes, started in order, monitored, and terminated in every case."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ POLL_S = 0.01
 
 
 class ProcessSpec(Struct, frozen=True):
-    """One process: what it is called, and `python -m` what."""
+    """Specification of one process: its name, and the arguments of `python -m`."""
 
     name: str
     arguments: tuple[str, ...]
     outlives_launcher: bool = False
-    """It hears of the launcher's death, wakes up if it was stopped, and ends by itself."""
+    """True: on the launcher's death it receives SIGCONT instead of SIGKILL, resumes if stopped, and ends by itself."""
     restart_args: tuple[str, ...] = ()
-    """What it is told besides when it starts again."""
+    """Additional arguments of a restart."""
     command_prefix: tuple[str, ...] = ()
-    """The command that it runs under, such as one that enters a network namespace."""
+    """Command that executes the process, such as one that enters a network namespace."""
 
     def restarted(self) -> ProcessSpec:
-        """An agent that starts again starts as a follower, and the others tell it the rest; a world resumes."""
+        """Return the specification of a restart: an agent starts as a follower, a world resumes by `restart_args`."""
         told = tuple("follower" if word == "leader" else word for word in self.arguments)
         return ProcessSpec(self.name, (*told, *self.restart_args), command_prefix=self.command_prefix)
 
 
 class ProcessGroup:
-    """Those that were started; each has its log. All calls come from the main thread."""
+    """Child processes of one run, by name, each with a log file. All calls come from the main thread."""
 
     def __init__(self, folder: Path) -> None:
         self._logs = folder / LOGS
@@ -46,7 +46,7 @@ class ProcessGroup:
         self._children: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, row: ProcessSpec) -> None:
-        """Raises OSError when no process can be made."""
+        """Start a process and append its output to its log. Raises OSError when no process can be created."""
         death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
         with self.log(row.name).open("ab") as log:
@@ -60,12 +60,12 @@ class ProcessGroup:
         return self._children[name].poll() == 0
 
     def failed(self, name: str) -> bool:
-        """It ended, neither well nor because what it was told was refused."""
+        """Return True if `name` ended with an exit code other than 0 (success) and 2 (bad input)."""
         child = self._children.get(name)
         return child is not None and child.poll() not in (None, 0, 2)
 
     def exit_of(self, name: str) -> str | None:
-        """How `name` ended, in words; None while it runs, and before it was started."""
+        """Return a text on how `name` ended; None while it runs, and before it was started."""
         code = self.code(name)
         if code is None:
             return None
@@ -74,24 +74,24 @@ class ProcessGroup:
         return f"{name} ended ({how})" + (f": {last_line}" if code > 0 and last_line else "")
 
     def code(self, name: str) -> int | None:
-        """As of a `Popen`: negative for a signal; None while it runs, and before it was started."""
+        """Return the exit code as `Popen` gives it, negative for a signal; None while running or not yet started."""
         child = self._children.get(name)
         return None if child is None else child.poll()
 
     def pid(self, name: str) -> int:
-        """0 while it does not run."""
+        """Return the pid of `name`, 0 while it does not run."""
         return self._children[name].pid if self.runs(name) else 0
 
     def log(self, name: str) -> Path:
         return self._logs / f"{name}.log"
 
     def signal(self, name: str, number: signal.Signals) -> bool:
-        """Signal `name`, checked to be still the process that was started; False when it has gone."""
+        """Signal `name` after checking that it is still the started process; return False when it has ended."""
         identity = self.identity(name)
         return identity is not None and processes.send(identity, number)
 
     def write_line(self, name: str, line: bytes) -> None:
-        """Write a line to the standard input of `name` and close it; one that has gone hears nothing."""
+        """Write a line to the standard input of `name` and close it; no effect if the process has ended."""
         stdin = self._children[name].stdin
         if stdin is None or stdin.closed:
             return
@@ -102,7 +102,7 @@ class ProcessGroup:
             pass
 
     def terminate(self, names: Sequence[str], grace_s: float = GRACE_S) -> None:
-        """SIGTERM to all of them, SIGKILL to what is left after the grace; stopped ones are woken for it."""
+        """Send SIGTERM (and SIGCONT, for stopped ones) to all `names`, and SIGKILL to the rest after `grace_s` [s]."""
         for name in names:
             self.signal(name, signal.SIGTERM)
             self.signal(name, signal.SIGCONT)
@@ -113,7 +113,7 @@ class ProcessGroup:
         self.wait(names, grace_s)
 
     def wait(self, names: Sequence[str], timeout_s: float) -> bool:
-        """True as soon as all of them have ended."""
+        """Wait until all `names` have ended; return False if that takes longer than `timeout_s` [s]."""
         until = clock.now() + timeout_s
         while any(self.runs(name) for name in names):
             if clock.now() > until:
@@ -122,13 +122,13 @@ class ProcessGroup:
         return True
 
     def kill_all(self) -> None:
-        """The last resort, for errors of our own."""
+        """Kill every child with SIGKILL and wait for it. For the cleanup after an internal error."""
         for child in self._children.values():
             child.kill()
             child.wait()
 
     def identity(self, name: str) -> Identity | None:
-        """A child that has not been waited for keeps its pid: this is who it is now."""
+        """Return the identity of `name`, None while it does not run. A child keeps its pid until it is waited for."""
         return processes.identify(self._children[name].pid) if self.runs(name) else None
 
     def _last_line(self, name: str) -> str:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as something that a loop looks at."""
+"""Ctrl-C and SIGTERM as a flag that a loop polls."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupts:
-    """While this is open, Ctrl-C and SIGTERM are noted in `signal` instead of ending the process; `count` of them."""
+    """Context that stores the last SIGINT or SIGTERM in `signal`, and their `count`, instead of ending the process."""
 
     def __init__(self) -> None:
         self.signal: signal.Signals | None = None

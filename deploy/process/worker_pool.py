@@ -1,4 +1,4 @@
-"""Worker processes of a campaign: none outlives the process that started it, however that ends, nor do their files."""
+"""Worker processes of a campaign. Neither they nor their temporary files outlive the process that started them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lfa.deploy.process.parent_death import die_with_parent
 
 @contextmanager
 def workers(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of `jobs`; what it still has to do when the block is left by an exception is not done."""
+    """Provide a pool of `jobs` processes. An exception in the block cancels the pending work and kills the workers."""
     with tempfile.TemporaryDirectory(prefix="lfa-", ignore_cleanup_errors=True) as place:
         # Spawned, not forked: the caller may have threads.
         pool = ProcessPoolExecutor(jobs, get_context("spawn"), _begin, (os.getpid(), place))
@@ -31,7 +31,7 @@ def workers(jobs: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _begin(parent: int, place: str) -> None:
-    """In a worker: its temporary files go to `place`, and Ctrl-C, which reaches it too, leaves no traceback."""
+    """Initialise a worker: temporary files in `place`, no traceback on Ctrl-C, death with the parent."""
     tempfile.tempdir = place
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     die_with_parent(parent, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""What the events of a run say: who led when, what each failover took, and whether terms ever went back."""
+"""Evaluation of the event log of a run: leaders' terms, durations of failovers, and order of terms (I2)."""
 
 from __future__ import annotations
 
@@ -18,42 +18,44 @@ Line = dict[str, Any]
 
 
 class LeaderTerm(Struct):
-    """One holder of the lease, from its first accepted leader command on. `term` is (n, issuer)."""
+    """Period of one lease holder, starting at its first accepted leader command. `term` is (n, issuer)."""
 
     term: tuple[int, int]
     robot_id: int
     from_s: float
     until_s: float | None
-    """When the next one led, or when a fault ended this one; None: to the end."""
+    """Time [s] when the next leader led, or when a fault ended this period; None: until the end of the run."""
     cause: str
-    """`start`; or how the one before ended: the fault, the word of its holder's lease event (`expired`, `released`),
-    `reelection` of the same robot, `handover`."""
+    """Cause of the change of leader: `start`, or how the period before ended: the kind of fault, the change in its
+    holder's lease event (`expired`, `released`), `reelection` of the same robot, or `handover`."""
 
 
 class Failover(Struct):
-    """What it took to replace a leader that was lost; durations from the fault on [ms]."""
+    """Replacement of a lost leader; durations [ms] are measured from the fault."""
 
     cause: str
     victim: int
     at_s: float
     leader: int | None
     lease_ms: float | None
-    """Until the new leader held the lease."""
+    """Duration [ms] until the new leader held the lease."""
     first_command_ms: float | None
-    """Until a gateway accepted the new leader's first command."""
+    """Duration [ms] until a gateway accepted the new leader's first command."""
     chain_ms: float | None
-    """Until all survivors had closed the chain."""
+    """Duration [ms] until all survivors had closed the chain."""
 
 
 class FaultDone(Struct):
+    """Fault that was injected during a run."""
+
     at_s: float
     kind: str
     target: int | str
-    """A robot's id, or whom a cut parts, or what share is lost."""
+    """Id of a robot, or the two sides of a cut, or the share of lost messages."""
 
 
 class TermViolation(Struct):
-    """An invariant that did not hold, when, and between whom."""
+    """Violation of an invariant, with its time [s] and a text that names the robots."""
 
     invariant: str
     at_s: float
@@ -61,7 +63,7 @@ class TermViolation(Struct):
 
 
 def lines(folder: Path) -> list[Line]:
-    """The events of a run in the order of their times; a last line cut off by a kill is left out."""
+    """Return the events of a run ordered by time; a last line truncated by a kill is skipped."""
     path = folder / EVENTS
     found = [_line(text) for text in path.read_bytes().splitlines()] if path.is_file() else []
     return sorted((line for line in found if line is not None), key=lambda line: float(line["t"]))
@@ -76,12 +78,12 @@ def faults(events: Sequence[Line]) -> list[FaultDone]:
 
 
 def asked_by_leader(line: Line) -> bool:
-    """Whether an event `formation` is a leader's own request: not an operator's, nor a follower's echo."""
+    """Return True if an event `formation` is a leader's own request, not an operator's nor a follower's echo."""
     return bool(line.get("by", "operator") != "operator")
 
 
 def reigns(events: Sequence[Line]) -> list[LeaderTerm]:
-    """Who led, by accepted leader commands over all gateways."""
+    """Return the leaders' terms in order, from the leader commands accepted by all gateways."""
     found: list[LeaderTerm] = []
     done = faults(events)
     for line in of_kind(events, "leader_command"):
@@ -100,7 +102,7 @@ def reigns(events: Sequence[Line]) -> list[LeaderTerm]:
 
 
 def places(events: Sequence[Line], robots: Sequence[int], end_s: float) -> dict[int, list[tuple[float, float]]]:
-    """Of each robot, its place in the newest chain from each moment on [s]; nan while it is out of it."""
+    """Return per robot the steps (time [s], place in the newest chain); the place is nan while out of the chain."""
     newest: tuple[Any, ...] = ()
     steps: dict[int, list[tuple[float, float]]] = {robot: [(0.0, nan)] for robot in robots}
     for line in of_kind(events, "chain"):
@@ -114,7 +116,7 @@ def places(events: Sequence[Line], robots: Sequence[int], end_s: float) -> dict[
 
 
 def failovers(events: Sequence[Line], reigns: Sequence[LeaderTerm]) -> list[Failover]:
-    """One for each fault that ended a reign; None where the run ended before it was over."""
+    """Return one failover for each fault that ended a leader's term; None for durations that the run did not reach."""
     found = []
     for reign, successor in zip_longest(reigns, reigns[1:]):
         fault = next((f for f in faults(events) if _ended_by(f, reign) and f.at_s == reign.until_s), None)
@@ -142,9 +144,9 @@ def failovers(events: Sequence[Line], reigns: Sequence[LeaderTerm]) -> list[Fail
 
 
 def last_chain(events: Sequence[Line]) -> list[int]:
-    """The chain of the newest config that anybody spoke of; empty when nobody did.
+    """Return the chain of the newest config in any `chain` event; empty without one.
 
-    Not what the team makes of it when it is told to stop: whoever leads sees some of the others go before itself.
+    Events after `over` are ignored: when the run stops, the leader sees other robots leave before itself.
     """
     over_at = next((line["t"] for line in of_kind(events, "over")), float("inf"))
     spoken = [line for line in of_kind(events, "chain") if line["term"] is not None and line["t"] <= over_at]
@@ -153,7 +155,7 @@ def last_chain(events: Sequence[Line]) -> list[int]:
 
 
 def terms_that_went_back(events: Sequence[Line]) -> list[TermViolation]:
-    """I2: over all gateways, no leader command of an older term is accepted after one of a newer term."""
+    """Return the violations of I2: over all gateways, no leader command of an older term follows a newer term."""
     newest: tuple[int, ...] = ()
     found = []
     for line in of_kind(events, "leader_command"):
@@ -178,7 +180,7 @@ def _ended_by(fault: FaultDone, reign: LeaderTerm) -> bool:
 
 
 def _given_up(events: Sequence[Line], before: LeaderTerm, successor: int) -> str:
-    """How `before`, which no fault ended, came to its end."""
+    """Return how the term `before`, which no fault ended, came to its end."""
     if before.robot_id == successor:
         return "reelection"
     said = [e for e in of_kind(events, "lease") if e["robot"] == before.robot_id and e["t"] >= before.from_s]
@@ -186,12 +188,12 @@ def _given_up(events: Sequence[Line], before: LeaderTerm, successor: int) -> str
 
 
 def _ending(done: Sequence[FaultDone], reign: LeaderTerm, before_s: float) -> FaultDone | None:
-    """The first fault that can have ended `reign`."""
+    """Return the first fault until `before_s` [s] that can have ended the term."""
     return next((fault for fault in done if _ended_by(fault, reign) and fault.at_s <= before_s), None)
 
 
 def _chain_closed(later: Sequence[Line], victim: int) -> float | None:
-    """When the last of the new chain's members first spoke of a chain without `victim`."""
+    """Return the time [s] when the last member of the new chain first reported a chain without `victim`."""
     closed: dict[int, float] = {}
     members: list[int] = []
     for line in of_kind(later, "chain"):

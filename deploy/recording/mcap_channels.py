@@ -1,7 +1,7 @@
-"""Wire types as plain JSON for people's tools: objects with field names, and JSON schemas that say the same.
+"""Conversion of wire types to plain JSON for external tools: objects with field names, and matching JSON schemas.
 
 On the wire a struct is an array without names. Here it becomes an object, with its tag as `type`. JSON has no
-infinity: a number that is not finite is written as the string "inf", "-inf" or "nan", and the schema says so
+infinity: a number that is not finite is written as the string "inf", "-inf" or "nan", and the schema allows for it
 (a scan's +inf, nothing within range, would otherwise be lost as null). Bytes are base64.
 """
 
@@ -19,7 +19,7 @@ from msgspec import Struct
 
 NonFinite = Literal["inf", "-inf", "nan"]
 Number = float | NonFinite
-"""A JSON number, or the name of one that JSON does not have; `float()` reads both."""
+"""JSON number, or the name of a number that JSON lacks; `float()` reads both."""
 
 _encoder = msgspec.json.Encoder()
 _WORDS: dict[float, NonFinite] = {inf: "inf", -inf: "-inf"}
@@ -27,17 +27,17 @@ _PLAIN = frozenset({int, str, bool, type(None)})
 
 
 def encode(message: Struct) -> bytes:
-    """`message` as a JSON object with field names.
+    """Return `message` as a JSON object with field names.
 
-    Nearly all go the quick way, a quarter of the time: renamed, and written by msgspec. It writes null for what is
-    not finite; a message with a null in it goes the thorough way.
+    Fast path for nearly all messages, in a quarter of the time: convert to the named type, encode by msgspec. msgspec
+    writes null for a number that is not finite, so a message with a null in it takes the slow path.
     """
     quick = _encoder.encode(_namer(type(message))(message))
     return quick if b"null" not in quick else _encoder.encode(plain(message))
 
 
 def plain(value: Any) -> Any:
-    """`value` with structs as dicts and non-finite floats as strings."""
+    """Return `value` with structs as dicts, bytes as base64 and non-finite floats as strings."""
     kind = type(value)
     if kind is float:
         return value if value - value == 0.0 else str(value)
@@ -57,7 +57,7 @@ def plain(value: Any) -> Any:
 
 
 def restore(body: bytes, kind: type[Struct]) -> Any:
-    """The message of type `kind` that `encode` made `body` of. Raises msgspec.DecodeError when it is none."""
+    """Return the message of type `kind` that `encode` wrote as `body`. Raises msgspec.DecodeError for other bytes."""
     return _restored(msgspec.json.decode(body, type=shape(kind)), kind)
 
 
@@ -94,17 +94,17 @@ def _fields(kind: type[Struct]) -> tuple[str | None, tuple[str, ...]]:
 
 @cache  # bounded by the number of types in the program
 def _namer(kind: type[Struct]) -> Callable[[Any], Struct]:
-    """What makes the `shape` of a `kind`: the same values, under their names.
+    """Return the function that converts a `kind` to its `shape`: the same values, under their names.
 
-    One expression, written out and compiled once a type as dataclasses does it: calls from field to field take three
-    times as long, and every message that is recorded goes through here.
+    It is one expression, generated and compiled once per type, as dataclasses does: one call per field takes three
+    times as long, and every recorded message is converted here.
     """
     names: dict[str, Any] = {"numbers": _numbers, "member": _member}
     return eval(f"lambda value: {_renamed(kind, 'value', names)}", names)  # type: ignore[no-any-return]
 
 
 def _renamed(annotation: Any, value: str, names: dict[str, Any]) -> str:
-    """The expression for what stands under `value` and is an `annotation`; what it calls is put into `names`."""
+    """Return the expression that converts `value` of type `annotation`; add the functions it calls to `names`."""
     arguments, origin = get_args(annotation), get_origin(annotation)
     if isinstance(annotation, type) and issubclass(annotation, Struct):
         names[annotation.__name__] = shape(annotation)
@@ -121,21 +121,21 @@ def _renamed(annotation: Any, value: str, names: dict[str, Any]) -> str:
 
 
 def _member(value: Any) -> Any:
-    """Of a union: what it is shows only now."""
+    """Convert a value of a union by its type at run time."""
     return _namer(type(value))(value) if isinstance(value, Struct) else value
 
 
 def _numbers(values: tuple[float, ...]) -> tuple[Number, ...]:
-    """Beams and heights are by far the most of all numbers, and need no call each."""
+    """Convert an array of numbers without a call per item: beams and heights are most of all recorded numbers."""
     if isfinite(sum(values)):
         return values
-    # What is not finite, less itself, is nan: true, where a number's rest is 0.
+    # value - value is nan (true) for a value that is not finite, and 0 (false) otherwise.
     return tuple([_WORDS.get(value, "nan") if value - value else value for value in values])
 
 
 @cache  # bounded by the number of types in the program
 def shape(kind: type[Struct]) -> type[Struct]:
-    """The type of what `encode` writes for `kind`: same fields by name, floats as `Number`."""
+    """Return the type of the JSON that `encode` writes for `kind`: same fields by name, floats as `Number`."""
     hints = get_type_hints(kind)
     config = kind.__struct_config__
     fields = [(name, _shape_of(hints[name])) for name in kind.__struct_fields__]
@@ -143,7 +143,7 @@ def shape(kind: type[Struct]) -> type[Struct]:
 
 
 def schema(kind: type[Struct]) -> bytes:
-    """JSON schema of what `encode` writes for `kind`."""
+    """Return the JSON schema of the objects that `encode` writes for `kind`."""
     return msgspec.json.encode(msgspec.json.schema(shape(kind)))
 
 

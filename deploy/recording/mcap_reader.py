@@ -1,7 +1,7 @@
-"""A recording as numbers: `recording.mcap` to numpy arrays per robot.
+"""Reader of `recording.mcap` into numpy arrays per robot.
 
-Reads from the front, so a file whose writer was killed gives everything up to its last whole chunk. A recording in
-several files is read as one.
+It reads from the front, so a file whose writer was killed yields everything up to its last complete chunk. A recording
+in several files is read as one.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ Row = tuple[float, ...]
 
 
 class RecordedRun(Struct):
-    """Arrays with one row a message, first column the time [s] since the run's start; columns as in `COLUMNS`."""
+    """Arrays of a run, one row per message; first column: time [s] since the run's start; columns as in `COLUMNS`."""
 
     truth: dict[int, Array]
     tracking: dict[int, Array]
     cmd_vel: dict[int, Array]
     obstacles: dict[int, Array]
-    """t, x, y of each moving body, by its place in the scenario's list."""
+    """t [s], x [m], y [m] of each moving body, by its index in the scenario's list."""
     commanded: dict[int, Array] = {}
-    """t, k^d [m], phi^d [rad] of each follower's slot as the leader asks for it, by robot."""
+    """t [s], k^d [m], phi^d [rad] of each follower's slot as commanded by the leader, by robot."""
 
     @property
     def end_s(self) -> float:
-        """Time of the last ground truth, 0 when there is none."""
+        """Time [s] of the last ground truth, 0 when there is none."""
         return max((float(rows[-1, 0]) for rows in self.truth.values()), default=0.0)
 
 
@@ -61,7 +61,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 
 
 def read(folder: Path) -> RecordedRun:
-    """The trace of the run in `folder`; an empty one when nothing was recorded."""
+    """Return the arrays of the run in `folder`; empty when nothing was recorded."""
     truth: dict[int, list[Row]] = {}
     obstacles: dict[int, list[Row]] = {}
     commanded: dict[int, list[Row]] = {}
@@ -85,7 +85,10 @@ def read(folder: Path) -> RecordedRun:
 
 
 def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, float, Any]]:
-    """Owner, topic, time [s] and content (an object with the wire type's fields) of every message on `topics`."""
+    """Yield owner, topic, time [s] and content (an object with the wire type's fields) of each message on `topics`.
+
+    Raises Refused for a recording of another program or another version of lfa.
+    """
     decoders = {t: msgspec.json.Decoder(mcap_channels.shape(TOPIC[t].type)) for t in topics}
     for channel, t, body in recorded(folder, topics):
         _, owner, topic, *_ = channel.split("/")
@@ -97,7 +100,7 @@ def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, f
 
 
 def look_into(folder: Path) -> None:
-    """Raises Refused when `folder` holds no recording; says on stderr when it holds one that was cut off."""
+    """Raise Refused when `folder` holds no recording; warn on stderr when a recording is truncated."""
     if not (folder / RECORDING).is_file():
         raise Refused(f"{folder}: no run folder, it has no {RECORDING}")
     for path in parts(folder):
@@ -110,7 +113,7 @@ def look_into(folder: Path) -> None:
 
 
 def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:
-    """Channel (`/robot1/pose`), time [s] and JSON of every message on `topics`, in the order of the recording."""
+    """Yield channel (`/robot1/pose`), time [s] and JSON of each message on `topics`, in the order of the recording."""
     for path in parts(folder):
         yield from _recorded(path, topics)
 
@@ -140,7 +143,7 @@ _MESSAGE = struct.Struct("<HIQ8x")  # channel, sequence, log time; publish time 
 
 
 def _chunks(stream: IO[bytes]) -> Iterator[bytes]:
-    """The contents of every whole chunk, up to the end or to where the writer was cut off."""
+    """Yield the contents of every complete chunk, up to the end or to where the file is truncated."""
     reader = StreamReader(stream, emit_chunks=True)
     try:
         for record in reader.records:
@@ -151,7 +154,7 @@ def _chunks(stream: IO[bytes]) -> Iterator[bytes]:
 
 
 def _records(chunk: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and body of each record: mcap's own reader takes three times as long."""
+    """Yield opcode and body of each record; three times as fast as mcap's own reader."""
     at = 0
     while at < len(chunk):
         opcode, length = _RECORD.unpack_from(chunk, at)

@@ -1,4 +1,4 @@
-"""The outcome of a run."""
+"""Outcome of a run."""
 
 from __future__ import annotations
 
@@ -8,5 +8,7 @@ from lfa.world.description.load import Outcome
 
 
 class Verdict(Struct, frozen=True):
+    """Outcome of a run, with the reason if it has one."""
+
     outcome: Outcome
     reason: str | None = None

@@ -1,7 +1,7 @@
-"""What a run leaves behind: `recording.mcap` with every message, `events.jsonl` with one line for each event.
+"""Recorder of a run: `recording.mcap` with every message, `events.jsonl` with one line for each event.
 
-One `Recorder` for both modes: the simulator feeds it in virtual time, the recorder process (`python -m
-lfa.deploy.recording.recorder`) from the bus. It sits outside the control path: nobody waits for it.
+One `Recorder` serves both modes: the simulator feeds it in virtual time, the recorder process (`python -m
+lfa.deploy.run.recorder_process`) from the bus. It is outside the control path: no process waits for it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
 
 RECORDING = "recording.mcap"
 PART = "recording-{}.mcap"
-"""Of a recording in several files, those after the first."""
+"""Name of the second and later files of a recording in several files."""
 EVENTS = "events.jsonl"
-FLUSH_S = 1.0  # what a SIGKILL of the recorder may cost
+FLUSH_S = 1.0  # interval between flushes, the most that a SIGKILL of the recorder loses
 ONLOOKERS = (WORLD_NAME, OPERATOR_NAME, RECORDER_NAME)
 CHUNK_BYTES_MAX = 4 * 1024 * 1024
 
@@ -31,33 +31,33 @@ _line_encoder = msgspec.json.Encoder(order="deterministic")
 
 
 class Recording(Struct, kw_only=True):
-    """What there is of a recording, and what it lost."""
+    """Size of a recording, and number of lost messages."""
 
     messages: int
     files: int
     bytes: int
     missing: int = 0
-    """Gaps in the senders' numbers: messages that never came."""
+    """Number of messages that never arrived, from gaps in the senders' sequence numbers."""
     dropped: int = 0
-    """Came, and found the recorder's inbox full."""
+    """Number of messages dropped because the recorder's inbox was full."""
     undecodable: int = 0
 
 
 def parts(folder: Path) -> list[Path]:
-    """The files of the recording in `folder`, oldest first; empty when there is none."""
+    """Return the files of the recording in `folder`, oldest first; empty when there is none."""
     first, later = folder / RECORDING, folder.glob(PART.format("*"))
     return [first, *sorted(later)] if first.is_file() else []
 
 
 class Recorder:
-    """Writes both files; every message goes to the recording, an Event to its own line as well.
+    """Writer of both files: every message goes to the recording, and an Event also to a line of the event log.
 
-    With `split_bytes` the recording goes on in a new file once one has that size; of these the first, which knows the
-    mission, and the newest are kept, `keep` in all (0: all).
+    With `split_bytes` the recording continues in a new file once a file has that size. `keep` files are retained
+    (0: all): the first, which contains the mission, and the newest.
     """
 
     def __init__(self, folder: Path, about: dict[str, str], *, split_bytes: int = 0, keep: int = 0) -> None:
-        """`about` (scenario, fleet, mode, seed) goes into the recording. Raises OSError when a file cannot be made."""
+        """Open both files; `about` (scenario, fleet, mode, seed) is written to the recording. Raises OSError."""
         self._folder = folder
         self._about = about
         self._split_bytes = split_bytes
@@ -70,7 +70,7 @@ class Recorder:
         self._open()
 
     def record(self, t: float, key: str, message: Message) -> None:
-        """`message` travelled on `key`, `t` [s] since the run's start; what came before that is given as 0."""
+        """Record `message`, sent on `key` at `t` [s] since the run's start; a negative `t` is recorded as 0."""
         t = t if t > 0.0 else 0.0
         channel = self._channels.get(key)
         if channel is None:
@@ -84,21 +84,22 @@ class Recorder:
             self.flush_when_due(t)
 
     def flush_when_due(self, t: float) -> None:
-        """Close the chunk every second, so that all before can be read even if this process dies."""
+        """Close the chunk every FLUSH_S, so that everything before is readable even if this process dies."""
         if t >= self._flushed_at + FLUSH_S:
             self._flushed_at = t
-            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._writer.flush()
             if 0 < self._split_bytes <= self._stream.tell():
                 self._close()
                 self._open()
 
     def close(self) -> Recording:
+        """Finish both files and return the size of the recording."""
         self._close()
         self._events.close()
         return Recording(messages=self._messages, files=self._number, bytes=self._bytes)
 
     def _open(self) -> None:
-        """Go on in a new file; each can be read without the others."""
+        """Open the next file; each file is readable without the others."""
         self._number += 1
         name = RECORDING if self._number == 1 else PART.format(f"{self._number:04}")
         self._stream: IO[bytes] = open(self._folder / name, "wb")  # noqa: SIM115 (closed by _close)
@@ -111,12 +112,12 @@ class Recorder:
             (self._folder / PART.format(f"{self._number - self._keep + 1:04}")).unlink(missing_ok=True)
 
     def _close(self) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         self._bytes += self._stream.tell()
         self._stream.close()
 
     def _open_channel(self, key: str, kind: type) -> int:
-        """`lfa/<fleet>/robot1/pose` is recorded as `/robot1/pose`."""
+        """Register the channel of a key: `lfa/<fleet>/robot1/pose` is recorded as `/robot1/pose`."""
         schema = self._schemas.get(kind)
         if schema is None:
             schema = self._writer.register_schema(f"lfa.{kind.__name__}", "jsonschema", mcap_channels.schema(kind))
@@ -125,9 +126,9 @@ class Recorder:
 
 
 def event_line(t: float, event: Event) -> bytes:
-    """One line of events.jsonl: when [s], about which robot, in which term, what, who says it, and its data.
+    """Return one line of events.jsonl: time [s], robot, term, kind, sender (`from`), and the event's data.
 
-    World, operator and recorder speak about others, and may know when: they say `robot` and `t` themselves.
+    World, operator and recorder report on other processes: their data may set `robot` and `t`.
     """
     data = mcap_channels.plain(event.data)
     sender = event.header.sender

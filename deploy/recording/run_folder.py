@@ -1,4 +1,4 @@
-"""The run folder: where it is, what it is about, and its scenario as a file that can be run again."""
+"""Run folder: its path, its description, and its scenario as a file that can be run again."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RUNS = Path("runs")
 
 
 class About(Struct, frozen=True):
-    """Which run this is: goes into the recording and the summary."""
+    """Description of a run, written to the recording and the summary."""
 
     scenario: str
     mode: str
@@ -31,9 +31,9 @@ class About(Struct, frozen=True):
 
 
 def make(out: Path | None, scenario: Scenario) -> Path:
-    """A new folder with the scenario in it: `out` or `runs/<scenario>-<time>`, suffixed -2, -3 ... when taken.
+    """Create and return a folder with the scenario in it: `out` or `runs/<scenario>-<time>`, with -2, -3 ... if taken.
 
-    Raises Refused when it cannot be made.
+    Raises Refused when it cannot be created.
     """
     path = out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
@@ -46,12 +46,12 @@ def make(out: Path | None, scenario: Scenario) -> Path:
 
 
 def scenario_of(folder: Path) -> Scenario:
-    """The scenario that was run, as drawn."""
+    """Return the scenario of a run, as drawn."""
     return load(str(folder / SCENARIO))
 
 
 def toml(scenario: Scenario) -> str:
-    """`scenario` in TOML, every field said; `lfa.world.description.load.load` reads it back."""
+    """Return `scenario` in TOML with every field; `lfa.world.description.load.load` reads it back."""
     fields: dict[str, Any] = msgspec.to_builtins(scenario)
     fields.pop("name")
     tables = {name: value for name, value in fields.items() if isinstance(value, dict)}
@@ -72,7 +72,7 @@ def _value(value: Any) -> str:
 
 
 def _free(path: Path) -> Path:
-    """`path`, or one beside it by a like name. Raises Refused for one without a name, such as `.`, that is taken."""
+    """Return `path`, with a numeric suffix if it is taken. Raises Refused for a taken path without a name, like `.`."""
     if path.name in ("", "..") and not _empty(path):
         raise Refused(f"--out {path}: is not empty, must be a new or an empty folder")
     suffix, candidate = 1, path

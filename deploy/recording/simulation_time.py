@@ -1,14 +1,17 @@
-"""The world's time as an onlooker knows it: 0 at the world's start, carried forward between two ground truths."""
+"""Estimate of the world's time in an observer session: 0 at the world's start, extrapolated between ground truths."""
 
 from __future__ import annotations
 
 from collections import deque
 
-WINDOW = 50  # ground truths: one second
+WINDOW = 50  # number of ground truths: one second
 
 
 class WorldTime:
-    """`at` is the onlooker's own clock [s]. Delays of single messages do not show: the least of a second counts."""
+    """Offset between the observer's clock and world time, the least over WINDOW messages, which filters delays.
+
+    Every `at` is a time [s] of the observer's own clock.
+    """
 
     def __init__(self) -> None:
         self._offsets: deque[float] = deque(maxlen=WINDOW)
@@ -19,10 +22,10 @@ class WorldTime:
         return bool(self._offsets)
 
     def see(self, at: float, time_s: float) -> None:
-        """A ground truth of world time `time_s` came at `at`."""
+        """Update the offset by a ground truth of world time `time_s` [s] that arrived at `at`."""
         self._offsets.append(at - time_s)
         self._offset = min(self._offsets)
 
     def of(self, at: float) -> float:
-        """World time at `at`; 0 before anything is known."""
+        """Return the world time [s] at `at`; 0 before the first ground truth."""
         return max(0.0, at - self._offset) if self._offsets else 0.0

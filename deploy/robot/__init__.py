@@ -1,1 +1,4 @@
-"""A real robot's driver: it speaks the hardware topics and embeds the gateway, as the simulated world does."""
+"""Driver of a real robot: it publishes the hardware topics and embeds the gateway, as the simulated world does.
+
+Needs the base install only; no simulation code may live here.
+"""

@@ -1,6 +1,6 @@
-"""What a driver needs of a robot's own hardware, and a simulated motor that has it. Yours goes beside this one.
+"""Hardware interface of a driver, and a simulated motor that implements it. Put your own class beside it.
 
-A TurtleBot's `drive` writes its wheels' speeds, its `read` asks wheels, localisation, scanner and bumper. Neither may
+For a TurtleBot, `drive` writes the wheel speeds, and `read` polls wheels, localisation, scanner and bumper. Neither may
 block: both are called 50 times a second from one thread. SI units and radians, frames as in REP-105.
 """
 
@@ -16,7 +16,7 @@ from lfa.protocol.mission import Limits
 
 
 class Scan(Struct, frozen=True):
-    """One turn of the scanner, as `lfa.protocol.messages.robot.LaserScan`: beyond the range +inf, bad nan (REP-117)."""
+    """One scan, as `lfa.protocol.messages.robot.LaserScan`: +inf beyond the range, nan for a bad beam (REP-117)."""
 
     angle_min: float
     angle_increment: float
@@ -26,32 +26,32 @@ class Scan(Struct, frozen=True):
 
 
 class Reading(Struct, frozen=True):
-    """All that the hardware knows at one moment; None: nothing new since the last reading."""
+    """Measurements of the hardware at one moment; None: nothing new since the last reading."""
 
     pose_odom: Pose2D
-    """From the wheels alone: smooth, and adrift."""
+    """Pose from the wheels alone: continuous, and drifting."""
     twist: Twist
     odometer_m: float
-    """The way that it has come, whichever direction: never decreases."""
+    """Travelled distance [m], forwards and backwards: never decreases."""
     pose_map: Pose2D | None = None
-    """From localisation: right, and rare. Ten times a second is enough."""
+    """Pose from localisation: does not drift. Ten times a second is enough."""
     scan: Scan | None = None
     contact: float | None = None
-    """Where the bumper was touched: bearing in `base_link` [rad]."""
+    """Bearing [rad] in `base_link` of a bumper contact."""
 
 
 class Base(Protocol):
-    """A robot on two wheels."""
+    """Hardware of a two-wheeled robot."""
 
     def drive(self, twist: Twist, now: float) -> None:
-        """Do this from `now` on [s, monotonic]. `STILL` means brake, and comes whenever nobody may command."""
+        """Drive at `twist` from `now` on [s, monotonic]. `STILL` means brake; it comes whenever no command is valid."""
 
     def read(self, now: float) -> Reading:
-        """What is known at `now`."""
+        """Return the measurements at `now` [s, monotonic]."""
 
 
 class SimulatedBase:
-    """A motor with the mission's limits on an empty plane, from `start` in `map` on; its scanner sees nothing."""
+    """Simulated motor with the mission's limits on an empty plane, from `start` in `map`; its scanner sees nothing."""
 
     FIX_S = 0.1
     BEAMS, RANGE_MIN_M, RANGE_MAX_M = 36, 0.1, 10.0
@@ -81,7 +81,7 @@ class SimulatedBase:
         return Reading(self._pose_odom, self._twist, self._odometer_m, pose_map, scan)
 
     def _move(self, now: float) -> None:
-        """Wheels reach what is wanted as fast as they can, and are then there for the rest of the time."""
+        """Integrate up to `now`: the twist moves towards the wanted one within the limits, then stays constant."""
         dt_s, self._at = now - self._at, now
         limits = self._limits
         linear = min(limits.v_max_mps, max(-limits.v_reverse_max_mps, self._wanted.linear_x))

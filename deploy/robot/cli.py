@@ -27,7 +27,7 @@ EXAMPLE = "example: lfa-driver --id 3 --at 0,-2.4,0 (beside lfa-world SCENARIO -
 
 
 def main() -> None:
-    """Entry point of `lfa-driver`: 0 ended well, 2 refused."""
+    """Run `lfa-driver` (entry point); exit code 0 after a normal end, 2 when refused."""
     try:
         sys.exit(start(_parser().parse_args()))
     except Refused as refused:
@@ -74,7 +74,7 @@ def _pose(text: str) -> Pose2D:
 
 class _DriverParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """One line instead of usage and a line."""
+        """Raise Refused with one line instead of printing the usage."""
         raise Refused(f"{message} ({EXAMPLE})")
 
 
@@ -84,11 +84,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--id", required=True, type=int, help="the robot's id in the mission")
-    add("--at", default="0,0,0", metavar="X,Y,THETA", help="where it stands in map at the start [m, m, rad]")
+    add("--at", default="0,0,0", metavar="X,Y,THETA", help="start pose in map [m, m, rad]")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
-    add("--connect", metavar="ENDPOINT", help="router, like tcp/127.0.0.1:7447; a,b: or the next")
-    add("--keys", type=Path, metavar="DIR", help="this machine's folder of `lfa keys`")
-    add("--link", choices=sorted(LINK_LEASES_MS), default="std", help="how soon a silent link counts as dead")
+    add("--connect", metavar="ENDPOINT", help="router, as tcp/127.0.0.1:7447; a,b: tried in turn")
+    add("--keys", type=Path, metavar="DIR", help="this machine's key folder from `lfa keys`")
+    add("--link", choices=sorted(LINK_LEASES_MS), default="std", help="timeout of a silent link: 0.5, 1 or 2 s")
     return parser
 
 

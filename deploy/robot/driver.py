@@ -1,9 +1,9 @@
 """The Node between an agent and its robot's hardware: commands through the gateway, sensors out, fences answered.
 
-All that an agent needs of a robot, and all that a simulated world does for one (`world/robot_hardware.py`). It hears `cmd_vel`
-of its own robot, FENCE to its gateway, and its agent's liveliness; it says `sensors` (with the gateway's own moment,
-which commands must echo), `localization`, `scan` and `contact`. The gateway's deadman brakes when its agent, its
-router or the network is gone: that happens here, on this machine's clock, and needs nobody else.
+It gives an agent the same interface as the simulated world does (`world/robot_hardware.py`). It subscribes to
+`cmd_vel` of its own robot, FENCE to its gateway, and its agent's liveliness; it publishes `sensors` (with the gateway's
+own stamp, which commands must echo), `localization`, `scan` and `contact`. The gateway's deadman brakes when the agent,
+the router or the network is gone: it runs here, on this machine's clock, and depends on no other process.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ REFUSAL_EVERY_S = 0.2
 
 
 class Driver:
-    """Of robot `robot_id`; `make_base(limits, now)` takes its hardware into use, once the mission is known."""
+    """Driver of robot `robot_id`; `make_base(limits, now)` opens its hardware once the mission is known."""
 
     def __init__(self, fleet: str, robot_id: int, incarnation: int, make_base: Callable[[Limits, float], Base]) -> None:
         self.name = f"{DRIVER_PREFIX}{robot_id}"
@@ -64,7 +64,7 @@ class Driver:
         return inf if self.finished else self._next
 
     def receive(self, received: Received) -> list[Envelope]:
-        """A command or a fence counts at once."""
+        """Process a message: commands and fences take effect at once."""
         now, gateway = received.at, self._gateway
         match received.message:
             case MissionNote(mission=mission) if gateway is None:
@@ -94,7 +94,7 @@ class Driver:
         return []
 
     def tick(self, now: float) -> list[Envelope]:
-        """Drive what the gateway lets through, and tell what the hardware says."""
+        """Drive the twist that the gateway lets through, and return the hardware's measurements as messages."""
         if self.finished:
             return []
         if self._gateway is None or self._base is None:
@@ -131,7 +131,7 @@ class Driver:
         return [Envelope(key(self._fleet, self._robot, topic), m) for topic, m in zip(topics, sent, strict=True)]
 
     def _command(self, cmd: CmdVel, gateway: Gateway, now: float) -> list[Envelope]:
-        """Events for whoever looks on: each term in which this robot leads, and refusals, now and then."""
+        """Pass `cmd` to the gateway; return an event for each new term led and, rate-limited, for refusals."""
         reason = gateway.command(cmd, now)
         if reason is None:
             if not cmd.as_leader or cmd.term == self._led:

@@ -1,1 +1,4 @@
-"""From a run folder or a live fleet to something that a person reads."""
+"""Views of a run folder or a running fleet for people: terminal, rerun viewer, figures, report.
+
+No control and no evaluation: nothing here may be imported by a control loop, and numbers come from `deploy/analysis`.
+"""

@@ -1,7 +1,7 @@
-"""The voter in every process: what it has promised, to whom it is bound and for how long (rules E1-E4).
+"""Voter of a process: its promise, its bond and its refusals (rules E1-E4).
 
-Nothing here is kept on disk. A process that starts, also one that starts again, is a new member: it grants when a
-config names this very life of it, and its promises count in a full house only (E1, E18).
+No state is kept on disk. A process that starts or restarts is a new member: it grants only under a config that names
+this incarnation, and its promises count in a unanimous start only (E1, E18).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from lfa.protocol.messages.consensus import Config, Grant, Grantee, Member, Nack
 
 
 class Bond(Struct, frozen=True):
-    """A grant that was given: until `expiry` (own monotonic time [s]) nobody else gets one."""
+    """Grant given to one holder: until `expiry` (own monotonic time [s]) no other holder gets one."""
 
     term: Term
     holder: Member
@@ -29,16 +29,17 @@ class Acceptor:
         self._grant_s = grant_s
 
     def bound(self, now: float) -> Bond | None:
-        """The grant that is still in force."""
+        """Return the grant still in force at `now` [s]; None if there is none."""
         return self.bond if self.bond is not None and now < self.bond.expiry else None
 
     def prepare(
         self, src: Member, body: Prepare, config: Config, now: float, holder_gone: bool = False
     ) -> Promise | Nack | None:
-        """Phase 1. Refusing changes nothing here, so asking a bound voter is harmless: it is the pre-vote.
+        """Answer phase 1. A refusal changes no state, so asking a bound voter is harmless: it is the pre-vote.
 
-        E15: with `holder_gone`, a hint that the bond's holder is dead, the voter promises all the same, but tells
-        which term has to be fenced first: the hint alone frees nobody.
+        Returns None while a blank voter is silent (E1). E15: with `holder_gone` (the token of the bond's holder has
+        vanished) the voter promises nevertheless, and names the term to be fenced first: a liveliness event alone
+        frees no voter.
         """
         blank = is_first(config)
         if blank and now < self.silent_until:
@@ -52,23 +53,23 @@ class Acceptor:
         return Promise(body.term, config, needs_fence, blank)
 
     def propose(self, src: Member, body: Propose, config: Config, now: float) -> Grant | Nack:
-        """Phase 2: first grant and renewal alike."""
+        """Answer phase 2: first grant and renewal alike."""
         outdated = body.term < self.promised or body.term <= self.released or config.version > body.config.version
         bond = self.bound(now)
-        # E3: bound voters grant to their holder or to whom it hands over (E16), or when its term can move nothing more.
+        # E3: a bound voter grants only to its holder, to that holder's successor (E16), or after its term is fenced.
         foreign = bond is not None and bond.holder not in (body.holder, src) and bond.term not in body.fenced
         if outdated or foreign:
             return self.refusal(body.term, config, now)
         self.promised = body.term
-        # E2: the voter counts from now, the holder from before it asked: delay can only shorten what the holder has.
+        # E2: the voter counts from now, the holder from before it asked: delay can only shorten the holder's lease.
         self.bond = Bond(body.term, body.holder, now + self._grant_s)
         return Grant(body.term, body.round, body.config.version, nonce=now)
 
     def release(self, term: Term) -> bool:
-        """E4: the holder of exactly `term` has stopped; answers whether that freed this voter."""
+        """Record that the holder of `term` has stopped; return True if that ended this voter's bond (E4)."""
         self.released = max(self.released, term)
-        # Nothing up to here is granted any more, so nothing is promised, and refusals say what beats it: others may
-        # have started anew, with terms below, since.
+        # Terms up to `term` are never granted again, so they are not promised either, and refusals name the term to
+        # exceed: other processes may have restarted since, with lower terms.
         self.promised = max(self.promised, term)
         if self.bond is None or self.bond.term != term:
             return False
@@ -76,7 +77,7 @@ class Acceptor:
         return True
 
     def refusal(self, term: Term, config: Config, now: float) -> Nack:
-        """When to try again, what to beat, and the newest config."""
+        """Return the refusal: the remaining bond [s], the term to exceed, and the newest config."""
         bond = self.bound(now)
         if bond is None:
             return Nack(term, self.promised, None, 0.0, config)

@@ -1,6 +1,6 @@
-"""One attempt to lead: a term, the promises for it, and when to ask again (rule E5).
+"""One candidacy: its term, the promises for it, and the time of the next PREPARE (rules E5, E6, E15, E18-E21).
 
-The term stays the same while the attempt only repeats itself, so a robot that nobody hears does not drive terms up.
+The term stays the same while PREPAREs are only repeated, so an unheard robot does not increase terms.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ PAUSE_GROWTH = 1.5
 
 class Candidate:
     def __init__(self, term: Term, timing: Timing, now: float, forget: tuple[Member, ...] = ()) -> None:
-        """`forget`: lives that an operator declared dead for this attempt (E20)."""
+        """Start a candidacy; `forget`: incarnations that an operator declared dead for this attempt (E20)."""
         self.term = term
         self.forget = forget
         self.began_at = now
         self.ask_at = now
         self.holder: Holder | None = None
-        """Set once the first PROPOSE has left: the term as it is being granted."""
+        """Holder state of the term while it is being granted; set when the first PROPOSE is sent."""
         self.transferred = False
-        """The term was handed over by its issuer (E16): this process only counts the grants."""
+        """True if the issuer handed the term over (E16): this process only counts the grants."""
         self._promised: dict[Member, Grantee | None] = {}
         self._absent: frozenset[Grantee] = frozenset()
-        """E21: stands for whatever a robot that did not promise may still command."""
+        """Placeholders for the leases of robots that did not promise and may still command (E21)."""
         self._fenced: set[Grantee] = set()
         self._with_state: set[Member] = set()
         self._refused: set[Member] = set()
@@ -41,14 +41,14 @@ class Candidate:
         self._pause_s_max = timing.heartbeat_s
 
     def asked(self, now: float) -> None:
-        """A PREPARE leaves: each pause is longer than the one before, up to a heartbeat."""
+        """Record that a PREPARE is sent at `now` [s]; each pause until the next is longer, up to a heartbeat."""
         self.ask_at = now + self._pause_s
         self._fences_asked.clear()
         self._bound_until = now
         self._pause_s = min(self._pause_s * PAUSE_GROWTH, self._pause_s_max)
 
     def wait_until(self, at: float) -> None:
-        """A voter is bound until then: ask again exactly when all that refused are free."""
+        """Schedule the next PREPARE for `at` [s], when a refusing voter's bond ends, or later if another ends later."""
         self._bound_until = max(self._bound_until, at)
         self.ask_at = self._bound_until
 
@@ -60,28 +60,28 @@ class Candidate:
 
     @property
     def gives_up_at(self) -> float:
-        """Without a quorum's grants by then, what was granted is worth nothing any more."""
+        """Time [s] at which the candidacy is abandoned: grants received by then without a quorum have expired."""
         return float("inf") if self.holder is None else self.holder.began_at + self._act_s
 
     def promised(self, src: Member, needs_fence: Grantee | None, blank: bool) -> None:
-        """The newest answer of a voter counts: a bond that it named before may have run out since."""
+        """Record a promise; a voter's newest answer replaces the earlier one, whose bond may have expired."""
         self._promised[src] = needs_fence
         if not blank:
             self._with_state.add(src)
 
     def fenced(self, robot_id: int, old: Term) -> None:
-        """The gateway of `robot_id` refuses `old`."""
+        """Record that the gateway of `robot_id` refuses the term `old`."""
         self._fenced |= {g for g in self._named() if (g.holder.id, g.term) == (robot_id, old)}
 
     def unfenced(self, me: Member) -> list[Grantee]:
-        """E15: leases that promisers are still bound to, and whose gateways have not answered yet."""
+        """Return the leases of other holders that promisers are bound to and that are not fenced yet (E15), sorted."""
         return sorted((g for g in self._named() - self._fenced if g.holder != me), key=_of_whom)
 
     def _named(self) -> set[Grantee]:
         return {g for g in self._promised.values() if g is not None} | self._absent
 
     def fences_to_ask(self, me: Member) -> list[Grantee]:
-        """Of these the ones not asked for since the last PREPARE."""
+        """Return the unfenced leases for which no FENCE was sent since the last PREPARE, and mark them as sent."""
         due = [grantee for grantee in self.unfenced(me) if grantee not in self._fences_asked]
         self._fences_asked.update(due)
         return due
@@ -91,11 +91,12 @@ class Candidate:
         return tuple(sorted(grantee.term for grantee in self._fenced if grantee.term != NO_TERM))
 
     def refused(self, src: Member, config: Config, ended: Callable[[Member], bool]) -> bool:
-        """`src` has promised a higher term; answers whether this one is beaten.
+        """Record that `src` has promised a higher term; return True if this candidacy is beaten.
 
-        While it only asks, at once: a higher term of its own costs nothing. Once grants are on their way, only
-        when no quorum is left: a late refusal by one voter must not undo an election that the others have made.
-        A life that has `ended` leaves none: counted in, it would hold an attempt that nobody can grant for T_act.
+        In phase 1 it is beaten at once: a higher term of its own costs nothing. In phase 2 it is beaten only if no
+        quorum is left: a late refusal by one voter must not undo an election that the others have made. An incarnation
+        that has `ended` without a grant does not count towards that quorum; otherwise an attempt that can no longer
+        be granted would go on for T_act.
         """
         self._refused.add(src)
         if self.holder is None:
@@ -105,20 +106,23 @@ class Candidate:
         return not is_quorum(config, left)
 
     def has_quorum(self, config: Config) -> bool:
-        """E18: only lives that `config` names, and that know of a config, count."""
+        """Return True if a quorum of `config` has promised; only incarnations that know a config count (E18)."""
         return is_quorum(config, self._with_state)
 
     def _answering(self, superseded: Callable[[Member], bool]) -> dict[int, Member]:
-        """Of each id the newest life that promised. One that a later life has replaced cannot grant any more:
-        counted in, it would hold an attempt that needs all of them for T_act."""
+        """Return the newest incarnation that promised, by id, without superseded ones.
+
+        A superseded incarnation cannot grant any more; counted in, it would block a unanimous attempt for T_act.
+        """
         return {m.id: m for m in sorted(self._promised) if not superseded(m)}
 
     def full_house(
         self, config: Config, universe: tuple[int, ...], superseded: Callable[[Member], bool]
     ) -> tuple[Member, ...]:
-        """E18: the newest life of every id, when all have promised and hold no quorum of `config`; else nobody.
+        """Return the members of a unanimous start (E18): the newest incarnation of every id.
 
-        Of the ids that are forgotten in this attempt none is needed (E20).
+        Empty unless all ids have promised, without a quorum of `config`. Ids that this attempt forgets are not needed
+        (E20).
         """
         lives = self._answering(superseded)
         forgotten = {m.id for m in self.forget}
@@ -127,9 +131,9 @@ class Candidate:
         return tuple(lives[i] for i in universe if i in lives)
 
     def blank_majority(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
-        """E19: the newest lives of more than half of all ids, the witness (last of `universe`) among them; else nobody.
+        """Return the newest incarnations of more than half of all ids, the witness (last of `universe`) included (E19).
 
-        One promiser that remembers a config is enough to forbid it.
+        Empty if there are too few, or if a single promiser remembers a config.
         """
         lives = self._answering(superseded)
         here = tuple(lives[i] for i in universe if i in lives)
@@ -137,14 +141,14 @@ class Candidate:
         return here if fine else ()
 
     def whoever_answers(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
-        """E21: the newest lives that promised. Every other robot's gateway is to refuse what is below, first."""
+        """Return the newest incarnations that promised (E21); the gateways of all other robots must be fenced first."""
         lives = self._answering(superseded)
         absent = (i for i in universe if i not in lives and i != WITNESS_ID)
         self._absent = frozenset(Grantee(NO_TERM, Member(i, ANY_LIFE)) for i in absent)
         return tuple(lives[i] for i in universe if i in lives)
 
     def expects_nobody(self) -> None:
-        """E21 does not apply (any more)."""
+        """Clear the placeholders of absent robots: E21 does not apply (any more)."""
         self._absent = frozenset()
 
 

@@ -1,4 +1,4 @@
-"""What a `Lease` wants done: plain data, to be carried out in order by whoever runs it."""
+"""Effects that a `Lease` returns: plain data, to be carried out in order by its caller."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ Cause = Literal["expired", "released", "deposed", "handed_over"]
 
 
 class Send(Struct, frozen=True):
-    """Publish `body`. `to` is `all`, `robot2`, `witness`, or `gateway2`: the gateway of robot 2 (its driver's)."""
+    """Order to publish `body`. `to` is `all`, `robot2`, `witness`, or `gateway2`: robot 2's gateway (in its driver)."""
 
     to: str
     body: LeaseBody
 
 
 class BecomeLeader(Struct, frozen=True):
-    """A quorum granted `term` to this process until `expiry`, its own monotonic time [s].
+    """Notice that a quorum granted `term` to this process until `expiry`, its own monotonic time [s].
 
-    Comes again with a higher term when a leader had to raise its own; there is no StepDown between.
+    Repeated with a higher term when a leader had to raise its own, without a StepDown in between.
     """
 
     term: Term
@@ -34,14 +34,14 @@ class LeaseExtended(Struct, frozen=True):
 
 
 class StepDown(Struct, frozen=True):
-    """Command no more under `term`."""
+    """Order to send no further command under `term`."""
 
     term: Term
     cause: Cause
 
 
 class AdoptChain(Struct, frozen=True):
-    """A newer config than the last one; `config.chain[0]` leads."""
+    """Notice of a newer config; `config.chain[0]` leads."""
 
     config: Config
 

@@ -1,4 +1,4 @@
-"""When one process stands for election (E6), and who makes a fresh config where no quorum answers (E18-E21)."""
+"""Time at which a process stands for election (E6), and starts without a quorum of a known config (E18-E21)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from lfa.protocol.mission import Mission
 
 NEVER = float("inf")
 COLD_START_S = 3.0
-"""How long a cold start waits for everybody where `cold_start = "majority"` (E19)."""
+"""Time [s] that a cold start waits for all ids with `cold_start = "majority"` (E19)."""
 FORGET_GRANTS = 3
-"""How many T_grant an operator's order to forget holds: enough for one attempt of everybody in the line (E20)."""
+"""Validity of an operator's `forget` command, in units of T_grant: one attempt of each candidate in order (E20)."""
 
 
 class Election:
@@ -22,12 +22,12 @@ class Election:
         self.all_member_ids = all_member_ids(mission)
         self.may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
         self.at = NEVER
-        """When to stand."""
+        """Time [s] to stand for election."""
         self.base = now
-        """The moment that the line counts from."""
+        """Time [s] from which the candidates' delays count."""
         self.forget_until = now
         self._forget: tuple[Member, ...] = ()
-        """E20: whom the operator declared dead, until `forget_until`."""
+        """Incarnations that the operator declared dead, until `forget_until` (E20)."""
         self._timing = timing
         majority = mission.cold_start == "majority" and mission.witness
         self._majority_from = now + COLD_START_S if majority else NEVER
@@ -38,18 +38,18 @@ class Election:
         return rank(config, robot_id, lambda other: other.id not in self.may_lead or peers.is_gone(other))
 
     def after(self, at: float, config: Config, peers: FailureDetector) -> None:
-        """E6: stand once `at` has passed, each robot its rank later than the one before it."""
+        """Schedule the candidacy for `at` [s] plus this robot's rank times `rank_step_s` (E6)."""
         self.base = at
         if self.me.id not in self.may_lead:
             self.at = NEVER
             return
-        # Who has no vote stands last: it is needed only when nobody who has one can lead.
+        # A robot without a vote stands last: it is needed only when no voter can lead.
         named = is_first(config) or self.me in config.voters
         place = self.rank(config, self.me.id, peers) + (0 if named else len(config.voters))
         self.at = at + place * self._timing.rank_step_s
 
     def held(self, now: float) -> None:
-        """Somebody holds a lease: whoever hears of it is not alone (E21)."""
+        """Record that a lease is held at `now` [s], which restarts the time to E21."""
         self._lonely_from = now + self._lonely_s
 
     def forget(self, lost: tuple[Member, ...], now: float) -> None:
@@ -61,7 +61,7 @@ class Election:
     def without_quorum(
         self, candidate: Candidate, config: Config, peers: FailureDetector, now: float
     ) -> tuple[Member, ...]:
-        """Who makes a fresh config where no quorum of the known one answers; nobody while too few do."""
+        """Return the members of a fresh config if no quorum of the known one answers (E18, E19, E21); else ()."""
         lives = candidate.full_house(config, self.all_member_ids, peers.is_superseded)
         if not lives and is_first(config) and now >= self._majority_from:
             lives = candidate.blank_majority(self.all_member_ids, peers.is_superseded)

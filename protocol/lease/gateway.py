@@ -1,9 +1,9 @@
-"""The actuator gateway of one robot: the only way to its motors, and therefore the place where a lost lease ends.
+"""The actuator gateway of one robot: the only path to its actuators, and therefore the place where a lost lease ends.
 
-Believing that one leads harms nobody; commanding does. So terms are enforced here, last, on one clock: a command
-is obeyed when its term is not below the highest seen, and when it echoes a moment of this gateway's own clock
-that is younger than the deadman D. A command computed before a pause carries an old moment, whatever its sender
-has believed since (rule E12). The world holds the gateways of the robots that it simulates, a robot's driver its own.
+A false leader does harm by its commands only. So terms are enforced at the actuators, on one clock: a
+command is obeyed if its term is not below the highest seen, and if it echoes a time of this gateway's own clock that is
+younger than the deadman D. A command computed before a pause carries an old time, whatever its sender's state (rule
+E12). The world holds the gateways of simulated robots; a real robot's driver holds its own.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ FOREIGN_STAMP, OLD_STAMP, LATCHED, TWO_HOLDERS = "foreign_stamp", "old_stamp", "
 
 
 class Gateway:
-    """Term fence, stamp age, deadman and latch of robot `robot_id`; `now` is the gateway's own monotonic time [s]."""
+    """Fence, stamp age check, deadman and latch of robot `robot_id`; `now` is the gateway's own monotonic time [s]."""
 
     def __init__(self, robot_id: int, incarnation: int, timing: Timing, now: float) -> None:
         self.robot_id = robot_id
         self.incarnation = incarnation
         self.term_max: Term = NO_TERM
         self.refused: dict[str, int] = {}
-        """Refused commands by reason."""
+        """Number of refused commands by reason."""
         self._deadman_s = timing.deadman_s
-        # E13: an earlier life of this gateway may have promised a fence that this one does not know of. Every lease
-        # that could be under that fence has run out after T_grant.
+        # E13: an earlier incarnation of this gateway may have confirmed a fence unknown to this one. Every lease below
+        # that fence has expired after T_grant.
         self._shut_until = now + timing.grant_s
         self._obeyed = 0
-        """The newest incarnation of the robot's agent that was heard of: the only one that is obeyed."""
+        """Newest known incarnation of the robot's agent; commands of earlier ones are refused."""
         self._holder = 0
-        """Whom leader and followers of `term_max` named as its holder; 0: nobody yet."""
+        """Holder of `term_max` named by the obeyed commands; 0: none yet."""
         self._latched: Term | None = None
         self._twist = STILL
         self._stamped_at = float("-inf")
-        """The moment of this gateway that the last obeyed command echoes: how old the information is that moves it."""
+        """Time [s] of this gateway that the last obeyed command echoes; it gives the age of the command's input."""
 
     def command(self, cmd: CmdVel, now: float) -> str | None:
-        """Obey `cmd` and answer None, or answer (and count) the reason of refusal."""
+        """Obey `cmd` and return None, or count and return the reason of refusal."""
         reason = self._objection(cmd, now)
         if reason is not None:
             self.refused[reason] = self.refused.get(reason, 0) + 1
@@ -75,41 +75,41 @@ class Gateway:
         return None
 
     def fence(self, fence: Fence, now: float) -> Fenced:
-        """E11: from here on nothing below `fence.term` moves this robot, and what moved it so far is braked."""
+        """Refuse all terms below `fence.term` from now on, brake if it is new, and return the confirmation (E11)."""
         if fence.term > self.term_max:
             self.term_max, self._holder = fence.term, 0
             self._twist = STILL
         return Fenced(fence.old, fence.term)
 
     def agent_down(self, incarnation: int, now: float) -> None:
-        """E14: the robot's agent left the wire. Its leader commands are barred below the next term, at once.
+        """Brake, and bar leader commands of the disconnected agent up to the current term (E14).
 
-        A follower's commands are not: a token that vanished is a hint, and a follower harms nobody. Not to be
-        called when the gateway's own link to the router is gone too: that says nothing about the agent.
+        Follower commands are not barred: a vanished token proves nothing, and a follower does no harm. Not to be
+        called when the gateway's own link to the router is lost too: that says nothing about the agent.
         """
         if incarnation >= self._obeyed:
             self._obeyed, self._latched = incarnation, self.term_max
             self._twist = STILL
 
     def agent_up(self, incarnation: int, now: float) -> None:
-        """An agent of this robot is on the wire; a newer life than the one obeyed replaces it."""
+        """Record that an agent of this robot is connected; a newer incarnation replaces the obeyed one; stop then."""
         if incarnation > self._obeyed:
             self._obeyed = incarnation
             self._twist = STILL
 
     @property
     def latched(self) -> bool:
-        """Leader commands of `term_max` are barred."""
+        """True if leader commands of `term_max` are barred."""
         return self._latched is not None and self._latched >= self.term_max
 
     def stamp(self, now: float) -> GatewayStamp:
-        """This moment, to be echoed in the commands that are computed from it."""
+        """Return the present time of this gateway, to be echoed in the commands computed from it."""
         return GatewayStamp(self.incarnation, now)
 
     def twist(self, now: float) -> Twist:
-        """What the motors get: the last command obeyed, or a stop once the deadman has run out.
+        """Return the velocity for the actuators: the last obeyed command, or a stop once the deadman has expired.
 
-        The deadman runs from the moment that the command echoes, not from its arrival: a command that was long on
-        its way would otherwise move the robot up to 2 D after its sender's lease, and T_grant allows for one (I8).
+        The deadman counts from the time that the command echoes, not from its arrival: a delayed command could
+        otherwise move the robot up to 2 D after its sender's lease, and T_grant allows for one D (I8).
         """
         return self._twist if now - self._stamped_at <= self._deadman_s else STILL

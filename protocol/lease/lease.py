@@ -1,8 +1,8 @@
-"""The lease of one process: who leads, for how long, with whom behind it. Rules E1.. are in protocol/README.md.
+"""The lease protocol of one process: leader, lease duration and chain. Rules E1.. are in protocol/README.md.
 
-`Lease` joins the voter (`acceptor.py`), the candidacy (`candidate.py`) and the held term (`holder.py`) of one
-process, owns its config, and decides when each of them speaks. It never reads a clock: `now` is the process's own
-monotonic time [s] in every call, and calls must not go back in time.
+`Lease` combines the voter (`acceptor.py`), the candidacy (`candidate.py`) and the held term (`holder.py`) of one
+process, owns its config, and decides when each of them sends. It never reads a clock: `now` is the process's own
+monotonic time [s] in every call, and must not decrease between calls.
 """
 
 from __future__ import annotations
@@ -43,31 +43,31 @@ __all__ = ["AdoptChain", "BecomeLeader", "Effect", "Lease", "LeaseExtended", "Se
 NEVER = float("inf")
 HELLO_HEARTBEATS = 3
 LATE_S = 1e-3
-"""A round that falls due no longer than this before the next tick waits until then."""
+"""Tolerance [s]: a round due at most this long before the next tick waits until that tick."""
 
 
 def gateway_of(robot_id: int) -> str:
-    """The address of a robot's gateway in `Send.to`."""
+    """Return the address of a robot's gateway in `Send.to`."""
     return f"gateway{robot_id}"
 
 
 class Lease:
-    """Voter, candidate and leader of one process; effects go out in the order given."""
+    """Voter, candidate and leader of one process; the caller carries out effects in the given order."""
 
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float, floor: int) -> None:
-        """The lease of `me` (id 0: the witness, which votes and never leads) at its start.
+        """Start the lease of `me` (id 0: the witness, which votes and never leads).
 
-        `floor` is the wall clock's milliseconds at boot (small integers in simulation): terms of this life are
-        above it. It orders lives and is no part of any safety argument.
+        `floor` is the wall clock [ms] at boot (small integers in simulation): terms of this incarnation are above it.
+        It orders incarnations and is no part of any safety argument.
         """
         self.me = me
         self.config: Config = first_config(mission)
         self.leader: int | None = None
-        """Id of the holder of the newest term heard of; None once its lease has run out as seen from here."""
+        """Id of the holder of the newest term known; None once its lease has expired by this process's own clock."""
         self.left_out: frozenset[int] = frozenset()
-        """Ids that a leader keeps out of its chain although they live: robots that are stuck (E22)."""
+        """Ids of live robots that a leader keeps out of its chain because they are stuck (E22)."""
         self.released = False
-        """A requested release is complete: the last words are out and the process may end."""
+        """True if a requested release is complete: the final messages are out and the process may end."""
         self._timing = timing
         self._grant_s = timing.grant_s
         self._election = Election(me, mission, timing, now)
@@ -76,18 +76,18 @@ class Lease:
         self._candidate: Candidate | None = None
         self._holder: Holder | None = None
         self._seen = Term(floor)
-        """The highest term heard of."""
+        """Highest term known."""
         self._peers = FailureDetector(me, timing.heartbeat_s)
         self._pending_release = PendingRelease(timing.deadman_s)
         self._pending: tuple[Member, Prepare] | None = None
-        """The last PREPARE refused because of a bond."""
+        """Last PREPARE refused because of a bond."""
         self._leader_until = now
         self._hello_at = now
         self._early: list[tuple[Member, Grant]] = []
-        """Grants of a term that we do not know yet."""
+        """Grants of a term that this process does not know yet."""
         self._elect_after(self._acceptor.silent_until)
 
-    # --- what the agent reads ----------------------------------------------------------------------------------
+    # --- read by the agent --------------------------------------------------------------------------------------
 
     @property
     def chain(self) -> tuple[int, ...]:
@@ -96,7 +96,7 @@ class Lease:
 
     @property
     def term(self) -> Term:
-        """Of the lease that this process holds, or of the config that it obeys."""
+        """Term of the lease that this process holds, else of the config that it follows."""
         return self._holder.term if self._holder is not None else self.config.version.term
 
     @property
@@ -107,28 +107,28 @@ class Lease:
 
     @property
     def missing(self) -> tuple[int, ...]:
-        """Ids that the first election of the fleet still waits for (E18); empty once somebody has led."""
+        """Ids that the first election of the fleet still waits for (E18); empty once a leader is known."""
         return (
             tuple(i for i in self._election.all_member_ids if not self._peers.knows(i)) if is_first(self.config) else ()
         )
 
     def may_command(self, now: float) -> bool:
-        """Leading, and `now` is before the lease's expiry (I1, I2)."""
+        """Return True if leading and `now` is before the lease's expiry (I1, I2)."""
         return self._holder is not None and now < _expiry(self._holder)
 
     def commanded(self, now: float) -> None:
-        """A command as leader was just sent."""
+        """Record that a command as leader was sent at `now` [s]."""
         self._pending_release.commanded_at = now
 
-    # --- what comes in -----------------------------------------------------------------------------------------
+    # --- input -------------------------------------------------------------------------------------------------
 
     def receive(self, src: Member, body: LeaseBody, now: float) -> list[Effect]:
-        """A message of another process, or of this one's own gateway (FENCED: `src.id` is the gateway's robot)."""
+        """Process a message of another process or of the own gateway (FENCED: `src.id` is the gateway's robot)."""
         effects: list[Effect] = []
         self._expire(now, effects)
         if not isinstance(body, Fenced):  # a gateway's incarnations are not its robot's
             if src.id == self.me.id:
-                return effects  # an echo of our own
+                return effects  # own message
             self._peers.heard(src, now)
         match body:
             case Propose():
@@ -148,11 +148,11 @@ class Lease:
             case Fenced():
                 self._on_fenced(src, body, now, effects)
             case Fence():
-                pass  # a gateway's matter
+                pass  # for gateways only
         return effects
 
     def tick(self, now: float, again_at: float = float("-inf")) -> list[Effect]:
-        """A deadline passed. A round that would fall due before `again_at`, the next tick, is sent now."""
+        """Do what is due at `now` [s]; send a round now if it falls due before `again_at` [s], the next tick."""
         effects: list[Effect] = []
         self._expire(now, effects)
         if now >= self._pending_release.release_at:
@@ -168,7 +168,7 @@ class Lease:
             self._stand(now, effects)
         if now >= self._hello_at:
             pause_s = HELLO_HEARTBEATS * self._timing.heartbeat_s
-            on_time = now < self._hello_at + pause_s  # then late looks do not add up
+            on_time = now < self._hello_at + pause_s  # so that late ticks do not accumulate
             self._hello_at = (self._hello_at if on_time else now) + pause_s
             if self._is_out(now) and not self._pending_release.closing:
                 effects.append(Send("all", Hello(None if is_first(self.config) else self.config.version)))
@@ -177,10 +177,10 @@ class Lease:
         return effects
 
     def next_deadline(self, again_at: float = float("-inf")) -> float:
-        """When to tick next.
+        """Return the time [s] of the next tick.
 
-        Who ticks at `again_at` anyway is not woken before it only to find that it need not say HELLO, nor just
-        before it for a round.
+        A process that ticks at `again_at` anyway is not woken earlier for a HELLO that it does not need to send, nor
+        shortly before for a round.
         """
         at = self._pending_release.release_at
         if self._hello_at >= again_at or self._candidate is not None or self._is_out(self._hello_at):
@@ -199,7 +199,7 @@ class Lease:
         return at
 
     def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:
-        """A liveliness token came (up) or went: never a proof. A leader closes the chain over a vanished follower."""
+        """Process a liveliness event, which proves nothing; a leader closes the chain over a vanished follower (E8)."""
         effects: list[Effect] = []
         self._expire(now, effects)
         if up:
@@ -213,9 +213,9 @@ class Lease:
         return effects
 
     def gateway_term(self, term: Term, now: float, latched: bool = False) -> list[Effect]:
-        """What this robot's own gateway says in `sensors`: its highest term, and whether it is latched there.
+        """Process the own gateway's state from `sensors`: its highest term, and whether it is latched in that term.
 
-        E10: a leader whose gateway has seen a higher term, or is latched in this one, raises its own term.
+        E10: a leader whose gateway has seen a higher term, or is latched in the present one, raises its own term.
         """
         effects: list[Effect] = []
         self._expire(now, effects)
@@ -227,7 +227,7 @@ class Lease:
         return effects
 
     def request_release(self, now: float) -> list[Effect]:
-        """Clean exit: stop leading, tell the voters; `released` turns true, at once if there is nothing to give up."""
+        """Exit cleanly: stop leading and release the voters; `released` turns True, at once if there is no lease."""
         effects: list[Effect] = []
         self._pending_release.closing = True
         self._election.at = NEVER
@@ -237,7 +237,7 @@ class Lease:
         return effects
 
     def request_handover(self, now: float) -> list[Effect]:
-        """The leader is stuck: give the lease to the next in the chain that answers; if none does, release it."""
+        """Hand the lease of a stuck leader to the next in the chain that answers; release it if none does (E16)."""
         effects: list[Effect] = []
         self._expire(now, effects)
         if self._holder is not None:
@@ -245,10 +245,10 @@ class Lease:
         return effects
 
     def request_forget(self, lost: tuple[Member, ...], now: float) -> list[Effect]:
-        """E20: an operator says that these lives, and every earlier one of their ids, are dead and stay off.
+        """Apply an operator's declaration that the incarnations `lost`, and all earlier ones of their ids, are dead.
 
-        It holds for one attempt of each that stands for election now, and is no news where somebody leads, or
-        where a later life of one of them was heard.
+        E20: it is valid for one attempt of each present candidate, and is ignored while a leader is known or if a later
+        incarnation of one of them was heard.
         """
         effects: list[Effect] = []
         self._expire(now, effects)
@@ -260,7 +260,7 @@ class Lease:
         return effects
 
     def _lives_on(self, lost: tuple[Member, ...]) -> bool:
-        """One of these is this very process, or was heard in a later life."""
+        """Return True if one of `lost` is this process, or was heard in a later incarnation."""
         return any(m.id == self.me.id or self._peers.is_superseded(m) for m in lost)
 
     # --- voting ------------------------------------------------------------------------------------------------
@@ -280,10 +280,10 @@ class Lease:
             if self._candidate is None:
                 self._elect_after(max(now + 2.0 * self._timing.heartbeat_s, self._election.base))
         elif answer is not None and answer.remaining_s > 0.0:
-            self._pending = (src, body)  # answered again as soon as the bond ends: it may have overtaken the news
+            self._pending = (src, body)  # answered again when the bond ends: it may have overtaken the RELEASE
 
     def _stands_before(self, src: Member, body: Prepare) -> bool:
-        """E5: in the first election of a fleet nobody promises to a candidate further back than itself."""
+        """Return True if this process precedes the candidate `src` in the first election of a fleet (E5)."""
         first = is_first(self.config) and body.version == self.config.version and self.me.id in self._election.may_lead
         return first and not self._pending_release.closing and self._rank(self.me.id) < self._rank(src.id)
 
@@ -300,7 +300,7 @@ class Lease:
             effects.append(Send(robot_name(body.holder.id), answer))
         self._yield_to(body.term, now, effects)
         if answer is not None and body.holder != self.me:
-            self._step_down(now, "deposed", effects)  # the own voter has let go: our term is fenced
+            self._step_down(now, "deposed", effects)  # the own voter has granted another holder
         self._adopt(body.config, now, effects)
         if answer is not None and body.holder == self.me:
             self._take_over(body, answer, now, effects)
@@ -311,7 +311,7 @@ class Lease:
 
     def _on_release(self, body: Release, now: float, effects: list[Effect]) -> None:
         freed = self._acceptor.release(body.term)
-        # Whoever has no vote was bound to nobody, and yet waits for the lease that it knew of to run out.
+        # A process without a vote has no bond, but waits for the known lease to expire.
         known = self._holder is None and body.term == self.config.version.term and self._acceptor.bound(now) is None
         if not (freed or known):
             return
@@ -320,13 +320,13 @@ class Lease:
         self._answer_pending(now, effects)
 
     def _on_holder_gone(self, now: float, effects: list[Effect]) -> None:
-        """E15: a hint that the holder is dead starts the next in the chain, and answers whoever was faster than it."""
+        """Start the election after the holder's token vanished; answer a PREPARE that came before that event (E15)."""
         if self._acceptor.bound(now) is not None and self._holder_gone() and self._candidate is None:
             self._elect_after(now)
             self._answer_pending(now, effects)
 
     def _holder_gone(self) -> bool:
-        """The token of the holder that this voter is bound to vanished."""
+        """Return True if the token of the holder that this voter was last bound to has vanished."""
         bond = self._acceptor.bond
         return bond is not None and self._peers.is_gone(bond.holder)
 
@@ -336,7 +336,7 @@ class Lease:
             self._on_prepare(*pending, now, effects)
 
     def _yield_to(self, term: Term, now: float, effects: list[Effect]) -> None:
-        """Whoever promises or grants a higher term gives up its own lower candidacy."""
+        """Give up an own candidacy lower than `term`, which this process has promised or granted."""
         if self._candidate is not None and term > self._candidate.term:
             self._drop_candidate(now, effects)
             self._elect_after(now + 2.0 * self._timing.heartbeat_s)
@@ -347,12 +347,12 @@ class Lease:
         return self._election.rank(self.config, robot_id, self._peers)
 
     def _elect_after(self, at: float) -> None:
-        """E6: stand for election when the line has come to us, counted from `at`."""
+        """Schedule the own candidacy by rank, counted from `at` [s] (E6)."""
         if not self._pending_release.closing:
             self._election.after(at, self.config, self._peers)
 
     def _stand(self, now: float, effects: list[Effect]) -> None:
-        """A new candidacy under a term above all that was heard of. A leader may stand too: it raises its term."""
+        """Start a candidacy under a term above all known ones. A leader does so too, to raise its term (E10)."""
         self._elect_after(now + self._grant_s)
         bond = self._acceptor.bound(now)
         if bond is not None and bond.holder != self.me and not self._holder_gone():
@@ -365,7 +365,7 @@ class Lease:
         self._press(self._candidate, now, effects)
 
     def _press(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
-        """The candidacy's deadline: ask (again) for promises, or (again) for grants."""
+        """Act on the candidacy's deadline: send PREPARE or PROPOSE (again), or give up."""
         if candidate.holder is not None:
             if now >= candidate.gives_up_at:
                 self._drop_candidate(now, effects)
@@ -391,7 +391,7 @@ class Lease:
         self._fence_or_propose(candidate, now, effects)
 
     def _fence_or_propose(self, candidate: Candidate, now: float, effects: list[Effect]) -> None:
-        """E15: phase 2 begins when every lease that a promiser is bound to is fenced at its holder's own gateway."""
+        """Send FENCE for each lease that a promiser is bound to; start phase 2 when all gateways confirmed (E15)."""
         lives: tuple[Member, ...] = ()
         candidate.expects_nobody()
         if not candidate.has_quorum(self.config):
@@ -418,7 +418,7 @@ class Lease:
             self._fence_or_propose(candidate, now, effects)
 
     def _drop_candidate(self, now: float, effects: list[Effect]) -> None:
-        """Give the candidacy up. Grants for it are given back, unless this robot may still move under another term."""
+        """Give up the candidacy and release its grants, unless this robot may still move under another term."""
         candidate, self._candidate = self._candidate, None
         if candidate is None or candidate.holder is None or self._holder is not None:
             return
@@ -432,7 +432,7 @@ class Lease:
             self._election.held(now)
         candidate, holder = self._candidate, self._holder
         newer = body.config.version > self.config.version
-        # Whatever a voter refuses, it tells what it will refuse next: asking on under a lower term is in vain.
+        # Every refusal names the promised term: repeating the request under a lower term is useless.
         in_vain = candidate is not None and candidate.holder is None and body.promised > candidate.term
         if candidate is not None and (body.term == candidate.term or in_vain):
             if newer:
@@ -454,13 +454,13 @@ class Lease:
                 self._stand(now, effects)  # E10
         elif newer and candidate is None and holder is None:
             self._adopt(body.config, now, effects)
-            # Who holds a lease under it, if anybody, speaks within a heartbeat, or is told of by this very refusal.
+            # A holder under that config, if any, sends within a heartbeat, or this refusal names it.
             self._elect_after(now + max(body.remaining_s * SLOWEST, self._timing.heartbeat_s))
 
     # --- leading -----------------------------------------------------------------------------------------------
 
     def _send_round(self, holder: Holder, now: float, effects: list[Effect]) -> None:
-        """One PROPOSE to all, this process's own voter first."""
+        """Send one PROPOSE to all; the own voter answers first."""
         propose = holder.next_propose(self.config, now)
         own = self._acceptor.propose(self.me, propose, self.config, now)
         if not isinstance(own, Grant):
@@ -478,7 +478,7 @@ class Lease:
         elif self._holder is not None and self._holder.term == body.term:
             self._count(self._holder, src, body, now, effects)
         elif body.term > self.term:
-            self._early = [*self._early[1 - VOTERS_MAX :], (src, body)]  # of a hand-over that is still on its way
+            self._early = [*self._early[1 - VOTERS_MAX :], (src, body)]  # hand-over: PROPOSE still to come
 
     def _count(self, holder: Holder, src: Member, grant: Grant, now: float, effects: list[Effect]) -> None:
         if not holder.granted(src, grant, self.config, now):
@@ -488,7 +488,7 @@ class Lease:
         if holder is self._holder:
             effects.append(LeaseExtended(holder.term, expiry))
             if self.config.previous is not None and self._candidate is None:
-                self._reshape(now, effects)  # the joint config may have been accepted
+                self._reshape(now, effects)  # the joint config may be accepted by now
         elif now < expiry:
             if self._candidate is not None and self._candidate.transferred:
                 self._adopt(
@@ -499,7 +499,7 @@ class Lease:
             effects.append(BecomeLeader(holder.term, expiry))
 
     def _reshape(self, now: float, effects: list[Effect]) -> None:
-        """E8, E9, E17: who is gone leaves the chain, who asks joins its tail, and the voters follow, jointly."""
+        """Write and propose the next config if chain or voters change (E8, E9, E17)."""
         holder = self._holder
         assert holder is not None
         known, policy, timing = self._peers, self._policy, self._timing
@@ -510,7 +510,7 @@ class Lease:
             self._send_round(holder, now, effects)
 
     def _on_hello(self, src: Member, body: Hello, now: float, effects: list[Effect]) -> None:
-        """E9: whoever is out asks the leader; while nobody leads, it is told the newest config."""
+        """Process a HELLO: a leader takes its sender in; without a leader, answer with the newest config (E9)."""
         if self.leader is None and (body.version is None or body.version < self.config.version):
             effects.append(Send(robot_name(src.id), self._acceptor.refusal(NO_TERM, self.config, now)))
         if self._holder is None or src.id not in self._election.all_member_ids or self._peers.is_superseded(src):
@@ -524,15 +524,15 @@ class Lease:
     # --- stopping ----------------------------------------------------------------------------------------------
 
     def _expire(self, now: float, effects: list[Effect]) -> None:
-        """E7: the first thing in every call, so that nobody leads a moment longer than its lease."""
+        """Step down if the lease has expired; first action of every call, so that no leader outlasts its lease (E7)."""
         if self._holder is not None and now >= _expiry(self._holder):
             self._step_down(now, "expired", effects)
-            # A leader that can talk but not hear would keep its voters bound for ever: it falls silent, and lets
-            # others go first.
+            # A leader that can send but not receive would keep its voters bound for ever: it becomes silent, and lets
+            # others stand first.
             self._elect_after(now + self._grant_s)
 
     def _step_down(self, now: float, cause: Cause, effects: list[Effect], below: Term | None = None) -> None:
-        """Stop, have the own gateway refuse the term (all below `below`), then free the voters (E4)."""
+        """Stop leading and fence the own gateway below `below` (default: just above the term), before RELEASE (E4)."""
         holder, self._holder = self._holder, None
         if holder is None:
             return
@@ -542,7 +542,7 @@ class Lease:
         effects.append(Send(gateway_of(self.me.id), Fence(holder.term, below or _just_above(holder.term))))
 
     def _stopped(self, now: float, effects: list[Effect]) -> None:
-        """The own gateway refuses the term, or its last command is too old: RELEASE, or what was to be handed over."""
+        """Send RELEASE or the transfer proposal: the own gateway refuses the term, or its last command is too old."""
         term, transfer_proposal = self._pending_release.end()
         self.released = self._pending_release.closing
         if term is None:
@@ -561,10 +561,10 @@ class Lease:
     # --- handing over ------------------------------------------------------------------------------------------
 
     def _hand_over(self, holder: Holder, now: float, effects: list[Effect]) -> None:
-        """E16: stop, then ask the voters to bind themselves to the successor under a term of ours.
+        """Stop, then ask the voters to bind themselves to the successor under a new term of this process (E16).
 
-        Its lease starts at a moment that it stamped itself before, so no clock but its own is needed. The config stays
-        as it is, version included: a new one is the new leader's to write, after its quorum.
+        The successor's lease starts at its own nonce, so that only its own clock is used. The config stays unchanged,
+        version included: the new leader writes a new one after its quorum.
         """
         successor = self._successor(holder, now)
         if successor is not None:
@@ -578,7 +578,7 @@ class Lease:
         self._elect_after(now + self._grant_s)
 
     def _successor(self, holder: Holder, now: float) -> tuple[Member, float] | None:
-        """The first behind us that may lead and granted within t_chain: its life, and its clock's moment then."""
+        """Return the first follower that may lead and was heard within t_chain, with the nonce of its last grant."""
         for member in self.config.chain[1:]:
             nonce = holder.nonces.get(member)
             fit = (
@@ -591,7 +591,7 @@ class Lease:
         return None
 
     def _take_over(self, body: Propose, own: Grant, now: float, effects: list[Effect]) -> None:
-        """E16: a term was handed to us. Count its grants, also those that were faster than the news."""
+        """Take over a term handed to this process; count its grants, also those that came before the PROPOSE (E16)."""
         if body.nonce is None or self._holder is not None or self._candidate is not None:
             return
         candidate = Candidate(body.term, self._timing, now)
@@ -604,10 +604,10 @@ class Lease:
             if self._candidate is candidate and grant.term == body.term:
                 self._count(candidate.holder, src, grant, now, effects)
 
-    # --- small -------------------------------------------------------------------------------------------------
+    # --- helpers -----------------------------------------------------------------------------------------------
 
     def _adopt(self, config: Config, now: float, effects: list[Effect]) -> None:
-        """A newer config becomes ours. One of another leader ends our lease: it has been fenced, or has run out."""
+        """Adopt `config` if newer; step down if another leads it, as the own lease is then fenced or expired."""
         if config.version > self.config.version:
             if config.chain[0] != self.me:
                 self._step_down(now, "deposed", effects)
@@ -615,7 +615,7 @@ class Lease:
             effects.append(AdoptChain(config))
 
     def _is_out(self, now: float) -> bool:
-        """E9: bound to nobody (a learner always is), or this life of it is not in the leader's chain."""
+        """Return True if bound by no grant (always so for a learner) or absent from the leader's chain (E9)."""
         if self._holder is not None:
             return False
         if self.me.id != WITNESS_ID and self.me not in self.config.chain:
@@ -624,10 +624,10 @@ class Lease:
 
 
 def _expiry(holder: Holder) -> float:
-    """When a held lease ends; before a quorum has granted it has not begun."""
+    """Return the expiry [s] of a held lease; -inf before a quorum has granted it."""
     return float("-inf") if holder.expiry is None else holder.expiry
 
 
 def _just_above(term: Term) -> Term:
-    """The least term above `term`."""
+    """Return the least term above `term`."""
     return Term(term.n, term.issuer, term.incarnation + 1)

@@ -1,7 +1,7 @@
-"""Configs: the first one, and how voters and chain change. Pure functions; who may write one is `lease.py`'s matter.
+"""Configs: the first one, and changes of voters and chain. Pure functions; `lease.py` decides who may write a config.
 
-The order of the chain survives every change: the dead leave it, whoever was out returns at the tail (E9). Voters change
-jointly (E17): the new config counts with the quorums of both, until both have accepted it.
+Every change keeps the order of the chain: dead robots leave it, returning robots join at the tail (E9). Voters change
+jointly (E17): the new config needs quorums of both electorates, until both have accepted it.
 """
 
 from __future__ import annotations
@@ -13,37 +13,37 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID
 
 VOTERS_MAX = 7
-"""Lease traffic grows with the voters, not with the team: robots further back only learn."""
+"""Maximum number of voters: lease traffic grows with the voters, not with the team; further robots only learn."""
 ANY_LIFE = 0
-"""Incarnation in the config that nobody has written: it names no life, so nobody can vote in it."""
+"""Incarnation in the first config, which no leader wrote: it names no real incarnation, so no process votes in it."""
 
 Gone = Callable[[Member], bool]
 
 
 def first_config(mission: Mission) -> Config:
-    """What a process knows that has heard nothing: the mission's order, and no voters."""
+    """Return the config of a process that has heard no other: the mission's order, without voters."""
     return Config(Version(NO_TERM, 0), (), None, None, tuple(Member(i, ANY_LIFE) for i in mission.robots))
 
 
 def is_first(config: Config) -> bool:
-    """Nobody has led yet, as far as is known."""
+    """Return True if no leader is known to have written a config yet."""
     return config.version.term == NO_TERM
 
 
 def ids(chain: tuple[Member, ...]) -> tuple[int, ...]:
-    return tuple([member.id for member in chain])  # asked for at every control step: a generator takes twice as long
+    return tuple([member.id for member in chain])  # called at every control step: a generator takes twice as long
 
 
 def all_member_ids(mission: Mission) -> tuple[int, ...]:
-    """Every id that the mission names, the witness last."""
+    """Return every id of the mission, the witness last."""
     return (*mission.robots, WITNESS_ID) if mission.witness else mission.robots
 
 
 def rank(config: Config, me: int, passable: Gone) -> int:
-    """How many others stand before `me` in the line of candidates (E6).
+    """Return the number of candidates before `me` in the election order (E6).
 
-    The line is the chain behind the lost leader, without those who are `passable` (known to be gone, or never
-    leading); whoever is not in it, the lost leader included, comes after it.
+    The order is the chain behind the lost leader, without `passable` members (known to be gone, or not allowed to
+    lead); an id outside of it, the lost leader included, comes after it.
     """
     line = config.chain if is_first(config) else config.chain[1:]
     before = 0
@@ -55,9 +55,9 @@ def rank(config: Config, me: int, passable: Gone) -> int:
 
 
 def led_by(config: Config, leader: Member, term: Term, gone: Gone, keep_leader: bool = False) -> Config:
-    """`config` re-stamped `(term, 0)`: `leader`, then the old chain without its lost leader and without the gone.
+    """Return `config` with version `(term, 0)` and the chain `leader`, then the old chain without lost leader and dead.
 
-    With `keep_leader` the old leader gave its lease away and goes to the tail.
+    With `keep_leader` the old leader has handed its lease over and moves to the tail.
     """
     old = config.chain
     if not is_first(config) and old and old[0].id != leader.id:
@@ -67,7 +67,7 @@ def led_by(config: Config, leader: Member, term: Term, gone: Gone, keep_leader: 
 
 
 def unanimous_config(config: Config, leader: Member, term: Term, lives: tuple[Member, ...]) -> Config:
-    """E18: a fresh config of all the lives that promised; every one of them must accept it."""
+    """Return a fresh config of all the incarnations `lives` that promised; each of them must accept it (E18)."""
     line = [leader.id, *ids(config.chain), *ids(lives)]
     known = {m.id: m for m in lives}
     chain = tuple(known[i] for i in dict.fromkeys(line) if i in known and i != WITNESS_ID)
@@ -77,7 +77,7 @@ def unanimous_config(config: Config, leader: Member, term: Term, lives: tuple[Me
 
 
 def chosen(kept: tuple[Member, ...], chain: tuple[Member, ...], witness: Member | None) -> tuple[Member, ...]:
-    """Voters: those `kept`, the witness, then the chain from its head, up to VOTERS_MAX, each id once."""
+    """Return the voters: `kept`, the witness, then the chain from its head, up to VOTERS_MAX, each id once."""
     voters = list(kept)
     for member in (*(() if witness is None else (witness,)), *chain):
         if len(voters) < VOTERS_MAX and all(member.id != v.id for v in voters):
@@ -88,10 +88,10 @@ def chosen(kept: tuple[Member, ...], chain: tuple[Member, ...], witness: Member 
 def rewritten(
     config: Config, chain: tuple[Member, ...], voters: tuple[Member, ...], tie: Member | None, settled: bool
 ) -> Config:
-    """The next config within the term, or `config` itself when nothing changes.
+    """Return the next config within the term, or `config` itself if nothing changes.
 
-    `settled`: quorums have accepted `config`. Only then may voters change, one change at a time: first joint with the
-    previous voters, then, settled again, alone (E17).
+    `settled`: quorums have accepted `config`. Only then may voters change, one change at a time: first jointly with
+    the previous voters, then, settled again, alone (E17).
     """
     version = Version(config.version.term, config.version.seq + 1)
     if settled and config.previous is not None:

@@ -1,6 +1,6 @@
-"""Which sets of voters decide. Pure arithmetic on configs (lease.md 3.1); no state, no time.
+"""Quorum rules: pure arithmetic on configs (lease.md 3.1), without state and time.
 
-Dynamic linear voting: a majority, or exactly one half when the tie-breaker is in it. Two quorums of one electorate
+Dynamic linear voting: a majority, or exactly one half if it contains the tie-breaker. Two quorums of one electorate
 always share a voter, and while a change is joint the previous electorate must agree too, so quorums of neighbouring
 configs share one as well.
 """
@@ -15,7 +15,7 @@ NEVER = float("-inf")
 
 
 def is_half(voters: tuple[Member, ...], tie: Member | None, present: Container[Member]) -> bool:
-    """More than half of `voters`, or one half with the tie-breaker."""
+    """Return True if `present` has more than half of `voters`, or one half with the tie-breaker."""
     count = 0
     for voter in voters:
         count += voter in present
@@ -23,28 +23,28 @@ def is_half(voters: tuple[Member, ...], tie: Member | None, present: Container[M
 
 
 def agrees(electorate: Electorate, present: Container[Member]) -> bool:
-    """`present` decides for `electorate` by its own rule."""
+    """Return True if `present` is a quorum of `electorate` by its own rule."""
     if electorate.rule == "all":
         return all(voter in present for voter in electorate.voters)
     return is_half(electorate.voters, electorate.tie, present)
 
 
 def is_quorum(config: Config, present: Container[Member]) -> bool:
-    """`present` decides for `config`: for its voters and, while it is joint, for the previous ones too."""
+    """Return True if `present` is a quorum of the voters of `config` and, while joint, of the previous ones too."""
     if not is_half(config.voters, config.tie, present):
         return False
     return config.previous is None or agrees(config.previous, present)
 
 
 def electors(config: Config) -> tuple[Member, ...]:
-    """Everyone whose vote counts in `config`, each once, in a fixed order."""
+    """Return all members whose vote counts in `config`, each once, in a fixed order."""
     if config.previous is None:
         return config.voters
     return config.voters + tuple(m for m in config.previous.voters if m not in config.voters)
 
 
 def quorum_time(config: Config, times: Mapping[Member, float]) -> float | None:
-    """The latest t such that a quorum has `times` at or after t; None while no quorum has any."""
+    """Return the latest t [s] such that a quorum has `times` at or after t; None if no quorum has times."""
     time = _half_time(config.voters, config.tie, times)
     previous = config.previous
     if previous is not None:
@@ -58,7 +58,7 @@ def quorum_time(config: Config, times: Mapping[Member, float]) -> float | None:
 
 
 def _half_time(voters: tuple[Member, ...], tie: Member | None, times: Mapping[Member, float]) -> float:
-    """`is_half` from the other side: as many voters as are needed have reached this time."""
+    """Return the latest time [s] reached by enough voters for `is_half`; NEVER if there is none."""
     if not voters:
         return NEVER
     newest_first = sorted([times.get(m, NEVER) for m in voters], reverse=True)

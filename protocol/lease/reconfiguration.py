@@ -1,4 +1,4 @@
-"""What a leader makes of its config when robots go and come (E8, E9, E17, E22): a pure function of what it knows."""
+"""Changes of a leader's config when robots leave and join (E8, E9, E17, E22): a pure function of its knowledge."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from lfa.protocol.names import WITNESS_ID
 
 
 class Policy(Struct, frozen=True):
-    """What the mission says of it."""
+    """Reconfiguration settings of the mission."""
 
     tiebreak: TieBreak
     shrink: Shrink
     everybody: int
-    """How many ids there are, the witness included."""
+    """Number of ids, the witness included."""
 
 
 def reshaped(
-    config: Config, holder: Holder, me: Member, peers: FailureDetector, left_out: frozenset[int], policy: Policy, timing: Timing,
-    now: float,
+    config: Config, holder: Holder, me: Member, peers: FailureDetector, left_out: frozenset[int], policy: Policy,
+    timing: Timing, now: float,
 ) -> Config:  # fmt: skip
-    """The next config, or `config` itself.
+    """Return the next config, or `config` itself if nothing changes.
 
-    Who is gone leaves the chain, who asks joins its tail, and the voters follow, jointly.
+    Dead robots leave the chain, robots that sent HELLO join its tail, and the voters follow, jointly.
     """
 
     def stays(member: Member, silence_s: float) -> bool:

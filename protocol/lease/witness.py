@@ -1,4 +1,4 @@
-"""The witness: a voter without a robot. It breaks ties, so that one half of a team can go on and the other cannot."""
+"""The witness: a voter without a robot. It breaks ties, so that exactly one half of a partitioned team can continue."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STATUS_S = 1.0
 
 
 class Witness:
-    """A Node around `Lease` with id 0. Without a mission it asks for one."""
+    """Node around a `Lease` with id 0. Without a mission it asks for one."""
 
     name = WITNESS_NAME
 
@@ -48,7 +48,7 @@ class Witness:
 
     @property
     def lease(self) -> Lease | None:
-        """The voter's lease; None before the mission."""
+        """Lease of the witness; None before the mission."""
         return self._lease
 
     def receive(self, received: Received) -> list[Envelope]:

@@ -1,7 +1,7 @@
-"""All that travels between processes, as frozen structs, and the codec (msgpack, one array a message).
+"""Union of all messages between processes, and the codec (msgpack, one array per message).
 
 Every message begins with a `Header`: Zenoh samples carry no sender, and a stamp of the sender's own monotonic
-clock is the only time that means anything. Between machines only differences of stamps do.
+clock is the only usable time. Between machines only differences of stamps are meaningful.
 """
 
 from __future__ import annotations
@@ -29,24 +29,6 @@ from lfa.protocol.messages.team import (
     TableRow,
     Tracking,
 )
-
-# --- terms, members and configs: what the lease protocol agrees on (lease.md 3.1, 3.3) -------------------------
-
-
-# --- the lease protocol's own messages (lease.md 3.3); the header of `LeaseNote` says who speaks -----------------
-
-
-# --- what a robot's hardware says and hears ------------------------------------------------------------------
-
-
-# --- what robots tell each other ----------------------------------------------------------------------------
-
-
-# --- ground truth, for recorder and checkers only -------------------------------------------------------------
-
-
-# --- what the supervisors of a fleet's machines say and hear -------------------------------------------------------
-
 
 Message = (
     LeaseNote
@@ -79,7 +61,7 @@ _decoder: msgspec.msgpack.Decoder[Message] = msgspec.msgpack.Decoder(Message)
 
 
 class BadMessage(ValueError):
-    """Bytes from the network that are no message of ours: too long, truncated, foreign, or with absurd numbers."""
+    """Bytes from the network that are no valid message: too long, truncated, foreign, or with numbers out of bounds."""
 
 
 def encode(message: Message) -> bytes:
@@ -87,9 +69,9 @@ def encode(message: Message) -> bytes:
 
 
 def decode(payload: bytes, expected: type) -> Message:
-    """The message in `payload`. Raises BadMessage when it is no well-formed one of type `expected`.
+    """Return the message in `payload`. Raises BadMessage if it is no well-formed message of type `expected`.
 
-    Numbers that a core computes with are finite; ranges and heights alone may be infinite or nan (REP-117).
+    Numbers that a core computes with are finite; only ranges and heights may be infinite or nan (REP-117).
     """
     if len(payload) > MESSAGE_BYTES_MAX:
         raise BadMessage(f"{len(payload)} bytes, more than {MESSAGE_BYTES_MAX}")
@@ -104,7 +86,7 @@ def decode(payload: bytes, expected: type) -> Message:
     return message
 
 
-# What no single field's type tells. A table: whoever hears hundreds of messages a second asks each once.
+# Checks across several fields. A table, so that a receiver of hundreds of messages a second does one look-up for each.
 
 
 def _anything(_message: Message) -> bool:

@@ -12,7 +12,7 @@ from lfa.protocol.messages.header import Count, Header, Stamp
 
 
 class Term(Struct, frozen=True, array_like=True, order=True, gc=False):
-    """An election epoch, totally ordered and never used twice: number, issuer's id and issuer's incarnation."""
+    """Election epoch, totally ordered and never used twice: number, issuer's id and issuer's incarnation."""
 
     n: Count = 0
     issuer: Count = 0
@@ -23,30 +23,30 @@ NO_TERM = Term()
 
 
 class Member(Struct, frozen=True, array_like=True, order=True, gc=False):
-    """One life of one id. Id 0 is the witness: a voter without a robot."""
+    """One incarnation of one id. Id 0 is the witness: a voter without a robot."""
 
     id: Count
     incarnation: Count
 
 
 class Version(Struct, frozen=True, array_like=True, order=True, gc=False):
-    """Of a config: the term whose holder wrote it, and a number within that term."""
+    """Version of a config: the term whose holder wrote it, and a number within that term."""
 
     term: Term = NO_TERM
     seq: Count = 0
 
 
 class Electorate(Struct, frozen=True, array_like=True):
-    """A set of voters and its tie-breaker: the previous one counts too while a change is joint."""
+    """Set of voters and its tie-breaker. While a change is joint, the previous electorate must agree too."""
 
     voters: tuple[Member, ...]
     tie: Member | None = None
     rule: str = "half"
-    """`half` (majority, or one half with the tie-breaker) or `all` (after a full house, lease.md 3.9)."""
+    """Quorum rule: `half` (majority, or one half with the tie-breaker) or `all` (unanimous start, lease.md 3.9)."""
 
 
 class Config(Struct, frozen=True, array_like=True):
-    """The one versioned record of a term: who votes and who follows whom. `chain[0]` leads."""
+    """Versioned record of voters and chain, written by the holder of a term. `chain[0]` leads."""
 
     version: Version
     voters: tuple[Member, ...]
@@ -56,7 +56,7 @@ class Config(Struct, frozen=True, array_like=True):
 
 
 class GatewayStamp(Struct, frozen=True, array_like=True, gc=False):
-    """A moment of a gateway's own clock, echoed in commands so that their age is judged on one clock only."""
+    """Time [s] of a gateway's own clock, echoed in commands so that their age is measured on one clock only."""
 
     incarnation: Count
     time: Stamp
@@ -66,11 +66,11 @@ class Prepare(Struct, frozen=True, array_like=True, tag="prepare"):
     term: Term
     version: Version
     forget: tuple[Member, ...] = ()
-    """Lives that an operator declared dead for this attempt only, and with them every earlier one of their ids."""
+    """Incarnations that an operator declared dead for this attempt only, with all earlier ones of their ids (E20)."""
 
 
 class Grantee(Struct, frozen=True, array_like=True):
-    """Whom a voter is still bound to: the exact term, its holder and the holder's incarnation."""
+    """Lease that a voter is still bound to: the exact term, its holder and the holder's incarnation."""
 
     term: Term
     holder: Member
@@ -92,7 +92,7 @@ class Nack(Struct, frozen=True, array_like=True, tag="nack"):
 
 
 class Propose(Struct, frozen=True, array_like=True, tag="propose"):
-    """Lease request, renewal, config write and hand-over: the heartbeat."""
+    """Lease request, renewal, config write and hand-over; it is also the heartbeat."""
 
     term: Term
     config: Config
@@ -110,30 +110,30 @@ class Grant(Struct, frozen=True, array_like=True, tag="grant"):
 
 
 class Release(Struct, frozen=True, array_like=True, tag="release"):
-    """The holder's own gateway refuses every term up to `term`, or its residual motion has run out."""
+    """Notice that the holder's own gateway refuses every term up to `term`, or that its residual motion has ended."""
 
     term: Term
 
 
 class Hello(Struct, frozen=True, array_like=True, tag="hello"):
-    """From anyone who holds no live grant; `version` is None for a blank process."""
+    """Request of a process that holds no live grant or is out of the chain (E9); `version` is None if it is blank."""
 
     version: Version | None
 
 
 HELLO_MARK, GRANT_MARK = (msgspec.msgpack.encode(kind.__struct_config__.tag) for kind in (Hello, Grant))
-"""Among the bytes of every note that holds one."""
+"""Byte sequences contained in every encoded LeaseNote with a Hello or a Grant."""
 
 
 class Fence(Struct, frozen=True, array_like=True, tag="fence"):
-    """To the gateway of the robot whose term `old` is to end: refuse everything below `term`."""
+    """Order to the gateway of the robot whose term `old` is to end: refuse every term below `term`."""
 
     old: Term
     term: Term
 
 
 class Fenced(Struct, frozen=True, array_like=True, tag="fenced"):
-    """From that gateway: `old` can act no more here; nothing below `term` will."""
+    """Answer of that gateway: `old` cannot act here any more, nor any term below `term`."""
 
     old: Term
     term: Term

@@ -15,19 +15,19 @@ MESSAGE_BYTES_MAX = 64 * 1024
 
 
 Count = Annotated[int, Meta(ge=0, le=2**53)]
-"""Whoever hears one can add to it and say the sum: msgpack ends at 2**64, what a JSON reader keeps exactly at 2**53."""
+"""Non-negative integer up to 2**53, so that increments still fit msgpack (2**64) and stay exact in JSON (2**53)."""
 
 
 Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
-"""A moment of somebody's own clock, or the difference of two [s]; also of one that counts from 1970."""
+"""Time of one process's own clock, or a difference of two [s]; the bound also admits clocks that count from 1970."""
 
 
 Step = Annotated[float, Meta(ge=0.001, le=NUMBER_MAX)]
-"""From one reading to the next [m]: whoever goes along them gets to the end."""
+"""Distance [m] between two readings; positive, so that a loop over the readings ends."""
 
 
 class Header(Struct, frozen=True, array_like=True, gc=False):
-    """Who says it, in which of its lives, as how manieth on this topic, and when by its own clock [s]."""
+    """Sender, its incarnation, the sequence number on this topic, and the time [s] on the sender's own clock."""
 
     sender: str
     incarnation: Count

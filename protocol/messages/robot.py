@@ -10,7 +10,7 @@ from lfa.protocol.messages.header import Count, Header, Step
 
 
 class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
-    """Wheel odometry and the gateway's state, as of `header.stamp` on the driver's clock."""
+    """Wheel odometry and gateway state at `header.stamp` on the driver's clock."""
 
     header: Header
     pose_odom: Pose2D
@@ -28,7 +28,7 @@ class Localization(Struct, frozen=True, array_like=True, tag="localization"):
 
 
 class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):
-    """REP-117: beyond `range_max_m` is +inf, below `range_min_m` is -inf, a bad reading is nan."""
+    """Laser scan by REP-117: beyond `range_max_m` is +inf, below `range_min_m` is -inf, a bad reading is nan."""
 
     header: Header
     angle_min: Number
@@ -39,12 +39,12 @@ class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):
 
 
 class GroundProfile(Struct, frozen=True, array_like=True, tag="ground"):
-    """The floor ahead, looked down upon: heights along three lines parallel to the direction of travel.
+    """Height profile of the floor ahead, along three lines parallel to the direction of travel.
 
-    The lines are those of the left wheel, the centre and the right wheel: what lies beside all three is not in the
-    way. Point j of line i is at x = `first_m` + j `increment_m`, y = `offsets_m[i]` in `base_link`; its height [m] is
-    relative to what the wheels stand on now, negative for a hole. In the spirit of REP-117: a bad or missing reading
-    is nan, a floor deeper than the sensor sees is -inf. Walls and bodies are no floor and do not show.
+    The lines belong to the left wheel, the centre and the right wheel; the floor beside all three is not crossed.
+    Point j of line i is at x = `first_m` + j `increment_m`, y = `offsets_m[i]` in `base_link`; its height [m] is
+    relative to the floor under the wheels, negative for a hole. In the spirit of REP-117, a bad or missing reading
+    is nan and a floor deeper than the sensor's range is -inf. Walls and bodies are not floor and do not appear.
     """
 
     header: Header
@@ -52,18 +52,18 @@ class GroundProfile(Struct, frozen=True, array_like=True, tag="ground"):
     increment_m: Step
     offsets_m: tuple[Number, ...]
     heights_m: tuple[tuple[float, ...], ...]
-    """One row a line."""
+    """Heights [m], one row per line."""
 
 
 class Contact(Struct, frozen=True, array_like=True, tag="contact"):
-    """The bumper: direction of the touch in `base_link` [rad]."""
+    """Bumper contact; `bearing` is the direction of the touch [rad] in `base_link`."""
 
     header: Header
     bearing: Number
 
 
 class CmdVel(Struct, frozen=True, array_like=True, tag="cmd_vel"):
-    """A velocity command. `as_leader` tells whether it is one of the lease's holder."""
+    """Velocity command. `as_leader` is True if the sender commands as holder of the lease."""
 
     header: Header
     twist: Twist

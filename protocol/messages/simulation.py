@@ -1,4 +1,4 @@
-"""Messages of the simulator only: ground truth and clock."""
+"""Messages that only the simulator publishes: ground truth and clock."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class TrueRobot(Struct, frozen=True, array_like=True, gc=False):
 
 
 class TrueObstacle(Struct, frozen=True, array_like=True, gc=False):
-    """A body that moves, by its place in the scenario's list."""
+    """Moving obstacle; `index` is its position in the scenario's list."""
 
     index: int
     x: float
@@ -25,7 +25,7 @@ class TrueObstacle(Struct, frozen=True, array_like=True, gc=False):
 
 
 class Truth(Struct, frozen=True, array_like=True, tag="truth"):
-    """All bodies at one moment `time_s` of the world's own time (0 at its start)."""
+    """Ground truth of all bodies at `time_s` of the world's own time (0 at its start)."""
 
     header: Header
     time_s: float

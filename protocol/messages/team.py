@@ -14,7 +14,7 @@ from lfa.protocol.mission import Mission
 
 
 class PoseStamped(Struct, frozen=True, array_like=True, tag="pose"):
-    """A robot's own pose in `map`, as of `header.stamp` on its clock; only its successor listens."""
+    """A robot's own pose in `map` at `header.stamp` on its clock; only its successor subscribes to it."""
 
     header: Header
     x: Number
@@ -28,14 +28,14 @@ class PoseStamped(Struct, frozen=True, array_like=True, tag="pose"):
 
 
 class Delay(Struct, frozen=True, array_like=True, gc=False):
-    """Least (receive - send) seen from a peer [s]: one half of a round trip, for the clock offset."""
+    """Minimum (receive - send) [s] measured for a peer: one half of a round trip, for the clock offset."""
 
     robot: Count
     least_s: Stamp
 
 
 class TableRow(Struct, frozen=True, array_like=True, tag="table"):
-    """The paper's table (X, Y, Z, theta), kept by all of all."""
+    """One robot's row of the paper's table (X, Y, Z, theta), which every robot keeps of all robots."""
 
     header: Header
     x: Number
@@ -49,7 +49,7 @@ class TableRow(Struct, frozen=True, array_like=True, tag="table"):
 
 
 class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):
-    """What a follower is commanded to keep and how it stands to it, for recorder and views."""
+    """Commanded slot of a follower and its tracking error, for recorder and views."""
 
     header: Header
     predecessor: int
@@ -57,7 +57,7 @@ class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):
     phi: float
     chi: float
     heading: float
-    """psi_r, the feasible heading [rad]."""
+    """Feasible heading psi_r [rad]."""
     slot_map: Pose2D
     error_m: float
     avoiding: bool
@@ -65,7 +65,7 @@ class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):
 
 
 class Slot(Struct, frozen=True, array_like=True, gc=False):
-    """Commanded place of one follower: k^d [m] and phi^d [rad] in its predecessor's formation frame."""
+    """Commanded position of one follower: k^d [m] and phi^d [rad] in its predecessor's formation frame."""
 
     robot: Count
     separation_m: Number
@@ -73,7 +73,7 @@ class Slot(Struct, frozen=True, array_like=True, gc=False):
 
 
 class FormationNote(Struct, frozen=True, array_like=True, tag="formation"):
-    """The orientation request of the leader of `term`; the highest (term, number) counts."""
+    """Formation request of the leader of `term`; the highest (term, number) counts."""
 
     header: Header
     term: Term
@@ -83,7 +83,7 @@ class FormationNote(Struct, frozen=True, array_like=True, tag="formation"):
 
 
 class ObstacleNote(Struct, frozen=True, array_like=True, tag="obstacles"):
-    """What one robot met or tracks, shared with all; position in `map`."""
+    """Obstacle that one robot met or tracks, shared with all robots; position [m] in `map`."""
 
     header: Header
     kind: str
@@ -94,17 +94,17 @@ class ObstacleNote(Struct, frozen=True, array_like=True, tag="obstacles"):
 
 
 class PlanNote(Struct, frozen=True, array_like=True, tag="plan"):
-    """What who leads through unknown ground knows and intends, for recorder and views: its route, a tile of its map."""
+    """Route and one map tile of a leader that explores unknown ground, for recorder and views."""
 
     header: Header
     route_map: tuple[tuple[Number, Number], ...]
-    """x, y [m]."""
+    """Route points x, y [m] in `map`."""
     cell_m: Number
     corner_map: tuple[Number, Number]
-    """The tile's lower left corner [m]."""
+    """Lower left corner [m] of the tile in `map`."""
     columns: int
     cells: bytes
-    """Row by row from the lower left: 0 nobody has looked, 1 free, 2 occupied."""
+    """Cells row by row from the lower left: 0 unknown, 1 free, 2 occupied."""
 
 
 class MissionNote(Struct, frozen=True, array_like=True, tag="mission"):
@@ -113,7 +113,7 @@ class MissionNote(Struct, frozen=True, array_like=True, tag="mission"):
 
 
 class Ask(Struct, frozen=True, array_like=True, tag="ask"):
-    """`what` names a topic whose last message the sender would like to have again."""
+    """Request to publish the last message of the topic `what` again."""
 
     header: Header
     what: str
@@ -133,7 +133,7 @@ class Level(StrEnum):
 
 
 class Status(Struct, frozen=True, array_like=True, tag="status"):
-    """Diagnostics in the sense of ROS: a level, a sentence, and counters."""
+    """Diagnostics as in ROS: a level, a sentence, and counters."""
 
     header: Header
     level: Level
@@ -144,7 +144,7 @@ class Status(Struct, frozen=True, array_like=True, tag="status"):
 
 
 class Event(Struct, frozen=True, array_like=True, tag="event"):
-    """Something worth a line in `events.jsonl`: a decision, a change of role, a lease event, a contact, a fault."""
+    """Entry of `events.jsonl`: a decision, a change of role, a lease event, a contact or a fault."""
 
     header: Header
     kind: str

@@ -1,7 +1,8 @@
-"""Each Node's own inputs and ticks, in order, and a hash of what each call returned: what a replay reads.
+"""Journal of a Node for replay: its inputs and ticks in order, with a hash of the output of each call.
 
-One file for each life of a node. A four-byte length precedes each msgpack entry, so that a file cut off by SIGKILL is
-read up to its last whole entry; one `write` a wake-up puts the entries where a dead process cannot lose them.
+One file per incarnation of a node. A four-byte length precedes each msgpack entry, so that a file cut off by SIGKILL
+is readable up to its last whole entry; one `write` per wake-up hands the entries to the kernel, so that a killed
+process does not lose them.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ JOURNAL_VERSION = 1
 
 
 class Heading(Struct, frozen=True):
-    """First entry: which node this is and what it was started with."""
+    """First entry of a journal: the node and its start arguments."""
 
     version: int
     node: str
@@ -32,7 +33,7 @@ class Heading(Struct, frozen=True):
 
 
 class JournalEntry(Struct, frozen=True, array_like=True, gc=False):
-    """One call. `kind` is `message` (key and payload as they came), `local` (payload is the local event) or `tick`."""
+    """One call of the node. `kind`: `message` (key and payload as received), `local` (payload: the event) or `tick`."""
 
     kind: str
     at: float
@@ -47,7 +48,7 @@ _heading_decoder = msgspec.msgpack.Decoder(Heading)
 
 
 def digest(sent: Sequence[tuple[str, bytes]]) -> int:
-    """CRC-32 over keys and payloads of what one call returned; 0 for nothing."""
+    """Return the CRC-32 over keys and payloads of one call's output; 0 for no output."""
     crc = 0
     for key, payload in sent:
         crc = zlib.crc32(payload, zlib.crc32(key.encode(), crc))
@@ -55,10 +56,10 @@ def digest(sent: Sequence[tuple[str, bytes]]) -> int:
 
 
 class Journal:
-    """Writes one node's journal; `directory` None keeps none."""
+    """Writer of one node's journal; without a `directory` it writes nothing."""
 
     def __init__(self, directory: Path | None, heading: Heading) -> None:
-        """Raises OSError when the file cannot be made."""
+        """Create the file and write its heading. Raises OSError if the file cannot be created."""
         self._file: int | None = None
         self._pending = bytearray()
         if directory is None:
@@ -74,7 +75,7 @@ class Journal:
             self._append(JournalEntry(kind, at, key, payload, digest(sent)))
 
     def flush(self) -> None:
-        """Hand everything added so far to the kernel. On a full disk the journal ends; the robot does not."""
+        """Write all added entries to the file. On a full disk the journal ends and the robot continues."""
         if self._file is None or not self._pending:
             return
         try:
@@ -98,9 +99,9 @@ class Journal:
 
 
 def read(path: Path) -> tuple[Heading, Iterator[JournalEntry]]:
-    """Heading and entries of a journal, up to its last whole entry. Raises ValueError when it is none.
+    """Return heading and entries of a journal, up to its last whole entry. Raises ValueError if it is no journal.
 
-    The entries raise Refused where bytes were changed.
+    The iterator of entries raises Refused at corrupted bytes.
     """
     bodies = _bodies(path.read_bytes())
     try:
@@ -111,7 +112,7 @@ def read(path: Path) -> tuple[Heading, Iterator[JournalEntry]]:
 
 
 def _entries(path: Path, bodies: Iterator[bytes]) -> Iterator[JournalEntry]:
-    """Raises Refused where one of them is no entry: bytes that were changed, not cut off."""
+    """Yield the entries. Raises Refused at an undecodable one: its bytes were corrupted, not cut off."""
     for n, body in enumerate(bodies, start=1):
         try:
             yield _entry_decoder.decode(body)

@@ -1,7 +1,6 @@
-"""What a node tells in its events, as lines of its log too: for `lfa logs`, a journal, or who looks at the terminal.
+"""Log lines of a node's events, on standard error: for `lfa logs`, the system journal or a terminal.
 
-A robot never waits for a reader: a line that would not go out at once (a stopped terminal, a full pipe) is left
-out.
+A robot never waits for a reader: a line that cannot be written at once (stopped terminal, full pipe) is dropped.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ from lfa.protocol.messages.team import Event
 
 STDERR = 2
 LINE_BYTES_MAX = 1000
-"""Less than a pipe takes whole."""
+"""Maximum length [bytes] of a line, below the size that a pipe writes atomically."""
 EVENT_ENDING = "/event"
-"""Of the keys that events are said on."""
+"""Last part of the keys that events are published on."""
 
 
 def line(event: Event, wall_ms: int) -> str:
-    """`21:44:15.123Z robot2 role leader=1 role=leader term=7763`, without a line's end."""
+    """Return an event's log line: `21:44:15.123Z robot2 role leader=1 role=leader term=7763`, no newline."""
     seconds, ms = divmod(wall_ms % 86_400_000, 1000)
     at = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}.{ms:03}Z"
     term = () if event.term is None or not event.term.n else (f"term={event.term.n}",)
@@ -33,7 +32,7 @@ def line(event: Event, wall_ms: int) -> str:
 
 
 def tell(payload: bytes, wall_ms: int, out: int = STDERR) -> None:
-    """A line on the file descriptor `out` about the event that `payload` is."""
+    """Write the log line of the event in `payload` to the file descriptor `out`; ignore other payloads."""
     try:
         event = decode(payload, Event)
     except BadMessage:

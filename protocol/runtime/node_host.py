@@ -1,6 +1,6 @@
-"""A Node with its journal, codec and counters: the part of a shell that real and virtual time share.
+"""A Node with its journal, codec and counters: the part of a runner that real and virtual time share.
 
-Bytes in, bytes out. What cannot be decoded is counted and dropped here, so a core only ever sees well-formed messages.
+Input and output are bytes. Undecodable input is counted and dropped here: a core gets well-formed messages only.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _local_encoder = msgspec.msgpack.Encoder()
 
 
 class NodeHost:
-    """Calls one Node and keeps its journal. What a call returns is what there is to publish, encoded."""
+    """Adapter that calls one Node and keeps its journal. Each call returns the encoded messages to publish."""
 
     def __init__(self, node: Node, journal: Journal) -> None:
         self.node = node
@@ -26,7 +26,7 @@ class NodeHost:
         self.undecodable = 0
 
     def decoded(self, key: str, payload: bytes) -> Message | None:
-        """The message in bytes that came on `key`; None, counted, when they are none of ours, or in another's name."""
+        """Return the message in `payload`; if foreign, malformed or in another's name, count it and return None."""
         where = address(key)
         topic = TOPIC.get(where.topic) if where is not None else None
         try:
@@ -40,12 +40,12 @@ class NodeHost:
         return None
 
     def message(self, at: float, key: str, payload: bytes) -> Sent:
-        """Bytes came on `key`."""
+        """Decode and deliver `payload`, received on `key` at `at` [s]; return the messages to publish."""
         message = self.decoded(key, payload)
         return [] if message is None else self.deliver(at, key, message, payload)
 
     def deliver(self, at: float, key: str, message: Message | Local, payload: bytes) -> Sent:
-        """A decoded message, with the bytes that it came in; or a local event (`key` and `payload` empty)."""
+        """Deliver a decoded message with its bytes, or a local event (`key`, `payload` empty), and journal the call."""
         sent = _encoded(self.node.receive(Received(at, key, message)))
         if key:
             self.journal.add("message", at, key, payload, sent)
@@ -54,7 +54,7 @@ class NodeHost:
         return sent
 
     def tick(self, now: float) -> Sent:
-        """The node's deadline passed."""
+        """Tick the node at `now` [s] and journal the call; return the messages to publish."""
         sent = _encoded(self.node.tick(now))
         self.journal.add("tick", now, "", b"", sent)
         return sent

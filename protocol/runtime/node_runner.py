@@ -1,7 +1,7 @@
-"""The real-time loop around any Nodes: bus, clock, signals, journal. Agent, world, witness and drivers all run in it.
+"""The real-time loop around Nodes: bus, clock, signals, journal. Agent, world, witness and drivers all run in it.
 
-Wait for something urgent or for the next deadline, whichever is first; feed what came, tick what is due, publish what
-the cores answer, write the journals once. Nothing else decides here.
+The loop waits for an urgent arrival or the next deadline, delivers the arrivals, ticks the due nodes, publishes their
+answers, and writes the journals once. It makes no other decision.
 """
 
 from __future__ import annotations
@@ -37,36 +37,36 @@ from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASE_MS, RouterAbsent
 
 CONNECT_RETRY_S = 0.2
-STOP_GRACE_S = 0.7  # last words: a fence round trip or the residual motion, whatever the profile
+STOP_GRACE_S = 0.7  # for final messages: a fence round trip or the residual motion, in any profile
 VITALS_S = 1.0
-NAMESAKE_LEASES = 1.75  # of the two that are waited: one that waits for its mission speaks once a second only
+NAMESAKE_LEASES = 1.75  # of the two that are waited: a process that waits for its mission publishes only once a second
 TWIN_LEASES = 1.5
 WAIT_S_MAX = 0.5
 M_ARENA_MAX = -8  # malloc.h
 TICKS_KEPT = 1000
-"""Of 20 s of control: ten of them are above the 99th percentile."""
+"""Number of tick durations kept, 20 s of control: ten of them lie above the 99th percentile."""
 
 
 class Options(Struct, frozen=True):
-    """How a process joins its fleet."""
+    """Options with which a process joins its fleet."""
 
     fleet: str
     endpoint: str
-    """The router's; or several, `a,b`: the first that answers."""
+    """Endpoint of the router; or several, `a,b`: the first that answers is used."""
     journal: Path | None = None
     faults: bool = False
-    """Obey an operator's weather: bad radio, made at the receiver."""
+    """Apply link conditions set by an operator: loss and delay, simulated at the receiver."""
     lease_ms: int = LINK_LEASE_MS
     credentials: Credentials | None = None
     notify: str = ""
-    """Where systemd listens (NOTIFY_SOCKET); empty: nowhere."""
+    """Socket of systemd (NOTIFY_SOCKET); empty: none."""
 
 
 class _NodeRunner:
-    """One node in the loop: its session, its inbox, its host, and what it has followed so far."""
+    """One node in the loop, with its session, inbox, node host and current subscriptions."""
 
     def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal, weather_key: str | None) -> None:
-        """`weather_key` is where an operator's weather comes, None when there shall be none."""
+        """`weather_key` is the key of an operator's link conditions, None if they are not to be applied."""
         self.node = node
         self.host = NodeHost(node, journal)
         self.bus = bus
@@ -83,7 +83,7 @@ class _NodeRunner:
         return min(self.node.next_deadline(), wire)
 
     def step(self, now: float) -> float:
-        """Feed what came, tick if due; how late the tick was [s]."""
+        """Deliver the arrivals and tick if due; return the lateness of the tick [s], negative if none was due."""
         host, node = self.host, self.node
         for arrival in self._through_the_air(now):
             if isinstance(arrival.payload, bytes):
@@ -91,7 +91,7 @@ class _NodeRunner:
             else:
                 self._links.see(arrival.payload, now)
                 self._publish(host.deliver(arrival.at, "", arrival.payload, b""))
-        self._follow()  # before it asks: an answer that comes at once would pass by
+        self._follow()  # before the node asks: an immediate answer would be missed
         late = now - node.next_deadline()
         if late >= 0.0:
             before_s = clock.thread_s()
@@ -105,12 +105,12 @@ class _NodeRunner:
         return late
 
     def tick_p99_s(self) -> float:
-        """Processor time of a tick, at the 99th percentile of the newest; 0 before the first."""
+        """Return the processor time [s] of a tick, 99th percentile of the newest TICKS_KEPT; 0 before the first."""
         ordered = sorted(self._ticks_s)
         return ordered[int(0.99 * len(ordered))] if ordered else 0.0
 
     def _follow(self) -> bool:
-        """Hear what the node wants to hear; whether that is something else than before."""
+        """Subscribe to the node's interests; return True if they have changed."""
         wanted = self.node.interests
         if wanted is self._followed:
             return False
@@ -119,13 +119,13 @@ class _NodeRunner:
         return True
 
     def _weather_interest(self, interests: frozenset[str]) -> frozenset[str]:
-        """Nothing when there is no weather, or when the node hears operators anyway."""
+        """Return the key of link conditions; empty if not applied or if the node subscribes to operators anyway."""
         wanted = self._weather_key
         heard = wanted is None or any(matches(interest, wanted) for interest in interests)
         return frozenset() if wanted is None or heard else frozenset({wanted})
 
     def _through_the_air(self, now: float) -> list[Arrival]:
-        """What came, less what the weather took; the operator's word about the weather goes no further."""
+        """Return the arrivals after the link model; an operator's link conditions are applied and not passed on."""
         arrivals = self._tokens.debounce(self.inbox.take(), now)
         if self._weather_key is None:
             return arrivals
@@ -144,12 +144,12 @@ class _NodeRunner:
         return isinstance(note, OperatorNote) and note.command == WEATHER and self._reception.air.obey(note.arguments)
 
     def tell(self, event: Local, now: float) -> None:
-        """Give the node a local event."""
+        """Deliver a local event to the node."""
         self._publish(self.host.deliver(now, "", event, b""))
 
     def _publish(self, sent: Sent) -> None:
         if sent:
-            self.host.journal.flush()  # first: whoever hears it may outlive us, and the record must explain it
+            self.host.journal.flush()  # first: a receiver may outlive us, and the journal must explain the message
         for to, payload in sent:
             self.bus.publish(to, payload)
         for to, payload in sent:
@@ -158,11 +158,12 @@ class _NodeRunner:
 
 
 def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
-    """Run `nodes` in this process until all are finished; the exit code (0 ended well, 2 refused).
+    """Run `nodes` in this process until all are finished; return the exit code 0.
 
-    Waits for a router as long as it takes. Raises Refused when a node's name already lives in the fleet.
+    Waits for a router without a time limit. Raises Refused (exit code 2) if a node cannot take part, or if its name
+    already runs in the fleet.
     """
-    _libc("mallopt", M_ARENA_MAX, 1)  # not a heap for each of Zenoh's threads
+    _libc("mallopt", M_ARENA_MAX, 1)  # one heap, not one for each of Zenoh's threads
     wake = Wake()
     stop = _on_signals(wake)
     seats: list[_NodeRunner] = []
@@ -181,7 +182,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             _refuse_twin(bus, options, node, dead)
         gc.collect()
         gc.freeze()
-        _libc("malloc_trim", 0)  # what starting took and freed
+        _libc("malloc_trim", 0)  # memory that the start used and freed
         return _loop(seats, wake, stop, Notify(options.notify))
     finally:
         for seat in seats:
@@ -190,7 +191,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
 
 
 def connect(options: Options, inbox: Inbox, stop: _StopRequest) -> ZenohBus | None:
-    """A session with a router, waiting for it; None when told to stop meanwhile."""
+    """Wait for a router and return a session with it; None if a stop is requested meanwhile."""
     told = False
     while not stop.told:
         try:
@@ -218,7 +219,7 @@ def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: 
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
         now = clock.now()
         for seat in seats:
-            vitals.lag(min(seat.step(now), now - began))  # a first deadline lies anywhere in the past
+            vitals.lag(min(seat.step(now), now - began))  # a first deadline may lie far in the past
         if vitals.due(now):
             notify.alive()
             for seat in seats:
@@ -232,7 +233,7 @@ def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: 
 
 
 def _is_over(seats: Sequence[_NodeRunner]) -> bool:
-    """All have finished. Raises Refused when one of them cannot take part."""
+    """Return True if all nodes have finished. Raises Refused if one of them cannot take part."""
     over = True
     for seat in seats:
         if seat.node.refusal is not None:
@@ -242,7 +243,7 @@ def _is_over(seats: Sequence[_NodeRunner]) -> bool:
 
 
 class _StopRequest:
-    """Whether a signal has told this process to end; it wakes the loop as well."""
+    """Flag that a signal has requested the end of this process; the signal also wakes the loop."""
 
     def __init__(self, wake: Wake) -> None:
         self.wake = wake
@@ -262,9 +263,10 @@ def _on_signals(wake: Wake) -> _StopRequest:
 
 
 def _refuse_double(bus: ZenohBus, inbox: Inbox, options: Options, node: Node) -> list[int]:
-    """A restarted name waits two link leases for its predecessor's token; only if that one still speaks, refuse.
+    """Wait two link leases for the token of an earlier incarnation of this name to vanish.
 
-    Returns the lives whose tokens stand, but who are silent: dead, as far as anybody can tell.
+    Returns the incarnations whose tokens remain but that are silent, hence presumed dead. Raises Refused if one of them
+    still publishes.
     """
     fleet, lease_s = options.fleet, options.lease_ms / 1000.0
     dead = bus.living(fleet, node.name)
@@ -288,9 +290,10 @@ def _refuse_double(bus: ZenohBus, inbox: Inbox, options: Options, node: Node) ->
 
 
 def _refuse_twin(bus: ZenohBus, options: Options, node: Node, dead: list[int]) -> None:
-    """Two that start at one moment see nobody before they announce themselves: the younger gives way then.
+    """Resolve two simultaneous starts of one name, which see each other only after announcing: the younger gives way.
 
-    Nothing is said meanwhile, so tokens alone count. The older waits long enough for the younger to go first.
+    Neither publishes meanwhile, so only tokens count. The older waits long enough for the younger to leave first.
+    Raises Refused if another incarnation remains.
     """
 
     def twins() -> list[int]:
@@ -314,7 +317,7 @@ def _double(fleet: str, node: Node) -> Refused:
 
 
 def _speakers(inbox: Inbox) -> dict[int, float]:
-    """Incarnations that sent a well-formed message, and when the last came."""
+    """Return the incarnations that sent a well-formed message, with the arrival time [s] of the last one."""
     heard: dict[int, float] = {}
     for arrival in inbox.take():
         where = address(arrival.key)
@@ -330,7 +333,7 @@ def _speakers(inbox: Inbox) -> dict[int, float]:
 
 
 class _VitalSigns:
-    """The process's own lag, processor share and memory, once a second."""
+    """Measurement of the process's own lag, processor share and memory, once a second."""
 
     def __init__(self, now: float) -> None:
         self._since = now
@@ -356,7 +359,7 @@ class _VitalSigns:
 
 
 def _libc(name: str, *numbers: int) -> None:
-    """Call a function with which glibc alone is told to take less memory."""
+    """Call a memory-saving function of glibc; do nothing with another C library."""
     function = getattr(ctypes.CDLL(None), name, None)
     if function is not None:
         function(*numbers)

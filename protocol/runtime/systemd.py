@@ -1,4 +1,4 @@
-"""Telling systemd that a process is ready, and that its loop still turns (sd_notify(3)); silent where nobody asks."""
+"""Notifications to systemd: readiness and the watchdog of the loop (sd_notify(3)); none without a NOTIFY_SOCKET."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import contextlib
 
 
 class Notify:
-    """`address` is the environment's NOTIFY_SOCKET; empty: nobody listens."""
+    """Sender of notifications. `address` is the environment's NOTIFY_SOCKET; empty: send nothing."""
 
     def __init__(self, address: str) -> None:
         self._address = f"\0{address[1:]}" if address.startswith("@") else address
 
     def ready(self) -> None:
-        """It takes part from now on; the watchdog's time begins."""
+        """Report that the process takes part from now on; the watchdog starts."""
         self._say(b"READY=1")
 
     def alive(self) -> None:
-        """The loop has turned."""
+        """Report that the loop still runs, to reset the watchdog."""
         self._say(b"WATCHDOG=1")
 
     def _say(self, word: bytes) -> None:
         if not self._address:
             return
-        import socket  # a robot without systemd does not carry it
+        import socket  # not loaded on a robot without systemd
 
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out, contextlib.suppress(OSError):
             out.sendto(word, self._address)

@@ -1,6 +1,6 @@
-"""The three methods that a transport has, and the inbox between its threads and the loop that thinks.
+"""The bus interface of a transport, and the inbox between the transport's threads and the node's loop.
 
-A transport's callbacks only call `Inbox.put`, on whatever thread they come; the loop alone reads.
+A transport's callbacks only call `Inbox.put`, on any thread; only the loop reads.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from lfa.protocol.messages.consensus import GRANT_MARK, HELLO_MARK
 from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
 from lfa.protocol.topics import TOPIC, Address, Topic, address
 
-INBOX_SIZE_MAX = 4096  # about 5 s of all that a fleet of 16 sends to one process
+INBOX_SIZE_MAX = 4096  # about 5 s of all messages of a fleet of 16 to one process
 ANEW_S = (1.5, 6.5)
-"""Routers have met again by then: links are tried every second, and a busy machine takes its time."""
+"""Delays [s] until the repeated subscriptions: routers retry links every second, and a busy machine takes longer."""
 TOKEN_HOLD_S = 0.001
-"""How long a vanished token is held back: six times what was measured between it and the news of a router's death."""
+"""Time [s] that a vanished token is held: six times the measured delay from it to the report of a router's death."""
 OWNER_RATE_MAX_HZ = 500.0
-"""Events that one owner of keys may have heard: over twice what a leader of seven voters says at its busiest."""
+"""Maximum event rate [Hz] accepted per key owner: over twice the peak rate of a leader with seven voters."""
 OWNER_BURST_MAX = 1000.0
-"""So many may come at once, after a link or a process stood still."""
+"""Maximum number of events accepted at once from one owner, after a link or a process stalled."""
 OWNERS_MAX = 256
 
 
 class Arrival(Struct, frozen=True, gc=False):
-    """Bytes on a key, or a liveliness change, with the local time at which they came."""
+    """Bytes on a key, or a local event, with the local time of arrival [s]."""
 
     at: float
     key: str
@@ -36,28 +36,28 @@ class Arrival(Struct, frozen=True, gc=False):
 
 
 class Bus(Protocol):
-    """Where bytes go. All of it is called from the loop's thread only."""
+    """Interface of a transport. All methods are called from the loop's thread only."""
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Send `payload`; never blocks, never raises for a lost link."""
+        """Send `payload` on `key`. Never blocks, never raises for a lost link."""
 
     def follow(self, interests: frozenset[str]) -> None:
-        """Hear exactly these key expressions from now on."""
+        """Subscribe to exactly these key expressions from now on."""
 
     def close(self) -> None:
-        """Leave; peers see the token go at once."""
+        """Close the session; peers see the token vanish at once."""
 
 
 class Settable(Protocol):
     def set(self) -> None:
-        """Something urgent came. Called on any thread."""
+        """Signal an urgent arrival. Called on any thread."""
 
 
 class Wake:
-    """The loop's one wake-up, set by any thread and by signal handlers: a lock that is free when it is set.
+    """Wake-up of the loop, set by any thread and by signal handlers: a lock that is free when set.
 
-    `threading.Event` will not do: its lock is not re-entrant, and a signal that comes while the loop itself holds it
-    stops the process for good, in its own handler.
+    `threading.Event` is unsuitable: its lock is not re-entrant, so a signal that arrives while the loop holds the lock
+    would deadlock the process in its own handler.
     """
 
     def __init__(self) -> None:
@@ -68,15 +68,15 @@ class Wake:
         try:
             self._unset.release()
         except RuntimeError:
-            return  # it is set already
+            return  # already set
 
     def wait(self, timeout_s: float) -> bool:
-        """Until it is set (True) or `timeout_s`, 0 or more, have passed (False); afterwards it is unset."""
+        """Wait until set (return True) or for `timeout_s` >= 0 (return False); unset it."""
         return self._unset.acquire(timeout=timeout_s)
 
 
 class Inbox:
-    """Newest value for state topics, a bounded queue for everything else, one wake-up."""
+    """Newest value per key of state topics, a bounded queue for all other messages, and one wake-up."""
 
     def __init__(
         self,
@@ -86,10 +86,10 @@ class Inbox:
         every: bool = False,
         defer_hellos: bool = False,
     ) -> None:
-        """`wake` is set when something urgent came; several inboxes of one loop share it.
+        """`wake` is set on an urgent arrival; several inboxes of one loop share it.
 
-        `every` queues state topics too: a recorder wants all values, not the newest. `defer_hellos`: who looks in fifty
-        times a second anyway is not woken by HELLO, which all without a vote keep saying.
+        `every` queues state topics too, for a recorder that needs all values. `defer_hellos` keeps a process that reads
+        its inbox fifty times a second anyway from being woken by HELLO, which processes without a vote repeat.
         """
         self._queue: deque[Arrival] = deque()
         self._newest: dict[str, Arrival] = {}
@@ -97,15 +97,15 @@ class Inbox:
         self._every = every
         self._defer_hellos = defer_hellos
         self.defer_grants = False
-        """GRANT can wait as well: of one that leads, and whose lease lasts well beyond its next look."""
+        """Do not wake for GRANT either: set by a leader whose lease lasts well beyond its next deadline."""
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
-        """How many more events an owner may have queued, as of when."""
+        """Remaining number of events that an owner may queue, and the time [s] of that number."""
         self._wake = wake or Wake()
         self.dropped = 0
 
     def put(self, arrival: Arrival) -> None:
-        """Called from foreign threads. A full queue drops the newcomer and counts it; so does a flood of one owner."""
+        """Add an arrival, on any thread; drop and count it if the queue is full or its owner exceeds its rate."""
         where = address(arrival.key)
         topic = TOPIC.get(where.topic) if where is not None else None
         with self._lock:
@@ -125,9 +125,9 @@ class Inbox:
         return (self._defer_hellos and HELLO_MARK in payload) or (self.defer_grants and GRANT_MARK in payload)
 
     def _allows(self, where: Address | None, now: float) -> bool:
-        """A token bucket an owner: whoever floods is heard less, and takes neither time nor room from the others."""
+        """Apply one token bucket per owner, so that a flooding owner takes neither time nor space from the others."""
         if where is None:
-            return True  # the loss of our own link
+            return True  # loss of the own link
         owner = where.owner
         if owner not in self._allowances and len(self._allowances) >= OWNERS_MAX:
             self._allowances.clear()
@@ -137,7 +137,7 @@ class Inbox:
         return left >= 1.0
 
     def take(self) -> list[Arrival]:
-        """All that has come since the last call, oldest first."""
+        """Return and remove all arrivals since the last call, oldest first."""
         with self._lock:
             if not self._queue and not self._newest:
                 return []
@@ -149,11 +149,11 @@ class Inbox:
 
 
 class Tokens:
-    """Liveliness changes, without those that only tell of the own router's death (zenoh.md 0.7).
+    """Filter of liveliness events that removes those caused by the own router's death (zenoh.md 0.7).
 
-    When the link to the router breaks, every token vanishes, a moment *before* the news of the break; and
-    `session.info` still shows the link then. So a token that vanished is held for a moment, and believed when no such
-    news followed. Nor does anything that vanishes while the link is gone say anything.
+    When the link to the router breaks, every token vanishes shortly *before* the report of the break, while
+    `session.info` still shows the link. So a vanished token is held for TOKEN_HOLD_S and passed on only if no such
+    report follows. Tokens that vanish while the link is gone are ignored too.
     """
 
     def __init__(self) -> None:
@@ -161,7 +161,7 @@ class Tokens:
         self._cut_off = False
 
     def debounce(self, arrivals: list[Arrival], now: float) -> list[Arrival]:
-        """Of `arrivals` and of what is held, what may be believed by `now`; a token that is held comes later."""
+        """Return those of `arrivals` and of the held events that are valid at `now` [s]; hold new vanished tokens."""
         if not arrivals and not self._held:
             return arrivals
         through: list[Arrival] = []
@@ -189,10 +189,11 @@ class Tokens:
 
 
 class Links:
-    """When to tell the router anew what is followed: a while after links between routers may have gone and come back.
+    """Times at which subscriptions are repeated: ANEW_S after a link between routers may have broken and recovered.
 
-    Declarations that cross a link while it comes back are dropped for good by a router that is busy (zenoh#1886), and
-    with them all that they ask for. Tokens tell of links: one that vanishes, and one that comes back in the same life.
+    A busy router permanently drops declarations that cross a link while it recovers (zenoh#1886), and with them the
+    subscribed messages. Liveliness events indicate such a link: a token that vanishes, one that reappears with the same
+    incarnation, or any token that appears after the own link was lost.
     """
 
     def __init__(self) -> None:
@@ -218,7 +219,7 @@ class Links:
         self._due = [now + after_s for after_s in ANEW_S]
 
     def due(self, now: float) -> bool:
-        """True once each time."""
+        """Return True once for each due time."""
         if now < self.anew_at:
             return False
         self._due.pop(0)

@@ -1,7 +1,7 @@
-"""Who a process is on the wire: its certificate, its key and its password, as `lfa keys` lays them into one folder.
+"""Credentials of a process: its certificate, key and password, as files that `lfa keys` writes into one folder.
 
-Only the files are looked at here, without a library of cryptography: an agent stays light. Zenoh reads keys and
-certificates by itself; a secret is never held in a value that could be printed.
+This module checks the files only and uses no cryptography library, to keep an agent small. Zenoh reads keys and
+certificates itself; a secret is never stored in a value that could be printed.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _UTC_TIME, _CONTEXT_0 = 0x17, 0xA0
 
 
 class Credentials(Struct, frozen=True):
-    """Where the proof lies that one is `name`; `password_file` (`user:password`) is what secure routers ask for
-    besides, None where there is none."""
+    """Paths of the files that prove the identity `name`; secure routers also require `password_file`
+    (`user:password`), None if there is none."""
 
     name: str
     ca: Path
@@ -34,7 +34,7 @@ class Credentials(Struct, frozen=True):
     password_file: Path | None
 
     def user_and_password(self) -> tuple[str, str] | None:
-        """Read anew at each use, so that it is part of no value."""
+        """Read and return user and password; they are read at each use, so that no value stores them."""
         if self.password_file is None:
             return None
         user, _, password = self.password_file.read_text().strip().partition(":")
@@ -42,9 +42,9 @@ class Credentials(Struct, frozen=True):
 
 
 def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
-    """Those of `name` in `folder` (`ca.pem`, `<name>.pem`, `<name>.key` and perhaps `<name>.password`).
+    """Return the credentials of `name` in `folder` (`ca.pem`, `<name>.pem`, `<name>.key`, optional `<name>.password`).
 
-    Raises Refused when one is missing, readable by others, or not valid at the wall clock's `wall_ms` [ms].
+    Raises Refused if a file is missing, readable by others, or invalid at wall-clock time `wall_ms` [ms].
     """
     certificate, key, password = (folder / f"{name}.{kind}" for kind in ("pem", "key", "password"))
     for path in (folder / CA_FILE, certificate):
@@ -55,7 +55,7 @@ def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
 
 
 def check_private(path: Path) -> None:
-    """Raises Refused when others than the owner may read the file at `path`, or nobody can."""
+    """Raise Refused if the file at `path` is missing, or if others than the owner may access it."""
     try:
         mode = path.stat().st_mode
     except OSError as error:
@@ -65,7 +65,7 @@ def check_private(path: Path) -> None:
 
 
 def check_valid(path: Path, wall_ms: int) -> None:
-    """Raises Refused when the certificate at `path` is none, or not valid at the wall clock's `wall_ms` [ms]."""
+    """Raise Refused if `path` is no certificate, or not valid at wall-clock time `wall_ms` [ms]."""
     begins, ends = validity(path)
     now = datetime.fromtimestamp(wall_ms / 1000.0, UTC)
     if now > ends:
@@ -75,7 +75,7 @@ def check_valid(path: Path, wall_ms: int) -> None:
 
 
 def validity(path: Path) -> tuple[datetime, datetime]:
-    """From when until when the certificate at `path` is valid. Raises Refused when it is none."""
+    """Return start and end of the validity of the certificate at `path`. Raises Refused if it is no certificate."""
     try:
         with path.open("rb") as file:
             text = file.read(CERTIFICATE_BYTES_MAX)
@@ -87,7 +87,10 @@ def validity(path: Path) -> tuple[datetime, datetime]:
 
 
 def _validity(der: bytes) -> tuple[datetime, datetime]:
-    """RFC 5280, 4.1: Certificate { TBSCertificate { [0] version, serial, signature, issuer, validity, .. } .. }."""
+    """Return start and end of validity.
+
+    RFC 5280, 4.1: Certificate { TBSCertificate { [0] version, serial, signature, issuer, validity, .. } .. }.
+    """
     at = _element(der, _element(der, 0)[1])[1]
     if der[at] == _CONTEXT_0:
         at = _element(der, at)[2]
@@ -98,7 +101,7 @@ def _validity(der: bytes) -> tuple[datetime, datetime]:
 
 
 def _element(der: bytes, at: int) -> tuple[int, int, int]:
-    """Tag, start and end of the content of the element at `at` (X.690, 8.1)."""
+    """Return tag, start and end of the content of the element at `at` (X.690, 8.1)."""
     length, start = der[at + 1], at + 2
     if length >= 0x80:
         start += length & 0x7F
@@ -109,7 +112,10 @@ def _element(der: bytes, at: int) -> tuple[int, int, int]:
 
 
 def _time(der: bytes, at: int) -> datetime:
-    """UTCTime has years 1950 to 2049 in two digits (RFC 5280, 4.1.2.5), GeneralizedTime four."""
+    """Return the time of an element: UTCTime has years 1950 to 2049 in two digits, GeneralizedTime in four.
+
+    RFC 5280, 4.1.2.5.
+    """
     tag, start, end = _element(der, at)
     text = der[start:end].decode("ascii")
     if tag == _UTC_TIME:

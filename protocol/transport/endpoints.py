@@ -1,4 +1,4 @@
-"""What an endpoint looks like: `tcp/127.0.0.1:7447`, `unixsock-stream//run/lfa.sock`; several are written `a,b`."""
+"""Syntax of endpoints: `tcp/127.0.0.1:7447`, `unixsock-stream//run/lfa.sock`; several are written `a,b`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _ON_DISK = re.compile(r"unixsock-stream/[^?#]+")
 
 
 def check_endpoints(endpoints: str, where: str) -> None:
-    """Refuse what no router could be reached or listen at; `where` is the option that it was given by.
+    """Raise Refused for an endpoint at which no router could listen or be reached; `where` is the option's name.
 
-    Zenoh itself tells a port that is none from a router that is not there yet by its text only. Raises Refused.
+    Zenoh itself distinguishes an invalid port from an absent router only by the error text.
     """
     for endpoint in endpoints.split(","):
         networked = _NETWORKED.fullmatch(endpoint)

@@ -1,7 +1,8 @@
-"""What the air does to messages: one model for the simulator and, at a receiver, for the live bus.
+"""Link model (delay, loss, duplication, cuts) for the simulator and, at a receiver, for the live bus.
 
-Places are robots and the world (with the witness); a robot's gateway and sensors are on the robot. A cut is of one
-link in one direction, so partial and asymmetric ones are just fewer links. Tokens are not messages: they stay.
+A link connects two places: robots, or the world (with the witness); a robot's gateway and sensors are on the robot. A
+cut affects one link in one direction, so partial and asymmetric partitions are sets of cuts. Liveliness tokens are not
+messages and are not affected.
 """
 
 from __future__ import annotations
@@ -19,35 +20,35 @@ from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER, WORLD
 from lfa.protocol.transport.bus import Arrival
 
 Link = tuple[str, str]
-"""From a place to a place."""
+"""Directed link: sending place, receiving place."""
 WEATHER = "weather"
-"""The operator's command; its arguments are those of `LinkModel.obey`."""
+"""Operator command that sets link conditions; its arguments are those of `LinkModel.obey`."""
 WAITING_MAX = 4096
-"""Messages that wait in a live receiver's air."""
+"""Maximum number of delayed messages at a live receiver."""
 _NOT_IN_THE_AIR = (OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
 
 
 class Radio(Struct, frozen=True, forbid_unknown_fields=True):
-    """Weather between processes of different robots."""
+    """Link conditions between processes of different robots."""
 
     delay_s: float = 0.0005
     jitter_s: float = 0.001
-    """Uniform, on top of `delay_s`."""
+    """Upper bound [s] of a uniform random delay added to `delay_s`."""
     loss: float = 0.0
     """Probability that one message to one receiver is lost."""
     loss_burst: float = 1.0
-    """Mean number of messages lost in a row, where more than chance makes it (Gilbert's two-state channel)."""
+    """Mean number of consecutive losses, if above that of independent losses (Gilbert's two-state channel)."""
     duplication: float = 0.0
 
 
 CLEAR = Radio(delay_s=0.0, jitter_s=0.0)
-"""Adds nothing to what a live bus does by itself."""
+"""Link conditions that add nothing to those of the live bus."""
 
 
 def link_of(key: str, receiver: str) -> Link | None:
-    """The link that a message on `key` crosses on its way to the process `receiver`; None when it is none.
+    """Return the link that a message on `key` crosses to the process `receiver`; None if it crosses none.
 
-    A robot and its own hardware do not speak through the air, and operator, recorder and ground truth never do.
+    A robot and its own hardware share a place; operator, recorder and ground truth never cross a link.
     """
     where = address(key)
     if where is None or where.topic == "alive" or where.owner in _NOT_IN_THE_AIR:
@@ -69,7 +70,7 @@ def _place(name: str) -> str:
 
 
 class LinkModel:
-    """The weather with its memory: chance comes in as a seeded generator."""
+    """Link conditions with their state; randomness comes from a seeded generator."""
 
     def __init__(self, radio: Radio, random: Random) -> None:
         self.radio = radio
@@ -79,7 +80,7 @@ class LinkModel:
         self._fading: dict[tuple[str, str], bool] = {}
 
     def delays(self, sender: str, receiver: str) -> list[float]:
-        """After how long [s] a message reaches `receiver`: none when lost, two when doubled."""
+        """Return the delays [s] of a message from `sender` to `receiver`: empty if lost, two if duplicated."""
         radio = self.radio
         if (sender, receiver) in self.cuts:
             return []
@@ -91,11 +92,11 @@ class LinkModel:
         return delays
 
     def obey(self, arguments: Mapping[str, Any]) -> bool:
-        """Change the weather by an operator's word; False, and no change, when the word is none.
+        """Change the link conditions by an operator's command; return False, without a change, if it is malformed.
 
-        `cut`: pairs (from, to) of places that from now on do not reach each other, besides those cut already; `mend`:
-        pairs that do again; `radio`: fields of `Radio`; `fair`: true brings the first weather back; `heal`: true does
-        that and ends all cuts.
+        `cut`: pairs (from, to) of places to disconnect, in addition to those already cut; `mend`: pairs to reconnect;
+        `radio`: fields of `Radio`; `fair`: true restores the initial conditions; `heal`: true does that and ends all
+        cuts.
         """
         try:
             order = msgspec.convert(dict(arguments), type=_Order)
@@ -109,13 +110,14 @@ class LinkModel:
 
     @property
     def orders(self) -> dict[str, Any]:
-        """What brings another one's weather to this."""
+        """Arguments of `obey` that give another model these link conditions."""
         return {"cut": sorted(self.cuts), "radio": structs.asdict(self.radio)}
 
     def _lost(self, sender: str, receiver: str) -> bool:
-        """Gilbert's channel: leaves a fade with 1/burst, enters one so that the mean loss is `loss`.
+        """Step Gilbert's channel of a link and return True if the message is lost.
 
-        Bursts no longer than independent losses make by themselves are independent losses.
+        A fade ends with probability 1/burst and starts so that the mean loss is `loss`. Bursts no longer than those of
+        independent losses give independent losses.
         """
         loss = self.radio.loss
         leave = min(1.0 / max(self.radio.loss_burst, 1.0), 1.0 - loss)
@@ -136,7 +138,7 @@ class _Order(Struct, forbid_unknown_fields=True):
 
 
 class Reception:
-    """The air before one process on a live bus: what is put in comes out when it has come through, or never."""
+    """Link model in front of one process on a live bus: messages come out after their delay, or never."""
 
     def __init__(self, receiver: str, random: Random) -> None:
         self.air = LinkModel(CLEAR, random)
@@ -146,11 +148,11 @@ class Reception:
 
     @property
     def is_clear(self) -> bool:
-        """What comes in would come out at once."""
+        """True if messages pass without a delay or a loss."""
         return not self._waiting and not self.air.cuts and self.air.radio == CLEAR
 
     def put(self, arrival: Arrival) -> None:
-        """A message came over the bus."""
+        """Queue a message of the bus with its simulated delays; drop it if it is lost."""
         link = link_of(arrival.key, self._receiver)
         delays = [0.0] if link is None else self.air.delays(*link)
         for delay_s in delays[: WAITING_MAX - len(self._waiting)]:
@@ -159,7 +161,7 @@ class Reception:
             heapq.heappush(self._waiting, (due.at, self._order, due))
 
     def take(self, now: float) -> list[Arrival]:
-        """All that has come through until `now`, in the order of its times."""
+        """Return and remove the messages due until `now` [s], in order of time."""
         through = []
         while self._waiting and self._waiting[0][0] <= now:
             through.append(heapq.heappop(self._waiting)[2])

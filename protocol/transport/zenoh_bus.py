@@ -1,7 +1,7 @@
-"""Zenoh behind the three methods of `Bus`, and the router: the only import of `zenoh` (zenoh.md section 0).
+"""The `Bus` interface implemented with a Zenoh client session (zenoh.md section 0).
 
 Every process is a client of its machine's router, over a unix socket or loopback; no multicast, no gossip. Callbacks
-run on Zenoh's receiver threads and do nothing but append to the inbox.
+run on Zenoh's receiver threads and only append to the inbox.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ _PRIORITY = {
 
 
 class ZenohBus:
-    """A client session with declared publishers, followed subscriptions and one liveliness token."""
+    """Zenoh client session with declared publishers, subscriptions and one liveliness token."""
 
     def __init__(
         self, endpoint: str, inbox: Inbox, lease_ms: int = LINK_LEASE_MS, credentials: Credentials | None = None
     ) -> None:
-        """`endpoint` may be several, `a,b`: the first that answers, the next when that one is lost.
+        """Open the session. `endpoint` may be several, `a,b`: the first that answers, the next if that one is lost.
 
-        `credentials` are shown to routers that ask for some, and tell whose routers are trusted. Raises RouterAbsent
-        when no router answers or none lets us in, Refused for an endpoint that is none.
+        `credentials` are shown to routers that ask for them, and define the trusted routers. Raises RouterAbsent if no
+        router answers or accepts the session, Refused for an invalid endpoint.
         """
         check_endpoints(endpoint, "connect")
         self._inbox = inbox
@@ -55,11 +55,11 @@ class ZenohBus:
         )
 
     def announce(self, fleet: str, owner: str, incarnation: int) -> None:
-        """Declare the liveliness token that tells the others of this process's life."""
+        """Declare the liveliness token of this incarnation."""
         self._token = self._session.liveliness().declare_token(alive_key(fleet, owner, incarnation))
 
     def living(self, fleet: str, owner: str, timeout_s: float = 1.0) -> list[int]:
-        """Incarnations of `owner` whose tokens stand at the moment."""
+        """Return the incarnations of `owner` whose tokens exist at the moment."""
         replies = self._session.liveliness().get(alive_key(fleet, owner, "*"), timeout=timeout_s)
         keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
         return sorted(peer.incarnation for key in keys if (peer := _peer(key, PeerUp)) is not None)
@@ -77,14 +77,17 @@ class ZenohBus:
             self._followed[key] = self._subscribe(key)
 
     def resubscribe(self) -> None:
-        """Say once more to the router what is followed: declarations that cross a link while it comes back are
-        dropped for good by a router that is busy (zenoh#1886), and all that they ask for with them."""
+        """Declare all subscriptions to the router again.
+
+        A busy router permanently drops declarations that cross a link while it recovers (zenoh#1886), and with them the
+        subscribed messages.
+        """
         for key in sorted(self._followed):
             self._followed[key].undeclare()
             self._followed[key] = self._subscribe(key)
 
     def close(self) -> None:
-        """Undeclare all and leave: without it a callback subscriber would keep the interpreter alive."""
+        """Close the session with all its declarations; otherwise a callback subscriber keeps the interpreter alive."""
         self._session.close()  # type: ignore[no-untyped-call]
 
     def _declare(self, key: str) -> zenoh.Publisher:
@@ -106,7 +109,7 @@ class ZenohBus:
         return self._session.declare_subscriber(key, zenoh.handlers.Callback(self._on_sample(key), indirect=False))
 
     def _on_sample(self, expression: str) -> Callable[[zenoh.Sample], None]:
-        """What to do with a sample on `expression`, which is its key when it is no pattern."""
+        """Return the callback for samples on `expression`, which is the key itself if it has no wildcard."""
         put = self._inbox.put
         known = None if "*" in expression else expression
 
@@ -132,10 +135,10 @@ _attached: set[int] = set()
 
 
 def _attach() -> None:
-    """Let Python keep what it knows of the calling receiver thread, which lives as long as the process.
+    """Make Python keep the thread state of the calling receiver thread, which exists until the process ends.
 
-    Otherwise it makes that anew for each sample, with memory for its stack that the kernel maps and takes back: a
-    fifteenth of an agent's processor time.
+    Otherwise Python creates it again for each sample, with stack memory that the kernel maps and unmaps: a fifteenth of
+    an agent's processor time.
     """
     _attached.add(get_ident())
     ctypes.pythonapi.PyGILState_Ensure()

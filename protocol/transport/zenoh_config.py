@@ -14,48 +14,49 @@ from lfa.protocol.mission import Profile
 from lfa.protocol.transport.credentials import Credentials
 
 LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000}
-"""Silence after which a link counts as dead; over radio there are gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
+"""Silence [ms] after which a link counts as dead; radio has gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
 
 
 LINK_LEASE_MS = LINK_LEASES_MS["std"]
 
 
 QUEUE_BATCHES = dict.fromkeys(("real_time", "interactive_high", "data", "background"), 16)
-"""Zenoh's largest. With its 2 for what is express, a link that a busy machine leaves alone for a few milliseconds
-drops leases and commands: 70 to 370 of 7000 messages in 7 s at a load of 8 on 2 cores; with 16 none."""
+"""Queue size [batches] per priority, Zenoh's maximum. With Zenoh's 2 for express messages, a link that a busy machine
+does not serve for a few milliseconds drops lease messages and commands: 70 to 370 of 7000 messages in 7 s at a load of
+8 on 2 cores; with 16 none."""
 
 
 FOLLOWED_AT_ONCE = ("cmd_vel",)
-"""Not sent by themselves: the pose that each control step says next takes them along, one write for the two."""
+"""Topics not sent express: the pose published next in each control step is sent in the same write."""
 
 
 CLIENT_THREADS = 6
-"""They read, write and keep the time in turn. A client has one link at a time, and those that it lost within the last
-10 s. In one pool, what the socket brings is read by the thread that waited for it: a quarter fewer wake-ups than with
-a pool for each."""
+"""Number of threads of the one pool that reads, writes and keeps time. A client has one link at a time, and those that
+it lost within the last 10 s. In one pool, the thread that waited for the socket also reads it: a quarter fewer wake-ups
+than with one pool per task."""
 
 
 SECURE_PROTOCOLS = ("unixsock-stream", "tls", "quic")
 
 
 def default_endpoint() -> str:
-    """Where `lfa-router` listens and everybody else connects when nothing is said."""
+    """Return the default endpoint, at which `lfa-router` listens and all other processes connect."""
     base = Path(os.environ.get("XDG_RUNTIME_DIR") or f"/tmp/lfa-{os.getuid()}")
     return f"unixsock-stream/{base / 'lfa-router.sock'}"
 
 
 def socket_path(endpoint: str) -> Path | None:
-    """The file behind a unix-socket endpoint, None for other transports."""
+    """Return the path of a unix-socket endpoint, None for other transports."""
     kind, _, rest = endpoint.partition("/")
     return Path(rest) if kind == "unixsock-stream" else None
 
 
 class RouterAbsent(ConnectionError):
-    """Nobody answers at the endpoint."""
+    """No router answers at the endpoint."""
 
 
 def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
-    """True when a session can be opened at `endpoint` at the moment."""
+    """Return True if a session can be opened at `endpoint` at the moment."""
     try:
         client_session(endpoint, LINK_LEASE_MS, credentials).close()  # type: ignore[no-untyped-call]
     except zenoh.ZError:
@@ -71,14 +72,14 @@ def client_session(endpoint: str, lease_ms: int, credentials: Credentials | None
     insert_settings(config, login)
     try:
         return _open(config, CLIENT_THREADS)
-    except zenoh.ZError:  # a router that asks for no password does not take one either
+    except zenoh.ZError:  # a router without passwords rejects a session that shows one
         return _open(session_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_THREADS)
 
 
 def _open(config: zenoh.Config, threads: int) -> zenoh.Session:
-    """With so many threads for all, unless the environment says otherwise or this process has some already.
+    """Open a session with one pool of `threads` threads, unless the environment sets ZENOH_RUNTIME.
 
-    Zenoh reads it from the environment, at the first use; a child must not inherit it: it may be a router.
+    Zenoh reads ZENOH_RUNTIME at its first use in the process only; a child must not inherit it, as it may be a router.
     """
     if "ZENOH_RUNTIME" in os.environ:
         return zenoh.open(config)
@@ -118,7 +119,10 @@ def insert_settings(config: zenoh.Config, settings: dict[str, Any]) -> None:
 
 
 def _certified(credentials: Credentials, *, serves: bool) -> dict[str, Any]:
-    """How a session shows who it is over tls and quic, and whom it takes for a router (zenoh.md section 5)."""
+    """Return the settings with which a session proves its identity and verifies routers over tls and quic.
+
+    See zenoh.md section 5.
+    """
     certificate, key = str(credentials.certificate), str(credentials.key)
     tls: dict[str, object] = {
         "root_ca_certificate": str(credentials.ca),
@@ -133,12 +137,15 @@ def _certified(credentials: Credentials, *, serves: bool) -> dict[str, Any]:
 
 
 def login_settings(credentials: Credentials) -> dict[str, Any]:
-    """Name and password, which secure routers ask for on all links; a router with one asks everybody for theirs."""
+    """Return the settings of name and password, which secure routers require on all links.
+
+    A router with a password requires one from every client.
+    """
     known = credentials.user_and_password()
     return {} if known is None else {"transport/auth/usrpwd": {"user": known[0], "password": known[1]}}
 
 
 def reason_of(error: zenoh.ZError) -> str:
-    """The last cause of Zenoh's nested error text, on one line."""
+    """Return the last cause of Zenoh's nested error text, on one line."""
     text = " ".join(str(error).split())
     return text.split(" at ")[0] if len(text) > 200 else text

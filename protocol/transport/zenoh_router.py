@@ -1,4 +1,4 @@
-"""Opens a Zenoh router session that listens on given endpoints."""
+"""Zenoh router session that listens on given endpoints."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ from lfa.protocol.transport.endpoints import check_endpoints
 from lfa.protocol.transport.zenoh_config import (
     LINK_LEASE_MS,
     SECURE_PROTOCOLS,
-    session_config,
+    answers,
     insert_settings,
     login_settings,
     reason_of,
-    answers,
+    session_config,
     socket_path,
 )
 
-ROUTER_RX_THREADS = 32  # more than the tcp links that can die at once: each blocks one for 10 s (zenoh.md section 2)
+ROUTER_RX_THREADS = (
+    32  # more than the tcp links that can fail at once: each blocks one thread for 10 s (zenoh.md section 2)
+)
 
 
 UNIX_PATH_BYTES_MAX = 107
@@ -37,11 +39,11 @@ def open_router(
     credentials: Credentials | None = None,
     secure: bool = False,
 ) -> Callable[[], None]:
-    """Start a router in this process; the returned function closes it.
+    """Start a router in this process; return the function that closes it.
 
-    `credentials` serve its `tls/` and `quic/` links, both ends of which prove who they are. `secure`: whoever it is,
-    only what the rules in their folder let it say and hear passes, and a unix socket asks for name and password.
-    Raises Refused when an endpoint cannot be listened on: taken, not permitted, not secure, or too long a path.
+    `credentials` serve its `tls/` and `quic/` links, both ends of which prove their identity. With `secure`, only
+    messages that the rules in the credentials' folder permit pass, and a unix socket requires name and password.
+    Raises Refused if it cannot listen at an endpoint: taken, not permitted, not secure, or the path is too long.
     """
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {ROUTER_RX_THREADS}))")
     for endpoint in listen:
@@ -92,7 +94,7 @@ def check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -
 
 
 def _guard(credentials: Credentials) -> dict[str, Any]:
-    """What a secure router adds: passwords, and the rules of who may say and hear what. Raises Refused."""
+    """Return the settings of a secure router: passwords and access rules. Raises Refused if a file is invalid."""
     folder = credentials.certificate.parent
     users, access = folder / USERS_FILE, folder / ACCESS_FILE
     check_private(users)

@@ -56,7 +56,7 @@ class Attacked:
             if row.name not in (ROUTER_NAME, RECORDER_NAME):
                 endpoint = self.tls if row.name == "robot2" else self.unix
                 told = (endpoint if word.startswith("unixsock") else word for word in row.arguments)
-                rows.append(ProcessSpec(row.name, (*told, *self._keys(False)), again=row.restart_args))
+                rows.append(ProcessSpec(row.name, (*told, *self._keys(False)), restart_args=row.restart_args))
         return rows
 
     def _keys(self, secure: bool) -> tuple[str, ...]:
@@ -89,7 +89,7 @@ class Attacked:
     def refused(self, endpoint: str, name: str | None = TRAITOR, folder: Path | None = None, **more: Any) -> bool:
         """Whether the router lets no such session in."""
         try:
-            self.open(endpoint, name, folder, **more).close()
+            self.open(endpoint, name, folder, **more).close()  # type: ignore[no-untyped-call]
         except zenoh.ZError:
             return True
         return False
@@ -110,7 +110,7 @@ class Attacked:
             onlooker.declare_subscriber(f"lfa/{FLEET}/{name}/event", hear)
             own = attacker.declare_publisher(f"lfa/{FLEET}/{name}/event")
             until = clock.now() + HEARD_S
-            while not own.matching_status.matching and clock.now() < until:
+            while not own.matching_status.matching and clock.now() < until:  # type: ignore[attr-defined]
                 clock.sleep(0.005)
             attack(attacker)
             own.put(b"done")

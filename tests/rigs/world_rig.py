@@ -71,7 +71,8 @@ class Rig:
         return self
 
     def truth(self) -> Truth:
-        return last(self.said, Truth)
+        truth: Truth = last(self.said, Truth)
+        return truth
 
 
 def of(said: list[Envelope], kind: type, owner: str | None = None) -> list[Any]:

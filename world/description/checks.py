@@ -1,4 +1,4 @@
-"""Values of a scenario that no world can be built from: each refused with its key, itself and what would be right."""
+"""Range and consistency checks of a scenario; each error names the key, the value and the valid range."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
 
 
 def check_scenario(scenario: Scenario) -> Scenario:
-    """`scenario`, or `Refused` with the first field of it that no world could be built from."""
+    """Return `scenario` unchanged. Raises `Refused` with the first field from which no world can be built."""
     robots = scenario.mission.robots
     _require(len(robots) <= ROBOTS_MAX, "mission.robots", f"{len(robots)} ids", f"at most {ROBOTS_MAX} ids")
     check_mission(scenario.mission)
@@ -35,7 +35,7 @@ def check_scenario(scenario: Scenario) -> Scenario:
     processes = ("router", "world", "robots", *(robot_name(robot) for robot in robots))
     strange = [robot for robot in scenario.world.real_robots if robot not in robots]
     _require(not strange, "world.real_robots", strange, f"ids among {list(robots)}")
-    # E19: a real robot's gateway does not stand or fall with the witness.
+    # E19: a real robot's gateway does not fail together with the witness.
     waits = not scenario.world.real_robots or scenario.mission.cold_start == "full_house"
     _require(waits, "mission.cold_start", scenario.mission.cold_start, "full_house with world.real_robots")
     stranger = next((name for name in scenario.restart if name not in processes), None)
@@ -86,7 +86,7 @@ def _ranges(scenario: Scenario) -> list[tuple[str, float, float, float]]:
 
 
 def _check_obstacle(where: str, obstacle: Obstacle) -> None:
-    """One shape, and at most one way of moving."""
+    """Require one shape and at most one kind of motion. Raises Refused."""
     radius_m, corners_m, mass_kg = obstacle.radius_m, obstacle.corners_m, obstacle.mass_kg
     shaped = (radius_m is None) != (corners_m is None)
     _require(shaped, where, "radius_m and corners_m", "exactly one of the two")
@@ -117,7 +117,7 @@ def _check_obstacle(where: str, obstacle: Obstacle) -> None:
 
 
 def _convex(corners_m: tuple[Point, ...]) -> bool:
-    """Left at every corner, and once round in all: a five-pointed star goes twice."""
+    """Return True if every corner turns left and the corners turn once around in all (a pentagram turns twice)."""
     if len(corners_m) < 3:
         return False
     turned_rad = 0.0

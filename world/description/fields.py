@@ -1,6 +1,6 @@
-"""What the types of a scenario say of its keys: a document becomes one, or a line says which value is not of its type.
+"""Conversion of a TOML document to a Scenario by its types, with one-line errors for a value of the wrong type.
 
-A key is said as a person would: `world.obstacles[2].radius_m`, `restart.robot2`.
+Keys are written as in `--set`: `world.obstacles[2].radius_m`, `restart.robot2`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _PARTS = re.compile(r"\w+|\[\d*\]")
 
 
 def converted(document: dict[str, Any]) -> Scenario:
-    """The scenario that `document` says. Raises Refused: key, value, what would be right."""
+    """Convert `document` to a scenario. Raises Refused with the key, the value and the valid range."""
     try:
         return msgspec.convert(document, Scenario)
     except msgspec.ValidationError as error:
@@ -36,7 +36,7 @@ def converted(document: dict[str, Any]) -> Scenario:
 
 
 def value_at(document: Any, key: str) -> str:
-    """The value of a key, as far as the document has it, cut to what fits in a line."""
+    """Return the value of a key as text, as far as the document has it, cut to `SHOWN_MAX` characters."""
     for part in _PARTS.findall(key):
         document = _inside(document, part)
     text = str(document)
@@ -44,7 +44,7 @@ def value_at(document: Any, key: str) -> str:
 
 
 def structs_in(type_: Any) -> Iterator[type[msgspec.Struct]]:
-    """The Structs that an annotation speaks of: `Lidar`, `tuple[Obstacle, ...]`."""
+    """Yield the Struct types inside an annotation such as `Lidar` or `tuple[Obstacle, ...]`."""
     if isinstance(type_, type) and issubclass(type_, msgspec.Struct):
         yield type_
     for argument in getattr(type_, "__args__", ()):
@@ -52,7 +52,7 @@ def structs_in(type_: Any) -> Iterator[type[msgspec.Struct]]:
 
 
 def _inside(value: Any, part: str) -> Any:
-    """What `value` holds at a part of a key; itself when it holds nothing."""
+    """Return the member of `value` at a part of a key; `value` itself if it has no such member."""
     index = part.strip("[]")
     if isinstance(value, dict):
         return value.get(index, "...")
@@ -62,7 +62,7 @@ def _inside(value: Any, part: str) -> Any:
 
 
 def _named(document: Any, key: str) -> str:
-    """`key` with the name of the entry that msgspec leaves out, writing `restart[]`: the first of a wrong type."""
+    """Return `key` with the entry's name for msgspec's `restart[]`: that of the first entry of a wrong type."""
     table_key, entry, _ = key.partition("[]")
     if not entry:
         return key
@@ -82,7 +82,7 @@ def _fits(value: Any, type_: Any) -> bool:
 
 
 def _type_of(key: str) -> Any:
-    """What stands in the types at a key: that of the field, or of the table or list that the key goes on into."""
+    """Return the type at a key: that of the field, or of the table or list in which the rest of the key lies."""
     type_: Any = Scenario
     for part in re.findall(r"[^\W\d]\w*", key):
         struct = next(structs_in(type_), None)
@@ -93,7 +93,7 @@ def _type_of(key: str) -> Any:
 
 
 def _words_in(type_: Any) -> Iterator[str]:
-    """The words that an annotation admits: of `Literal["left", "right"] | None` these two."""
+    """Yield the words that an annotation admits: for `Literal["left", "right"] | None` these two."""
     if isinstance(type_, str):
         yield type_
     for argument in getattr(type_, "__args__", ()):

@@ -1,4 +1,4 @@
-"""The images of ROS maps: pgm (P5, P2) and png, as shades from 0 to 255 with row 0 at the top."""
+"""Readers for the images of ROS maps: pgm (P5, P2) and png, as shades from 0 to 255 with row 0 at the top."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from lfa.protocol.errors import Refused
 
 CELLS_MAX = 64_000_000
 BYTES_MAX = 5 * CELLS_MAX
-"""A cell is up to three digits and a blank, in a P2; a device that never ends is cut here."""
+"""Largest number of bytes read: a P2 cell is up to three digits and a blank; an endless device file is cut here."""
 PATH_SHOWN_MAX = 200
 
 Shades = npt.NDArray[np.uint8]
 
 
 def shades_of(yaml: Path, image: str) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
-    """Shades from 0 to 255, row 0 the top, and which cells an image with transparency shows.
+    """Return the shades from 0 to 255, row 0 the top, and the mask of opaque cells (None without transparency).
 
-    `image` is a path as `yaml` gives it, relative to that file's folder. Raises Refused with one line.
+    `image` is the path written in `yaml`, relative to that file's folder. Raises Refused with one line.
     """
     path = yaml.parent / image
     try:
@@ -40,7 +40,7 @@ def shades_of(yaml: Path, image: str) -> tuple[Shades, npt.NDArray[np.bool_] | N
 
 
 def _pgm(path: Path, data: bytes) -> Shades:
-    """P5 (bytes) or P2 (numbers), with comments; at most 255 shades."""
+    """Decode P5 (bytes) or P2 (numbers), with comments; at most 255 shades. Raises Refused."""
     match = re.match(rb"(P[25])" + 3 * rb"(?:\s|#[^\n]*\n)+(\d{1,9})" + rb"(?:[ \t]*#[^\n]*)?\s", data)
     if match is None:
         raise Refused(f"{path}: no pgm header: must be P5 or P2, width, height and 255")
@@ -51,7 +51,7 @@ def _pgm(path: Path, data: bytes) -> Shades:
         raise Refused(f"{path}: largest shade {top}{bits}: must be an 8-bit pgm, at most 255")
     body = data[match.end() :]
     if match[1] == b"P5":
-        body = body[: rows * columns] + body[rows * columns :].rstrip()  # some writers end with a new line
+        body = body[: rows * columns] + body[rows * columns :].rstrip()  # some writers append a newline
         shades = np.frombuffer(body, dtype=np.uint8)
     else:
         words = re.sub(rb"#[^\n]*", b"", body).split()
@@ -68,7 +68,7 @@ def _pgm(path: Path, data: bytes) -> Shades:
 
 
 def _png(path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
-    """Shade is the mean of the colours; what is transparent is unknown."""
+    """Decode a png: the shade is the mean of the colours, transparent cells are unknown. Raises Refused."""
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -77,7 +77,7 @@ def _png(path: Path) -> tuple[Shades, npt.NDArray[np.bool_] | None]:
             image = Image.open(path)
         with image:
             _check_size(path, *image.size)
-            image.verify()  # every chunk's check sum, which reading the cells leaves out
+            image.verify()  # checks every chunk's CRC, which decoding the pixels does not
         with Image.open(path) as image:
             if image.mode.startswith(("I", "F")):
                 raise Refused(f"{path}: png of mode {image.mode} (16-bit): must be 8-bit")

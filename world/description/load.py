@@ -1,7 +1,7 @@
-"""Scenarios from TOML files: shipped ones by name, others by path, any field overridden by `--set a.b=value`.
+"""Loading of scenarios from TOML files: shipped ones by name, others by path, fields overridden by `--set a.b=value`.
 
-An unknown key, a wrong type or an impossible value is refused with one line that says where (the file, `--set` or
-`--robots`), the key, the value and what would be right.
+An unknown key, a wrong type or an impossible value raises Refused with one line: the source (the file, `--set` or
+`--robots`), the key, the value and what would be valid.
 """
 
 from __future__ import annotations
@@ -49,23 +49,23 @@ SHORT_FORMS = {
     "start": "world.start",
     "goal": "mission.leading.route_m",
 }
-"""What `--set` knows by a shorter name; `goal=[x, y]` is a route of one point."""
+"""Short names for keys in `--set`; `goal=[x, y]` is a route of one point."""
 INSTEAD_OF = {"world.start": "starts", "world.starts": "start"}
-"""Two ways of saying where robots start: the one that is set takes the place of the other."""
+"""Keys that exclude each other: setting one removes the other."""
 QUOTES = "'\""
 NUMBER_MAX = 1e9
 
 
 def shipped() -> dict[str, Scenario]:
-    """The scenarios of this package, by name."""
+    """Return the scenarios of this package by name."""
     return {name: load(name) for name in _names()}
 
 
 def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
-    """The shipped scenario of that name or the one in that file, with fields overridden, checked.
+    """Load the shipped scenario of that name, or the one in that file, apply overrides and check it.
 
     `overrides` are texts `a.b=value` with a TOML value (bare words are text); `robots` renumbers the team to 1..N.
-    Raises Refused with one line: file, key, value, what would be right.
+    Raises Refused with one line: file, key, value, what would be valid.
     """
     path = _path_of(name_or_path)
     document = read_toml(path, "a scenario file")
@@ -83,7 +83,7 @@ def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = 
 
 
 def _on_map(scenario: Scenario, folder: Path) -> Scenario:
-    """Only a scenario with a map needs what reads images."""
+    """Resolve the map of a scenario; without a map the image readers are not imported."""
     if scenario.world.map is None and scenario.world.keepout is None and scenario.world.start is None:
         return scenario
     from lfa.world.description.map_scenario import on_map
@@ -107,7 +107,7 @@ def _path_of(name_or_path: str) -> Path:
 
 
 def _override(document: dict[str, Any], override: str) -> str:
-    """Put `a.b=value` or `a.b[0].c=value` into `document`; the key that it sets."""
+    """Apply `a.b=value` or `a.b[0].c=value` to `document` and return the key it sets. Raises Refused."""
     key, equals, text = override.partition("=")
     key, text = key.strip(), text.strip()
     if key in ("start", "goal") and not text.startswith("["):
@@ -115,7 +115,7 @@ def _override(document: dict[str, Any], override: str) -> str:
     if key == "goal":
         text = f"[{text}]"
     key = SHORT_FORMS.get(key, key)
-    if key in ("world.map", "world.keepout"):  # relative to where the command is given, not to the scenario's file
+    if key in ("world.map", "world.keepout"):  # relative to the working directory, not to the scenario's file
         text = f"'{Path(text.strip(QUOTES)).absolute()}'"
     if not equals or not re.fullmatch(r"\w+(\.\w+|\[\d+\])*", key):
         raise Refused(f"--set {override!r}: must be key=value, such as world.lidar.beams=360")
@@ -142,7 +142,7 @@ def _toml_value(key: str, text: str) -> Any:
 
 
 def _inside(table: Any, part: str | int) -> Any:
-    """What `table` holds at `part`; a table that is not there yet is made, what cannot hold anything is None."""
+    """Return the member of `table` at `part`, creating a missing table; None if `table` cannot hold members."""
     if not _holds(table, part):
         return None
     return table.setdefault(part, {}) if isinstance(table, dict) else table[part]
@@ -155,8 +155,8 @@ def _holds(table: Any, part: str | int) -> bool:
 
 
 def _renumber(document: dict[str, Any], robots: int) -> None:
-    """A team of 1..N; a longer list of starts is cut, a shorter one is refused later."""
-    if robots > ROBOTS_MAX:  # before a list is made of them
+    """Set the team to ids 1..N; a longer list of starts is cut, a shorter one is refused later. Raises Refused."""
+    if robots > ROBOTS_MAX:  # before a list of that length is built
         raise Refused(f"--robots {robots}: mission.robots = {robots} ids: must be at most {ROBOTS_MAX} ids")
     mission, world = document.setdefault("mission", {}), document.get("world", {})
     if isinstance(mission, dict):
@@ -176,7 +176,7 @@ def _refuse_unknown(document: dict[str, Any]) -> None:
 
 
 def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str, ...], dict[str, Any]]]:
-    """Every TOML table in `value` that stands for a Struct: its place, the keys that it may hold, and itself."""
+    """Yield every TOML table in `value` that stands for a Struct: its path, its allowed keys, the table itself."""
     if isinstance(value, list):
         for index, item in enumerate(value):
             yield from _tables(item, type_, f"{where.removesuffix('.')}[{index}].")
@@ -192,7 +192,7 @@ def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str
 
 
 def _refuse_endless(value: Any, where: str = "") -> None:
-    """TOML knows nan, inf and 1e300; no field of a scenario does."""
+    """Raise Refused for nan, inf and numbers above `NUMBER_MAX`: TOML allows them, no field of a scenario does."""
     if isinstance(value, int | float) and not abs(value) <= NUMBER_MAX:
         raise Refused(f"{where} = {value}: must be a finite number, at most {NUMBER_MAX:g}")
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
@@ -202,7 +202,7 @@ def _refuse_endless(value: Any, where: str = "") -> None:
 
 
 def _source(refusal: str, keys: list[str], robots: int | None, path: Path) -> str:
-    """Who gave the refused value: the command line, when it set that very key, or the file."""
+    """Return the source of the refused value: the command line if it set that key, else the file."""
     if robots is not None and refusal.startswith(("mission.robots", "world.starts")):
         return f"--robots {robots}"
     given = any(re.match(rf"{re.escape(key)}\b", refusal) for key in keys)

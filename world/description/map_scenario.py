@@ -1,4 +1,4 @@
-"""A scenario on a ROS map: its walls, what its keepout mask forbids, and where a chain can stand at the start."""
+"""Scenarios on a ROS map: walls, keepout boxes, and a placement of the chain at the start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lfa.world.description.placement import slot_bearing
 from lfa.world.description.scenario import Scenario
 
 MARGIN_M = 0.10
-"""Kept from walls where the chain is laid out."""
+"""Clearance [m] between a robot's hull and walls when the chain is laid out."""
 BEND_STEP_RAD = pi / 18
 HEADINGS = 24
 LINE_STEP_M = 0.05
@@ -24,7 +24,7 @@ LAY_OUT_TRIES_MAX = 20_000
 
 
 def on_map(scenario: Scenario, folder: Path) -> Scenario:
-    """`scenario` with the walls and starts that its map gives: what it holds then needs no map any more.
+    """Return `scenario` with walls, keepout boxes and starts computed from its maps; the result refers to no map.
 
     Paths are relative to `folder`. Raises Refused for a map that cannot be read, and for a start or goal without room.
     """
@@ -78,7 +78,7 @@ def _check_goal(scenario: Scenario, drawn: Map, room: Room) -> None:
 
 
 def _check_start(scenario: Scenario, drawn: Map) -> None:
-    """Of those that are given; nearer to a wall than their radius is looked at with all other starts."""
+    """Raise Refused for a given start outside the map or inside a wall; distance to walls is checked elsewhere."""
     world = scenario.world
     given = {"world.start": world.start or (0.0, 0.0)}
     if world.starts is not None:
@@ -92,7 +92,10 @@ def _check_start(scenario: Scenario, drawn: Map) -> None:
 
 
 def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
-    """The first robot at `start`, each other in its slot or, where walls leave none, bent round as little as works."""
+    """Place the first robot at `start` and each other in its slot, bending the chain least where walls need it.
+
+    Return None without a map and a start. Raises Refused when there is no room.
+    """
     start, mission = scenario.world.start, scenario.mission
     if start is None and room is None:
         return None
@@ -113,7 +116,7 @@ def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
 
 
 def _lay_out(mission: Mission, first: Pose2D, room: Room | None) -> tuple[float, list[Pose2D]] | None:
-    """Depth first, straightest first: how much the chain is bent in all [rad], and the poses."""
+    """Search depth first, straightest first; return the chain's total bend [rad] and its poses, or None."""
     tries = 0
 
     def after(poses: list[Pose2D], bent: float) -> tuple[float, list[Pose2D]] | None:
@@ -141,7 +144,7 @@ def _behind(ahead: Pose2D, phi: float, bend: float, separation_m: float) -> Pose
 
 
 def _stands(mission: Mission, others: list[Pose2D], pose: Pose2D, room: Room | None) -> bool:
-    """There is room at `pose` and on the straight way from it to the one ahead, and nobody else is near."""
+    """Return True if `pose` and the segment to the predecessor are clear of walls, and no other robot is near."""
     apart = min(hypot(pose.x - other.x, pose.y - other.y) for other in others)
     if apart < 0.9 * mission.formation.separation_m:
         return False
@@ -154,5 +157,5 @@ def _stands(mission: Mission, others: list[Pose2D], pose: Pose2D, room: Room | N
 
 
 def _outwards(most: int) -> list[int]:
-    """0, 1, -1, 2, -2 ... up to `most` on either side."""
+    """Return 0, 1, -1, 2, -2 ... up to `most` on either side."""
     return [0, *(side * n for n in range(1, most + 1) for side in (1, -1))]

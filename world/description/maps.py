@@ -1,4 +1,4 @@
-"""ROS occupancy maps in and out: `map.yaml` beside its image (pgm or png), and what a map means in metres.
+"""Reading and writing of ROS occupancy maps (`map.yaml` and its pgm or png), and their geometry in metres.
 
 Cells are read as Nav2's map server reads them: p = 1 - shade/255 (shade/255 with `negate`), occupied above
 `occupied_thresh`, free below `free_thresh`. Row 0 of the image is the top, `origin` the lower left corner and its yaw.
@@ -29,7 +29,7 @@ Point = tuple[float, float]
 
 
 class Map(Struct, frozen=True):
-    """Occupancy in percent (0 free, 100 occupied, -1 unknown) of square cells; row 0 is the bottom."""
+    """Occupancy grid in percent (0 free, 100 occupied, -1 unknown) of square cells; row 0 is the bottom."""
 
     cells: Cells
     resolution_m: float
@@ -42,7 +42,7 @@ class Map(Struct, frozen=True):
         return self.cells >= 100.0 * self.occupied_thresh
 
     def cell_of(self, x: float, y: float) -> tuple[int, int] | None:
-        """Row and column of a point in `map`; None outside of the image."""
+        """Return row and column of a point in `map`; None outside of the image."""
         c, s = cos(self.origin[2]), sin(self.origin[2])
         dx, dy = x - self.origin[0], y - self.origin[1]
         column = int((c * dx + s * dy) // self.resolution_m)
@@ -51,13 +51,13 @@ class Map(Struct, frozen=True):
         return (row, column) if inside else None
 
     def to_map(self, x: float, y: float) -> Point:
-        """A point from the image's axes ([m] from its lower left corner) in `map`."""
+        """Transform a point from the image's axes ([m] from its lower left corner) to `map`."""
         c, s = cos(self.origin[2]), sin(self.origin[2])
         return self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y
 
 
 def read(path: Path) -> Map:
-    """The map of a `map.yaml`. Raises Refused with one line: file, key, value, what would be right."""
+    """Read the map of a `map.yaml`. Raises Refused with one line: file, key, value, what would be valid."""
     fields = _fields(path)
     image = fields.get("image")
     if not image:
@@ -84,7 +84,7 @@ def read(path: Path) -> Map:
 
 
 def write(path: Path, drawn: Map) -> None:
-    """`path` (a .yaml) and the .pgm beside it, trinary: 0 occupied, 254 free, 205 unknown."""
+    """Write `path` (a .yaml) and the .pgm beside it, trinary: 0 occupied, 254 free, 205 unknown."""
     image = path.with_suffix(".pgm")
     shades = np.full(drawn.cells.shape, 254, dtype=np.uint8)
     shades[drawn.cells == UNKNOWN] = 205
@@ -99,7 +99,7 @@ def write(path: Path, drawn: Map) -> None:
 
 
 def walls(drawn: Map) -> tuple[Segment, ...]:
-    """The outlines of occupied cells as segments in `map`, one for each straight run of cell edges."""
+    """Return the outlines of occupied cells as segments in `map`, one for each straight run of cell edges."""
     padded = np.pad(drawn.occupied, 1).astype(np.int8)
     found: list[Segment] = []
     for row, low, high in _runs(np.diff(padded, axis=0)[:, 1:-1]):
@@ -113,7 +113,7 @@ def walls(drawn: Map) -> tuple[Segment, ...]:
 
 
 def boxes(drawn: Map) -> tuple[Segment, ...]:
-    """The occupied cells of a mask without yaw as few boxes x1, y1, x2, y2 in `map`: runs that equal the row below."""
+    """Return the occupied cells of a mask with yaw 0 as boxes x1, y1, x2, y2 in `map`, merging equal runs of rows."""
     r = drawn.resolution_m
     open_runs: dict[tuple[int, int], int] = {}
     found: list[tuple[int, int, int, int]] = []
@@ -130,14 +130,14 @@ def boxes(drawn: Map) -> tuple[Segment, ...]:
 
 
 class Room:
-    """How far it is from any point to the nearest wall of a map."""
+    """Distance field of a map's walls: clearance of any point."""
 
     def __init__(self, drawn: Map) -> None:
         self._drawn = drawn
         self._rows, self._columns = np.nonzero(drawn.occupied)
 
     def clearance_m(self, x: float, y: float) -> float:
-        """Distance [m] to the edge of the nearest occupied cell; 0 inside of one, inf with no walls."""
+        """Return the distance [m] to the edge of the nearest occupied cell; 0 inside of one, inf with no walls."""
         if not len(self._rows):
             return float("inf")
         drawn, half = self._drawn, 0.5
@@ -153,7 +153,7 @@ def _rounded(point: Point) -> Point:
 
 
 def _runs(edges: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Line, first and last+1 place of each run of equal non-zero values along the lines of `edges`."""
+    """Return line, first and last+1 index of each run of equal non-zero values along the lines of `edges`."""
     padded = np.pad(edges, ((0, 0), (1, 1)))
     lines, places = np.nonzero(np.diff(padded, axis=1))
     found = []
@@ -165,7 +165,7 @@ def _runs(edges: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
 
 
 def _fields(path: Path) -> dict[str, str]:
-    """The flat `key: value` lines of a map.yaml: what ROS writes, and nothing of YAML beyond it."""
+    """Parse the flat `key: value` lines of a map.yaml, the subset of YAML that ROS writes. Raises Refused."""
     try:
         with path.open("rb") as file:
             text = file.read(YAML_BYTES_MAX + 1).decode("utf-8-sig")
@@ -205,7 +205,7 @@ def _number(path: Path, fields: dict[str, str], key: str, default: float | None)
 
 
 def _origin(path: Path, fields: dict[str, str]) -> tuple[float, float, float]:
-    """`[x, y, yaw]`, also as a YAML list of lines."""
+    """Parse `[x, y, yaw]` [m, m, rad], also written as a YAML list of lines. Raises Refused."""
     text = fields.get("origin", "[0, 0, 0]")
     try:
         values = [

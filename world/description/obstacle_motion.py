@@ -1,7 +1,7 @@
-"""Where obstacles are that move of themselves: to and fro between points, straight on, or on a random walk.
+"""Motion of moving obstacles: to and fro between points, at constant velocity, or on a random walk.
 
-Each keeps its way whatever it meets, and is a function of the world's time alone: the engine, the plain kinematics
-and a test see it in the same place.
+Collisions do not deflect a moving obstacle. Its position is a function of the world's time alone: the physics engine,
+the kinematic model and a test compute the same position.
 """
 
 from __future__ import annotations
@@ -15,23 +15,25 @@ from lfa.protocol.geometry import TAU
 from lfa.world.description.scenario import Obstacle, Point
 
 WALK_LEG_S = 1.0
-"""A random walk takes a new direction so often."""
+"""Duration [s] of one leg of a random walk, after which the direction changes."""
 
 
 class Way(Protocol):
+    """Trajectory of a moving obstacle."""
+
     def at(self, time_s: float) -> Point:
-        """Position [m] in `map` at the world's time."""
+        """Return the position [m] in `map` at the world's time [s]."""
 
 
 def way_of(obstacle: Obstacle) -> Way:
-    """The way of a moving `obstacle`."""
+    """Return the trajectory of a moving `obstacle`."""
     if obstacle.waypoints_m:
         return ToAndFro(obstacle)
     return Walk(obstacle) if obstacle.walk_m is not None else Straight(obstacle)
 
 
 class ToAndFro:
-    """Along `center_m` -> `waypoints_m` and back at constant speed."""
+    """Motion along `center_m` -> `waypoints_m` and back at constant speed."""
 
     def __init__(self, obstacle: Obstacle) -> None:
         stops = (obstacle.center_m, *obstacle.waypoints_m)
@@ -53,7 +55,7 @@ class ToAndFro:
 
 
 class Straight:
-    """With constant velocity from `center_m`, for ever."""
+    """Motion from `center_m` at constant velocity, without end."""
 
     def __init__(self, obstacle: Obstacle) -> None:
         assert obstacle.velocity_mps is not None, obstacle
@@ -65,7 +67,7 @@ class Straight:
 
 
 class Walk:
-    """Legs of one second in random directions at constant speed; a leg that would end outside goes to the centre."""
+    """Random walk: legs of one second at constant speed; a leg that would end outside heads for the centre instead."""
 
     def __init__(self, obstacle: Obstacle) -> None:
         assert obstacle.walk_m is not None, obstacle

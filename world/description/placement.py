@@ -1,4 +1,4 @@
-"""A scenario's course in the plane: where robots start, what stands in their way, and what a seed draws of it."""
+"""Placement of a scenario in the plane: start poses, their distances to obstacles, and the seed's random variations."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Obstacl
 from lfa.world.description.terrain import Ditch, Feature, features, patch_of, patches_of
 
 DRAW_MARGIN_M = 0.5
-"""What is drawn stays this far from the robots' starts and from the goal."""
+"""Minimum distance [m] of drawn obstacles from the robots' starts and from the goal, beyond their radius."""
 SEED_MAX = 2**63 - 1
 WALK_SEED_BITS = 29
-"""Within the numbers that a scenario's file may hold: what is drawn is written down, and read again."""
+"""Bits of a drawn walk seed, within the number range of a scenario file: drawn scenarios are written and read again."""
 DRAWS_MAX = 50
-"""An obstacle or a start for which so many draws find no room stays where the scenario puts it."""
+"""Draws tried for an obstacle or a start; if no draw finds room, it stays where the scenario puts it."""
 
 
 def starts_of(scenario: Scenario) -> tuple[Pose2D, ...]:
-    """Where each robot of `mission.robots` starts, in `map`: as given, or the leader at (0, 0, 0), others in slots."""
+    """Return the start pose in `map` of each robot: as given, or the leader at (0, 0, 0) and the others in slots."""
     given = scenario.world.starts
     if given is not None:
         return tuple(Pose2D(*pose) for pose in given)
@@ -37,7 +37,7 @@ def starts_of(scenario: Scenario) -> tuple[Pose2D, ...]:
 
 
 def slot_bearing(mission: Mission, hop: int) -> float:
-    """phi^d [rad] of the follower number `hop` in its predecessor's `base_link` (control.md section 4)."""
+    """Return phi^d [rad] of follower number `hop` in its predecessor's `base_link` (control.md section 4)."""
     left = pi - mission.formation.angle_rad
     sides = {"left": left, "right": -left, "column": pi, "zigzag": left if hop % 2 == 0 else -left}
     return sides[mission.formation.side]
@@ -49,7 +49,7 @@ def _slot(mission: Mission, hop: int) -> Pose2D:
 
 
 def check_course(scenario: Scenario) -> Scenario:
-    """`scenario`, or `Refused` when a start or the goal cannot be stood on."""
+    """Return `scenario` unchanged. Raises `Refused` if a start or the goal is not free or not reachable."""
     mission, world = scenario.mission, scenario.world
     if world.starts is not None and len(world.starts) != len(mission.robots):
         right = f"one pose for each of the {len(mission.robots)} robots"
@@ -101,15 +101,15 @@ def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
 
 
 def _as_it_begins(obstacle: Obstacle) -> Obstacle:
-    """With its centre where it is at the world's time 0."""
+    """Return the obstacle with its centre where it is at the world's time 0."""
     return replace(obstacle, center_m=way_of(obstacle).at(0.0)) if obstacle.moves else obstacle
 
 
 def draw(scenario: Scenario, seed: int) -> Scenario:
-    """What `seed` makes of `scenario`: a concrete one, with starts given and nothing left to vary.
+    """Draw a concrete scenario from `scenario` and `seed`, with starts given and nothing left to vary.
 
-    Each start and each obstacle has its own generator, so an obstacle more does not move the others. Raises Refused
-    for a seed that no journal could hold.
+    Each start and each obstacle has its own generator, so an added obstacle does not move the others. Raises Refused
+    for a seed beyond `SEED_MAX`, which no journal could hold.
     """
     if not -SEED_MAX <= seed <= SEED_MAX:
         raise Refused(f"--seed {seed}: must be from -{SEED_MAX} to {SEED_MAX}")
@@ -139,7 +139,7 @@ def draw(scenario: Scenario, seed: int) -> Scenario:
 
 
 def _draw_walks(obstacles: tuple[Obstacle, ...], seed: int) -> tuple[Obstacle, ...]:
-    """Walks are the seed's even in a scenario that varies nothing."""
+    """Draw the seeds of random walks, also in a scenario that varies nothing."""
     return tuple(
         obstacle
         if obstacle.walk_m is None
@@ -149,7 +149,7 @@ def _draw_walks(obstacles: tuple[Obstacle, ...], seed: int) -> tuple[Obstacle, .
 
 
 def _draw_pace(obstacle: Obstacle, anchors: list[Point], radius_m: float, chance: Random) -> Obstacle:
-    """How fast it moves, and where on its way to and fro it begins: in no robot of `radius_m` at one of `anchors`."""
+    """Draw a moving obstacle's speed and initial phase, clear of a robot of `radius_m` at each of `anchors`."""
     if obstacle.velocity_mps is not None:
         (vx, vy), faster = obstacle.velocity_mps, chance.uniform(0.8, 1.2)
         paced = replace(obstacle, velocity_mps=(faster * vx, faster * vy))
@@ -220,7 +220,7 @@ def _in_disc(radius_m: float, chance: Random) -> Point:
 
 
 def gap_to(place: Point, obstacle: Obstacle) -> float:
-    """Distance [m] from `place` to the surface of `obstacle` at `center_m`; negative or zero inside."""
+    """Return the distance [m] from `place` to the surface of `obstacle` at `center_m`; negative or zero inside."""
     x, y = place[0] - obstacle.center_m[0], place[1] - obstacle.center_m[1]
     if obstacle.radius_m is not None:
         return hypot(x, y) - obstacle.radius_m
@@ -231,24 +231,24 @@ def gap_to(place: Point, obstacle: Obstacle) -> float:
 
 
 def reach_of(obstacle: Obstacle) -> float:
-    """Distance [m] of the outermost part from `center_m`."""
+    """Return the distance [m] of the outermost point from `center_m`."""
     if obstacle.radius_m is not None:
         return obstacle.radius_m
     return max(hypot(x, y) for x, y in obstacle.corners_m or ())
 
 
 def _swept_gap(place: Point, obstacle: Obstacle) -> float:
-    """The least distance [m] ever, wherever on its way a moving obstacle is."""
+    """Return the least distance [m] from `place` to a moving obstacle over its whole trajectory."""
     if obstacle.walk_m is not None:
         return gap_to(place, obstacle) - obstacle.walk_m
-    if not obstacle.waypoints_m:  # one that goes straight on comes by once, and late
+    if not obstacle.waypoints_m:  # one at constant velocity passes once, and late
         return gap_to(place, obstacle)
     legs = pairwise((obstacle.center_m, *obstacle.waypoints_m))
     return min(to_segment(place, a, b) for a, b in legs if a != b) - reach_of(obstacle)
 
 
 def to_segment(p: Point, a: Point, b: Point) -> float:
-    """Distance [m] from `p` to the nearest point between `a` and `b`."""
+    """Return the distance [m] from `p` to the nearest point between `a` and `b`."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     along = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)
     along = min(1.0, max(0.0, along))

@@ -1,7 +1,7 @@
-"""Whether walls part the goal from the start: then no robot can reach it, and a scenario is refused.
+"""Reachability of the goal: a scenario whose walls separate the goal from the start is refused.
 
-Only walls count, and generously: what a gap lets through is for the robots to find out. A flood fill over cells of
-`CELL_M`, and only where a wall crosses the straight way along the route: most scenarios cost nothing.
+Only walls count, and optimistically: whether a robot fits through a gap is not checked. The test is a flood fill over
+cells of `CELL_M`, run only if a wall crosses a straight leg of the route: most scenarios cost nothing.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ Segment = tuple[float, float, float, float]
 
 CELL_M = 0.1
 BAND_M = 0.08
-"""Cells whose centre is nearer to a wall are barred: more than 0.71 cells, so that no flood gets through a wall."""
+"""Distance [m] to a wall below which a cell's centre is blocked: more than 0.71 cells, so that no wall leaks."""
 CELLS_MAX = 4_000_000
 RIM_M = 0.5
 
 
 def parted(route: Sequence[Point], walls: Sequence[Segment]) -> bool:
-    """Whether `walls` leave no way from the first point of `route` to its last; False for ground that is too large."""
+    """Return True if `walls` separate the first point of `route` from its last; False if the grid is too large."""
     if not any(_cross(a, b, wall) for a, b in pairwise(route) for wall in walls):
         return False
     xs = [x for x, _ in route] + [x for wall in walls for x in wall[::2]]
@@ -35,12 +35,14 @@ def parted(route: Sequence[Point], walls: Sequence[Segment]) -> bool:
 
 
 class _Ground:
+    """Grid of free and blocked cells for the flood fill."""
+
     def __init__(self, low_x: float, low_y: float, high_x: float, high_y: float) -> None:
         self._x, self._y = low_x, low_y
         self.columns, self.rows = ceil((high_x - low_x) / CELL_M) + 1, ceil((high_y - low_y) / CELL_M) + 1
 
     def bar(self, walls: Sequence[Segment]) -> None:
-        """Take the cells beside `walls`, and the rim, out of what can be flooded."""
+        """Block the cells beside `walls`, and the rim."""
         self._taken = bytearray(self.columns * self.rows)
         for column in range(self.columns):
             self._taken[column] = self._taken[(self.rows - 1) * self.columns + column] = 1
@@ -50,7 +52,7 @@ class _Ground:
             self._bar_beside(wall)
 
     def flood(self, start: Point, goal: Point) -> bool:
-        """Whether `goal` is reached from `start`."""
+        """Return True if `goal` is reached from `start`."""
         taken, columns, wanted = self._taken, self.columns, self._cell(goal)
         first = self._cell(start)
         waiting = deque([first])

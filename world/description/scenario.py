@@ -1,8 +1,8 @@
-"""The scenario type: a mission, a world, radio weather, faults and a time limit.
+"""The scenario type: a mission, a world, link conditions, faults and a time limit.
 
-Names carry their units. `world/description/load.py` reads it from TOML, `world/description/checks.py` says what no
-world can be built from, `world/description/placement.py` what a seed draws of it.
-Nothing here imports the engine: a launcher, a test or an editor reads a scenario in milliseconds.
+Names carry their units. `world/description/load.py` reads a scenario from TOML, `world/description/checks.py` checks
+its values, `world/description/placement.py` draws its random variations.
+Nothing here may import the engine: a launcher, a test or an editor reads a scenario in milliseconds.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from lfa.world.description.terrain import Bump, Ditch, Pothole
 
 Point = tuple[float, float]
 SPEED_MPS_MIN, SPEED_MPS_MAX = 0.001, 10.0
-"""Of an obstacle that moves."""
+"""Least and greatest speed [m/s] of a moving obstacle."""
 STATE = "state.json"
-"""Where a world keeps in its run folder what it remembers over its own death (`checkpoint.py`)."""
+"""Name of the world's checkpoint in the run folder (`checkpoint.py`)."""
 
 
 class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
-    """A body that robots see and bump into: `radius_m` makes it round, `corners_m` a convex polygon."""
+    """Body that robots see and collide with: round with `radius_m`, or a convex polygon with `corners_m`."""
 
     center_m: Point
     radius_m: float | None = None
     corners_m: tuple[Point, ...] | None = None
-    """Relative to `center_m`, counter-clockwise."""
+    """Corners [m] relative to `center_m`, counter-clockwise."""
     mass_kg: float | None = None
-    """None: nailed to the floor; otherwise robots can push it."""
+    """Mass [kg] of an obstacle that robots can push; None: fixed to the floor."""
     waypoints_m: tuple[Point, ...] = ()
-    """A moving obstacle goes to and fro along center_m -> waypoints_m at `speed_mps`, whatever it meets."""
+    """Motion to and fro along center_m -> waypoints_m at `speed_mps`; collisions do not deflect it."""
     speed_mps: float = 0.0
     phase: float = 0.0
-    """Where on its way there and back it starts: 0 at `center_m`, 0.5 at the last way-point."""
+    """Initial phase of the motion to and fro, in [0, 1): 0 at `center_m`, 0.5 at the last way-point."""
     velocity_mps: Point | None = None
-    """Another way of moving: straight on, for ever."""
+    """Constant velocity [m/s] in `map`, without end; an alternative to `waypoints_m`."""
     walk_m: float | None = None
-    """Another: a random walk at `speed_mps` within this of `center_m`, drawn by the seed."""
+    """Radius [m] around `center_m` of a random walk at `speed_mps`, drawn by the seed; another alternative."""
     walk_seed: int = 0
-    """Set by `draw`."""
+    """Seed of the random walk, set by `draw`."""
 
     @property
     def moves(self) -> bool:
@@ -49,15 +49,17 @@ class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
-    """The simulated robots' bodies; the radius is the mission's."""
+    """Bodies of the simulated robots; their radius is the mission's."""
 
     mass_kg: float = 5.0
     push_n: float = 40.0
-    """Largest force of the wheels on the ground: what a robot can push, and how steep a contact it climbs."""
+    """Largest force [N] of the wheels on the ground; limits what a robot can push and how steep a contact it climbs."""
     wheel_radius_m: float = 0.05
 
 
 class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
+    """Laser scanner at the centre of each robot, covering 360 degrees."""
+
     beams: int = 180
     range_min_m: float = 0.05
     range_max_m: float = 8.0
@@ -65,59 +67,61 @@ class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Ground(Struct, frozen=True, forbid_unknown_fields=True):
-    """The downward-looking range sensor: points along three lines ahead of the robot's centre, 20 times a second."""
+    """Downward-looking range sensor: points along three lines ahead of the robot's centre, 20 times a second."""
 
     first_m: float = 0.1
     reach_m: float = 1.5
     increment_m: float = 0.05
     depth_m: float = 1.0
-    """A floor that lies deeper is not seen."""
+    """Greatest depth [m] measured; a deeper floor is not seen."""
 
 
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
-    """Standard deviations; all zero is a clean world."""
+    """Standard deviations and error probabilities of the sensors; with all at zero the sensors are exact."""
 
     localization_m: float = 0.0
     localization_rad: float = 0.0
     localization_dropout: float = 0.0
     """Probability that one fix is missing."""
     odometry: float = 0.0
-    """Of the wheels' speed, as a fraction."""
+    """Standard deviation of the measured wheel speed, as a fraction of it."""
     range_m: float = 0.0
     range_dropout: float = 0.0
     range_outlier: float = 0.0
-    """Probability that a beam reads anything between its limits."""
+    """Probability that a beam returns a random range between its limits."""
     ground_m: float = 0.0
     ground_dropout: float = 0.0
     ground_outlier: float = 0.0
-    """Probability that a height is off by anything up to 0.1 m either way."""
+    """Probability that a height has a random error of up to 0.1 m either way."""
 
 
 class Vary(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the seed draws about the course, uniformly within plus or minus these bounds."""
+    """Bounds of the seed's random variations, drawn uniformly within plus or minus each."""
 
     obstacles_m: float = 0.0
     starts_m: float = 0.0
     starts_rad: float = 0.0
     moving_phase: bool = False
-    """A moving obstacle's start along its way, and its speed within 20 %."""
+    """Draw each moving obstacle's initial phase, and its speed within 20 %."""
 
 
 class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
+    """Simulated world: starts, walls, obstacles, terrain, bodies, sensors and their noise."""
+
     starts: tuple[tuple[float, float, float], ...] | None = None
-    """x [m], y [m], theta [rad] of each robot in `map`; None: the leader at (0, 0, 0), the others in their slots."""
+    """Start x [m], y [m], theta [rad] of each robot in `map`; None: the leader at (0, 0, 0), the others in slots."""
     starts_coincide: bool = False
-    """Starts may lie in each other, as the paper's do: such robots meet and see each other once they were apart."""
+    """Starts may overlap, as the paper's do: such robots collide with and see each other only after they separated."""
     start: tuple[float, ...] | None = None
-    """x, y [m] and perhaps theta [rad] of the first robot; the others stand behind it, where walls leave room."""
+    """Start x, y [m] and optionally theta [rad] of the first robot; the others stand behind it where walls permit."""
     real_robots: tuple[int, ...] = ()
-    """Ids whose hardware is not simulated here but speaks for itself (`lfa-driver`): they are moved as they say."""
+    """Ids of robots with a driver of their own (`lfa-driver`): not simulated, their bodies follow reported poses."""
     map: str | None = None
-    """A ROS `map.yaml`, relative to the scenario's file: its occupied cells become walls when the scenario is read."""
+    """ROS `map.yaml`, relative to the scenario's file; its occupied cells become walls when the scenario is read."""
     keepout: str | None = None
-    """Another `map.yaml`, whose occupied cells a leader that plans its own route stays out of."""
+    """Keepout mask, another `map.yaml`; a leader that plans its own route avoids its occupied cells."""
     walls_m: tuple[tuple[float, float, float, float], ...] = ()
-    """Segments x1, y1, x2, y2."""
+    """Wall segments x1, y1, x2, y2 [m] in `map`."""
     obstacles: tuple[Obstacle, ...] = ()
     potholes: tuple[Pothole, ...] = ()
     bumps: tuple[Bump, ...] = ()
@@ -131,30 +135,30 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Assert(Struct, frozen=True, forbid_unknown_fields=True):
-    """What must hold at the end of a run besides the goal; a key that is not given is not judged."""
+    """Assertions checked at the end of a run; a key that is not given is not checked."""
 
     goal_reached: bool = True
-    """False: a run may as well end at its time limit."""
+    """Require that the goal is reached; False: the run may also end at its time limit."""
     distance_error_max_m: float | None = None
-    """Largest distance error of any follower from when it settled, avoidance and formation changes left out."""
+    """Largest distance error [m] of any follower after it settled, excluding avoidance and formation changes."""
     distance_error_rms_m: float | None = None
     bearing_error_rms_rad: float | None = None
     settled_within_s: float | None = None
-    """Every follower within 5 cm of its distance for good, this soon after the start."""
+    """Time [s] after the start by which every follower stays within 5 cm of its distance."""
     recovered_within_s: float | None = None
-    """The chain closed over a lost leader, this soon after its loss."""
+    """Time [s] after the loss of a leader by which the chain has closed over it."""
     failover_max_ms: float | None = None
-    """From the loss of a leader to the first accepted command of the next."""
+    """Largest time [ms] from the loss of a leader to the first accepted command of the next."""
     contacts_max: int | None = None
     separation_min_m: float | None = None
-    """Between the centres of any two robots, at any time."""
+    """Least distance [m] between the centres of any two robots, at any time."""
     duration_max_s: float | None = None
     leaders_max: int | None = None
     left_behind_max: int | None = None
 
 
 class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
-    """`mission` is what the team is told; the rest is what the world does to it."""
+    """Complete description of a run: `mission` is sent to the team, the rest configures the world around it."""
 
     title: str
     mission: Mission
@@ -162,13 +166,13 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     world: WorldSpec = WorldSpec()
     radio: Radio = Radio()
     restart: dict[str, Literal["never", "on-failure"]] = {}
-    """Whether `lfa run` starts a process again that failed: of `router`, `world`, `robots` or one `robot2`."""
+    """Restart policy of `lfa run` for a failed process: keys `router`, `world`, `robots`, or one as `robot2`."""
     faults: tuple[str, ...] = ()
-    """Each as one would say it: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'."""
+    """Faults to inject, as sentences: 'kill leader at 20 s', 'stop 2 at 5 s for 3 s'."""
     asserted: Assert = field(default=Assert(), name="assert")
-    """The table `[assert]`: what `lfa run` and `lfa sim` judge a run by."""
+    """Assertions of the table `[assert]`, checked by `lfa run` and `lfa sim`."""
     name: str = ""
-    """Set by `load` from the file's name."""
+    """Name of the scenario, set by `load` from the file's name."""
 
 
 Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted"]

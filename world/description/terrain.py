@@ -1,7 +1,8 @@
-"""The ground: potholes, bumps and ditches as a scenario gives them, and as patches of floor at another height.
+"""Terrain: potholes, bumps and ditches of a scenario, and their conversion to patches of floor at another height.
 
-The floor is at 0 and flat. A patch lies lower or higher, with an upright edge all round: what that does to wheels
-is `wheel_contact.py`, how it looks from above `ground_sensor.py`. Where patches overlap the deepest counts, then the highest.
+The floor is flat at height 0. A patch lies lower or higher, with an upright edge all round. `wheel_contact.py`
+computes its effect on wheels, `ground_sensor.py` its view from above. Where patches overlap the deepest counts, then
+the highest.
 """
 
 from __future__ import annotations
@@ -16,35 +17,35 @@ from lfa.protocol.errors import Refused
 
 Point = tuple[float, float]
 PATCH_WIDTH_M_MIN = 0.02
-"""Two steps of a robot with 1 m/s: no edge falls between two points of the world's time."""
+"""Minimum width [m] of a feature: two steps at 1 m/s, so that no edge lies between two steps of the simulation."""
 
 
 class Pothole(Struct, frozen=True, forbid_unknown_fields=True):
-    """A hole: round with diameter `width_m`, or rectangular with `length_m` too."""
+    """Hole in the floor: round with diameter `width_m`, or rectangular if `length_m` is given too."""
 
     center_m: Point
     width_m: float
-    """Along `theta`."""
+    """Extent [m] along `theta`."""
     depth_m: float
     length_m: float | None = None
-    """Across `theta`."""
+    """Extent [m] across `theta`."""
     theta: float = 0.0
 
 
 class Bump(Struct, frozen=True, forbid_unknown_fields=True):
-    """A bar on the floor, as a speed bump: mostly crossed along `theta`."""
+    """Bar on the floor, like a speed bump, usually crossed along `theta`."""
 
     center_m: Point
     width_m: float
-    """Along `theta`."""
+    """Extent [m] along `theta`."""
     length_m: float
-    """Across `theta`."""
+    """Extent [m] across `theta`."""
     height_m: float
     theta: float = 0.0
 
 
 class Ditch(Struct, frozen=True, forbid_unknown_fields=True):
-    """A strip between two points."""
+    """Rectangular trench between two points."""
 
     ends_m: tuple[Point, Point]
     width_m: float
@@ -52,7 +53,7 @@ class Ditch(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Terrain(Protocol):
-    """The part of a world that is ground."""
+    """Terrain features of a world."""
 
     @property
     def potholes(self) -> tuple[Pothole, ...]: ...
@@ -63,7 +64,7 @@ class Terrain(Protocol):
 
 
 class Patch(Struct, frozen=True, gc=False):
-    """A circle (`radius_m` above 0) or a rectangle (x along `theta`) of floor at `height_m`, in `map`."""
+    """Circle (`radius_m` above 0) or rectangle (x along `theta`) of floor at `height_m`, in `map`."""
 
     x: float
     y: float
@@ -78,12 +79,12 @@ class Patch(Struct, frozen=True, gc=False):
 
     @property
     def reach_m(self) -> float:
-        """Distance [m] of the outermost point from the centre."""
+        """Distance [m] of the patch's outermost point from its centre."""
         return self.radius_m or hypot(self.half_x_m, self.half_y_m)
 
     @property
     def corners_m(self) -> tuple[Point, ...]:
-        """Of a rectangle, in `map`, counter-clockwise."""
+        """Corners [m] of a rectangle, in `map`, counter-clockwise."""
         a, b = self.half_x_m, self.half_y_m
         corners = ((a, -b), (a, b), (-a, b), (-a, -b))
         return tuple((self.x + self.c * u - self.s * v, self.y + self.s * u + self.c * v) for u, v in corners)
@@ -95,7 +96,7 @@ class Patch(Struct, frozen=True, gc=False):
         return abs(self.c * dx + self.s * dy) <= self.half_x_m and abs(self.c * dy - self.s * dx) <= self.half_y_m
 
     def gap_m(self, x: float, y: float) -> float:
-        """Distance [m] from (x, y) to the patch, zero on it."""
+        """Return the distance [m] from (x, y) to the patch, zero on it."""
         dx, dy = x - self.x, y - self.y
         if self.radius_m > 0.0:
             return max(0.0, hypot(dx, dy) - self.radius_m)
@@ -103,7 +104,7 @@ class Patch(Struct, frozen=True, gc=False):
         return hypot(beside, max(0.0, abs(self.c * dy - self.s * dx) - self.half_y_m))
 
     def chord_m(self, x: float, y: float, ahead_x: float, ahead_y: float) -> float:
-        """How much of the straight line through (x, y) along the unit vector (ahead_x, ahead_y) lies in the patch."""
+        """Return the length [m] in the patch of the line through (x, y) along the unit vector (ahead_x, ahead_y)."""
         dx, dy = x - self.x, y - self.y
         if self.radius_m > 0.0:
             beside = ahead_x * dy - ahead_y * dx
@@ -124,7 +125,7 @@ Feature = Pothole | Bump | Ditch
 
 
 def features(terrain: Terrain) -> Iterator[tuple[str, Feature]]:
-    """All of it with the key under which the scenario gives it, `potholes[0]` first."""
+    """Yield every feature with its key in the scenario, `potholes[0]` first."""
     kinds: tuple[tuple[str, tuple[Feature, ...]], ...] = (
         ("potholes", terrain.potholes),
         ("bumps", terrain.bumps),
@@ -136,13 +137,13 @@ def features(terrain: Terrain) -> Iterator[tuple[str, Feature]]:
 
 
 def patches_of(terrain: Terrain) -> tuple[Patch, ...]:
-    """All patches, in the order in which they count where they overlap."""
+    """Return all patches, in order of precedence where they overlap."""
     patches = (patch_of(feature) for _, feature in features(terrain))
     return tuple(sorted(patches, key=lambda patch: (patch.height_m > 0.0, -abs(patch.height_m))))
 
 
 def patch_of(feature: Feature) -> Patch:
-    """The piece of floor that `feature` is."""
+    """Convert `feature` to a patch of floor."""
     if isinstance(feature, Ditch):
         (x1, y1), (x2, y2) = feature.ends_m
         length_m = hypot(x2 - x1, y2 - y1)
@@ -158,7 +159,7 @@ def patch_of(feature: Feature) -> Patch:
 
 
 def check_feature(where: str, feature: Feature) -> None:
-    """Refuses with the key, the value and what would be right when no ground can be made of `feature`."""
+    """Raise Refused with the key, the value and the valid range if `feature` is not a valid feature."""
     right = f"a number from {PATCH_WIDTH_M_MIN:g} to 1000"
     _require(PATCH_WIDTH_M_MIN <= feature.width_m <= 1e3, f"{where}.width_m", feature.width_m, right)
     if isinstance(feature, Ditch):

@@ -1,4 +1,4 @@
-"""A TOML file that a person wrote, whatever it turns out to be."""
+"""Bounded reading of a TOML file written by a person."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FILE_BYTES_MAX = 4 * 1024 * 1024
 
 
 def read_toml(path: Path, kind: str) -> dict[str, Any]:
-    """What the file says. Raises Refused when it cannot be read, is too long or no TOML: it must be `kind`."""
+    """Read the file as TOML. Raises Refused, naming `kind`, if it cannot be read, is too long or is not TOML."""
     try:
         with path.open("rb") as file:
             text = file.read(FILE_BYTES_MAX + 1)

@@ -1,7 +1,7 @@
-"""Robots that go exactly where their wheels turn, pass through everything and over any terrain: no engine.
+"""Kinematic model without an engine: robots follow their wheels exactly, through everything and over any terrain.
 
-The same shape as `physics.Physics`, for fuzzing what robots say to each other at the speed of arithmetic; and the
-parts that both share: a drive with its limits, and the way of a moving obstacle.
+It has the interface of `rigid_bodies.Physics` and serves fast fuzzing of the protocol. The drive with its limits and
+the touch event, which both models share, also live here.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from lfa.world.description.scenario import Scenario
 
 
 class Touch(Struct, frozen=True, gc=False):
-    """Robot number `robot` (by place in the mission's list) began to touch `other` at (x, y) in `map`."""
+    """Start of a contact between robot number `robot` (index in the mission's list) and `other` at (x, y) in `map`."""
 
     robot: int
     other: str
-    """`robot3`, `wall2`, `obstacle5`: robots by id, the rest by place in the scenario's list."""
+    """Name of the other body, `robot3`, `wall2` or `obstacle5`: robots by id, the rest by index in the scenario."""
     x: float
     y: float
 
 
 class Drive:
-    """The wheels of one robot: they follow the commanded twist within the limits of speed and acceleration."""
+    """Wheel drive of one robot: tracks the commanded twist within the limits of speed and acceleration."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self.twist = STILL
-        """What the wheels turn for, whatever the body does."""
+        """Twist that the wheels roll, independent of the body's motion."""
 
     def step(self, wanted: Twist, dt_s: float) -> Twist:
-        """The wheels' twist during the next `dt_s`."""
+        """Update and return the wheels' twist for the next `dt_s`."""
         if wanted is self.twist:
             return self.twist
         limits, now = self._limits, self.twist
@@ -51,7 +51,7 @@ class Drive:
 
 
 class Kinematic:
-    """All robots of a drawn scenario, stepped together; obstacles that move do, and nobody meets anybody."""
+    """Robots and moving obstacles of a drawn scenario, stepped together without collisions."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._dt_s = 1.0 / scenario.world.physics_hz
@@ -59,18 +59,18 @@ class Kinematic:
         self._drives = [Drive(scenario.mission.limits) for _ in scenario.mission.robots]
         self._ways = {n: way_of(o) for n, o in enumerate(scenario.world.obstacles) if o.moves}
         self.poses: list[Pose2D] = list(starts_of(scenario))
-        """Of each robot's `base_link` in `map`."""
+        """Pose of each robot's `base_link` in `map`."""
         self.twists: list[Twist] = [STILL] * len(self.poses)
-        """Of each robot's body in its `base_link`."""
+        """Twist of each robot's body in its `base_link`."""
         self.wheels: list[Twist] = [STILL] * len(self.poses)
-        """What each robot's wheels turn for; differs from `twists` where they slip."""
+        """Twist that each robot's wheels roll; always equal to `twists` here."""
 
     def advance(self, steps: int) -> None:
-        """Begin at that step: robots stand where the scenario says, obstacles on their ways are further."""
+        """Start at step number `steps`: robots stay where the scenario puts them, moving obstacles have moved on."""
         self._steps = steps
 
     def step(self, wanted: Sequence[Twist]) -> list[Touch]:
-        """One step of 1/physics_hz with these commanded twists, one a robot."""
+        """Advance one step of 1/physics_hz with the commanded twists, one per robot; return no touches."""
         self._steps += 1
         for n, drive in enumerate(self._drives):
             twist = drive.step(wanted[n], self._dt_s)
@@ -80,14 +80,14 @@ class Kinematic:
         return []
 
     def place(self, n: int, pose: Pose2D) -> None:
-        """Put robot `n` there: it is a real one, and says so."""
+        """Set the pose of robot `n`, a real one that reports its pose."""
         self.poses[n] = pose
 
     def moved(self) -> dict[int, Pose2D]:
-        """The pose in `map` of each obstacle that is not nailed down, by its place in the scenario's list."""
+        """Return the pose in `map` of each moving obstacle, by its index in the scenario's list."""
         time_s = self._steps * self._dt_s
         return {n: Pose2D(*way.at(time_s), 0.0) for n, way in self._ways.items()}
 
     def standing_m(self) -> list[float]:
-        """Height [m] of what each robot stands on: the floor, whatever the terrain."""
+        """Return the height [m] under each robot: always the floor, 0."""
         return [0.0] * len(self.poses)

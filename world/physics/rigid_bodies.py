@@ -1,9 +1,9 @@
-"""Rigid bodies in the plane (pymunk): robots on two wheels, walls, obstacles nailed down, pushable or on their way.
+"""Rigid-body physics in the plane (pymunk): two-wheeled robots, walls, and fixed, pushable or moving obstacles.
 
 A robot that touches nothing follows equation (1) exactly: the engine moves a body along a straight line for one
-step, so it is given the chord of the arc, which has the arc's ends. A robot in touch with something is driven by
-what its wheels can push at most; where that is not enough the wheels slip, and odometry goes astray as it should.
-Terrain lets a wheel over its edges or not (`wheel_contact.py`), and holds as hard as it needs to.
+step, so the step is the chord of the arc, which has the arc's ends. A robot in contact is driven by at most the force
+that its wheels can exert; beyond that the wheels slip, and odometry drifts as a real robot's does.
+Terrain lets a wheel over an edge or not (`wheel_contact.py`), with no limit on the holding force.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from lfa.world.physics.wheel_contact import Floor
 
 GRAVITY_MPS2 = 9.81
 GROUND_FRICTION = 0.4
-"""Of a pushable obstacle on the floor: 40 N of push move up to 10 kg."""
+"""Friction coefficient of a pushable obstacle on the floor: 40 N of push move up to 10 kg."""
 SIDE_FRICTION = 0.2
-"""Between bodies that touch."""
+"""Friction coefficient between bodies that touch."""
 OVERLAP_M = 0.0005
-"""How deep bodies may stay in each other, so that a lasting touch is one touch."""
+"""Penetration [m] that bodies may keep, so that a lasting contact counts as one touch."""
 OVERLAP_KEPT = 0.8
-"""Of a deeper overlap, the part that is left after one step."""
+"""Fraction of a deeper penetration that is left after one step."""
 RETOUCH_S = 0.25
-"""A touch given up for less than this is still the same touch."""
+"""Longest interruption [s] after which a renewed contact still counts as the same touch."""
 
 _ROBOT, _THING = 1, 2
 
 
 class Physics:
-    """All bodies of a drawn scenario, stepped together; equal calls give equal bits."""
+    """Physics engine with all bodies of a drawn scenario, stepped together; equal calls give equal bits."""
 
     def __init__(self, scenario: Scenario) -> None:
         world, mission = scenario.world, scenario.mission
@@ -47,14 +47,14 @@ class Physics:
         self._space.collision_slop = OVERLAP_M
         self._space.collision_bias = OVERLAP_KEPT**world.physics_hz
         self._names: dict[pymunk.Shape, tuple[int, str]] = {}
-        """Of each shape: the robot's place in the list (-1 for a thing), and what it is called."""
+        """Robot index (-1 for a wall or obstacle) and name of each shape."""
         self._drives = [Drive(mission.limits) for _ in mission.robots]
         self.poses: list[Pose2D] = list(starts_of(scenario))
-        """Of each robot's `base_link` in `map`."""
+        """Pose of each robot's `base_link` in `map`."""
         self.twists: list[Twist] = [STILL] * len(self.poses)
-        """Of each robot's body in its `base_link`."""
+        """Twist of each robot's body in its `base_link`."""
         self.wheels: list[Twist] = [STILL] * len(self.poses)
-        """What each robot's wheels turn for; differs from `twists` where they slip."""
+        """Twist that each robot's wheels roll; differs from `twists` where they slip."""
         mass_kg, radius_m = world.body.mass_kg, mission.radius_m
         self._inertia = pymunk.moment_for_circle(mass_kg, 0.0, radius_m)
         self._mass_kg, self._push_n, self._torque_nm = mass_kg, world.body.push_n, world.body.push_n * radius_m
@@ -62,14 +62,14 @@ class Physics:
         self._velocity = [(0.0, 0.0, 0.0)] * len(self._robots)
         self._floor = Floor(scenario)
         self._rolls: list[Twist] = [STILL] * len(self._robots)
-        """What the ground lets each robot's body do."""
+        """Twist of each robot's body that the ground permits in this step."""
         self._jolted = [False] * len(self._robots)
-        """Lost speed at an edge in the last step."""
+        """True for each robot that lost speed at an edge in the last step."""
         self._touching = [0] * len(self._robots)
         self._parted_at: dict[tuple[int, str], int] = {}
         self._touches: list[Touch] = []
         self._never_apart = _overlapping(self.poses, radius_m)
-        """Pairs of robots, by place, that began in each other: nothing to each other until they were apart."""
+        """Pairs of robots, by index, that overlapped at the start: they do not collide until they have separated."""
         for n, (x1, y1, x2, y2) in enumerate(world.walls_m):
             self._add_shape(pymunk.Segment(self._space.static_body, (x1, y1), (x2, y2), 0.0), _THING, -1, f"wall{n}")
         self._pushable: dict[int, pymunk.Body] = {}
@@ -80,13 +80,13 @@ class Physics:
             self._space.on_collision(_ROBOT, other, begin=self._on_begin, separate=self._on_separate)
 
     def advance(self, steps: int) -> None:
-        """Begin at that step: robots stand where the scenario says, obstacles on their ways are further."""
+        """Start at step number `steps`: robots stay where the scenario puts them, moving obstacles have moved on."""
         self._steps = steps
         for _, body, way in self._moving:
             body.position = way.at(steps * self._dt_s)
 
     def step(self, wanted: Sequence[Twist]) -> list[Touch]:
-        """One step of 1/physics_hz with these commanded twists, one a robot; the touches that began in it."""
+        """Advance one step of 1/physics_hz with the commanded twists, one per robot; return the touches that began."""
         dt_s = self._dt_s
         self._steps += 1
         near = [self._floor.near(n, pose) for n, pose in enumerate(self.poses)]
@@ -106,31 +106,31 @@ class Physics:
         return touches
 
     def place(self, n: int, pose: Pose2D) -> None:
-        """Put robot `n` there: it is a real one, and says so."""
+        """Set the pose of robot `n`, a real one that reports its pose."""
         body = self._robots[n]
         self.poses[n] = pose
         body.position, body.angle = (pose.x, pose.y), pose.theta
         self._space.reindex_shapes_for_body(body)
 
     def moved(self) -> dict[int, Pose2D]:
-        """The pose in `map` of each obstacle that is not nailed down, by its place in the scenario's list."""
+        """Return the pose in `map` of each obstacle that is not fixed, by its index in the scenario's list."""
         poses = {n: Pose2D(*body.position, 0.0) for n, body, _ in self._moving}
         poses.update((n, Pose2D(*body.position, wrap(body.angle))) for n, body in self._pushable.items())
         return dict(sorted(poses.items()))
 
     def standing_m(self) -> list[float]:
-        """Height [m] of what each robot stands on."""
+        """Return the height [m] of the ground under each robot."""
         return [self._floor.standing_m(n) for n in range(len(self._robots))]
 
     def _roll(self, n: int, drive: Drive) -> bool:
-        """Let the ground have its say about where robot `n` rolls; whether an edge holds or slows it."""
+        """Apply the ground's limits to the rolling of robot `n`; return True if an edge holds or slows it."""
         wheels, jolted = drive.twist, self._jolted[n]
         self._rolls[n], drive.twist = self._floor.roll(n, self.poses[n], wheels, self.twists[n])
         self._jolted[n] = drive.twist is not wheels
         return jolted or self._rolls[n] is not wheels
 
     def _push(self, n: int, twist: Twist, held_hard: bool) -> None:
-        """Bring robot `n` to `twist`, as far as its wheels' grip on the floor allows, or an edge makes it."""
+        """Accelerate robot `n` to `twist`, limited by its wheels' grip unless an edge holds it (`held_hard`)."""
         touching = self._touching[n] > 0
         now = self._velocity[n]
         if twist is STILL and not touching and now == (0.0, 0.0, 0.0):
@@ -145,8 +145,8 @@ class Physics:
             dx, dy, dw = grip * dx, grip * dy, max(-dw_max, min(dw_max, dw))
         body = self._robots[n]
         if touching:
-            # As a force, so that the contact answers it within the step: a speed given now would first be a way
-            # into the other body.
+            # Applied as a force, so that the contact reacts within the step: a velocity set now would first
+            # penetrate the other body.
             body.force = (self._mass_kg * dx / self._dt_s, self._mass_kg * dy / self._dt_s)
             body.torque = self._inertia * dw / self._dt_s
         else:
@@ -161,7 +161,7 @@ class Physics:
         x, y = body.position
         pose = Pose2D(x, y, wrap(body.angle))
         if near and not self._floor.settle(n, pose, self.twists[n]):
-            # Pushed, or sliding, against an edge that it does not get over.
+            # Pushed, or sliding, against an edge that the wheels cannot climb.
             body.position, body.angle = (self.poses[n].x, self.poses[n].y), self.poses[n].theta
             body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
             self._velocity[n], self.twists[n] = (0.0, 0.0, 0.0), STILL
@@ -210,7 +210,7 @@ class Physics:
             self._brake_on_ground(body, obstacle)
 
     def _brake_on_ground(self, body: pymunk.Body, obstacle: Obstacle) -> None:
-        """Coulomb friction with the floor: joints that hold against speed with a bounded force, and never pull back."""
+        """Add Coulomb friction with the floor: joints that oppose velocity with bounded force and never pull back."""
         center = body.center_of_gravity
         slide = pymunk.PivotJoint(self._space.static_body, body, body.local_to_world(center), center)
         turn = pymunk.GearJoint(self._space.static_body, body, 0.0, 1.0)
@@ -245,7 +245,7 @@ class Physics:
                 self._parted_at[robot, self._names[against][1]] = self._steps
 
     def _pair(self, arbiter: pymunk.Arbiter) -> frozenset[int]:
-        """Places of the two robots that meet; -1 stands for a thing."""
+        """Return the indices of the two robots in contact; -1 stands for a wall or obstacle."""
         return frozenset(self._names[shape][0] for shape in arbiter.shapes)
 
 

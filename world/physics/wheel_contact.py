@@ -1,21 +1,22 @@
-"""What ground does to wheels: rules for a rigid wheel at an upright edge, and the floor that applies them.
+"""Wheel-ground contact: rules for a rigid wheel at an upright edge, and the floor model that applies them.
 
 A robot stands on two driven wheels at the sides of its centre; castors glide over anything. A wheel of radius r
-meets an edge when its centre comes over it (in truth up to r earlier). Where a rule says no, that wheel slips on the
-spot: odometry runs on, and the robot stands or turns about that wheel. Where it says yes, wheel and body lose speed
-together. `traction` is the largest force of the wheels over the weight, whether motors or friction set it.
+meets an edge when its centre comes over it (in reality up to r earlier). If the rule forbids the climb, that wheel
+slips on the spot: odometry continues, and the robot stands or turns about that wheel. If it permits the climb, wheel
+and body lose speed together. `traction` is the largest force of the wheels divided by the weight, whether drive or
+friction limits it.
 
 The rules are the statics of a wheel on one contact point and the plastic impact on it. With theta the angle of that
 contact from straight below, cos(theta) = (r - h) / r for a step of height h:
 
-- At rest the contact force must balance the weight, so it is upright, theta off the normal: it is within the
+- At rest the contact force must balance the weight, so it is vertical, theta off the normal: it is within the
   friction cone while tan(theta) <= traction (the friction condition for the first wheel of a driven axle, as in
   Bekker, Introduction to Terrain-Vehicle Systems, 1969).
-- At speed v the impact leaves what is at right angles to the contact, v cos(theta), as for the rimless wheel
-  (McGeer, Passive dynamic walking, 1990, with the centre's mass alone); kinetic energy then lifts the wheel as far as
+- At speed v the impact leaves the component at right angles to the contact, v cos(theta), as for the rimless wheel
+  (McGeer, Passive dynamic walking, 1990, with the centre's mass alone); kinetic energy then supplies the lift that
   traction cannot.
-- A gap narrower than 2r is straddled: the wheel dips by r - sqrt(r^2 - (w/2)^2), or less when it flies over
-  (v > 2 sqrt(g r), 1.4 m/s for r = 0.05 m), and then has a step of that height before it.
+- A gap of width w below 2r is straddled: the wheel dips by r - sqrt(r^2 - (w/2)^2), or less when it flies over
+  (v > 2 sqrt(g r), 1.4 m/s for r = 0.05 m), and then climbs a step of that height.
 """
 
 from __future__ import annotations
@@ -29,35 +30,35 @@ from lfa.world.description.terrain import Patch, patches_of
 
 GRAVITY_MPS2 = 9.81
 WHEEL_SIDE = 0.8
-"""Of the robot's radius: how far from its centre each wheel stands."""
+"""Distance of each wheel from the robot's centre, as a fraction of the robot's radius."""
 AROUND_M = 0.5
-"""Patches are looked for once in so much way."""
+"""Distance [m] a robot moves before the list of patches near it is computed again."""
 STEP_M_MAX = 0.1
-"""No robot goes farther in one step."""
+"""Upper bound [m] of a robot's motion in one step."""
 
 
 def dip_m(gap_m: float, radius_m: float, speed_mps: float) -> float:
-    """How far [m] a wheel sinks between the edges of a gap; `inf` when it falls in."""
+    """Return the depth [m] by which a wheel sinks between the edges of a gap; `inf` if it falls in."""
     flown = inf if speed_mps <= 0.0 else 0.5 * GRAVITY_MPS2 * (gap_m / speed_mps) ** 2
     half_m = 0.5 * gap_m
     return min(flown, inf if half_m >= radius_m else radius_m - sqrt(radius_m * radius_m - half_m * half_m))
 
 
 def step_m_max(radius_m: float, traction: float) -> float:
-    """Highest step [m] that a wheel climbs from rest: tan(theta) = traction."""
+    """Return the highest step [m] that a wheel climbs from rest: tan(theta) = traction."""
     return radius_m * (1.0 - 1.0 / sqrt(1.0 + traction * traction))
 
 
 def gap_m_max(radius_m: float, traction: float) -> float:
-    """Widest gap [m], however deep, out of which a wheel climbs from rest: sin(theta) = w / 2r at the far edge."""
+    """Return the widest gap w [m], of any depth, that a wheel leaves from rest: sin(theta) = w / 2r at the far edge."""
     return 2.0 * radius_m * traction / sqrt(1.0 + traction * traction)
 
 
 def speed_after_step(speed_mps: float, step_m: float, radius_m: float, traction: float) -> float | None:
-    """What is left of a wheel's speed [m/s] on top of a step; None when it does not get up.
+    """Return a wheel's remaining speed [m/s] on top of a step; None if it cannot climb it.
 
-    From the contact angle down to the friction angle gravity exceeds traction, and the difference is paid in speed:
-    integral of g (sin - traction cos) r over that angle.
+    From the contact angle down to the friction angle gravity exceeds traction; the difference, the integral of
+    g (sin - traction cos) r over that angle, is taken from the kinetic energy.
     """
     if step_m <= 0.0:
         return speed_mps
@@ -72,7 +73,7 @@ def speed_after_step(speed_mps: float, step_m: float, radius_m: float, traction:
 
 
 class Floor:
-    """The ground under all wheels of a drawn scenario: what each stands on, and what it lets them do."""
+    """Floor model of a drawn scenario: the patch under each wheel, and the motions that edges permit."""
 
     def __init__(self, scenario: Scenario) -> None:
         body, poses = scenario.world.body, starts_of(scenario)
@@ -85,9 +86,9 @@ class Floor:
         self._looked_at = [(inf, inf)] * len(poses)
         self._obstacles: list[list[Patch]] = [[] for _ in poses]
         self._under: list[list[Patch | None]] = [[None, None] for _ in poses]
-        """What is under the left and the right wheel of each robot; None is the floor at 0."""
+        """Patch under the left and the right wheel of each robot; None is the floor at height 0."""
         self._height_m = [[0.0, 0.0] for _ in poses]
-        for n, pose in enumerate(poses):  # a world that resumes has robots in holes
+        for n, pose in enumerate(poses):  # in a resumed world robots may stand in holes
             self.near(n, pose)
             for wheel in (0, 1):
                 edge = self._edge(n, wheel, pose, 0.0)
@@ -95,7 +96,7 @@ class Floor:
                     self._under[n][wheel], self._height_m[n][wheel] = edge
 
     def near(self, n: int, pose: Pose2D) -> bool:
-        """Whether robot number `n` at `pose` may have to do with a patch in this step."""
+        """Return True if robot number `n` at `pose` may reach a patch in this step."""
         if not self._patches:
             return False
         x, y = self._looked_at[n]
@@ -106,19 +107,19 @@ class Floor:
         return bool(self._obstacles[n])
 
     def standing_m(self, n: int) -> float:
-        """Height [m] of what the robot stands on, the mean of its wheels."""
+        """Return the height [m] of the ground under robot `n`, the mean over its two wheels."""
         left_m, right_m = self._height_m[n]
         return 0.5 * (left_m + right_m)
 
     def roll(self, n: int, pose: Pose2D, wanted: Twist, body: Twist) -> tuple[Twist, Twist]:
-        """What the body of robot `n` does in the next step, and what its wheels turn for after it.
+        """Return the twist of robot `n`'s body in the next step, and the twist that its wheels roll after it.
 
-        The wheels turn for `wanted`, and the body moved with `body` until now. A wheel that an edge refuses slips on;
-        one that climbs an edge loses speed once it is up.
+        The wheels roll `wanted`, and the body has moved with `body` until now. A wheel that cannot climb an edge keeps
+        slipping; one that climbs an edge loses speed on top of it.
         """
         rims, speeds = self._of_wheels(wanted), [abs(v) for v in self._of_wheels(body)]
         rolling = rims
-        for _ in rims:  # a wheel that is held turns the other one another way, perhaps to an edge of its own
+        for _ in rims:  # a held wheel changes the other one's path, perhaps towards another edge
             through = wanted if rolling is rims else self._of_body(rolling)
             ahead = along_arc(pose, through, self._dt_s)
             afters = [self._after(n, wheel, ahead, speeds[wheel]) for wheel in (0, 1)]
@@ -128,9 +129,9 @@ class Floor:
         return STILL, wanted
 
     def settle(self, n: int, pose: Pose2D, body: Twist) -> bool:
-        """The wheels stand on what is under them at `pose`; False, and nothing changes, when one cannot have got there.
+        """Update the ground under the wheels for `pose`; return False, unchanged, if a wheel cannot have got there.
 
-        `body` is as in `roll`. Only a robot that is pushed, or slides, gets where its wheels do not roll.
+        `body` is as in `roll`. Only a robot that is pushed, or slides, reaches a pose to which its wheels cannot roll.
         """
         speeds = self._of_wheels(body)
         found: list[tuple[int, Patch | None, float]] = []
@@ -145,14 +146,14 @@ class Floor:
         return True
 
     def _after(self, n: int, wheel: int, pose: Pose2D, speed_mps: float) -> float | None:
-        """The wheel's speed with the robot at `pose`, whatever edge is on the way; None when it does not get there."""
+        """Return the wheel's speed with the robot at `pose`, after any edge it crosses; None if it cannot get there."""
         edge = self._edge(n, wheel, pose, speed_mps)
         if edge is None:
             return speed_mps
         return speed_after_step(speed_mps, edge[1] - self._height_m[n][wheel], self._radius_m, self._traction)
 
     def _edge(self, n: int, wheel: int, pose: Pose2D, speed_mps: float) -> tuple[Patch | None, float] | None:
-        """What the wheel comes to stand on and at which height [m], None when it stays on what it is on."""
+        """Return the new patch under the wheel and its height [m]; None if the wheel stays on its present patch."""
         c, s = cos(pose.theta), sin(pose.theta)
         beside = self._side_m if wheel == 0 else -self._side_m
         x, y = pose.x - beside * s, pose.y + beside * c
@@ -175,7 +176,7 @@ class Floor:
         return self._of_body(slowed)
 
     def _of_wheels(self, twist: Twist) -> list[float]:
-        """Speeds [m/s] of the left and the right wheel over the ground."""
+        """Return the speeds [m/s] of the left and the right wheel over the ground."""
         turn = self._side_m * twist.angular_z
         return [twist.linear_x - turn, twist.linear_x + turn]
 

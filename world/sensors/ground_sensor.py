@@ -1,8 +1,8 @@
-"""What lies ahead of the wheels, looked down upon: heights along three lines, of all robots in one batch call.
+"""Ground profile sensor: heights of the floor ahead of all robots, along three lines each, in one batch call.
 
 The lines run in the direction of travel through the left wheel, the centre and the right wheel. A height is relative
-to what the robot stands on (the mean of its wheels; it is taken to stand level). Nothing hides anything: the sensor
-looks from above, as a boom's would.
+to the ground under the robot (the mean of its wheels; it is taken to stand level). There is no occlusion: the sensor
+looks straight down, as if on a boom.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Profiler:
-    """The downward-looking sensors of all robots of one scenario."""
+    """Downward-looking sensors of all robots of one scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
         spec, side_m = scenario.world.ground, WHEEL_SIDE * scenario.mission.radius_m
@@ -35,14 +35,14 @@ class Profiler:
         self._reach_m = float(np.hypot(ahead[-1], side_m))
         self._patches = patches_of(scenario.world)
         self.flat = not self._patches
-        """Nothing to see: robots of such a world carry no ground sensor, and need not hear of it 20 times a second."""
+        """True for a world without terrain: its robots get no ground profiles, which saves 20 messages a second."""
         rows = [(p.x, p.y, p.reach_m, p.radius_m, p.half_x_m, p.half_y_m, p.c, p.s) for p in self._patches]
         self._rows = np.array(rows, dtype=float).reshape(-1, 8)
 
     def profile(self, robots: Sequence[Pose2D], standing_m: Sequence[float]) -> Floats:
-        """Heights [m] of shape (n, 3, points), exact; `standing_m` is the height of what each robot stands on.
+        """Return the exact heights [m], shape (n, 3, points); a floor deeper than the sensor's range is -inf.
 
-        A floor deeper than the sensor sees is -inf.
+        `standing_m` is the height [m] of the ground under each robot.
         """
         heights = np.zeros((len(robots), self._ahead.size))
         if self._patches:
@@ -53,11 +53,11 @@ class Profiler:
         return heights.reshape(len(robots), *self._shape)
 
     def _sink(self, heights: Floats, poses: Floats) -> None:
-        """The floor's own height at each point of the robots that are near a patch."""
+        """Write the floor's absolute height at each point of the robots near a patch into `heights`."""
         rows = self._rows
         away = np.hypot(rows[:, 0] - poses[:, 0:1], rows[:, 1] - poses[:, 1:2])
         robots, patches = np.nonzero(away <= self._reach_m + rows[:, 2])
-        # What counts most is listed first, so it is written last.
+        # Patches are sorted by precedence, so the first is written last.
         for n, index in sorted(zip(robots.tolist(), patches.tolist(), strict=True), key=lambda pair: -pair[1]):
             x, y, _, radius_m, half_x, half_y, pc, ps = rows[index]
             c, s = np.cos(poses[n, 2]), np.sin(poses[n, 2])

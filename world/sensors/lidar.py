@@ -1,8 +1,8 @@
-"""All robots' beams against all shapes in one batch call: numpy over (robot, shape) pairs, no loop over beams.
+"""Ray casting of all robots' laser scanners in one batch: numpy over (robot, shape) pairs, no loop over beams.
 
-A shape is seen under an interval of angles, so only the few beams in it are tested at all: the work grows with what
-there is to see, not with beams times shapes. Beams start behind the robot and go round counter-clockwise:
-beam j looks to `ANGLE_MIN` + j TAU/beams in `base_link`.
+A shape covers an interval of angles, and only the beams in that interval are tested: the cost grows with the visible
+shapes, not with beams times shapes. Beams start behind the robot and run counter-clockwise: beam j points to
+`ANGLE_MIN` + j TAU/beams in `base_link`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from lfa.protocol.geometry import TAU, Pose2D
 from lfa.world.description.scenario import Lidar, Obstacle, Scenario
 
 OVERLAP_SEEN = 0.9
-"""Of two radii: a robot with its centre nearer than this is not seen."""
+"""Distance of two robots' centres, as a fraction of two radii, below which they do not see each other."""
 ANGLE_MIN = -pi
 ROUNDING = 1e-9
-"""Of a beam's width: beams through a corner meet at least one of its edges."""
+"""Angular tolerance as a fraction of a beam's width, so that a beam through a corner hits at least one of its edges."""
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -30,7 +30,7 @@ Segment = tuple[float, float, float, float]
 
 
 class Scanner:
-    """The laser scanners of all robots of one scenario, each at the centre of a round robot."""
+    """Laser scanners of all robots of one scenario, each at the centre of a round robot."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._lidar = scenario.world.lidar
@@ -42,7 +42,7 @@ class Scanner:
         self._segments = np.array([*scenario.world.walls_m, *segments], dtype=float).reshape(-1, 4)
 
     def scan(self, robots: Sequence[Pose2D], moved: Mapping[int, Pose2D]) -> Floats:
-        """Ranges [m], one row of beams a robot, without noise; `moved` holds the obstacles that are not nailed down.
+        """Return the exact ranges [m], shape (robots, beams); `moved` holds the obstacles that are not fixed.
 
         Beyond `range_max_m` is +inf, below `range_min_m` is -inf (REP-117).
         """
@@ -56,7 +56,7 @@ class Scanner:
 
 
 def outline(placed: Iterable[tuple[Obstacle, Pose2D]]) -> tuple[list[Circle], list[Segment]]:
-    """Circles (x, y, radius) and segments (x1, y1, x2, y2) in `map` of obstacles at their poses."""
+    """Return the circles (x, y, radius) and segments (x1, y1, x2, y2) in `map` of obstacles at their poses."""
     circles: list[Circle] = []
     segments: list[Segment] = []
     for obstacle, pose in placed:
@@ -70,7 +70,7 @@ def outline(placed: Iterable[tuple[Obstacle, Pose2D]]) -> tuple[list[Circle], li
 
 
 def cast(poses: Floats, radius_m: float, circles: Floats, segments: Floats, lidar: Lidar) -> Floats:
-    """Ranges [m] of shape (n, beams) from n `poses` (x, y, theta) in `map`; the robots themselves are circles too."""
+    """Return ranges [m] of shape (n, beams) from n `poses` (x, y, theta) in `map`; the robots are circles too."""
     ranges = np.full((len(poses), lidar.beams), np.inf)
     flat = ranges.reshape(-1)
     robots = np.column_stack((poses[:, :2], np.full(len(poses), radius_m)))
@@ -83,13 +83,13 @@ def cast(poses: Floats, radius_m: float, circles: Floats, segments: Floats, lida
 
 
 def _cast_at_circles(flat: Floats, poses: Floats, circles: Floats, lidar: Lidar) -> None:
-    """The first n circles are the robots, each unseen by itself."""
+    """Reduce the ranges in `flat` by the hits on circles; the first n are the robots, which do not see themselves."""
     dx = circles[:, 0] - poses[:, 0:1]
     dy = circles[:, 1] - poses[:, 1:2]
     away = np.sqrt(dx * dx + dy * dy)
     seen = away < lidar.range_max_m + circles[:, 2]
     np.fill_diagonal(seen, False)
-    # Bodies do not overlap, but for robots that started in each other: they are nothing to each other (physics.py).
+    # Only robots that started at the same place overlap; they do not interact until they separate (rigid_bodies.py).
     robots = len(poses)
     seen[:, :robots] &= away[:, :robots] > OVERLAP_SEEN * 2.0 * circles[:robots, 2]
     robot, shape = np.nonzero(seen)
@@ -122,7 +122,7 @@ def _cast_at_segments(flat: Floats, poses: Floats, segments: Floats, lidar: Lida
     first = np.arctan2(ay, ax)
     swept = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
     start = np.where(swept < 0.0, first + swept, first) - heading
-    # Distance to the line, with its normal's direction: the range is the one over the cosine of the angle between.
+    # Range = distance to the line / cos(angle between beam and normal).
     area = ax * ey - ay * ex
     height = area / np.sqrt(ex * ex + ey * ey)
     normal = np.arctan2(-ex, ey) - heading
@@ -130,13 +130,13 @@ def _cast_at_segments(flat: Floats, poses: Floats, segments: Floats, lidar: Lida
     pair, turn, beam = _beams_within(start, start + np.abs(swept), robot, lidar.beams)
     with np.errstate(divide="ignore", invalid="ignore"):
         ranges = height[pair] / np.cos(turn - normal[pair])
-    # Seen edge-on the quotient is 0/0 or anything: the nearest point is then the answer (fmax passes nan over).
+    # Seen edge-on the quotient is 0/0 or undefined: the range is then that of the nearest point (fmax ignores nan).
     ranges = np.minimum(np.fmax(ranges, nearest[pair]), farthest[pair])
     np.minimum.at(flat, beam, ranges)
 
 
 def _beams_within(low: Floats, high: Floats, robot: Ints, beams: int) -> tuple[Ints, Floats, Ints]:
-    """Every beam with low <= angle <= high, angles [rad] from beam 0: its pair, its angle, its place in all beams."""
+    """Return pair index, angle [rad] from beam 0 and flat index of every beam with low <= angle <= high."""
     width = TAU / beams
     first = np.ceil(low / width - ROUNDING).astype(np.int64)
     count = np.minimum(np.floor(high / width + ROUNDING).astype(np.int64) - first + 1, beams)

@@ -1,7 +1,8 @@
-"""What a robot's own hardware would say: odometry, localisation, scan, ground; with noise, drop-out and outliers.
+"""Sensor models with noise, drop-out and outliers: odometry, localisation, scan and ground.
 
-Each robot and sensor has its own generator, derived from the scenario's seed: a sensor more, or a robot that is asked
-more often, changes nobody else's noise. Standard deviations come from `Noise`; with all at zero, nothing is drawn.
+Each sensor of each robot has its own random generator, derived from the scenario's seed: an added sensor, or a robot
+sampled more often, does not change the noise of the others. Standard deviations come from `Noise`; with all at zero,
+no random number is drawn.
 """
 
 from __future__ import annotations
@@ -16,18 +17,18 @@ from lfa.world.description.scenario import Lidar, Noise
 from lfa.world.sensors.lidar import Floats
 
 HEIGHT_OUTLIER_M = 0.1
-"""A bad height is off by up to this much."""
+"""Largest error [m] of an outlier height."""
 HEIGHT_DIGITS = 4
-"""The ground sensor resolves 0.1 mm."""
+"""Decimal places of a height [m]: the ground sensor resolves 0.1 mm."""
 
 
 def chance_of(seed: int, robot_id: int, sensor: str) -> Random:
-    """The generator of one sensor of one robot; the same in every process for the same seed."""
+    """Return the random generator of one sensor of one robot; the same in every process for the same seed."""
     return Random(f"{seed}/robot{robot_id}/{sensor}")
 
 
 class WheelOdometry:
-    """Counts what the wheels turn, each reading a little wrong: continuous, and drifting (REP-105 `odom`)."""
+    """Wheel odometry with a relative error per reading: continuous, and drifting (REP-105 `odom`)."""
 
     def __init__(self, noise: Noise, seed: int, robot_id: int) -> None:
         self._deviation = noise.odometry
@@ -35,17 +36,17 @@ class WheelOdometry:
         self._errors = (0.0, 0.0)
         self.pose_odom = Pose2D()
         self.twist = STILL
-        """As measured, in `base_link`."""
+        """Measured twist in `base_link`."""
         self.odometer_m = 0.0
 
     def redraw(self) -> None:
-        """New errors, once a reading: a fraction of the wheels' speed each for way and turn."""
+        """Draw new errors, once per reading: fractions of the wheels' linear and angular speed."""
         if self._deviation > 0.0:
             gauss = self._chance.gauss
             self._errors = gauss(0.0, self._deviation), gauss(0.0, self._deviation)
 
     def turn(self, wheels: Twist, duration_s: float) -> None:
-        """The wheels turned for `wheels` during `duration_s`."""
+        """Integrate the wheels' twist `wheels` over `duration_s`."""
         if self._deviation > 0.0:
             linear_error, angular_error = self._errors
             wheels = Twist(wheels.linear_x * (1.0 + linear_error), wheels.angular_z * (1.0 + angular_error))
@@ -57,14 +58,14 @@ class WheelOdometry:
 
 
 class Localizer:
-    """Pose in `map` from outside: noisy, sometimes missing, never drifting."""
+    """Localisation in `map` from an external source: noisy, sometimes missing, never drifting."""
 
     def __init__(self, noise: Noise, seed: int, robot_id: int) -> None:
         self._noise = noise
         self._chance = chance_of(seed, robot_id, "localization")
 
     def fix(self, pose_map: Pose2D) -> Pose2D | None:
-        """The measured pose, None when this fix is missing."""
+        """Return the measured pose in `map`, or None if this fix drops out."""
         noise, chance = self._noise, self._chance
         if noise.localization_dropout > 0.0 and chance.random() < noise.localization_dropout:
             return None
@@ -76,7 +77,7 @@ class Localizer:
 
 
 class RangeNoise:
-    """What a real scanner makes of exact ranges: jitter on each, wrong ones, and beams that do not come back (+inf)."""
+    """Noise of a laser scanner: jitter on each range, outliers, and beams without a return (+inf)."""
 
     def __init__(self, noise: Noise, lidar: Lidar, seed: int, robot_id: int) -> None:
         self._noise = noise
@@ -84,7 +85,7 @@ class RangeNoise:
         self._chance = np.random.default_rng(chance_of(seed, robot_id, "scan").getrandbits(64))
 
     def apply(self, ranges: Floats) -> tuple[float, ...]:
-        """The ranges [m] as measured; what was out of range stays so, but for outliers."""
+        """Return the measured ranges [m]; ranges out of bounds stay so, except for outliers."""
         noise, chance = self._noise, self._chance
         if noise.range_m > 0.0:
             finite = np.isfinite(ranges)
@@ -99,14 +100,14 @@ class RangeNoise:
 
 
 class HeightNoise:
-    """What a real range sensor makes of exact heights: jitter on each, wrong ones, and missing ones (nan)."""
+    """Noise of the ground sensor: jitter on each height, outliers, and missing heights (nan)."""
 
     def __init__(self, noise: Noise, seed: int, robot_id: int) -> None:
         self._noise = noise
         self._chance = np.random.default_rng(chance_of(seed, robot_id, "ground").getrandbits(64))
 
     def apply(self, heights: Floats) -> tuple[tuple[float, ...], ...]:
-        """The heights [m], one row a line, as measured; too deep (-inf) stays so, but for missing ones."""
+        """Return the measured heights [m], one row per line; too deep (-inf) stays so, except for missing ones."""
         noise, chance, shape = self._noise, self._chance, heights.shape
         if noise.ground_m > 0.0:
             heights = heights + chance.normal(0.0, noise.ground_m, shape)

@@ -1,1 +1,4 @@
-"""The shapes that the paper's figures must show (control.md 7.1), judged on recorded runs: `lfa verify`."""
+"""Checks of recorded runs against the paper's figures (control.md 7.1) for `lfa verify`.
+
+No drawing and no checks of lease invariants: they are in `deploy/view/figures` and `deploy/analysis/verification`.
+"""

@@ -1,4 +1,4 @@
-"""The properties of control.md 7.1 that compare runs: path 1 with path 2, iteration 2 with 1, spikes of many seeds."""
+"""Properties of control.md 7.1 that compare runs: path 1 with path 2, iteration 2 with 1, spikes of many seeds."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from lfa.deploy.analysis.paper.experiment import Subject, duration_s, on_course
 from lfa.deploy.analysis.run_data import Run
 
 SPIKES_MIN = 20
-"""Fewer pooled spikes say nothing about a rank correlation."""
+"""Minimum number of pooled spikes for a meaningful rank correlation."""
 CORRELATION_MIN = 0.8
 
 
 class Kept(Struct, frozen=True):
-    """What comparisons need of one run; small, so that a bench can keep many."""
+    """Data of one run for comparisons; small, so that a bench can hold many."""
 
     scenario: str
     seed: int
     iteration: int
-    """2 with the obstacles of an earlier run known, else 1."""
+    """Iteration of the experiment: 2 when the obstacles of an earlier run are known, else 1."""
     duration_s: float
     way_m: float
-    """Driven by all robots together."""
+    """Path length [m], summed over all robots."""
     requests: int
-    """Orientation requests of leaders."""
+    """Number of orientation requests by leaders."""
     switches: int
-    """From one leading robot to another."""
+    """Number of role switches from one leading robot to another."""
     spikes: tuple[tuple[float, float, float], ...]
-    """Width [s], peak [m], duration [s] of the avoidances that it belongs to, of each spike that belongs to one."""
+    """Width [s], peak [m] and duration [s] of the causing avoidances, for each spike that an avoidance caused."""
 
 
 def keep(run: Run) -> Kept:
@@ -53,7 +53,7 @@ def keep(run: Run) -> Kept:
 
 
 def across(runs: Sequence[Kept]) -> list[Finding]:
-    """Each comparison; with too few runs of the paper's paths it `needs more runs`, which is no fault."""
+    """Return the finding of each comparison; with too few runs of the paper's paths `needs more runs`, no failure."""
     firsts = [run for run in runs if run.iteration == 1]
     again = [bar.judged(_largest_share(runs, of)) for bar, of in ITERATIONS]
     return [bar.judged(measure(firsts)) for bar, measure in COMPARISONS] + again
@@ -68,7 +68,7 @@ def _height(runs: Sequence[Kept]) -> Measured | None:
 
 
 def _ranked(runs: Sequence[Kept], other: int) -> Measured | None:
-    """Of the pooled spikes of several runs: width against another of their columns."""
+    """Return the rank correlation of width and column `other` over pooled spikes; None with too few runs or spikes."""
     pooled = [spike for run in runs for spike in run.spikes]
     if len(runs) < 2 or len(pooled) < SPIKES_MIN:
         return None
@@ -89,7 +89,7 @@ def _more_switches(runs: Sequence[Kept]) -> Measured | None:
 
 
 def _least_more(runs: Sequence[Kept], of: Callable[[Kept], float]) -> Measured | None:
-    """By how much path 1 exceeds path 2 at least: of equal seeds, or of all when no two are equal."""
+    """Return the minimum excess of path 1 over path 2: over pairs of equal seed, else over all pairs."""
     ones, twos = ([run for run in runs if run.scenario == path] for path in PATHS)
     pairs = [(a, b) for a in ones for b in twos]
     pairs = [(a, b) for a, b in pairs if a.seed == b.seed] or pairs
@@ -100,7 +100,7 @@ def _least_more(runs: Sequence[Kept], of: Callable[[Kept], float]) -> Measured |
 
 
 def _largest_share(runs: Sequence[Kept], of: Callable[[Kept], float]) -> Measured | None:
-    """Of iteration 2 in iteration 1, of runs of the same world, at the most."""
+    """Return the maximum ratio of iteration 2 to iteration 1, over pairs of runs in the same world."""
     firsts = {(run.scenario, run.seed): run for run in runs if run.iteration == 1}
     pairs = [(first, run) for run in runs if run.iteration == 2 and (first := firsts.get((run.scenario, run.seed)))]
     if not pairs:

@@ -1,4 +1,4 @@
-"""Every property of control.md 7.1 that one run can show, with the scenarios it applies to and its bar."""
+"""Table of the control.md 7.1 properties of a single run, each with its scenarios and its bar."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ MATCHED_MIN = 0.9
 SWITCH_S = 8.0
 COINCIDE_M = 0.05
 OVERLAP_M = 0.005
-"""Bodies of the engine may stay in each other by 0.5 mm; the rest is how far one goes between two records of truth."""
+"""Allowed overlap [m]: 0.5 mm that the physics engine tolerates, plus the motion between two ground truth records."""
 
 
 class Property(Struct, frozen=True):
-    """What must hold in a run of one of `scenarios`."""
+    """Property that must hold in a run of one of `scenarios`."""
 
     bar: Bar
     scenarios: tuple[str, ...]
@@ -32,7 +32,7 @@ class Property(Struct, frozen=True):
 
 
 def of_run(run: Run) -> list[Finding]:
-    """Every property that applies to the run's scenario; none when it is not one of the paper's."""
+    """Return the findings of all properties of the run's scenario; empty when it is not one of the paper's."""
     subject, name = Subject(run), run.summary.scenario
     return [one.bar.judged(one.measure(subject)) for one in PROPERTIES if name in one.scenarios]
 

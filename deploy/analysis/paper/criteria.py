@@ -1,4 +1,4 @@
-"""A value beside the bar that it has to reach, as `lfa verify` prints it."""
+"""Comparison of a measured value with its bar, and its output line of `lfa verify`."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ NOTE_MAX = 160
 
 
 class Measured(Struct, frozen=True):
-    """A value to be judged; nan: there was nothing of the kind, which is no fault."""
+    """Measured value of a property; nan when the property does not apply, which is not a failure."""
 
     value: float
     note: str = ""
-    """Where the value is from, or what is missing."""
+    """Source of the value, or what is missing."""
 
 
 class Finding(Struct, frozen=True):
-    """One property. `value` is None where there was nothing to judge."""
+    """Result of one property. `value` is None when there was nothing to measure."""
 
     figure: str
-    """7, 8, 9 or 11: the paper's; `run` for what all of them need."""
+    """Figure of the paper: 7, 8, 9 or 11; `run` for properties that all figures need."""
     name: str
     status: Status
     value: float | None
@@ -33,6 +33,8 @@ class Finding(Struct, frozen=True):
 
 
 class Bar(Struct, frozen=True):
+    """Bound of one property: figure, name, comparison and limit with its unit."""
+
     figure: str
     name: str
     rule: Literal["<", "<=", ">=", "=", ">"]
@@ -40,7 +42,7 @@ class Bar(Struct, frozen=True):
     unit: str = ""
 
     def judged(self, measured: Measured | None) -> Finding:
-        """`None`: it takes more runs to say."""
+        """Compare a value with the bar and return the finding; None as value gives `needs more runs`."""
         shown = f"{self.rule} {self.bar:g} {self.unit}".rstrip()
         if measured is None:
             return Finding(self.figure, self.name, "needs more runs", None, self.unit, shown)
@@ -56,7 +58,7 @@ class Bar(Struct, frozen=True):
 
 
 def line(one: Finding) -> str:
-    """One row of a table."""
+    """Format a finding as one row of a table."""
     value = "-" if one.value is None else f"{one.value:.4g}"
     return f"  {one.figure:<4}{one.name:<48}{value:>10} {one.unit:<4} bar {one.bar:<11} {one.status}" + (
         f"  ({one.note})" if one.note else ""

@@ -1,4 +1,4 @@
-"""A run with all that several properties need of it."""
+"""Intermediate results of a run that several properties of the paper's figures share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STRAIGHT_RADPS = 0.05
 
 
 class Subject:
-    """One recorded run. Distances are in metres, angles in radians, times in seconds."""
+    """One recorded run with its episodes and spikes. Distances in metres, angles in radians, times in seconds."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -40,13 +40,13 @@ class Subject:
         return spikes.bearing_spikes(self.run)
 
     def alive(self) -> list[int]:
-        """Followers that stood in the chain at the end."""
+        """Return the followers in the last chain that have tracking errors."""
         chain = event_log.last_chain(self.run.events)[1:]
         return [robot for robot in chain if robot in self.run.errors]
 
 
 def on_course(s: Subject) -> list[Spike]:
-    """Spikes of the distance but those with which the robots come into their places."""
+    """Return the spikes of the distance error, without those of robots that move to their slots at the start."""
     starts = [one for one in s.episodes if one.kind == "start"]
     return [
         spike
@@ -56,11 +56,11 @@ def on_course(s: Subject) -> list[Spike]:
 
 
 def duration_s(s: Subject, spike: Spike) -> float:
-    """How long there was avoiding for a spike, overlaps counted once; 0 with none.
+    """Return the duration [s] of the avoidances that caused a spike, overlaps counted once; 0 without an avoidance.
 
-    An avoidance that began at most `FELT_S` before the spike may have made it, and counts from its beginning. One that
-    began earlier, as of a robot that is stuck for long, did not make it begin: it counts from there on. What lasted on
-    after the spike did not make it either.
+    An avoidance that began at most `FELT_S` before the spike may have caused it and counts from its own start. An
+    earlier one, for example of a robot that is stuck for long, did not start the spike and counts from the spike's
+    start. The time after the end of the spike never counts.
     """
     avoided = [one for one in spikes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
     began = [(one, one.from_s if one.from_s >= spike.from_s - spikes.FELT_S else spike.from_s) for one in avoided]

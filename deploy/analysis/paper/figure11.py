@@ -1,4 +1,4 @@
-"""Figure 11, the tracking output: errors that vanish, speeds that ramp up, dip and end."""
+"""Properties of figure 11, the tracking output: errors that vanish, speeds that ramp up, dip and end."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def final_bearing(s: Subject) -> Measured:
 
 
 def ramp(s: Subject) -> Measured:
-    """From the leader's first motion to 90 % of its cruise speed: how far off the time that its acceleration takes."""
+    """Return the relative deviation of the leader's time to 90 % of cruise speed from that of its set acceleration."""
     t, v = _leader_speed(s)
     leading = s.run.scenario.mission.leading
     moving, there = np.flatnonzero(v > REST_MPS), np.flatnonzero(v > 0.9 * leading.cruise_mps)
@@ -65,7 +65,7 @@ def over_speed(s: Subject) -> Measured:
 
 
 def same_speed(s: Subject) -> Measured:
-    """Of followers that keep their place on a straight way: the largest median difference to the leader's speed."""
+    """Return the largest median difference [m/s] to the leader's speed, for settled followers on a straight path."""
     t, v = _leader_speed(s)
     worst, note = nan, ""
     for robot in s.alive():
@@ -85,7 +85,7 @@ def final_speed(s: Subject) -> Measured:
 
 
 def stops(s: Subject) -> Measured:
-    """How long after the leader each follower came to rest, for each hop."""
+    """Return the largest delay [s] per hop from the leader's rest to a follower's rest."""
     chain = [robot for robot in event_log.last_chain(s.run.events) if robot in s.run.truth]
     if len(chain) < 2:
         return Measured(nan)

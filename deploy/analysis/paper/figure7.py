@@ -1,4 +1,4 @@
-"""Figure 7, the distance error: a flat baseline, and spikes that each have their reason."""
+"""Properties of figure 7, the distance error: a flat baseline, and spikes that each have a cause."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def episodes_felt(s: Subject) -> Measured:
 
 
 def early_spikes(s: Subject) -> Measured:
-    """Spikes in the first half of the course, less those in the second; the start's own are none of the course's."""
+    """Return the number of spikes in the first half of the course minus the second, without those of the start."""
     halves = [0, 0]
     for spike in on_course(s):
         rows = s.run.truth[spike.robot]

@@ -1,4 +1,4 @@
-"""Figure 8, the orientation error, and the order of the chain."""
+"""Properties of figure 8, the orientation error, and of the order of the chain."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from lfa.deploy.analysis.paper.experiment import Subject, explained, share
 from lfa.deploy.recording import event_log
 
 REQUEST_S = 3.0
+"""Maximum time [s] from a request to the spike of the first follower's bearing error."""
 SAID_S = 0.1
-"""A request's note is on its way for less, and is said again only after a second."""
+"""Upper bound [s] of a request's latency; the request is repeated only after a second."""
 
 
 def requests_seen(s: Subject) -> Measured:
-    """The first follower's bearing against what it is asked for goes up at once; a request may ask nothing of it."""
+    """Return the share of requests after which the first follower's bearing error rises within `REQUEST_S`.
+
+    A request that does not change the first follower's bearing counts as answered.
+    """
     asked, mute = episodes.requests(s.run), []
     for at_s in asked:
         first = next((robot for robot, e in s.run.errors.items() if _second_in_chain(s, robot, at_s)), None)
@@ -34,7 +38,7 @@ def requests_seen(s: Subject) -> Measured:
 
 
 def _asked_anew(s: Subject, robot: int, at_s: float) -> bool:
-    """Whether what `robot` is asked for is another bearing after the request than before it."""
+    """Return True if the request changes the bearing that `robot` is commanded to keep."""
     said = s.run.seen.commanded.get(robot)
     if said is None:
         return False
@@ -47,11 +51,11 @@ def bearings_explained(s: Subject) -> Measured:
 
 
 def after_switch(s: Subject) -> Measured:
-    """The longest time from a role switch until a follower's bearing is back, or something else disturbs it."""
+    """Return the longest time [s] from a role switch to a follower's recovered bearing or to another disturbance."""
     worst, note = nan, "no role switch in this run"
     for before, reign in pairwise(s.run.reigns):
         for robot, e in s.run.errors.items():
-            if robot == before.robot_id:  # it comes back at the tail when it can: a rejoin
+            if robot == before.robot_id:  # it may return at the tail, which is a rejoin
                 continue
             after = (e.t >= reign.from_s) & (e.t <= _undisturbed_until(s, robot, reign.from_s))
             off = after & (np.abs(e.bearing) >= episodes.BASE_RAD)
@@ -64,7 +68,7 @@ def after_switch(s: Subject) -> Measured:
 
 
 def chain_kept(s: Subject) -> Measured:
-    """Chains that are not the one before, less some, with others at its tail."""
+    """Count the chains out of order: not the chain before with robots removed and others appended at the tail."""
     before: list[int] = []
     newest: tuple[object, ...] = ()
     wrong = []
@@ -94,7 +98,7 @@ def _undisturbed_until(s: Subject, robot: int, after_s: float) -> float:
 
 
 def _tail_only(before: Sequence[int], after: Sequence[int]) -> bool:
-    """Whether `after` is `before` with some robots taken out and others, or the same ones, put at its tail."""
+    """Return True if `after` is `before` with some robots removed, and these or others appended at its tail."""
     kept = 0
     for robot in before:
         if kept < len(after) and after[kept] == robot:

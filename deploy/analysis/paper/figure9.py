@@ -1,4 +1,4 @@
-"""Figure 9, the path flow: where the robots went, and what they went round."""
+"""Properties of figure 9, the path flow: the robots' paths and the obstacles along them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def bounded(s: Subject) -> Measured:
 
 
 def ends_at_goal(s: Subject) -> Measured:
-    """How much farther from the goal than its place in the chain allows the farthest robot ended."""
+    """Return the largest excess [m] of a robot's final distance to the goal over what its place in the chain allows."""
     mission = s.run.scenario.mission
     chain = event_log.last_chain(s.run.events)
     away, note = nan, ""
@@ -36,7 +36,10 @@ def ends_at_goal(s: Subject) -> Measured:
 
 
 def counts_differ(s: Subject) -> Measured:
-    """How many different counts there are; in iteration 2 a team that passes all it knows meets nothing."""
+    """Return the number of different counts of obstacles met.
+
+    Does not apply in iteration 2 when the team passed all known obstacles and met none.
+    """
     met = [sum(robot.obstacles_met.values()) for robot in s.run.summary.robots]
     if s.run.scenario.mission.leading.known_m and not any(met):
         return Measured(nan, "all known obstacles passed by")
@@ -44,7 +47,7 @@ def counts_differ(s: Subject) -> Measured:
 
 
 def on_new_trace(s: Subject) -> Measured:
-    """Sideways distance of followers from the path of the last new leader, less what their slots ask for."""
+    """Return the largest median offset [m] of a follower from the last new leader's path, less its slots' offset."""
     if len(s.run.reigns) < 2:
         return Measured(nan, "no role switch in this run")
     reign = s.run.reigns[-1]
@@ -67,7 +70,10 @@ def no_overlap(s: Subject) -> Measured:
 
 
 def _beside(path: Array, row: Array) -> float:
-    """Signed distance [m] to the left of a path of the point in `row`, at the path's nearest segment."""
+    """Return the signed distance [m], left positive, of the point in `row` from the path at its nearest sample.
+
+    nan when that is the first or last sample of the path.
+    """
     gaps = np.hypot(path[:, 1] - row[1], path[:, 2] - row[2])
     i = int(np.argmin(gaps))
     if i in (0, path.shape[0] - 1):
@@ -77,7 +83,7 @@ def _beside(path: Array, row: Array) -> float:
 
 
 def _asked_beside(s: Subject, robot: int, leader: int, at_s: float) -> float:
-    """k sin(phi), summed over the hops from `leader` to `robot`; nan when it is not behind that leader."""
+    """Return k sin(phi) [m], summed over the hops from `leader` to `robot`; nan when the robot is not behind it."""
     beside, seen = 0.0, set()
     while robot != leader:
         e = s.run.errors.get(robot)

@@ -1,4 +1,4 @@
-"""What every run of the paper ends with: the goal, nobody touched, nobody left."""
+"""Properties of the end of every run of the paper: goal reached, no contact, no robot left behind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the paths of a run kept out of what stood there, from ground truth."""
+"""Overlap of the robots' bodies with obstacles and walls, from the ground truth of a run."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from lfa.deploy.recording.mcap_reader import Array
 from lfa.world.description.placement import gap_to, reach_of
 
 EVERY = 3
-"""Records of ground truth between two looks: a robot goes 6 cm at most in that time."""
+"""Step in ground truth records between two checks: a robot moves 6 cm at most in that time."""
 
 
 def overlap_m(run: Run) -> float:
-    """How deep [m] any robot's body was in an obstacle or a wall, at the worst; negative: the narrowest gap."""
+    """Return the largest overlap [m] of a robot's body with an obstacle or a wall; negative: the narrowest gap."""
     radius_m, world = run.scenario.mission.radius_m, run.scenario.world
     worst = -inf
     for rows in run.truth.values():
@@ -35,7 +35,7 @@ def overlap_m(run: Run) -> float:
 
 
 def outside_m(run: Run, rows: Array) -> float:
-    """How far [m] a path leads out of the box round all walls; 0 within, inf where a place is not finite."""
+    """Return how far [m] a path leaves the bounding box of all walls; 0 inside, inf for a non-finite position."""
     walls = np.array(run.scenario.world.walls_m, dtype=float).reshape(-1, 2)
     places = rows[:, 1:3]
     if not np.isfinite(places).all():
@@ -47,7 +47,7 @@ def outside_m(run: Run, rows: Array) -> float:
 
 
 def _near(rows: Array, run: Run, index: int) -> Mask:
-    """Which rows are near enough to an obstacle to be looked at closely."""
+    """Return a mask of the rows near enough to an obstacle for an exact check."""
     obstacle = run.scenario.world.obstacles[index]
     within_m = reach_of(obstacle) + run.scenario.mission.radius_m + 0.3
     moved = run.seen.obstacles.get(index)

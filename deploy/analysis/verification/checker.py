@@ -1,7 +1,7 @@
-"""What all checkers of invariants share: what they are told, and what they know about fences.
+"""Base of all invariant checkers: the facts that they receive, and the state of the fences.
 
-They see true time and what left each process and each gateway, nothing of anybody's state: the fuzzer feeds
-them while a schedule runs, and a recording of real processes can feed them as well.
+Checkers observe true time and the output of each process and gateway, never internal state. The fuzzer feeds them
+while a schedule runs; a recording of real processes can feed them as well.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from lfa.protocol.messages.consensus import Config, Grant, Member, Promise, Prop
 from lfa.protocol.messages.robot import CmdVel
 
 EARLY_S = 1e-6
-"""Rounding of clock conversions."""
+"""Tolerance [s] for the rounding of clock conversions."""
 LONG_AGO = float("-inf")
+"""Time [s] before every event of a run."""
 
 
 class Violation(Struct, frozen=True):
-    """What was broken, when (true time [s]), and by what."""
+    """Violation of an invariant: its name, the true time [s] and a text with the cause."""
 
     name: str
     at: float
@@ -28,7 +29,10 @@ class Violation(Struct, frozen=True):
 
 
 class Checker:
-    """One invariant. It overrides what it needs to hear; `violations` is what it found."""
+    """Checker of one invariant.
+
+    It overrides the methods of the facts that it needs; `violations` holds its results. `at` is always true time [s].
+    """
 
     name = ""
 
@@ -40,53 +44,53 @@ class Checker:
         self.violations.append(Violation(self.name, at, text))
 
     def leads(self, at: float, who: Member, term: Term, until: float) -> None:
-        """`who` holds `term`, new or extended, and believes so until true time `until`."""
+        """Record that `who` holds `term`, new or extended, until true time `until` [s] by its own clock."""
 
     def leads_no_more(self, at: float, who: Member) -> None:
-        """It stepped down, or its process ended."""
+        """Record that `who` stepped down, or that its process ended."""
 
     def adopts(self, at: float, who: Member, config: Config) -> None: ...
 
     def promises(self, at: float, who: Member, promise: Promise) -> None:
-        """A promise reached the candidate that `promise.term` names."""
+        """Record that a promise reached the candidate that `promise.term` names."""
 
     def proposes(self, at: float, who: Member, propose: Propose) -> None: ...
 
     def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
-        """`voter` is bound to the holder of `grant.term` until true time `until`."""
+        """Record that `voter` is bound to the holder of `grant.term` until true time `until` [s]."""
 
     def releases(self, at: float, term: Term) -> None:
-        """A RELEASE of `term` left its holder."""
+        """Record that a RELEASE of `term` left its holder."""
 
     def bars(self, at: float, robot_id: int, below: Term) -> None:
-        """The gateway of `robot_id` refuses every term under `below` from here on, by a fence or a command."""
+        """Record that the gateway of `robot_id` from now on refuses terms under `below`, by a fence or a command."""
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None: ...
 
     def lives(self, at: float, who: Member) -> None:
-        """A process began."""
+        """Record that the process of incarnation `who` started."""
 
     def ends(self, at: float, who: Member) -> None:
-        """A process ended."""
+        """Record that the process of incarnation `who` ended."""
 
     def parts(self, at: float, cuts: Set[tuple[int, int]]) -> None:
-        """From here on nothing passes over these links between ids, from and to, and everything over the others."""
+        """Record the links (from id, to id) that are cut from now on; all other links are open."""
 
     def wall_steps(self, at: float, host: int) -> None:
-        """A wall clock was stepped, which nothing but the order of terms over a total blackout may feel."""
+        """Record a step of a wall clock, which may affect only the order of terms over a total blackout."""
 
     def heals(self, at: float, step_s: float) -> None:
-        """The last fault is over, a quorum is connected, and a message comes and is answered within half `step_s`."""
+        """Record the end of the last fault: a quorum is connected, a round trip takes at most half of `step_s` [s]."""
 
     def over(self, at: float) -> None:
-        """Nothing more will be told."""
+        """Record the end of the run: no more facts follow."""
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
-        """The gateway of `robot_id` let `cmd` through, whose stamp is `age` seconds old by the gateway's clock."""
+        """Record that the gateway of `robot_id` accepted `cmd`, whose stamp is `age` [s] old by the gateway's clock."""
 
 
 def listeners(checkers: Sequence[Checker]) -> dict[str, list[Callable[..., None]]]:
-    """By what there is to hear, the methods of those checkers that want to hear it."""
+    """Return by name of the fact the methods of those checkers that override it."""
     return {
         name: [getattr(c, name) for c in checkers if getattr(type(c), name) is not getattr(Checker, name)]
         for name in vars(Checker)
@@ -95,7 +99,7 @@ def listeners(checkers: Sequence[Checker]) -> dict[str, list[Callable[..., None]
 
 
 class Fences:
-    """What each gateway refuses at a moment: the knowledge that I1, I4 and I8 share."""
+    """Terms that each gateway refuses at present; shared by the checkers of I1, I4 and I8."""
 
     def __init__(self) -> None:
         self._least: dict[int, Term] = {}
@@ -111,22 +115,22 @@ class Fences:
         self._shut_until[robot_id] = shut_until
 
     def refuses(self, robot_id: int, term: Term, until: float) -> bool:
-        """No command of `term` moves `robot_id`, now and until `until`."""
+        """Return True if no command of `term` can move `robot_id` from now until `until` [s]."""
         least = self._least.get(robot_id)
         return (least is not None and term < least) or until <= self._shut_until.get(robot_id, LONG_AGO)
 
     def fenced(self, robot_id: int, term: Term) -> bool:
-        """`term` was barred at `robot_id`, be it by an earlier life of its gateway.
+        """Return True if `term` was ever barred at `robot_id`, also by an earlier incarnation of its gateway.
 
-        That life's fence followed the promises of a quorum, so that no lease of `term` has begun since; and those
-        begun before have run out when the next life opens (E13).
+        That incarnation's fence followed the promises of a quorum, so no lease of `term` has started since; leases
+        started before have expired when the next incarnation of the gateway opens (E13).
         """
         least = self._least_ever.get(robot_id)
         return least is not None and term < least
 
 
 class WithFences(Checker):
-    """A checker that has to know what is fenced."""
+    """Checker that also tracks the fences of the gateways."""
 
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)

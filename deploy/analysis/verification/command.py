@@ -1,4 +1,4 @@
-"""`lfa verify`: of each run the lease's invariants and, where it is one of the paper's, the shapes of its figures."""
+"""`lfa verify`: check each run: the lease's invariants and, for a scenario of the paper, the figures' properties."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from lfa.protocol.errors import Refused
 
 
 class Checked(Struct, frozen=True):
-    """All that was found out about one run folder."""
+    """Results of all checks of one run folder."""
 
     folder: str
     scenario: str
@@ -32,21 +32,23 @@ class Checked(Struct, frozen=True):
     happenings: int
     broken: tuple[Violation, ...]
     shapes: tuple[Finding, ...]
-    """Empty when the scenario is none of the paper's."""
+    """Findings of the paper checks; empty when the scenario is not one of the paper's."""
 
 
 class VerifyReport(Struct, frozen=True):
+    """Results of all checks of all given runs."""
+
     ok: bool
     runs: tuple[Checked, ...]
     across: tuple[Finding, ...]
-    """Comparisons of the paper's two paths; empty when none of the runs is one of them."""
+    """Findings of the comparisons of the paper's two paths; empty when no run is one of them."""
 
 
 def command(
     folders: Annotated[list[Path], typer.Argument(help="Run folders with journals; several are compared.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print all findings as JSON.")] = False,
 ) -> int:
-    """Exit code 1 when an invariant was broken or a property does not hold."""
+    """Check the run folders and print the findings; exit code 1 for a broken invariant or a failed property."""
     checked: list[Checked] = []
     kept: list[Kept] = []
     for folder in folders:
@@ -65,7 +67,10 @@ def command(
 
 
 def check(folder: Path) -> tuple[Checked, Kept]:
-    """The findings on the run in `folder`. Raises Refused when it is none, or cannot be run again."""
+    """Return the findings on a run and its data for comparisons.
+
+    Raises Refused when `folder` is no finished run or its journals cannot be re-executed.
+    """
     lease = verify(folder)
     if not (folder / SUMMARY).is_file():
         raise Refused(f"{folder}: no {SUMMARY}, must be the folder of a run that came to its end")

@@ -1,6 +1,6 @@
-"""`lfa map`: what a robot came to know of the ground, as a ROS map.yaml and its pgm.
+"""`lfa map`: export a robot's map of explored ground as a ROS map.yaml and its pgm.
 
-The map is not recorded: the robot's journal is run again, and its agent asked at the end.
+The map is not recorded: the robot's journal is re-executed, and the map is read from its agent at the end.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from lfa.world.description import maps
 from lfa.world.description.maps import Map
 
 RIM_CELLS = 2
-"""Of unknown ground, kept around what is known."""
+"""Width [cells] of the border of unknown ground around the known part of a map."""
 
 
 def command(
     run: Annotated[Path, typer.Argument(help="Run folder of a scenario with motion = explore.")],
     out: Annotated[Path | None, typer.Option(help="Folder for map.yaml and map.pgm; default the run folder.")] = None,
-    robot: Annotated[int | None, typer.Option(help="Whose map; default the last leader's.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
+    robot: Annotated[int | None, typer.Option(help="Id of the robot; default the last leader.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print path and size of the map as JSON.")] = False,
 ) -> int:
     drawn = map_of(run, robot)
     path = (out or run) / "map.yaml"
@@ -50,7 +50,10 @@ def command(
 
 
 def map_of(run: Path, robot: int | None = None) -> Map:
-    """The map of `robot`, or of who led last, at the end of the run. Raises Refused when there is none."""
+    """Return the map of `robot`, by default of the last leader, at the end of the run.
+
+    Raises Refused when the robot has no journal or kept no map.
+    """
     reigns = event_log.reigns(event_log.lines(run))
     robot = robot if robot is not None else reigns[-1].robot_id if reigns else 1
     lives = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
@@ -71,7 +74,7 @@ def map_of(run: Path, robot: int | None = None) -> Map:
 
 
 def known_part(grid: Grid) -> Map:
-    """The smallest map with all that `grid` knows, and a rim."""
+    """Return the smallest map with all known cells of `grid`, and a border of `RIM_CELLS`."""
     scores = np.frombuffer(bytes(grid.scores), dtype=np.uint8).reshape(grid.rows, grid.columns)
     cells = np.where(scores >= OCCUPIED, maps.OCCUPIED, np.where(scores > 0, 0, maps.UNKNOWN)).astype(np.int16)
     rows, columns = np.nonzero(scores)

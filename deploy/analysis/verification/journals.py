@@ -1,9 +1,9 @@
-"""The invariants' checkers on a run of real processes.
+"""Check of the lease's invariants on a run of real processes, from their journals.
 
-The journals hold all that each process was told, by the one clock of the machine. Cores of agents and witness are run
-again on theirs, which gives every effect of every lease; the gateways are run again on the world's, which gives every
-command that moved a robot. What a killed process said in its last moment may be missing from its own journal: then
-those who heard it tell.
+The journals hold every input of each process, by the single clock of the machine. The cores of agents and witness are
+re-executed on their journals, which yields every effect of every lease; the gateways are re-executed on the world's
+journal, which yields every command that moved a robot. The last messages of a killed process may be missing from its
+own journal; they are then taken from the journals of their receivers.
 """
 
 from __future__ import annotations
@@ -42,21 +42,25 @@ _local_decoder = msgspec.msgpack.Decoder(Local)
 
 
 class Happening(Struct, frozen=True):
-    """What the checkers are to be told, at which moment [s]."""
+    """Fact for the checkers, with its time [s]."""
 
     at: float
     words: Words
 
 
 class JournalVerdict(Struct, frozen=True):
+    """Result of the invariant checks of one run."""
+
     journals: int
+    """Number of journals read."""
     happenings: int
+    """Number of facts given to the checkers."""
     broken: tuple[Violation, ...]
-    """With times from the run's first journalled moment on."""
+    """Violations, with times [s] from the first journalled time of the run."""
 
 
 def verify(folder: Path) -> JournalVerdict:
-    """Check the run in `folder`. Raises Refused when it has no journals, or those of another version of the cores."""
+    """Check the run in `folder`. Raises Refused when journals are missing or of another version of the cores."""
     paths = sorted((folder / JOURNALS).glob("*.bin"))
     if not paths:
         raise Refused(f"{folder}: no journals, must be a run folder of lfa run or lfa sim")
@@ -75,10 +79,10 @@ def verify(folder: Path) -> JournalVerdict:
 
 
 def _refuse_lost(journalled: set[str], folder: Path, mission: Mission) -> None:
-    """What one did that took part and left no journal would look like what the others made up."""
+    """Raise Refused when a process that took part has no journal: its actions would look like violations by others."""
     team = {WORLD_NAME, *map(robot_name, mission.robots)}
     for event in event_log.lines(folder):
-        came = event["kind"] == "peer_up"  # who only speaks is one of the team, and not anybody in its name
+        came = event["kind"] == "peer_up"  # a mere sender counts only if it is of the team
         name = str(event.get("name" if came else "from"))
         took_part = name in team or (came and robot_id_of(name) is not None)
         if took_part and name not in journalled:
@@ -86,7 +90,7 @@ def _refuse_lost(journalled: set[str], folder: Path, mission: Mission) -> None:
 
 
 def obeyed(folder: Path) -> Iterator[tuple[float, CmdVel]]:
-    """The commands of a run that gateways let through, and when; also of one that goes on."""
+    """Yield time [s] and command of each command that a gateway accepted; works for an unfinished run, too."""
     timing = timing_of(scenario_of(folder).mission.profile)
     for path in sorted((folder / JOURNALS).glob(f"{WORLD_NAME}-*.bin")):
         for happening in _happenings(path, timing):
@@ -135,7 +139,7 @@ def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], tim
 
 
 class _Gateways:
-    """The gateways of one life of the world, fed as the world fed them."""
+    """Gateways of one incarnation of the world, fed with the same inputs as in the run."""
 
     def __init__(self, robots: Sequence[int], incarnation: int, timing: Timing, now: float) -> None:
         self.gateways = {robot: Gateway(robot, incarnation, timing, now) for robot in robots}
@@ -179,7 +183,7 @@ def _of_gateways(heading: Heading, entries: Iterator[JournalEntry], timing: Timi
 
 
 def _message(entry: JournalEntry) -> Any:
-    """What came with this call, None for a tick and for bytes that are none of ours."""
+    """Return the lease or command message, or local event, of a journal entry; None for all other entries."""
     if entry.kind == "local":
         return _local_decoder.decode(entry.payload)
     where = address(entry.key) if entry.kind == "message" else None

@@ -1,5 +1,7 @@
-"""What a lease did, in the words of the checkers: the effects of an agent's or a witness's core, noted as it carries
-them out."""
+"""Conversion of lease effects and messages to facts for the checkers.
+
+The effects of an agent's or a witness's core are observed just before the core carries them out.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,11 @@ from lfa.protocol.messages.consensus import Grant, LeaseNote, Member, Promise, P
 from lfa.protocol.names import robot_id_of
 
 Words = tuple[Any, ...]
-"""The name of a method of `Checker`, and what it is called with."""
+"""Fact for the checkers: the name of a method of `Checker`, and its arguments."""
 
 
 def observe_lease(node: Agent | Witness, hear: Callable[[list[Effect]], object]) -> None:
-    """Give `hear` the effects of the node's lease, just before the node carries them out."""
+    """Call `hear` with the effects of the node's lease, just before the node carries them out."""
     name = "_apply" if isinstance(node, Agent) else "_carry_out"
     carry_out = getattr(node, name)
 
@@ -31,7 +33,7 @@ def observe_lease(node: Agent | Witness, hear: Callable[[list[Effect]], object])
 def effect_facts(
     effect: Effect, me: Member, at: float, bond_s: float, true: Callable[[float], float]
 ) -> Iterator[Words]:
-    """`bond_s` is how long a voter is bound in true time; `true` makes that of the node's own."""
+    """Yield the facts of an effect. `bond_s`: a voter's bond [s, true time]. `true`: maps node time to true time."""
     match effect:
         case BecomeLeader(term, expiry) | LeaseExtended(term, expiry):
             yield ("leads", at, me, term, true(expiry))
@@ -41,7 +43,7 @@ def effect_facts(
             yield ("adopts", at, me, config)
         case Send(_, Propose() as body):
             yield ("proposes", at, me, body)
-            if body.holder == me:  # its own voter's grant as well
+            if body.holder == me:  # implies the grant of its own voter
                 own = Grant(body.term, body.round, body.config.version, 0.0)
                 yield ("grants", at, me, own, at + bond_s)
         case Send(_, Grant() as body):
@@ -51,7 +53,7 @@ def effect_facts(
 
 
 def message_facts(note: LeaseNote, at: float) -> Iterator[Words]:
-    """What a message that came says of its sender, who may not have lived to journal that it said it."""
+    """Yield the facts about the sender of a received message; a killed sender may not have journalled it itself."""
     source = robot_id_of(note.header.sender)
     if source is None:
         return

@@ -1,7 +1,7 @@
-"""The invariants L1-L7 of protocol/README.md: that somebody leads, soon, alone and steadily.
+"""Checkers of the invariants L1-L7 of protocol/README.md: one robot leads, soon after a fault, alone and steadily.
 
-L1-L4 hold after the last fault, against the bounds of the design's section 6; they need to be told of it (`heals`)
-and of the end (`over`). L5 is for runs without faults, L6 for the crash of a leader and nothing else, L7 for any run.
+L1-L4 hold after the last fault, within the bounds of the design's section 6; they need the facts `heals` and `over`.
+L5 is for runs without faults, L6 for a crash of the leader and no other fault, L7 for any run.
 """
 
 from __future__ import annotations
@@ -18,15 +18,19 @@ from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.names import WITNESS_ID
 
 NEVER = float("inf")
+"""Time [s] after every event of a run."""
 SETTLED_S = 1.0
-"""How long after t_remove chain and versions may still change (L2, L3)."""
+"""Time [s] after t_remove in which chain and versions may still change (L2, L3)."""
 CHANGE_HEARTBEATS = 5.0
-"""How long a change of the config may take to reach everybody: a new leader drops a dead voter t_remove after it began
-to lead, which may be later than L3's bound, and writes two configs within a round trip each."""
+"""Maximum time [heartbeats] for a change of the config to reach all members.
+
+A new leader removes a dead voter t_remove after it started to lead, which may be later than L3's bound, and writes two
+configs within a round trip each.
+"""
 
 
 class _AfterFaults(Checker):
-    """A checker of what holds some time after the last fault."""
+    """Checker of an invariant that holds some time after the last fault."""
 
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)
@@ -45,7 +49,10 @@ class _AfterFaults(Checker):
 
     @property
     def led_by(self) -> float:
-        """When somebody must lead: T_grant + 4 delta N later, delta as the table wants it for this network."""
+        """Latest time [s] for a robot to lead: T_grant + 4 delta N after `healed_at`.
+
+        delta is the value of the table for this network.
+        """
         robots = sum(i != WITNESS_ID for i in self.alive)
         grant_s = self.timing.grant_s / (1.0 - CLOCK_RATE_ERROR)
         return self.healed_at + grant_s + 4.0 * self._step_s * robots
@@ -56,12 +63,14 @@ class _AfterFaults(Checker):
 
 
 class OneActs(_AfterFaults):
+    """Checker of L1: a leader command is accepted in time after the last fault, and one robot goes on leading."""
+
     name = "L1"
 
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)
         self._acting: tuple[float, int] | None = None
-        """When the first command after the faults came of whoever acts now, and its id."""
+        """Time [s] of the first command after the faults of the robot that acts now, and its id."""
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
         if at < self.healed_at or not cmd.as_leader:
@@ -79,6 +88,8 @@ class OneActs(_AfterFaults):
 
 
 class AllInChain(_AfterFaults):
+    """Checker of L2: the newest chain holds exactly the robots that are alive."""
+
     name = "L2"
 
     def __init__(self, timing: Timing) -> None:
@@ -105,7 +116,7 @@ class AllInChain(_AfterFaults):
         self._complete_since = min(self._complete_since, at) if complete else NEVER
 
     def _chain(self) -> tuple[Member, ...]:
-        """The newest that somebody alive knows."""
+        """Return the newest chain that a live process knows."""
         newest = max(self._config.values(), key=_version, default=None)
         return () if newest is None else newest.chain
 
@@ -117,6 +128,8 @@ class AllInChain(_AfterFaults):
 
 
 class OneVersion(_AfterFaults):
+    """Checker of L3: all live processes know the same version of the config."""
+
     name = "L3"
 
     def __init__(self, timing: Timing) -> None:
@@ -146,7 +159,7 @@ class OneVersion(_AfterFaults):
             self._differ_since = None
 
     def _judge(self, at: float) -> None:
-        """They differ no more, or it is all over."""
+        """Check the time that the versions differed: they are equal again, or the run is over."""
         if self._differ_since is None:
             return
         change_s = CHANGE_HEARTBEATS * self.timing.heartbeat_s / (1.0 - CLOCK_RATE_ERROR)
@@ -159,6 +172,8 @@ class OneVersion(_AfterFaults):
 
 
 class Obeyed(_AfterFaults):
+    """Checker of L4: gateways accept leader commands without a long gap."""
+
     name = "L4"
 
     def __init__(self, timing: Timing) -> None:
@@ -177,7 +192,7 @@ class Obeyed(_AfterFaults):
             self.broken(then, f"no leader command obeyed for {(then - last) * 1000.0:.0f} ms")
 
     def _hear(self, at: float) -> None:
-        """A robot that has a leader is never still for longer than the deadman and the way of a command."""
+        """Check the gap since the last leader command: at most the deadman time plus the latency of a command."""
         patience_s = self.timing.deadman_s / (1.0 - CLOCK_RATE_ERROR) + self._step_s
         since = max(self._last, self.led_by) if self.healed_at < NEVER else at
         if at - since > patience_s and self._silence is None:
@@ -186,6 +201,8 @@ class Obeyed(_AfterFaults):
 
 
 class Steady(Checker):
+    """Checker of L5: without faults the leader does not change."""
+
     name = "L5"
 
     def __init__(self, timing: Timing) -> None:
@@ -205,6 +222,8 @@ class Steady(Checker):
 
 
 class NextInChain(Checker):
+    """Checker of L6: after a crash of the leader the next robot in the chain leads."""
+
     name = "L6"
 
     def __init__(self, timing: Timing) -> None:
@@ -226,7 +245,7 @@ class NextInChain(Checker):
         self._leader, self._expected = who, None
 
     def ends(self, at: float, who: Member) -> None:
-        """Where no quorum is left, nobody is next."""
+        """Record the end of a process; after a leader's end its successor must lead, unless no quorum is left."""
         self._alive.discard(who)
         config = self._config.get(who)
         if who == self._leader and config is not None and is_quorum(config, self._alive):
@@ -234,6 +253,8 @@ class NextInChain(Checker):
 
 
 class StopsWithoutQuorum(Checker):
+    """Checker of L7: a leader that cannot reach a quorum stops acting in time."""
+
     name = "L7"
 
     def __init__(self, timing: Timing) -> None:
@@ -242,12 +263,12 @@ class StopsWithoutQuorum(Checker):
         self._cuts: Set[tuple[int, int]] = frozenset()
         self._config: dict[int, Config] = {}
         self._open: dict[tuple[int, int], float] = {}
-        """When each link that is cut was last open."""
+        """Time [s] at which each cut link was last open."""
         self._ended: dict[Member, float] = {}
         self._given: dict[tuple[int, Term], float] = {}
-        """When each robot first acted under a term that was handed over to it."""
+        """Time [s] at which each robot first acted under a term that was handed over to it."""
         self._before: dict[int, float] = {}
-        """When each robot last reached a quorum of the config that it had before."""
+        """Time [s] at which each robot last reached a quorum of its previous config."""
 
     def lives(self, at: float, who: Member) -> None:
         self._alive.add(who)
@@ -271,15 +292,18 @@ class StopsWithoutQuorum(Checker):
         longest_s = (self.timing.act_s + self.timing.deadman_s) / (1.0 - CLOCK_RATE_ERROR) + EARLY_S
         since = self._since(at, robot_id)
         if cmd.term.issuer != robot_id:
-            # What is handed over needs no way back to the voters: it begins at a moment told to the issuer before.
+            # A lease that was handed over needs no path to the voters: its start time was sent to the issuer before.
             since = max(since, self._given.setdefault((robot_id, cmd.term), at))
         if at - since > longest_s:
             late = f"{(at - since) * 1000.0:.1f} ms without a quorum"
             self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)}, {late}")
 
     def _since(self, at: float, robot_id: int) -> float:
-        """When a robot last reached a quorum of its config, or of the one before while it had that: a lease outlives
-        the config that it was granted under."""
+        """Return the time [s] at which a robot last reached a quorum of its config.
+
+        A quorum of the previous config counts for the time that the robot had it: a lease outlives the config that it
+        was granted under.
+        """
         config = self._config.get(robot_id)
         before = self._before.get(robot_id, LONG_AGO)
         if config is None:
@@ -288,7 +312,7 @@ class StopsWithoutQuorum(Checker):
         return before if now is None else max(before, now)
 
     def _reached(self, at: float, robot_id: int, voter: Member) -> float:
-        """When `voter` could last be asked, and could last answer."""
+        """Return the time [s] at which `voter` could last be reached and could last answer."""
         there, back = (robot_id, voter.id), (voter.id, robot_id)
         asked = self._open.get(there, LONG_AGO) if there in self._cuts else at
         answered = self._open.get(back, LONG_AGO) if back in self._cuts else at
@@ -301,4 +325,4 @@ def _version(config: Config) -> Version:
 
 
 AFTER_FAULTS: tuple[type[Checker], ...] = (OneActs, AllInChain, OneVersion, Obeyed)
-"""L1-L4."""
+"""Checkers of L1-L4."""

@@ -1,4 +1,4 @@
-"""A recording back onto a bus, message by message at the times it holds: views see it as they would a running fleet."""
+"""Playback of a recording onto a bus at the recorded times; views receive it like the messages of a running fleet."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ from lfa.protocol.transport.zenoh_config import answers, default_endpoint
 from lfa.protocol.transport.zenoh_router import open_router
 
 AHEAD_S_MIN = 0.002
-"""Shorter waits are not worth a sleep."""
+"""Minimum wait [s] that is worth a sleep."""
 
 
 def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
-    """Publish all that `folder` holds as `fleet`, `speed` times as fast. Raises Refused; needs no router to run."""
+    """Publish the recording in `folder` as `fleet`, `speed` times as fast; needs no running router.
+
+    Raises Refused for a bad speed, an unreadable recording, or no router at a given endpoint.
+    """
     if not speed > 0.0:
         raise Refused(f"--speed {speed:g}: must be a number above 0")
     look_into(folder)
@@ -48,7 +51,7 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
 
 @contextmanager
 def _bus(endpoint: str, *, may_open: bool) -> Iterator[ZenohBus]:
-    """A session at `endpoint`; where nobody answers, and if it may, with a router of its own."""
+    """Yield a session at `endpoint`; if no router answers, open one, or raise Refused without `may_open`."""
     here = answers(endpoint)
     if not here and not may_open:
         raise Refused(f"--connect {endpoint}: no router answers there, start one with lfa-router")

@@ -1,5 +1,6 @@
-"""A node's life once more: its core is started as its journal says, fed what the journal holds, and compared call by
-call with what it returned then. The regression test for every refactor: same inputs, same bytes.
+"""Re-execution of a node's core from its journal, and comparison call by call with the recorded output.
+
+The core is started and fed as the journal says. Regression test for every refactoring: same inputs, same bytes.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _local_decoder = msgspec.msgpack.Decoder(Local)
 
 
 class Difference(Struct, frozen=True):
-    """The first call that did not return what it returned then: its number from 1, what it was, what it says now."""
+    """First call with another output than recorded: its number from 1, its time [s], its input and its output now."""
 
     call: int
     at: float
@@ -40,7 +41,7 @@ class Difference(Struct, frozen=True):
 
 
 class Comparison(Struct, frozen=True):
-    """One journal, compared. `difference` None: every call returned the same bytes."""
+    """Result of the comparison of one journal; `difference` is None when every call returned the same bytes."""
 
     journal: str
     calls: int
@@ -52,9 +53,9 @@ class Comparison(Struct, frozen=True):
 
 
 def compare(path: Path) -> Comparison:
-    """Run the node of the journal at `path` again, up to the last whole entry or the first difference.
+    """Re-execute the node of the journal at `path`, up to the last whole entry or the first difference.
 
-    Raises Refused when the file is no journal of this version.
+    Raises Refused when the file is not a journal of this version.
     """
     try:
         heading, entries = journal.read(path)
@@ -81,7 +82,7 @@ def call(host: NodeHost, entry: JournalEntry) -> Sent:
 
 
 def node_of(path: Path, heading: Heading) -> Node:
-    """The node as it was before its first call. Raises Refused when this version cannot make it."""
+    """Return the node in its state before the first call. Raises Refused when this version cannot construct it."""
     if heading.version != JOURNAL_VERSION:
         raise Refused(
             f"{path}: version {heading.version}: must be {JOURNAL_VERSION}, replay it with the lfa of its time"
@@ -123,7 +124,7 @@ def _what(entry: JournalEntry) -> str:
 
 
 def _said(sent: Sent) -> list[str]:
-    """What the node says now, readable: one text a message."""
+    """Format the messages that the node publishes now: one text for each message."""
     texts = []
     for to, payload in sent:
         where = address(to)

@@ -1,4 +1,4 @@
-"""`lfa replay`: run the cores of a run again on their journals and compare; or play its recording back onto a bus."""
+"""`lfa replay`: re-execute the cores of a run on their journals and compare; or play its recording back onto a bus."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ PLAYBACK_FLEET = "replay"
 
 def command(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
-    robot: Annotated[str | None, typer.Option(help="Compare: a robot's id, world, witness or all.")] = None,
-    speed: Annotated[float, typer.Option(help="Play back: how much faster than it was.")] = 1.0,
-    fleet: Annotated[str, typer.Option(help="Play back: the fleet to speak as.")] = PLAYBACK_FLEET,
-    connect: Annotated[str | None, typer.Option(help="Play back: the router's endpoint.")] = None,
+    robot: Annotated[str | None, typer.Option(help="Compare: id of a robot, or world, witness, all.")] = None,
+    speed: Annotated[float, typer.Option(help="Play back: speed relative to the recording.")] = 1.0,
+    fleet: Annotated[str, typer.Option(help="Play back: name of the fleet to publish as.")] = PLAYBACK_FLEET,
+    connect: Annotated[str | None, typer.Option(help="Play back: endpoint of the router.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Compare: print the result as JSON.")] = False,
 ) -> int:
     if robot is not None:
@@ -33,7 +33,7 @@ def command(
 
 
 def journals(folder: Path, robot: str) -> list[Path]:
-    """The journals of every life of `robot`: an id, a name, or `all`. Raises Refused when there is none."""
+    """Return the journals of all incarnations of `robot` (id, name or `all`). Raises Refused when there is none."""
     number = whole_number(robot)
     name = robot if number is None else robot_name(number)
     found = sorted((folder / "journal").glob("*.bin"))
@@ -47,7 +47,7 @@ def journals(folder: Path, robot: str) -> list[Path]:
 
 
 def _compare(folder: Path, robot: str, as_json: bool) -> int:
-    """0 when all returned the same."""
+    """Compare the journals and print the result; return 0 if all outputs are equal, else 1."""
     from lfa.deploy.analysis.verification.reexecution import compare
 
     found = [compare(path) for path in journals(folder, robot)]

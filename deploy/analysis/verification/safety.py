@@ -1,4 +1,4 @@
-"""The invariants I1-I8 of protocol/README.md as objects that watch from outside. L1-L7 are in `liveness.py`."""
+"""Checkers of the invariants I1-I8 of protocol/README.md, by outside observation. L1-L7 are in `liveness.py`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from lfa.protocol.messages.robot import CmdVel
 
 
 class LeaseExclusivity(WithFences):
+    """Checker of I1: leases of different holders are never valid together, unless the lower term is fenced."""
+
     name = "I1"
 
     def __init__(self, timing: Timing) -> None:
@@ -38,6 +40,8 @@ class LeaseExclusivity(WithFences):
 
 
 class Acting(Checker):
+    """Checker of I2: accepted commands are fresh, a term has one holder, and leader terms never decrease."""
+
     name = "I2"
 
     def __init__(self, timing: Timing) -> None:
@@ -58,7 +62,7 @@ class Acting(Checker):
         self._with_state.add(who)
 
     def ends(self, at: float, who: Member) -> None:
-        """When nobody is left who remembers a term, the wall clocks alone keep the order (E1)."""
+        """Record the end of a process; once no process remembers a term, only the wall clocks keep the order (E1)."""
         self._with_state.discard(who)
         if self._wall_stepped and not self._with_state:
             self._highest = Term()
@@ -81,6 +85,8 @@ class Acting(Checker):
 
 
 class OneHolder(Checker):
+    """Checker of I3: each term has one holder, and only its holder or its issuer proposes it."""
+
     name = "I3"
 
     def __init__(self, timing: Timing) -> None:
@@ -96,6 +102,8 @@ class OneHolder(Checker):
 
 
 class OneBond(WithFences):
+    """Checker of I4: a bound voter grants to another holder only after expiry, release, hand-over or a fence."""
+
     name = "I4"
 
     def __init__(self, timing: Timing) -> None:
@@ -117,7 +125,7 @@ class OneBond(WithFences):
         holder = self._holder[grant.term]
         term, other, its_until = self._bond.get(voter, (grant.term, holder, LONG_AGO))
         issued_by = (grant.term.issuer, grant.term.incarnation)
-        # The receiver's own grant of a transfer_proposal is seen by nobody: it shows in its next one only.
+        # The receiver's own grant of a transfer proposal is not observable; it shows only in its next grant.
         handed_over = issued_by == (other.id, other.incarnation) or (other, voter) in self._gifts
         free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
         fenced = self.fences.fenced(other.id, term) or self.fences.refuses(other.id, term, its_until)
@@ -130,6 +138,8 @@ class OneBond(WithFences):
 
 
 class OneChain(Checker):
+    """Checker of I5: one config per version, versions never decrease, and a leader is first in its chain."""
+
     name = "I5"
 
     def __init__(self, timing: Timing) -> None:
@@ -151,6 +161,8 @@ class OneChain(Checker):
 
 
 class JointChange(Checker):
+    """Checker of I6: voters change through a joint config that quorums of both sets accept."""
+
     name = "I6"
 
     def __init__(self, timing: Timing) -> None:
@@ -179,6 +191,8 @@ class JointChange(Checker):
 
 
 class NoAmnesiacVote(Checker):
+    """Checker of I7: a new term rests on promises of a quorum that knows a config, or of all members."""
+
     name = "I7"
 
     def __init__(self, timing: Timing) -> None:
@@ -201,6 +215,8 @@ class NoAmnesiacVote(Checker):
 
 
 class Residual(WithFences):
+    """Checker of I8: a new leader acts only when the previous one is fenced or has come to rest by its deadman."""
+
     name = "I8"
 
     def __init__(self, timing: Timing) -> None:

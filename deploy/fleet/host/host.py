@@ -1,6 +1,7 @@
-"""`python -m lfa.deploy.fleet.host.host check|start|stop|listen|rekey`: what the operator's commands run on each machine.
+"""`python -m lfa.deploy.fleet.host.host check|start|stop|listen|rekey`: executed on each machine by `lfa` commands.
 
-A part comes on standard input, one JSON object goes out; what is wrong is one line on standard error and exit code 2.
+Reads a HostPlan (JSON) from standard input and prints one JSON object. An error is one line on standard error, with
+exit code 2 if the request is refused.
 """
 
 from __future__ import annotations
@@ -43,22 +44,22 @@ SYSTEMD = Path("/run/systemd/system")
 
 
 class Found(Struct, frozen=True):
-    """How a machine stands to a fleet."""
+    """State of a machine with respect to a fleet."""
 
     version: str
     wall_ms: int
     run: str = ""
-    """Of the supervisor that runs already; empty: none."""
+    """Run of the supervisor that is running; empty: none."""
     digest: str = ""
     orphans: tuple[str, ...] = ()
     router: bool = False
-    """It answers."""
+    """True: the router answers."""
     certificate: str = ""
-    """What is wrong with one; empty: nothing."""
+    """Fault of a certificate; empty: none."""
 
 
 def check(part: HostPlan) -> Found:
-    """Whether `start` would do. Raises Refused; starts nothing and leaves nothing."""
+    """Check that `start` would succeed: version, socket, folder, port, packages. Raises Refused; has no side effect."""
     if part.version != version("lfa"):
         raise Refused(f"has lfa {version('lfa')}: must be {part.version}, as on the operator's (lfa up --install)")
     running = living(part.folder)
@@ -79,7 +80,7 @@ def check(part: HostPlan) -> Found:
 
 
 def _running(found: Found, running: Ledger, own: HostPlan) -> Found:
-    """How the router stands that runs here, and the certificates that it and its clients show."""
+    """Return the state of the running router, and of the certificates that it and its clients show."""
     expired, known = "", None
     with contextlib.suppress(Refused):
         known = own.known_as(f"{HOST_PREFIX}{own.host}")
@@ -93,7 +94,7 @@ def _running(found: Found, running: Ledger, own: HostPlan) -> Found:
 
 
 def start(part: HostPlan) -> Found:
-    """Bring this machine's part up, so that it outlives the session that asked for it. Raises Refused."""
+    """Start this machine's supervisor so that it outlives the calling session; wait for its router. Raises Refused."""
     found = check(part)
     if found.run:
         return found
@@ -114,7 +115,7 @@ def start(part: HostPlan) -> Found:
 
 
 def stop(part: HostPlan) -> Found:
-    """End this machine's part and wait until nothing of it is left. Raises Refused when something is."""
+    """End this machine's supervisor and children, by SIGKILL after STOP_S. Raises Refused when a process remains."""
     running = living(part.folder)
     if running is None:
         end_orphans(part.folder)
@@ -142,7 +143,7 @@ def _wait_gone(everybody: tuple[processes.Identity, ...], within_s: float) -> li
 
 
 def _check_place(part: HostPlan) -> None:
-    """The nearest folder that exists can be written to, and has room."""
+    """Raise Refused unless the nearest existing folder is writable and has FREE_MIB_MIN free."""
     place = part.folder
     while not place.exists():
         place = place.parent
@@ -154,7 +155,7 @@ def _check_place(part: HostPlan) -> None:
 
 
 def _check_port(part: HostPlan) -> None:
-    """For routers over udp it is also that of tcp, for processes."""
+    """Raise Refused unless the port is free: in TCP, and if routers link over UDP also in UDP."""
     kinds = {"tcp": socket.SOCK_STREAM, **({"udp": socket.SOCK_DGRAM} if part.over_udp else {})}
     for name, kind in kinds.items():
         with socket.socket(socket.AF_INET, kind) as probe:
@@ -175,7 +176,7 @@ def _check_world() -> None:
 
 
 def _spawn(part: HostPlan, path: Path, log: Path) -> subprocess.Popen[bytes]:
-    """The supervisor, under systemd where it runs here, else in a session of its own."""
+    """Start the supervisor, under systemd if that is running here, else in its own session."""
     command = [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.supervisor", str(path)]
     with log.open("ab") as out:
         for runner in _runners(part):
@@ -186,7 +187,7 @@ def _spawn(part: HostPlan, path: Path, log: Path) -> subprocess.Popen[bytes]:
 
 
 def _runners(part: HostPlan) -> list[list[str]]:
-    """How to ask systemd, which starts it again should it fail: as the system's unit for root, else as the user's."""
+    """Return the systemd-run command, with restart on failure: a system unit for root, else a user unit."""
     if not SYSTEMD.is_dir() or shutil.which("systemd-run") is None:
         return []
     unit = ["--unit", f"lfa-{part.fleet}-{part.host}", "--collect", "--property", "Restart=on-failure"]
@@ -195,7 +196,7 @@ def _runners(part: HostPlan) -> list[list[str]]:
 
 
 def _await_ready(part: HostPlan, child: subprocess.Popen[bytes], log: Path) -> None:
-    """Until its router answers."""
+    """Wait until the supervisor is running and its router answers. Raises Refused after READY_S."""
     known = part.known_as(f"{HOST_PREFIX}{part.host}")
     until = clock.now() + READY_S
     while not (living(part.folder) is not None and answers(part.socket, known)):
@@ -210,7 +211,7 @@ def _await_ready(part: HostPlan, child: subprocess.Popen[bytes], log: Path) -> N
 
 
 def listen(part: HostPlan) -> Found:
-    """Listen where the router would, until somebody comes or a few seconds are over: is the port open?"""
+    """Listen at the router's port until a connection arrives or LISTEN_S is over, to test whether the port is open."""
     if part.over_udp:
         _echo(part.port)
         return Found(version("lfa"), clock.wall_ms())
@@ -231,7 +232,7 @@ def _echo(port: int) -> None:
 
 
 def rekey(part: HostPlan) -> Found:
-    """New keys and rules for what runs here already: its router opens anew with them. Raises Refused."""
+    """Install new keys and rules on a running machine and restart its router with them. Raises Refused."""
     running = living(part.folder)
     if running is None or not (own := parts.read(part.folder / parts.PART)).keyed:
         return Found(version("lfa"), clock.wall_ms())

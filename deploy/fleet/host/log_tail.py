@@ -1,4 +1,4 @@
-"""Lines of a log file as they come: what a supervisor says of its processes' logs."""
+"""Tail of a log file, which a supervisor publishes on an order `logs`."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import os
 from pathlib import Path
 
 FOLLOW_S = 5.0
-"""So long after an order to show a log its new lines are said too; who wants more says it again."""
+"""Duration [s] after an order `logs` for which new lines are published; repeating the order prolongs it."""
 LINE_CHARACTERS_MAX = 2000
 READ_BYTES_MAX = 16 * 1024
 LINES_MAX = 1000
 
 
 class Tail:
-    """The last lines of a file, then what comes."""
+    """Reader of the last lines of a file, then of the lines appended to it."""
 
     def __init__(self, path: Path, lines: int, now: float) -> None:
         self._path = path
@@ -27,7 +27,7 @@ class Tail:
         return now > self._until
 
     def take(self, now: float) -> tuple[str, ...]:
-        """Whole lines that have come since the last call, a message's worth at most."""
+        """Return the complete lines appended since the last call, at most READ_BYTES_MAX, for one message."""
         first, self._first = self._first, ()
         if first:
             return first
@@ -43,7 +43,7 @@ class Tail:
 
 
 def _last(path: Path, lines: int) -> tuple[int, tuple[str, ...]]:
-    """Where the file ends, and its last lines."""
+    """Return the offset behind the last complete line, and the last lines."""
     try:
         size = os.path.getsize(path)
         with path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""When a process that has ended starts again. Pure: times come in as arguments."""
+"""Restart policy of supervised processes. Pure: times are arguments."""
 
 from __future__ import annotations
 
@@ -10,25 +10,28 @@ from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
 
 REFUSED_CODE = 2
 ROUTER = Restart(policy="always", delay_s=0.05, delay_max_s=2.0, window_s=60.0, starts_max=1_000_000)
-"""Without its router a machine is alone: nobody gains by giving it up."""
+"""Restart policy of routers: unlimited, since a machine without its router is isolated."""
 
 
 class RestartDecision(Struct, frozen=True):
-    """`at`: when to start again; None: never, and why in one word."""
+    """Decision on a restart: time `at` [s], None for never, and the state in one word."""
 
     at: float | None
     word: str
 
 
 class RestartBackoff:
-    """The ends of one process, as far as they count."""
+    """Restart backoff of one process, from its ends within the window."""
 
     def __init__(self, restart: Restart) -> None:
         self._restart = restart
         self._ends: deque[float] = deque()
 
     def ended(self, code: int, now: float) -> RestartDecision:
-        """`code` as of a `Popen`: negative for a signal; 2 is a refusal, which another start would not change."""
+        """Return the decision after an end with `code` (as of `Popen`, negative for a signal) at `now` [s].
+
+        Code 2 is a refusal, which a restart would repeat.
+        """
         if not _again(self._restart.policy, code):
             return RestartDecision(None, "refused" if code == REFUSED_CODE else "ended" if code == 0 else "failed")
         while self._ends and self._ends[0] <= now - self._restart.window_s:
@@ -40,7 +43,7 @@ class RestartBackoff:
         return RestartDecision(now + delay_s, "waiting")
 
     def forget(self) -> None:
-        """An operator has started it: what was before counts no more."""
+        """Clear the history, after a restart by an operator."""
         self._ends.clear()
 
 

@@ -1,4 +1,4 @@
-"""`lfa-router`: the machine's one router. Agents, world and recorder are its clients."""
+"""`lfa-router`: the Zenoh router of a machine, one per machine. Agents, world and recorder are its clients."""
 
 from __future__ import annotations
 
@@ -27,27 +27,29 @@ def command(
     listen: Annotated[
         list[str] | None,
         typer.Option(
-            help=f"Where to listen, again for more. Default: {default_endpoint()} and {DEFAULT_TCP}"
+            help=f"Endpoint to listen at; repeatable. Default: {default_endpoint()} and {DEFAULT_TCP}"
             f" ({DEFAULT_TLS} with --secure)."
         ),
     ] = None,
     connect: Annotated[
-        list[str] | None, typer.Option(help="Another machine's router, such as quic/machine-a:7447.")
+        list[str] | None,
+        typer.Option(help="Endpoint of another machine's router, such as quic/machine-a:7447; repeatable."),
     ] = None,
     keys: Annotated[
-        Path | None, typer.Option(help="This machine's folder of `lfa keys`: serves tls/ and quic/, to its fleet only.")
+        Path | None,
+        typer.Option(help="This machine's folder of `lfa keys`: enables tls/ and quic/, for its fleet only."),
     ] = None,
     secure: Annotated[
-        bool, typer.Option("--secure", help="Pass only what the rules in --keys allow; all else is denied.")
+        bool, typer.Option("--secure", help="Pass only what the rules in --keys allow; deny the rest.")
     ] = False,
     link: Annotated[
-        Literal["fast", "std", "wifi"], typer.Option(help="How soon a silent link counts as dead: 0.5, 1 or 2 s.")
+        Literal["fast", "std", "wifi"], typer.Option(help="Profile: a silent link counts as dead after 0.5, 1 or 2 s.")
     ] = "std",
 ) -> int:
-    """Run until SIGTERM or Ctrl-C; SIGHUP starts it anew, with the keys and rules of that moment."""
+    """Run the router until SIGTERM or Ctrl-C; SIGHUP restarts it with the current keys and rules."""
     if secure and keys is None:
         raise Refused("--secure: needs --keys, a folder that lfa keys init made (DIR/hosts/NAME)")
-    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | {signal.SIGHUP})  # before Zenoh's threads: they inherit it
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | {signal.SIGHUP})  # before Zenoh starts threads, which inherit it
     endpoints = listen or [default_endpoint(), DEFAULT_TLS if secure else DEFAULT_TCP]
 
     close = open_router(endpoints, connect or (), LINK_LEASES_MS[link], _known(keys), secure)
@@ -59,7 +61,7 @@ def command(
             print(f"goes on as it was: {refused}", file=sys.stderr, flush=True)
             continue
         close()
-        os.execv(sys.executable, sys.orig_argv)  # a closed session keeps its QUIC port for a while; a process does not
+        os.execv(sys.executable, sys.orig_argv)  # frees the QUIC port, which a closed session keeps
     close()
     return 0
 
@@ -69,7 +71,7 @@ def _known(keys: Path | None) -> Credentials | None:
 
 
 def host_credentials(folder: Path) -> Credentials:
-    """Those of the machine whose folder this is. Raises Refused when it is that of none, or of several."""
+    """Return the credentials of the machine that `folder` belongs to. Raises Refused unless it holds exactly one."""
     names = [path.stem for path in folder.glob(f"{HOST_PREFIX}*.pem")]
     if len(names) != 1:
         raise Refused(f"{folder}: must hold one machine's keys ({HOST_PREFIX}NAME.pem), like DIR/hosts/NAME")
@@ -77,7 +79,7 @@ def host_credentials(folder: Path) -> Credentials:
 
 
 def main() -> None:
-    help_text = "The router of this machine: agents and world meet here."
+    help_text = "Run the Zenoh router of this machine, which agents and world connect to."
     example = "lfa-router --keys keys/hosts/a --listen unixsock-stream//run/lfa/z.sock --listen quic/0.0.0.0:7447"
     sys.exit(run_cli("lfa-router", command_app(command, help_text, example)))
 

@@ -1,9 +1,9 @@
-"""`python -m lfa.deploy.fleet.host.supervisor PART`: one machine's processes, kept running without anybody's help.
+"""`python -m lfa.deploy.fleet.host.supervisor PART`: supervisor of one machine's processes.
 
-It needs neither the machine that ran `lfa up` nor any other: it starts its own router, its robots and what else lives
-here, starts again what ends (`restart_policy.py`), says once a second how all of it stands (topic `host`) and hears an
-operator's orders (topic `order`). SIGTERM ends everything in order, also when no router is left to be asked through.
-Its children do not outlive it (`tether.py`); what an earlier life may have left all the same is ended first.
+It depends neither on the machine that ran `lfa up` nor on any other: it starts its router, its robots and the other
+processes of its plan, restarts those that end (`restart_policy.py`), publishes their status once a second (topic
+`host`) and executes an operator's orders (topic `order`). SIGTERM ends everything in order, also without a router.
+Its children do not outlive it (`parent_death.py`); at the start it ends orphans of an earlier incarnation.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
 from lfa.world.description.scenario import STATE
 
 LEDGER = "processes.json"
-"""Beside the part: who supervises, and whom; what a later life, `lfa down` and `lfa doctor` go by."""
+"""File beside the plan with the supervisor and its children; read by a later incarnation, `lfa down`, `lfa doctor`."""
 TELL_S = 1.0
 STEP_S = 0.1
 JOIN_S = 0.1
 ROUTER_S = 3.0
 LAST_WORDS_S = 0.1
 END_S = 1.5
-"""Last words take 0.7 s at most; who then still takes leave of a router that has gone is not waited for."""
+"""Time limit [s] for children to end. Their final messages take at most 0.7 s; the rest allows for a lost router."""
 LEAVE_S = 0.5
-"""Patience with a router, which says good-bye to others that may be gone already."""
+"""Time limit [s] for a router to end, which closes links to routers that may have ended already."""
 OPERATORS_MAX = 64
 
 
 class Ledger(Struct, frozen=True):
-    """Who is who on this machine, as far as this fleet is concerned."""
+    """Identities of a fleet's supervisor and child processes on this machine."""
 
     run: str
     digest: str
@@ -61,7 +61,7 @@ class Ledger(Struct, frozen=True):
 
 
 def ledger(folder: Path) -> Ledger | None:
-    """What the supervisor of that folder wrote last."""
+    """Return what the supervisor of that folder wrote last, None without a readable file."""
     try:
         return msgspec.json.decode((folder / LEDGER).read_bytes(), type=Ledger)
     except (OSError, msgspec.DecodeError):
@@ -69,14 +69,14 @@ def ledger(folder: Path) -> Ledger | None:
 
 
 def living(folder: Path) -> Ledger | None:
-    """The ledger of a supervisor that runs at the moment."""
+    """Return the ledger of that folder if its supervisor is running, else None."""
     written = ledger(folder)
     alive = written is not None and identity.identify(written.supervisor.pid) == written.supervisor
     return written if alive else None
 
 
 def end_orphans(folder: Path) -> list[str]:
-    """End what the last supervisor of that folder has left; their command lines. Only exactly those processes."""
+    """Kill exactly the processes that the last supervisor of that folder left; return their command lines."""
     written = ledger(folder)
     if written is None or living(folder) is not None:
         return []
@@ -84,13 +84,13 @@ def end_orphans(folder: Path) -> list[str]:
 
 
 def sweep(folder: Path) -> None:
-    """What a supervisor leaves behind when it could not do so itself."""
+    """Remove the files that a supervisor could not remove itself: socket, its lock, ledger."""
     for name in (parts.SOCKET, f"{parts.SOCKET}.lock", LEDGER):
         (folder / name).unlink(missing_ok=True)
 
 
 class _ManagedProcess:
-    """One process in care."""
+    """One supervised process: its specification, restart backoff and state."""
 
     def __init__(self, row: ProcessSpec, lives: RestartBackoff) -> None:
         self.row = row
@@ -109,7 +109,7 @@ class _ManagedProcess:
 
 
 class Supervisor:
-    """All of one machine. Every call comes from the main thread: the kernel takes it for its children's parent."""
+    """Supervisor of one machine. Every call comes from the main thread, which the kernel takes as the parent."""
 
     def __init__(self, part: HostPlan) -> None:
         self._part = part
@@ -123,7 +123,7 @@ class Supervisor:
         self._seqs: dict[str, int] = {}
         self._obeyed = (0, 0)
         self._orders: OrderedDict[int, int] = OrderedDict()
-        """The last number of each operator."""
+        """Last sequence number of each operator, by incarnation."""
         self._book: Ledger | None = None
         self._began = clock.now()
         self._tell_at = 0.0
@@ -136,7 +136,7 @@ class Supervisor:
         self._ending = False
 
     def run(self) -> int:
-        """Until SIGTERM, Ctrl-C or an order; nothing is left then."""
+        """Run until SIGTERM, Ctrl-C or an order `down`; all children have ended when it returns 0."""
         bell, ring = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.set_wakeup_fd(ring)
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -176,7 +176,7 @@ class Supervisor:
     # --- the processes ---------------------------------------------------------------------------------------------
 
     def _look_after(self, ward: _ManagedProcess, now: float) -> bool:
-        """Start it when it is due, notice when it has ended; True when something changed."""
+        """Start the process when it is due, detect its end; return True when its state changed."""
         name = ward.row.name
         if ward.start_at is not None:
             if now < ward.start_at or (name != ROUTER_NAME and self._waits_for_router(now)):
@@ -197,11 +197,11 @@ class Supervisor:
         if name == ROUTER_NAME and verdict.at is None:
             if ward.starts == 1:
                 raise Refused(ward.ended)
-            ward.start_at, ward.state = now + TELL_S, "waiting"  # it could listen before: what is in its way may go
+            ward.start_at, ward.state = now + TELL_S, "waiting"  # it could listen before: retry
         return True
 
     def _waits_for_router(self, now: float) -> bool:
-        """At the very start, so that nobody has to look for it again and again."""
+        """Return True during startup until the router is up, so that processes need not retry to connect."""
         return self._bus is None and now < self._began + ROUTER_S
 
     def _start(self, ward: _ManagedProcess, now: float) -> None:
@@ -218,7 +218,7 @@ class Supervisor:
             ward.start_at, ward.state = verdict.at, verdict.word
 
     def _remembers(self, ward: _ManagedProcess) -> bool:
-        """A world that ended before it wrote its first state begins anew."""
+        """Return False for a world that ended before it wrote its first state: it starts without `--resume`."""
         return not ward.row.restart_args or (self._part.run_folder / STATE).exists()
 
     def _write_ledger(self) -> None:
@@ -237,7 +237,7 @@ class Supervisor:
             print(f"{draft}: {error.strerror}", flush=True)
 
     def _end(self) -> None:
-        """Robots and world in order, then one last word, then the router."""
+        """Terminate robots and world in order, publish a last status, then terminate the router."""
         self._processes.terminate([name for name in self._managed if name != ROUTER_NAME], END_S)
         for ward in self._managed.values():
             if ward.row.name != ROUTER_NAME:
@@ -247,13 +247,13 @@ class Supervisor:
             clock.sleep(LAST_WORDS_S)
             leaving = threading.Thread(target=self._bus.close, daemon=True)
             leaving.start()
-            leaving.join(LEAVE_S)  # a router that hangs would hold us longer
+            leaving.join(LEAVE_S)  # closing takes longer if the router hangs
         self._processes.terminate([ROUTER_NAME], LEAVE_S)
 
-    # --- what is said and heard ------------------------------------------------------------------------------------
+    # --- messages --------------------------------------------------------------------------------------------------
 
     def _join(self, now: float) -> None:
-        """A session of its own, as soon as a router is there; Zenoh itself comes back from then on."""
+        """Open a session as soon as a router answers; from then on Zenoh reconnects by itself."""
         if self._bus is not None or now < self._join_at:
             return
         self._join_at = now + JOIN_S
@@ -285,7 +285,7 @@ class Supervisor:
         return told
 
     def _obey(self, order: HostOrder, now: float) -> bool:
-        """Each order once, however often it is said; True when it is to be answered."""
+        """Execute each order once, however often it is repeated; return True when it is to be confirmed."""
         place, _, name = order.target.rpartition("/")
         here = not place and name in ("", self._part.host)
         if place not in ("", self._part.host) or not (here or name in self._managed):
@@ -337,19 +337,19 @@ class Supervisor:
 
 
 def main() -> None:
-    """0 ended in order, 2 refused."""
+    """Run the supervisor. Exit codes: 0 ended in order, 2 refused."""
     try:
         part = parts.read(Path(sys.argv[1]))
         if living(part.folder) is not None:
             raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
         for orphan in end_orphans(part.folder):
-            print(f"ended what an earlier life has left: {orphan}", flush=True)
+            print(f"ended an orphan of an earlier supervisor: {orphan}", flush=True)
         code = Supervisor(part).run()
     except Refused as refused:
         print(f"lfa-supervise: {refused}", file=sys.stderr)
         code = REFUSED_CODE
     sys.stdout.flush()
-    os._exit(code)  # a session that did not close holds the interpreter
+    os._exit(code)  # a session that did not close would block the exit
 
 
 if __name__ == "__main__":

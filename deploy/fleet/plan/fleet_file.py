@@ -1,4 +1,4 @@
-"""The fleet file: which machines there are, what runs where, and what becomes of what fails."""
+"""The fleet file: machines, placement of processes, links, restart policy. Reads and checks it; starts nothing."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ Policy = Literal["never", "on-failure", "always"]
 
 
 class Machine(Struct, frozen=True, forbid_unknown_fields=True):
-    """One machine. ssh is asked for what is not said: user, port and key come from `~/.ssh/config`."""
+    """One machine. Omitted values are left to ssh: user, port and key come from `~/.ssh/config`."""
 
     address: str = "localhost"
-    """How the other machines reach it. `localhost`: this machine, without ssh."""
+    """Address at which the other machines reach it. `localhost`: this machine, without ssh."""
     ssh: str = ""
-    """What ssh calls it, such as a `Host` of `~/.ssh/config`; else its address."""
+    """Name for ssh, such as a `Host` of `~/.ssh/config`. Default: its address."""
     user: str = ""
     port: int = 0
-    """Of its ssh server; 0: what ssh's configuration says, else 22."""
+    """Port of its ssh server; 0: from ssh's configuration, else 22."""
     python: str = ""
-    """The Python that has `lfa` there. Default: `python3`; here: the one that runs this command."""
+    """Python with `lfa` on that machine. Default: `python3`; on this machine: the one that runs this command."""
     venv: str = ""
-    """A virtual environment there, instead of `python`; `lfa up --install` makes it."""
+    """Virtual environment on that machine, instead of `python`; `lfa up --install` creates it."""
     state: str = ""
     """Folder of logs, journals and sockets. Default: `~/.local/state/lfa/<fleet>/<host>`."""
     labels: tuple[str, ...] = ()
-    """What `robots.spread` may also call it by."""
+    """Further names of the machine in `robots.spread`."""
     router_port: int = ROUTER_PORT
 
     @property
@@ -50,73 +50,73 @@ class Machine(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Robots(Struct, frozen=True, forbid_unknown_fields=True):
-    """Which robot runs where."""
+    """Placement of the robots on machines."""
 
     spread: tuple[str, ...] = ()
-    """Machines, or labels, over which robots without a place of their own are dealt out in turn. Default: all."""
+    """Machines or labels over which robots not in `on` are distributed in turn. Default: all."""
     on: dict[str, str] = {}
-    """Robots with a place of their own: `3 = "pi-3"`."""
+    """Machine of single robots, by id: `3 = "pi-3"`."""
 
 
 class LinkPlan(Struct, frozen=True, forbid_unknown_fields=True):
-    """How the machines' routers are joined."""
+    """Links between the machines' routers."""
 
     transport: Literal["quic", "tcp"] = "quic"
-    """`quic`: encrypted, both ends show a certificate of this fleet. `tcp`: neither, for wires that you trust."""
+    """`quic`: encrypted, both ends show a certificate of this fleet. `tcp`: neither, for a trusted network."""
     pairs: tuple[tuple[str, str], ...] = ()
-    """Which routers are joined. Default: each with each."""
+    """Pairs of machines whose routers are linked. Default: all pairs."""
     failover: bool = True
-    """A process whose machine's router is lost goes to the next machine's."""
+    """True: a process whose router is lost connects to the next machine's router."""
 
 
 class Restart(Struct, frozen=True, forbid_unknown_fields=True):
-    """What becomes of a process that ends, except for routers: those always start again."""
+    """Restart policy for processes that end, except routers, which are always restarted."""
 
     policy: Policy = "on-failure"
     delay_s: float = 0.5
-    """Before the first new start; doubled with each further one within the window."""
+    """Delay [s] before the first restart; doubled for each further restart within the window."""
     delay_max_s: float = 10.0
     window_s: float = 60.0
     starts_max: int = 5
-    """New starts within the window; then it is given up."""
+    """Maximum number of restarts within the window; at the next end the process is not restarted."""
 
 
 class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
-    """All that `lfa up` needs to know."""
+    """Contents of a fleet file, the input of `lfa up`."""
 
     hosts: dict[str, Machine]
     scenario: str = "paper_path1"
-    """A shipped scenario, or a file beside this one."""
+    """Name of a shipped scenario, or of a file beside this one."""
     fleet: str = ""
-    """Its name: part of every key. Default: the name of this file."""
+    """Name of the fleet, part of every key. Default: the name of this file."""
     seed: int = 0
     set: tuple[str, ...] = ()
-    """Fields of the scenario to be other than they are: `["world.lidar.beams=90"]`."""
+    """Overrides of scenario fields: `["world.lidar.beams=90"]`."""
     team: int | None = None
-    """A team of 1..N instead of the scenario's."""
+    """Team size N, for a team 1..N instead of the scenario's."""
     profile: Profile | None = None
-    """Timing: `std` on wires, `wifi` on radio. Default: the scenario's."""
+    """Timing profile: `std` for wired links, `wifi` for radio. Default: the scenario's."""
     world: str = ""
-    """The machine of the simulated world. Default: the first."""
+    """Machine of the simulated world. Default: the first."""
     witness: str = ""
-    """The machine of the witness. Default: the world's, in its process."""
+    """Machine of the witness. Default: the world's machine, in the world's process."""
     robots: Robots = Robots()
     links: LinkPlan = LinkPlan()
     restart: Restart = Restart()
     secure: bool = False
-    """Everybody shows who it is, and what the rules do not allow is denied (also `lfa up --secure`)."""
+    """True: every process shows a certificate, and everything not allowed is denied (also `lfa up --secure`)."""
     keys: str = ""
     """Folder of the fleet's authority, on the operator's machine. Default: `~/.local/state/lfa/<fleet>.keys`."""
 
 
 class FleetPlan(Struct, frozen=True):
-    """A fleet file that can be obeyed, with nothing left open."""
+    """Checked fleet file with all defaults resolved, its scenario, and the placement of the robots."""
 
     path: Path
     file: FleetFile
     scenario: Scenario
     places: dict[int, str]
-    """Robot to machine."""
+    """Machine of each robot, by id."""
 
     @property
     def name(self) -> str:
@@ -127,7 +127,7 @@ class FleetPlan(Struct, frozen=True):
         return self.file.hosts
 
     def seconds(self, home: str) -> tuple[str, ...]:
-        """Whose routers a process goes to that has lost its own, in turn; secured, one is enough, and is trusted."""
+        """Return the machines whose routers a process of `home` fails over to, in order; only one if secured."""
         if not self.file.links.failover:
             return ()
         names = list(self.hosts)
@@ -140,7 +140,7 @@ class FleetPlan(Struct, frozen=True):
 
 
 class Mistaken(Refused):
-    """A fleet file with mistakes: one line each."""
+    """Refusal of a fleet file, with one line for each mistake."""
 
     def __init__(self, path: Path, mistakes: list[str]) -> None:
         self.lines = tuple(f"{path}: {mistake}" for mistake in mistakes)
@@ -148,7 +148,7 @@ class Mistaken(Refused):
 
 
 def is_fleet_file(path: Path) -> bool:
-    """True for a TOML file with a table `hosts`: a scenario has none."""
+    """Return True for a TOML file with a table `hosts`, which a scenario does not have."""
     try:
         return "hosts" in read_toml(path, "a fleet file")
     except Refused:
@@ -156,7 +156,7 @@ def is_fleet_file(path: Path) -> bool:
 
 
 def load(path: Path) -> FleetPlan:
-    """The plan in that file. Raises Refused, and Mistaken with every mistake at once."""
+    """Return the plan of a fleet file. Raises Refused, and Mistaken with every mistake at once."""
     document = read_toml(path, "a fleet file")
     mistakes: list[str] = []
     file = tables.read(document, FleetFile, mistakes)
@@ -185,7 +185,7 @@ def _scenario(file: FleetFile, path: Path, mistakes: list[str]) -> Scenario | No
 
 
 def _places(file: FleetFile, robots: tuple[int, ...], mistakes: list[str]) -> dict[int, str]:
-    """Robots with their own place there, the others dealt out in turn."""
+    """Return the machine of each robot: from `robots.on`, else in turn over `robots.spread`."""
     right = f"one of {', '.join(map(str, robots))}"
     for robot, host in file.robots.on.items():
         if robot not in map(str, robots):
@@ -204,7 +204,7 @@ def _called(file: FleetFile, word: str, mistakes: list[str]) -> list[str]:
 
 
 def _wrong(file: FleetFile) -> list[str]:
-    """What no single value's type tells."""
+    """Return the mistakes that the types of the single values do not reveal."""
     wrong = [] if NAME.fullmatch(file.fleet) else [f"fleet = {file.fleet}: must be {_NAMES}"]
     places = {"world": file.world, "witness": file.witness}
     if file.witness == file.world:
@@ -249,7 +249,7 @@ def _wrong_machine(name: str, machine: Machine) -> list[str]:
 
 
 def _wrong_together(file: FleetFile) -> list[str]:
-    """Machines that cannot be in one fleet."""
+    """Return the mistakes in machines that cannot be in one fleet."""
     wrong = []
     local = [name for name, machine in file.hosts.items() if machine.address in LOCAL]
     if local and len(local) < len(file.hosts):

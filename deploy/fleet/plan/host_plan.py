@@ -1,4 +1,4 @@
-"""What one machine is told of its fleet: one small file for its supervisor, and the processes made of it."""
+"""Plan of one machine: the file that its supervisor reads, and the processes derived from it."""
 
 from __future__ import annotations
 
@@ -27,46 +27,46 @@ USUAL_STATE = "~/.local/state/lfa"
 
 
 class HostPlan(Struct, frozen=True):
-    """One machine's share."""
+    """Share of one machine in a fleet."""
 
     fleet: str
     host: str
     run: str
-    """Which `lfa up` it belongs to: also the name of the folder of its logs and journals."""
+    """Identifier of the `lfa up` that it belongs to, also the name of the folder of its logs and journals."""
     digest: str
-    """Of all that the fleet file says: another file, another digest."""
+    """Digest of the fleet file and the scenario: two different files have different digests."""
     version: str
     state: str
-    """May begin with `~`: whose home that is, is known only there."""
+    """State folder; may begin with `~`, which is expanded on the machine itself."""
     scenario: str
-    """As drawn, in TOML."""
+    """Scenario as drawn, in TOML."""
     seed: int
     robots: tuple[int, ...]
     world: bool
     witness: bool
-    """A process of its own for the witness, here."""
+    """True: the witness runs on this machine in its own process."""
     world_witness: bool
-    """The world's process holds it."""
+    """True: the witness runs in the world's process."""
     listen: tuple[str, ...]
     connect: tuple[str, ...]
     others: tuple[str, ...]
-    """Routers of other machines, for processes that have lost their own."""
+    """Endpoints of other machines' routers, for processes that have lost their own."""
     port: int
-    """Of the router; 0: a unix socket is enough."""
+    """Port of the router; 0: unix socket only."""
     restart: Restart
     hosts: tuple[str, ...]
-    """All machines of the fleet."""
+    """Names of all machines of the fleet."""
     link: Profile = "std"
-    """How soon a silent link counts as dead: as the mission's profile."""
+    """Profile that sets when a silent link counts as dead; equals the mission's profile."""
     secure: bool = False
     keyed: bool = False
-    """Its processes show certificates: the router does so to others, or to everybody."""
+    """True: processes show certificates; the router does so to other routers, or to every process if secured."""
     bundle: dict[str, str] = {}
-    """Keys on their way, file by file; not kept in the part."""
+    """Contents of the key files by file name, for transfer to the machine; not stored in the plan's file."""
 
     @property
     def folder(self) -> Path:
-        """Of this fleet on this machine."""
+        """Folder of this fleet on this machine."""
         return Path(self.state).expanduser()
 
     @property
@@ -75,11 +75,11 @@ class HostPlan(Struct, frozen=True):
 
     @property
     def over_udp(self) -> bool:
-        """Its router listens for other machines at a port of UDP."""
+        """True if its router listens for other machines at a UDP port."""
         return any(where.startswith("quic/") for where in self.listen)
 
     def known_as(self, name: str) -> Credentials | None:
-        """What `name` shows here. Raises Refused."""
+        """Return the credentials of `name` on this machine, None if it uses none. Raises Refused."""
         return credentials(self.folder / KEYS, name, clock.wall_ms()) if self.keyed else None
 
     @property
@@ -88,14 +88,14 @@ class HostPlan(Struct, frozen=True):
 
     @property
     def endpoint(self) -> str:
-        """Where this machine's processes meet: its router, or the next when that one is lost."""
+        """Endpoints for this machine's processes: its router, then the routers to fail over to."""
         return ",".join((self.socket, *self.others))
 
 
 def parts(
     plan: FleetPlan, run: str, digest: str, bundles: Mapping[str, dict[str, str]] | None = None
 ) -> dict[str, HostPlan]:
-    """Each machine's share of `plan`, with its keys."""
+    """Return the plan of each machine, with its keys."""
     file, names = plan.file, list(plan.hosts)
     scenario = toml(plan.scenario)
     mission = plan.scenario.mission
@@ -129,20 +129,20 @@ def parts(
 
 
 def store(plan: FleetPlan) -> Path:
-    """Where the fleet's authority lives, on the operator's machine."""
+    """Return the folder of the fleet's certificate authority, on the operator's machine."""
     return Path(plan.file.keys or f"{USUAL_STATE}/{plan.name}.keys").expanduser()
 
 
 def endpoint(plan: FleetPlan, name: str) -> str:
-    """Where other machines' routers find the router of machine `name`."""
+    """Return the endpoint at which other machines' routers reach the router of machine `name`."""
     return f"{plan.file.links.transport}/{_at(plan.hosts[name])}"
 
 
 def door(plan: FleetPlan, name: str) -> str:
-    """Where processes of other machines, and the operator, find that router.
+    """Return the endpoint at which the operator and other machines' processes reach the router of machine `name`.
 
-    By tls, where routers speak quic: the end of a router's process ends its tcp links at once, as the kernel tells the
-    other end. A quic link ends by silence alone, a link lease later, and meanwhile nobody fails over.
+    It is tls where routers use quic: when a router's process ends, the kernel closes its tcp links at once. A quic link
+    ends only after a link lease of silence, and no process fails over until then.
     """
     return f"{_DOORS[plan.file.links.transport]}/{_at(plan.hosts[name])}"
 
@@ -156,7 +156,7 @@ def _at(machine: Machine) -> str:
 
 
 def _listen(plan: FleetPlan, machine: Machine) -> tuple[str, ...]:
-    """The same port number, of udp for routers and of tcp for processes."""
+    """Return the endpoints to listen at: the same port number in UDP for routers and in TCP for processes."""
     where = f"{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
     transport = plan.file.links.transport
     return tuple(f"{kind}/{where}" for kind in dict.fromkeys((transport, _DOORS[transport])))
@@ -168,7 +168,7 @@ def _joined(plan: FleetPlan, a: str, b: str) -> bool:
 
 
 def rows(part: HostPlan) -> list[ProcessSpec]:
-    """The processes of this machine, its router first."""
+    """Return the processes of this machine, its router first."""
     folder = part.run_folder
     keys = ("--keys", str(part.folder / KEYS)) if part.keyed else ()
     link = ("--link", part.link)
@@ -199,7 +199,7 @@ def rows(part: HostPlan) -> list[ProcessSpec]:
 
 
 def read(path: Path) -> HostPlan:
-    """Raises Refused for a file that is no part of a fleet."""
+    """Return the plan in a file that `lfa up` wrote. Raises Refused for any other file."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=HostPlan)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A TOML document to a Struct, and everything that is wrong with it, not only the first thing."""
+"""Conversion of a TOML document to a Struct, with all of its mistakes and not only the first."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ SHOWN_MAX = 60
 
 
 def read(document: dict[str, Any], struct: type[S], mistakes: list[str], where: str = "") -> S | None:
-    """`document` as `struct`; None when a key that must be given is not right. `mistakes` grows by a line each.
+    """Return `document` as `struct`; None when a required key is missing or wrong.
 
-    A wrong value is replaced by its default, so that what depends on it can still be looked at.
+    `mistakes` gets one line per mistake. A wrong value is replaced by its default, so that values that depend
+    on it can still be checked.
     """
     known = {field.encode_name: field for field in fields(struct)}
     hints = get_type_hints(struct)
@@ -39,7 +40,7 @@ def read(document: dict[str, Any], struct: type[S], mistakes: list[str], where: 
 
 
 def _value(value: Any, kind: Any, mistakes: list[str], where: str) -> tuple[Any, bool]:
-    """The value as `kind`, and whether it is one."""
+    """Return the value as `kind`, and True if the conversion succeeded."""
     if _is_struct(kind) and isinstance(value, dict):
         made = read(value, kind, mistakes, f"{where}.")
         return made, made is not None
@@ -54,7 +55,7 @@ def _value(value: Any, kind: Any, mistakes: list[str], where: str) -> tuple[Any,
 
 
 def _right(kind: Any, error: str) -> str:
-    """What would be right: the words of a choice, or what msgspec says."""
+    """Return a text on the right value: the words of a choice, or the message of msgspec."""
     for choice in (kind, *get_args(kind)):
         if get_origin(choice) is Literal:
             return f"one of {', '.join(map(str, get_args(choice)))}"

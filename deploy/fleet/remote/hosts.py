@@ -1,4 +1,4 @@
-"""All machines of a plan at once: asked whether they would do, brought up, taken down; what is wrong is a line each."""
+"""Concurrent operations on all machines of a plan: check, start, stop, rekey; one line for each machine that fails."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
 CLOCK_S_MAX = 60.0
-"""Beyond it certificates begin or end at the wrong time."""
+"""Maximum difference [s] of wall clocks; beyond it certificates start or end at the wrong time."""
 
 
 class FleetHosts:
-    """A shell on each machine that can be reached; `wrong` has a line for each that cannot, or does not obey."""
+    """Shells on the reachable machines of a plan; `wrong` has a line for each unreachable or failing machine."""
 
     def __init__(self, plan: FleetPlan, parts: Mapping[str, HostPlan]) -> None:
         self._plan = plan
@@ -38,7 +38,7 @@ class FleetHosts:
         await self._each(self._plan.hosts, one)
 
     async def check(self, *, may_install: bool) -> dict[str, Found]:
-        """Whether each machine would do: Python, the same `lfa`, clock, port, place. Installs `lfa` where wanted."""
+        """Check Python, version of `lfa`, clock, port and folder of each machine; install `lfa` first if allowed."""
         answers: dict[str, Found] = {}
 
         async def one(name: str) -> None:
@@ -56,7 +56,7 @@ class FleetHosts:
         return answers
 
     async def do(self, deed: str, names: Iterable[str] | None = None) -> dict[str, Found]:
-        """`start`, `stop` or `rekey` on each machine that is reached, or on those `names`; what they say."""
+        """Run `start`, `stop` or `rekey` on each reached machine, or on `names`; return their answers."""
         answers: dict[str, Found] = {}
 
         async def one(name: str) -> None:
@@ -86,11 +86,11 @@ class FleetHosts:
 
 
 async def ask(shell: Shell, machine: Machine, deed: str, part: HostPlan) -> Found:
-    """What `host.py` there answers. Raises Refused, with the cause when it is Python or another `lfa`."""
+    """Run `host.py` on a machine and return its answer. Raises Refused, naming a wrong Python or version of `lfa`."""
     python = python_of(machine)
     done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", deed), msgspec.json.encode(part))
     if done.code == 0:
-        with contextlib.suppress(msgspec.DecodeError):  # no Python of ours: the probe tells what it is
+        with contextlib.suppress(msgspec.DecodeError):  # not our program: the probe finds the cause
             return msgspec.json.decode(done.out, type=Found)
     if done.code != REFUSED_CODE or not done.err.strip():
         found = await probe(shell, python)

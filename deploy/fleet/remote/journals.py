@@ -1,4 +1,4 @@
-"""A fleet's journals, brought into one folder: of this machine's processes, or over ssh of all in a fleet file."""
+"""Collection of a fleet's journals in one folder, from this machine's processes or over ssh from all machines."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ PACK = (
     "    for path in (path for run in runs[-1:] for path in sorted(run.glob('*.bin'))):\n"
     "        packed.add(path, path.name)\n"
 )
-"""Run there: the journals of the newest run, as a tar file."""
+"""Program for the remote Python: write the journals of the newest run as a tar file to standard output."""
 
 
 def of_processes(fleet: str) -> set[Path]:
-    """Folders that this user's processes of `fleet` on this machine keep their journals in."""
+    """Return the journal folders of this user's processes of `fleet` on this machine."""
     found = (list(identity.arguments) for identity in own_processes())
     named = [option(words, "--journal", "") for words in found if option(words, "--fleet", "") == fleet]
     return {Path(name) for name in named if name}
 
 
 def copy(folders: set[Path], run: Path) -> int:
-    """Copy what these folders hold into `run`'s; how many. One that is still written is whole up to its last entry."""
+    """Copy the journals in `folders` to `run`; return their number. An open one may lack its last entries."""
     journals = [path for folder in sorted(folders) for path in sorted(folder.glob("*.bin"))]
     if journals:
         (run / JOURNALS).mkdir(exist_ok=True)
@@ -44,7 +44,7 @@ def copy(folders: set[Path], run: Path) -> int:
 
 
 def fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
-    """Bring the newest run's journals of every machine of `plan` into `run`'s folder: how many, and what went wrong."""
+    """Fetch the newest run's journals of all machines of `plan` to `run`; return their number, and the failures."""
     return asyncio.run(_fetch(plan, run))
 
 
@@ -56,7 +56,7 @@ async def _fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
 
 
 async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> int | str:
-    """How many came, or what is wrong."""
+    """Fetch the journals of one machine; return their number, or the failure."""
     machine = plan.hosts[name]
     try:
         shell = await reach(machine)
@@ -70,7 +70,7 @@ async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> 
 
 
 def unpack(packed: bytes, run: Path) -> int:
-    """Regular files called `*.bin` only, whatever else a machine has sent; none is put outside of the folder."""
+    """Unpack the regular files `*.bin` of a tar file into the folder itself, skip the rest; return their number."""
     (run / JOURNALS).mkdir(parents=True, exist_ok=True)
     count = 0
     with tarfile.open(fileobj=io.BytesIO(packed), mode="r|") as files:

@@ -1,6 +1,6 @@
-"""The keys of a fleet file's fleet: made on the operator's machine, and what of them goes to which machine.
+"""Keys of a fleet file's fleet: created on the operator's machine, and distributed to each machine.
 
-They lie in `~/.local/state/lfa/<fleet>.keys`, or where the file's `keys` says; who has that folder is the operator.
+They are stored in `~/.local/state/lfa/<fleet>.keys`, or in the file's `keys`; the owner of that folder is the operator.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from lfa.protocol.topics import OPERATOR_NAME, WORLD_NAME
 from lfa.protocol.transport.credentials import Credentials, credentials
 
 Bundle = dict[str, str]
-"""File name to text: all small, all text."""
+"""Contents of small text files, by file name."""
 
 
 def key_plan(plan: FleetPlan) -> KeyPlan:
-    """Who joins where: at home, and where a process goes that has lost its router."""
+    """Return the machines whose routers each process may join: its home, and those it fails over to."""
     file = plan.file
     homes = {robot_name(robot): host for robot, host in plan.places.items()} | {WORLD_NAME: file.world}
     if plan.scenario.mission.witness and file.witness != file.world:
@@ -33,13 +33,13 @@ def key_plan(plan: FleetPlan) -> KeyPlan:
 
 
 def operator(plan: FleetPlan) -> Credentials | None:
-    """What the operator shows, None where no keys were made yet. Raises Refused."""
+    """Return the operator's credentials, None before keys were created. Raises Refused."""
     issued = store(plan) / ISSUED
     return credentials(issued, OPERATOR_NAME, clock.wall_ms()) if issued.is_dir() else None
 
 
 def bundles(plan: FleetPlan) -> dict[str, Bundle]:
-    """The keys of each machine, made where they are missing. Raises Refused."""
+    """Return the keys of each machine, created where missing. Raises Refused."""
     keys.make(store(plan), key_plan(plan))
     return _bundles(plan)
 
@@ -50,9 +50,9 @@ def _bundles(plan: FleetPlan) -> dict[str, Bundle]:
 
 
 async def push(plan: FleetPlan) -> list[str]:
-    """Give the machines of a running fleet their keys anew, and open their routers one by one; a line for each fault.
+    """Send new keys to the machines of a running fleet and restart their routers one by one; return a line per failure.
 
-    Rules are read when a router opens. While one is away its processes go to the next machine's, as when it dies.
+    A router reads its rules when it opens. During its restart its processes fail over to the next machine's router.
     """
     fleet = FleetHosts(plan, parts(plan, "", "", _bundles(plan)))
     try:

@@ -1,4 +1,4 @@
-"""A machine to run commands on: over ssh, with the user's own configuration, keys and known hosts; or this one."""
+"""Command execution on a machine: over ssh with the user's configuration, keys and known hosts, or on this machine."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ PROBE = (
     "    lfa = ''\n"
     "print(json.dumps({'python': list(sys.version_info[:3]), 'lfa': lfa, 'wall_ms': int(time.time() * 1000)}))\n"
 )
-"""For any Python that may be there, with or without `lfa`."""
+"""Program for any remote Python, with or without `lfa`: print the versions and the wall clock as JSON."""
 
 
 class Done(Struct, frozen=True):
-    """How a command ended."""
+    """Result of a command: exit code, standard output and standard error."""
 
     code: int
     out: bytes
@@ -44,7 +44,7 @@ class Done(Struct, frozen=True):
 
 
 class Probed(Struct, frozen=True):
-    """What Python is there, which `lfa` it has (empty: none), and what its clock says."""
+    """Python version of a machine, its version of `lfa` (empty: none), and its wall clock [ms]."""
 
     python: tuple[int, int, int]
     lfa: str
@@ -52,20 +52,20 @@ class Probed(Struct, frozen=True):
 
 
 class Shell(Protocol):
-    """Where commands run."""
+    """Interface for running commands on a machine."""
 
     async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
-        """Run it to its end. Raises Unreachable when the machine has gone meanwhile."""
+        """Run a command to its end. Raises Unreachable when the machine is lost meanwhile."""
 
     async def close(self) -> None: ...
 
 
 class Unreachable(Exception):
-    """No command can be run there; the text says why, and what would be right."""
+    """Failure to run commands on a machine; the text gives the cause, and what is required."""
 
 
 class Here:
-    """This machine."""
+    """Shell on this machine."""
 
     async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
         pipe = asyncio.subprocess.PIPE
@@ -77,11 +77,11 @@ class Here:
         return Done(child.returncode or 0, out, err)
 
     async def close(self) -> None:
-        """Nothing was opened."""
+        """Do nothing: no connection was opened."""
 
 
 class Ssh:
-    """A machine behind ssh; `~` in the first word is the home there."""
+    """Shell on a machine over ssh; `~` in the first word is the home folder on that machine."""
 
     def __init__(self, connection: Any) -> None:
         self._connection = connection
@@ -93,7 +93,7 @@ class Ssh:
         command = " ".join([first, *map(shlex.quote, words[1:])])
         try:
             done = await self._connection.run(command, input=stdin, encoding=None, timeout=COMMAND_S)
-        except TimeoutError:  # asyncssh's own is one
+        except TimeoutError:  # also raised by asyncssh
             raise Unreachable(f"no answer within {COMMAND_S:g} s to: {words[0]}") from None
         except (OSError, asyncssh.Error) as error:
             raise Unreachable(f"lost its connection ({error})") from None
@@ -105,7 +105,7 @@ class Ssh:
 
 
 async def reach(machine: Machine) -> Shell:
-    """A shell on `machine`. Raises Unreachable."""
+    """Open a shell on `machine`. Raises Unreachable, and Refused without asyncssh."""
     if machine.local:
         return Here()
     try:
@@ -139,7 +139,7 @@ def python_of(machine: Machine) -> str:
 
 
 async def probe(shell: Shell, python: str) -> Probed:
-    """Raises Refused for no Python, or too old a one."""
+    """Return the versions and clock of a machine. Raises Refused when Python is missing or older than PYTHON_MIN."""
     done = await shell.run((python, "-c", PROBE))
     try:
         found = msgspec.json.decode(done.out, type=Probed)

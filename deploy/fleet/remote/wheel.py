@@ -1,4 +1,4 @@
-"""`lfa` as a wheel, made of what is installed here and put onto a machine: only what is missing there is fetched."""
+"""Wheel of the `lfa` installed here, and its installation on a machine; only missing dependencies are downloaded."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NEEDED = "import msgspec, typer, zenoh"
 
 
 def pack() -> tuple[str, bytes]:
-    """Name and content of the wheel of the packages as they are here."""
+    """Return name and content of a wheel of the packages as installed here."""
     dist = distribution("lfa")
     name = f"lfa-{dist.version}"
     root = Path(lfa.deploy.__file__).parent.parent
@@ -45,7 +45,7 @@ def pack() -> tuple[str, bytes]:
 
 
 async def install(shell: Shell, machine: Machine, wanted: str) -> None:
-    """Put this `lfa` there; a virtual environment that is not there yet is made. Raises Refused."""
+    """Install this `lfa` on a machine; create its virtual environment if it is missing. Raises Refused."""
     python = python_of(machine)
     if machine.venv and (await shell.run((python, "-c", ""))).code != 0:
         await _must(shell, ("python3", "-m", "venv", machine.venv), f"venv = {machine.venv}")

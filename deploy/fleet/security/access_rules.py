@@ -1,8 +1,8 @@
-"""Who may say and hear what, as the rules that a secure router reads: from the table of topics, and who lives where.
+"""Access rules of a secure router, derived from the table of topics and the placement of processes.
 
-A robot speaks under its own name, and only what the table's column `publishers` lets an agent say; the world speaks
-for the hardware that it simulates. A router admits from a neighbour router only what those may say whose place is
-there: whoever owns a machine can speak as everybody who lives on it, and as nobody else (zenoh.md section 5).
+A robot publishes under its own name, and only topics whose column `publishers` names an agent; the world publishes for
+the hardware that it simulates. A router admits from a neighbour router only the keys of the processes placed there: the
+owner of a machine can publish as any process of that machine, and as no other (zenoh.md section 5).
 """
 
 from __future__ import annotations
@@ -27,53 +27,54 @@ from lfa.protocol.topics import (
 )
 
 FLOOD_RATIO, FLOOD_HZ_MIN = 10.0, 50.0
-"""A topic may come so many times as often as the table says; what is more is dropped where it comes in."""
+"""Rate limit of a topic: its ratio to the rate in the table, and its minimum [Hz]; the excess is dropped at ingress."""
 FLOOD_HZ = {"lease": 2000.0, "obstacles": 500.0, "ask": 50.0}
-"""Of topics that come on events. Zenoh drops what follows the last one too soon, so a cap is also the least interval
-on a key: no agent says two of these in one breath. `event` has none: two at once are usual, and only persons listen."""
+"""Rate limits [Hz] of topics published on events. Zenoh drops a message that follows the last one too soon, so a limit
+is also the minimum interval on a key: no agent publishes two of these at once. `event` has no limit: two at once are
+usual, and only operators read it."""
 LEARN = ("declare_subscriber", "declare_queryable", "query", "liveliness_query", "declare_liveliness_subscriber")
-"""What tells a client who listens; without it, it sends nothing."""
+"""Zenoh messages that tell a client about subscribers; without them it sends nothing."""
 ASK = ("declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber")
 SAY = ("put", "liveliness_token")
 HEAR = ("put", "reply", "liveliness_token")
 
 
 class KeyPlan(Struct, frozen=True):
-    """A fleet's machines, and who joins at which of their routers."""
+    """Machines of a fleet, and the routers that each process may join."""
 
     fleet: str
     hosts: dict[str, tuple[str, ...]]
-    """Name of a machine: its addresses and names in the network."""
+    """Addresses and network names of each machine."""
     places: dict[str, tuple[str, ...]]
-    """`robot3`, `world`, `operator`, `host-a`, ..: the machines whose routers it may join, its home first."""
+    """Machines whose routers `robot3`, `world`, `operator`, `host-a`, .. may join, the home machine first."""
 
     def at(self, host: str) -> list[str]:
-        """Who may join there."""
+        """Return the names that may join the router of `host`."""
         return [name for name, hosts in self.places.items() if host in hosts]
 
     def kept_at(self, host: str) -> list[str]:
-        """Whose keys lie there: those who run there, and those of the persons who look on from anywhere."""
+        """Return the names whose keys are stored on `host`: its processes, the operator and the recorder."""
         persons = (OPERATOR_NAME, RECORDER_NAME)
         return [name for name in self.at(host) if name in persons or self.places[name][0] == host]
 
     def simulated(self) -> list[str]:
-        """The robots whose hardware the world plays: those without a driver of their own."""
+        """Return the robots whose hardware the world simulates: those without a driver."""
         robots = [name for name in self.places if robot_id_of(name)]
         return [name for name in robots if driver_of(name) not in self.places]
 
 
 def driver_of(robot: str) -> str:
-    """The name of the process that drives a real robot: `driver3` of `robot3`."""
+    """Return the name of the driver process of a real robot: `driver3` for `robot3`."""
     return robot.replace("robot", DRIVER_PREFIX, 1)
 
 
 def host_name(host: str) -> str:
-    """As whom machine `a`'s router and supervisor speak: `host-a`."""
+    """Return the name of a machine's router and supervisor: `host-a` for machine `a`."""
     return f"{HOST_PREFIX}{host}"
 
 
 def voices(name: str, plan: KeyPlan) -> list[tuple[str, str]]:
-    """As which kind (the table's `publishers`) under which owner's keys `name` may speak."""
+    """Return the pairs (kind in the table's `publishers`, owner of the keys) under which `name` may publish."""
     if name == WORLD_NAME:
         hardware = [("driver", robot) for robot in plan.simulated()]
         witness = [] if WITNESS_NAME in plan.places else [("witness", WITNESS_NAME)]
@@ -90,7 +91,7 @@ def voices(name: str, plan: KeyPlan) -> list[tuple[str, str]]:
 
 
 def sayable(name: str, plan: KeyPlan) -> list[str]:
-    """Every key expression that `name` may publish on."""
+    """Return every key expression that `name` may publish on."""
     keys = [
         f"lfa/{plan.fleet}/{owner}/{topic.name}{_receiver(topic, kind)}"
         for kind, owner in voices(name, plan)
@@ -104,7 +105,7 @@ def sayable(name: str, plan: KeyPlan) -> list[str]:
 def _speaks(kind: str, owner: str, topic: Topic) -> bool:
     if owner == TRUTH_OWNER or topic.name in ("truth", "clock"):
         return owner == TRUTH_OWNER and topic.name in ("truth", "clock")
-    if kind == "driver":  # hardware and FENCED under the robot's name, what it says of itself under its own
+    if kind == "driver":  # sensors and FENCED as the robot, its own status as the driver
         own = topic.name in ("status", "event", "ask")
         return kind in topic.publishers and own == owner.startswith(DRIVER_PREFIX)
     return kind in topic.publishers
@@ -115,14 +116,14 @@ def _lives(kind: str, owner: str) -> bool:
 
 
 def _receiver(topic: Topic, kind: str) -> str:
-    """A lease's message names whom it is for; a gateway answers to all."""
+    """Return the receiver's part of the key: a message on `lease` names its receiver, a gateway answers to all."""
     if topic.name != "lease":
         return ""
     return f"/{TO_ALL}" if kind == "driver" else "/*"
 
 
 def hearable(name: str, plan: KeyPlan) -> list[str]:
-    """What is brought to `name`: to robots all but ground truth, to everybody else all."""
+    """Return the key expressions delivered to `name`: all except ground truth to robots, all to other processes."""
     base = f"lfa/{plan.fleet}"
     if robot_id_of(name) is None:
         return [f"{base}/**"]
@@ -131,7 +132,7 @@ def hearable(name: str, plan: KeyPlan) -> list[str]:
 
 
 def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, Any]:
-    """The part of Zenoh's configuration that guards the router of `host`; `common_names`: those not revoked."""
+    """Return the access part of the Zenoh configuration of the router of `host`; `common_names`: those not revoked."""
     neighbours = [host_name(other) for other in plan.hosts if other != host]
     members = [name for name in plan.at(host) if name not in neighbours]
     everything = f"lfa/{plan.fleet}/**"
@@ -158,18 +159,19 @@ def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, A
 
 
 def _through(neighbour: str, plan: KeyPlan, common_names: dict[str, str]) -> list[str]:
-    """What a neighbour router may pass on: what those may say who may join there.
+    """Return the keys that a neighbour router may forward: those of the processes that may join it.
 
-    Its own supervisor shows the same certificate: should that one come here, it gets no more.
+    The neighbour's supervisor shows the same certificate; if it connects here, it has the same rights.
     """
     there = [name for name in plan.at(neighbour.removeprefix(HOST_PREFIX)) if name in common_names]
     return list(dict.fromkeys(key for name in there for key in sayable(name, plan)))
 
 
 def _subjects(name: str, common_name: str, *, joins: bool) -> list[dict[str, Any]]:
-    """By certificate and password over tls and quic, by password over the unix socket, whose file is 0600.
+    """Return the subjects that identify `name`.
 
-    A neighbour router that we opened the link to has shown us its certificate only.
+    A client shows certificate and password over tls and quic, and its password over the unix socket, whose file is
+    0600. A neighbour router at the far end of a link opened from here has shown its certificate only.
     """
     if not joins:
         return [{"id": name, "cert_common_names": [common_name]}]
@@ -182,7 +184,7 @@ def _rule(id: str, flow: str, messages: Iterable[str], keys: list[str]) -> dict[
 
 
 def _floods(plan: KeyPlan, host: str) -> list[dict[str, Any]]:
-    """Only what robots say: a world that catches up says much at once, and its newest counts."""
+    """Return the rate limits, for robots only: a world that catches up sends bursts, whose newest message counts."""
     robots = [name for name in plan.places if robot_id_of(name)]
     receivers = [TO_ALL, WITNESS_NAME, *robots, *(name.replace("robot", "gateway", 1) for name in robots)]
     rates = [

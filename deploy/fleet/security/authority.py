@@ -1,6 +1,6 @@
-"""The fleet's own certificate authority: EC P-256 keys and X.509 certificates (RFC 5280), by `cryptography`.
+"""Certificate authority of a fleet: EC P-256 keys and X.509 certificates (RFC 5280), by `cryptography`.
 
-Only a router's certificate serves: a robot's own cannot stand for a router, whatever address it takes.
+Only routers have server certificates: a robot's certificate cannot impersonate a router at any address.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from lfa.protocol.errors import Refused
 
 CA_DAYS = 3650.0
 BACKDATED = timedelta(hours=1)
-"""A machine whose clock is a little behind takes a fresh certificate too."""
+"""Start of validity before the time of issue, so that a machine whose clock lags accepts a new certificate."""
 RENEW_BEFORE = timedelta(days=30)
 
 
 class Authority(Struct, frozen=True):
-    """Who signs."""
+    """Certificate and private key of the authority."""
 
     certificate: x509.Certificate
     key: EllipticCurvePrivateKey
 
 
 def found(certificate: Path, key: Path, fleet: str) -> None:
-    """A new authority, in two files."""
+    """Create an authority and write its certificate and key."""
     private = generate_private_key(SECP256R1())
     name = _name(f"lfa fleet {fleet}")
     usage = x509.KeyUsage(False, False, False, False, False, True, True, False, False)
@@ -50,7 +50,7 @@ def found(certificate: Path, key: Path, fleet: str) -> None:
 
 
 def load(certificate: Path, key: Path) -> Authority:
-    """Raises Refused when the files hold no authority of ours."""
+    """Return the authority in these files. Raises Refused when they hold none, or do not belong together."""
     try:
         private = load_pem_private_key(key.read_bytes(), None)
         signed = x509.load_pem_x509_certificate(certificate.read_bytes())
@@ -62,7 +62,7 @@ def load(certificate: Path, key: Path) -> Authority:
 
 
 def issue(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...], days: float) -> None:
-    """A new key and certificate at `stem`.key and .pem; one with `addresses` (names or IPs) may serve there."""
+    """Write a new key and certificate to `stem`.key and .pem; `addresses` (names or IPs) make it a server's."""
     private = generate_private_key(SECP256R1())
     usages = [ExtendedKeyUsageOID.CLIENT_AUTH] + ([ExtendedKeyUsageOID.SERVER_AUTH] if addresses else [])
     signed = (
@@ -77,7 +77,11 @@ def issue(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...
 
 
 def fits(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...]) -> bool:
-    """Whether what lies at `stem` is by this authority, says this, and lasts a while (or half its life) longer."""
+    """Return True if the certificate at `stem` is valid for reuse.
+
+    It is issued by this authority for this name and these addresses, matches its key, and remains valid for more than
+    RENEW_BEFORE or half its validity, whichever is less.
+    """
     try:
         found = x509.load_pem_x509_certificate(stem.with_name(f"{stem.name}.pem").read_bytes())
         private = load_pem_private_key(stem.with_name(f"{stem.name}.key").read_bytes(), None)
@@ -92,7 +96,7 @@ def fits(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...]
 
 
 def write_key(path: Path, key: EllipticCurvePrivateKey) -> None:
-    """PKCS8, 0600 from the first byte on."""
+    """Write `key` in PKCS8; the file is created with mode 0600."""
     text = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     with suppress(FileNotFoundError):
         path.unlink()
@@ -122,7 +126,7 @@ def _name(common_name: str) -> x509.Name:
 
 
 def _names(addresses: tuple[str, ...]) -> list[x509.GeneralName]:
-    """IP addresses as such, everything else as a name in DNS."""
+    """Return IP addresses as such, everything else as DNS names."""
     names: list[x509.GeneralName] = []
     for address in addresses:
         try:

@@ -1,22 +1,23 @@
-"""A fleet's certificates, passwords and rules on disk: made, renewed, revoked, and laid out a folder a machine.
+"""Certificates, passwords and rules of a fleet on disk: creation, renewal, revocation, and one folder per machine.
 
-    DIR/ca.pem, ca.key       the fleet's own authority; the key never leaves the operator's machine
-    DIR/fleet.json           who joins where, under which common name (no secrets)
-    DIR/issued/              certificate, key and password of everybody: the operator's own `--keys`
-    DIR/hosts/a/             all that machine `a` needs, and no more: `scp -r DIR/hosts/a a:/etc/lfa/keys`
-        ca.pem, host-a.*     of its router and supervisor (the only certificates that serve)
-        robot1.pem .key .password   of those who run there, of operator and recorder
-        access.json, users   what its router lets pass with `--secure`
+    DIR/ca.pem, ca.key       the fleet's authority; the key never leaves the operator's machine
+    DIR/fleet.json           routers and common name of each member (no secrets)
+    DIR/issued/              certificate, key and password of every member: the operator's `--keys`
+    DIR/hosts/a/             all files that machine `a` needs, and no others: `scp -r DIR/hosts/a a:/etc/lfa/keys`
+        ca.pem, host-a.*     for its router and supervisor (the only server certificates)
+        robot1.pem .key .password   for its processes, for operator and recorder
+        access.json, users   access rules and passwords of its router with `--secure`
 
-For `lfa up` and others who call it:
+Use, as in `lfa up`:
 
     plan = spread("fleet", hosts={"a": ("10.0.0.1",), "b": ("10.0.0.2",)}, robots=range(1, 13))
-    make(folder, plan)                       # as often as one likes: only what is missing, expiring or misplaced
+    make(folder, plan)                       # idempotent: issues only what is missing, expiring or misplaced
     folder_of(folder, "a")                   # to be copied to machine a, and given to its processes as --keys
     revoke(folder, ["robot3"]); rotate(folder, ["robot4"])
 
-A process there takes `--keys /etc/lfa/keys` and is who its name says (`protocol/transport/credentials.py`); `lfa-router --keys
-DIR` serves `tls/` and `quic/`, with `--secure` under the rules. Files are 0600, folders 0700.
+A process with `--keys /etc/lfa/keys` uses the certificate of its name (`protocol/transport/credentials.py`);
+`lfa-router --keys DIR` listens at `tls/` and `quic/`, and enforces the rules with `--secure`. Files are 0600, folders
+0700.
 """
 
 from __future__ import annotations
@@ -42,13 +43,13 @@ KINDS = ("pem", "key", "password")
 
 
 class Registry(Struct, frozen=True):
-    """`fleet.json`."""
+    """Contents of `fleet.json`."""
 
     plan: KeyPlan
     common_names: dict[str, str] = {}
-    """Of those who are let in: what their certificates say. After a revocation never the same again."""
+    """Common names in the certificates of admitted members. A name is not reused after a revocation."""
     revoked: dict[str, int] = {}
-    """How often each was."""
+    """Number of revocations of each member."""
 
     def members(self) -> list[str]:
         return list(self.plan.places)
@@ -62,10 +63,10 @@ class Shown(Struct, frozen=True):
     """`valid`, `expired` or `revoked`."""
     common_name: str
     until: str
-    """UTC."""
+    """End of validity, UTC."""
     joins_at: tuple[str, ...]
     says: tuple[str, ...]
-    """The key expressions that it may publish on."""
+    """Key expressions that it may publish on."""
 
 
 def spread(
@@ -75,10 +76,10 @@ def spread(
     places: Mapping[str, Sequence[str]] | None = None,
     drivers: Iterable[int] = (),
 ) -> KeyPlan:
-    """A plan: robots in turn over the machines, each with the next machine's router as its second.
+    """Return a plan that distributes robots in turn over the machines, each with the next machine's router as second.
 
-    `places` says otherwise for some (`{"robot3": ["b"]}`); `drivers` are the robots whose hardware is not the
-    world's. World and witness are on the first machine (a place for `witness` is that of one that runs alone),
+    `places` overrides this for single members (`{"robot3": ["b"]}`); `drivers` are the robots whose hardware the world
+    does not simulate. World and witness are on the first machine (`witness` in `places` is one with its own process);
     operator and recorder may join anywhere. Raises Refused.
     """
     names = list(hosts)
@@ -106,7 +107,7 @@ def _turn(names: list[str], n: int) -> tuple[str, ...]:
 
 
 def make(folder: Path, plan: KeyPlan, days: float = DAYS) -> list[str]:
-    """Everything that `plan` needs, in `folder`; whose certificates were made or renewed. Raises Refused."""
+    """Create all files of `plan` in `folder`; return the members with a new certificate. Raises Refused."""
     try:
         private_folder(folder)
         known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
@@ -121,9 +122,10 @@ def make(folder: Path, plan: KeyPlan, days: float = DAYS) -> list[str]:
 
 
 def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[str]:
-    """New keys and certificates for `names` (all when empty); who was revoked comes back, as a stranger to old keys.
+    """Issue new keys and certificates to `names` (all when empty); a revoked member returns under a new common name.
 
-    Old ones stay valid until they expire, so that whoever runs goes on; `revoke` is for stolen ones. Raises Refused.
+    Old certificates stay valid until they expire, so that running processes continue; for stolen keys use `revoke`.
+    Raises Refused.
     """
     registry = load(folder)
     chosen = list(names) or [name for name in registry.members() if name in registry.common_names]
@@ -137,7 +139,10 @@ def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[
 
 
 def revoke(folder: Path, names: Sequence[str]) -> list[str]:
-    """`names` leave all allow lists; the machines whose rules changed. Routers read them when they open: restart."""
+    """Remove `names` from all allow lists; return the machines whose rules changed. Raises Refused.
+
+    Routers read the rules when they open: restart them.
+    """
     registry = load(folder)
     _check_names(registry, names)
     count = {name: registry.revoked.get(name, 0) + 1 for name in names if name in registry.common_names}
@@ -150,7 +155,7 @@ def revoke(folder: Path, names: Sequence[str]) -> list[str]:
 
 
 def show(folder: Path, now_ms: int) -> list[Shown]:
-    """All members, as of the wall clock's `now_ms` [ms]. Raises Refused."""
+    """Return all members, with their state at the wall clock time `now_ms` [ms]. Raises Refused."""
     registry, shown = load(folder), []
     for name in registry.members():
         common = registry.common_names.get(name)
@@ -163,12 +168,12 @@ def show(folder: Path, now_ms: int) -> list[Shown]:
 
 
 def folder_of(folder: Path, host: str) -> Path:
-    """What machine `host` needs."""
+    """Return the folder with all files that machine `host` needs."""
     return folder / HOSTS / host
 
 
 def load(folder: Path) -> Registry:
-    """Raises Refused when `folder` holds no fleet's keys."""
+    """Return the registry in `folder`. Raises Refused when it holds no fleet's keys."""
     path = folder / REGISTRY
     try:
         return msgspec.json.decode(path.read_bytes(), type=Registry)
@@ -185,7 +190,7 @@ def _check_names(registry: Registry, names: Sequence[str]) -> None:
 
 
 def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]) -> list[str]:
-    """Issue what is missing, then write every machine's folder anew; who got a new certificate."""
+    """Issue missing certificates, then rewrite every machine's folder; return the members with a new certificate."""
     issued = folder / ISSUED
     for inner in (issued, folder / HOSTS):
         private_folder(inner)
@@ -230,7 +235,7 @@ def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
 
 
 def _addresses(name: str, plan: KeyPlan) -> tuple[str, ...]:
-    """Where a router may be called; nobody else's certificate serves."""
+    """Return the addresses of a router, for its server certificate; empty for any other member."""
     for host, addresses in plan.hosts.items():
         if name == host_name(host):
             return tuple(dict.fromkeys((host, *addresses, "localhost", "127.0.0.1", "::1")))

@@ -1,7 +1,6 @@
-"""The figures of a run: those of the paper (7, 8, 9, 11) and what the paper has none of. One table
-for PNGs and reports.
+"""Table of the figures of a run, for PNGs and reports: those of the paper (7, 8, 9, 11) and others.
 
-Lines are thinned to what a page can show, with every spike kept.
+Lines are thinned to the resolution of a page, with every spike kept.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from lfa.deploy.view.figures.time_panels import finish
 if TYPE_CHECKING:
     pass
 
-TERM_SHARE_MIN = 0.15  # of the run: a shorter bar has no room for its term
+TERM_SHARE_MIN = 0.15  # share of the run's duration: a shorter bar has no room for its term
 FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": True, "grid.alpha": 0.3,
         "legend.fontsize": 8.0, "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
         "svg.hashsalt": "lfa"}  # fmt: skip
@@ -44,7 +43,7 @@ def svg(figure: Figure) -> bytes:
 
 
 def drawn(name: str, run: Run) -> Figure:
-    """The figure called `name` of FIGURES."""
+    """Draw and return the figure called `name` in FIGURES."""
     (width, height), draw = next((size, draw) for known, size, _, draw in FIGURES if known == name)
     with _style():
         figure = Figure(figsize=(width, height), layout="constrained")
@@ -53,7 +52,7 @@ def drawn(name: str, run: Run) -> Figure:
 
 
 def overview(run: Run) -> Figure:
-    """World, leaders, errors and speeds on one sheet, laid out as the viewer's."""
+    """Draw world, leaders and errors on one sheet, in the layout of the rerun viewer."""
     with _style():
         figure = Figure(figsize=(16.0, 10.0), layout="constrained")
         grid = figure.add_gridspec(20, 5)
@@ -84,7 +83,7 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
 
 
 def _string_stability(figure: FigureBase, run: Run) -> None:
-    """Along the last chain: how large an error each follower keeps, how lively each turns against the one ahead."""
+    """Draw, per hop of the last chain, distance error and ratio of the yaw rates' std, follower to predecessor."""
     left, right = figure.subplots(1, 2)
     hops = [(robot, int(e.predecessor[-1]), e) for robot, e in run.errors.items() if e.steady.any()]
     places = np.arange(len(hops))
@@ -106,7 +105,7 @@ def _string_stability(figure: FigureBase, run: Run) -> None:
     left.legend(ncols=2, loc="upper center")
 
 
-#             file                     size [inch]  title                                            what is drawn
+#             file                     size [inch]  title                                            function
 FIGURES: tuple[tuple[str, tuple[float, float], str, Draw], ...] = (
     ("fig09_path_flow",         (10.0, 5.5), "Paths over the map (the paper's figure 9)",           path_flow),
     ("fig07_distance_error",    (10.0, 4.8), "Distance error (figure 7)",                           distance_error),

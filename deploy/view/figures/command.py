@@ -1,4 +1,4 @@
-"""`lfa plot`, and `figures/*.png` of a run folder. Matplotlib is imported when a figure is drawn."""
+"""`lfa plot`: draw `figures/*.png` of a run folder. Matplotlib is imported only when a figure is drawn."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ FIGURES = "figures"
 
 def command(
     folder: Annotated[Path, typer.Argument(help="A run folder.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures' files as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the paths of the figures as JSON.")] = False,
 ) -> int:
-    """Draw the figures of a run folder anew."""
+    """Draw the figures of a run folder again."""
     from lfa.deploy.recording.mcap_reader import look_into
 
     look_into(folder)
@@ -25,7 +25,7 @@ def command(
 
 
 def draw(folder: Path) -> list[Path]:
-    """Draw all figures of the run in `folder`; their files."""
+    """Draw all figures of the run in `folder` and return their paths."""
     from lfa.deploy.analysis.run_data import Run
     from lfa.deploy.view.figures import catalogue
 

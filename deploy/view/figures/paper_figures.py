@@ -1,4 +1,4 @@
-"""The paper's figures 7, 8 and 11; its figure 9 is `path_plot.py`'s."""
+"""Drawing of the paper's figures 7, 8 and 11; figure 9 is in `path_plot.py`."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def tracking(figure: FigureBase, run: Run) -> None:
 
 
 def _velocities(run: Run, *, leading: bool) -> dict[int, tuple[Array, Array, Array]]:
-    """Time, v and omega of each robot while it led, or while it did not; gaps are not drawn over."""
+    """Return time [s], v [m/s] and omega [rad/s] of each robot while it led, or while it did not; nan otherwise."""
     found = {}
     for robot, rows in run.seen.truth.items():
         led = run.led(robot, rows[:, 0])

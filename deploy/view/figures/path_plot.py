@@ -1,4 +1,4 @@
-"""A run seen from above: walls, obstacles, terrain, the robots' ways, and where all stood from time to time."""
+"""Top view of a run: walls, obstacles, terrain, the robots' paths, and the team's poses at several times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 STANCES = 7
-"""How often the whole team is shown."""
+"""Number of times at which the whole team is shown."""
 
 
 def path_flow(figure: FigureBase, run: Run) -> None:
@@ -36,7 +36,7 @@ def path_flow(figure: FigureBase, run: Run) -> None:
 
 
 def _ground(axes: Axes, run: Run) -> None:
-    """Walls, obstacles and terrain where they were; a moving one's way is dotted."""
+    """Draw walls, obstacles and terrain; the path of a moving obstacle is dotted."""
     world = run.scenario.world
     for patch in patches_of(world):
         colours: dict[str, Any] = {
@@ -63,7 +63,7 @@ def _ground(axes: Axes, run: Run) -> None:
 
 
 def _stance(axes: Axes, run: Run, t: float) -> None:
-    """Where all stood at `t`, each with its heading, and who followed whom."""
+    """Draw the pose of each robot at `t` [s], and a line to its predecessor."""
     at = {robot: rows[min(int(np.searchsorted(rows[:, 0], t)), rows.shape[0] - 1)]
           for robot, rows in run.seen.truth.items()}  # fmt: skip
     for robot, row in at.items():

@@ -1,7 +1,7 @@
-"""How robots look in figures: colours and line styles, the same in every one; and where labels go that would overlap.
+"""Colours and line styles of the robots, the same in every figure, and the layout of labels that would overlap.
 
-Colours can be told apart with any colour vision; up to seven robots differ in line style as well, more are shades
-along the chain.
+The colours are distinguishable with any colour vision. Up to seven robots differ in line style as well; more robots
+get shades along the chain.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from matplotlib import colormaps
 
 from lfa.deploy.analysis.run_data import Run
 
-# Okabe and Ito's palette.
+# Palette of Okabe and Ito.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
 LEGEND_MAX = 12
+"""Maximum number of robots that a legend or an axis names."""
 
 
 def look(run: Run, robot: int) -> dict[str, Any]:
-    """Colour and style of a robot's lines, the same in every figure."""
+    """Return colour and style of a robot's lines, the same in every figure."""
     n = run.robots.index(robot) if robot in run.robots else 0
     if len(run.robots) <= len(COLOURS):
         return {"color": COLOURS[n], "linestyle": STYLES[n]}
@@ -28,17 +29,17 @@ def look(run: Run, robot: int) -> dict[str, Any]:
 
 
 def label(run: Run, robot: int) -> str | None:
-    """A name for the legend; with many robots only the first, the last and some between have one."""
+    """Return a name for the legend; with many robots None for all but the first, the last and some between."""
     n, many = run.robots.index(robot), len(run.robots)
     step = max(1, -(-many // LEGEND_MAX))
     return f"robot {robot}" if n % step == 0 or n == many - 1 else None
 
 
 def levels(texts: Sequence[tuple[float, str]], letter: float, most: int) -> list[int]:
-    """Of labels that begin at these places, in their order, lines to write them in so that none covers another.
+    """Return a line number for each label (position, text), so that no label covers another.
 
-    `letter` is a letter's width in units of the places. With more than `most` lines the one that is free first is
-    shared.
+    `texts` is sorted by position. `letter`: width of a letter in units of the position. With more than `most` lines
+    needed, the line that is free first is shared.
     """
     free_from = [float("-inf")] * most
     chosen = []

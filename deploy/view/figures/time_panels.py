@@ -1,4 +1,4 @@
-"""Panels over time: a line a robot, what was done to the team as marks, and a strip of what the robots did."""
+"""Panels over time: one line for each robot, marks for faults and requests, and a strip of avoidances."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from lfa.deploy.view.figures.style import LEGEND_MAX, label, look
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-POINTS_MAX = 8000  # on all lines of one panel together
+POINTS_MAX = 8000  # sum over all lines of one panel
 STRIP = "#555555"
 
 
 def plot(axes: Axes, run: Run, of_robots: dict[int, tuple[Array, Array]]) -> None:
-    """A line for each robot's (t [s], y)."""
+    """Plot one line for each robot's (t [s], y)."""
     most = POINTS_MAX // max(1, len(of_robots))
     for robot, (t, y) in of_robots.items():
         axes.plot(*_unwrapped(*thin(t, y, most)), label=label(run, robot), linewidth=1.4, **look(run, robot))
 
 
 def finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True, legend: bool = True) -> None:
-    """Faults, role switches and orientation requests as marks, names, units; a legend where there is what to name."""
+    """Add title, units, marks for faults, role switches and orientation requests, and a legend of labelled lines."""
     for at_s, text, style in _marks(run):
         axes.axvline(at_s, color="black", linewidth=0.8, linestyle=style)
         if legend:
@@ -43,7 +43,7 @@ def finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True,
 
 
 def strip(axes: Axes, run: Run) -> None:
-    """When each robot avoided something, by its own log: a bar an avoidance, in the robot's colour."""
+    """Draw a bar for each avoidance of each robot, from its event log, in the robot's colour."""
     shown = [robot for robot in run.robots if label(run, robot)][:LEGEND_MAX]
     for place, robot in enumerate(shown):
         spans = [(a, max(b - a, 0.1)) for a, b in episodes.avoidances(run, robot)]
@@ -59,7 +59,7 @@ def strip(axes: Axes, run: Run) -> None:
 
 
 def thin(t: Array, y: Array, most: int) -> tuple[Array, Array]:
-    """At most about `most` points: of each stretch its least and its largest, in their order."""
+    """Thin a line to about `most` points: the minimum and maximum of each interval, in time order."""
     width = -(-2 * t.size // max(most, 2))
     if width <= 2:
         return t, y
@@ -73,13 +73,13 @@ def thin(t: Array, y: Array, most: int) -> tuple[Array, Array]:
 
 
 def _unwrapped(t: Array, y: Array) -> tuple[Array, Array]:
-    """No line across the plot where an angle [deg] goes over from -180 to 180."""
+    """Insert a gap where an angle [deg] wraps between -180 and 180."""
     over = np.flatnonzero(np.abs(np.diff(y)) > 270.0) + 1
     return np.insert(t, over, t[over]), np.insert(y, over, np.nan)
 
 
 def _marks(run: Run) -> list[tuple[float, str, str]]:
-    """When [s], what, and with which line."""
+    """Return time [s], text and line style of each mark."""
     found = [(fault.at_s, f"{fault.kind} {fault.target}", ":") for fault in event_log.faults(run.events)]
     found += [(reign.from_s, f"robot {reign.robot_id} leads", "-") for reign in run.reigns[1:]]
     asked = (line for line in event_log.of_kind(run.events, "formation") if event_log.asked_by_leader(line))

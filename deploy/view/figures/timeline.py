@@ -1,4 +1,4 @@
-"""The timeline of a run's lease: who held it when, in which term, why it changed, and the chain after it."""
+"""Timeline of a run's lease: holders, terms, causes of changes, and the chain of followers."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LETTERS_WIDE = 150
-"""Letters of a label that the width of a figure has room for."""
+"""Width of a figure in letters of a label."""
 LINES = 3
-"""Of labels above a row."""
+"""Maximum number of lines of labels above a row."""
 LINE = 0.36
-"""Height of one, where a bar's is about 1."""
+"""Height of one line of labels, in units of the row distance."""
 
 
 def draw(figure: FigureBase, run: Run) -> None:
@@ -36,7 +36,7 @@ def draw(figure: FigureBase, run: Run) -> None:
 
 
 def _holders(axes: Axes, run: Run, end_s: float) -> None:
-    """A bar a term; above it why it began, and what was done to the team."""
+    """Draw a bar for each term; above it the cause of its start, and the faults."""
     first = min((reign.term[0] for reign in run.reigns), default=0)
     for reign in run.reigns:
         until_s = end_s if reign.until_s is None else reign.until_s
@@ -53,7 +53,7 @@ def _holders(axes: Axes, run: Run, end_s: float) -> None:
 
 
 def _chain(axes: Axes, run: Run, end_s: float) -> None:
-    """A row a place; in it who had that place when."""
+    """Draw a row for each place in the chain, with the robots that held it."""
     for robot, steps in event_log.places(run.events, run.robots, end_s).items():
         for from_s, until_s, place in _stretches(steps):
             _cell(axes, place, from_s, until_s, run, robot, end_s)
@@ -66,7 +66,7 @@ def _chain(axes: Axes, run: Run, end_s: float) -> None:
 
 
 def _cell(axes: Axes, row: float, from_s: float, until_s: float, run: Run, robot: int, end_s: float) -> None:
-    """A robot's stretch of a row, with its number in it where there is room."""
+    """Draw a robot's interval in a row, with its id if there is room."""
     axes.barh(row, until_s - from_s, left=from_s, height=0.84, color=look(run, robot)["color"], edgecolor="white")
     text = f"{robot}"
     if until_s - from_s > end_s * (len(text) + 1) / LETTERS_WIDE and len(run.robots) <= LEGEND_MAX:
@@ -84,7 +84,7 @@ def _labels(
 
 
 def _stretches(steps: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float, float]]:
-    """From, until and place of each stretch that a robot kept one place in the chain."""
+    """Yield start [s], end [s] and place of each interval in which a robot kept one place in the chain."""
     began, kept = 0.0, float("nan")
     for at_s, place in steps:
         if place == kept or (isnan(place) and isnan(kept)):

@@ -1,4 +1,4 @@
-"""`lfa report`: a run, or two side by side, as one HTML page that needs nothing else: no network, no script."""
+"""`lfa report`: write one run, or two side by side, as a self-contained HTML page without network or scripts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ REPORT = "report.html"
 
 def command(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
-    other: Annotated[Path | None, typer.Argument(metavar="[RUN2]", help="Another one, to stand beside it.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Where to; default report.html in the (first) run folder.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print where it is as JSON.")] = False,
+    other: Annotated[Path | None, typer.Argument(metavar="[RUN2]", help="Second run, shown side by side.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File; default report.html in the (first) run folder.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the path of the page as JSON.")] = False,
 ) -> int:
     folders = [folder] if other is None else [folder, other]
     path = out or folder / (REPORT if other is None else f"report-vs-{other.resolve().name}.html")
@@ -31,7 +31,7 @@ def command(
 
 
 def html(folders: list[Path]) -> str:
-    """The page about these runs (one or two). Raises Refused for what is no finished run folder."""
+    """Return the page about one or two runs. Raises Refused for a folder that is no finished run."""
     from lfa.deploy.analysis.run_data import Run
     from lfa.deploy.recording.mcap_reader import look_into
     from lfa.deploy.view.report import page

@@ -1,4 +1,4 @@
-"""How processes and radio fared in a run: sections of the report."""
+"""Sections of the report on the health of processes and radio."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfa.deploy.view.report.html import NONE, in_ms, table
 
 
 def processes(run: Run, s: Summary) -> str:
-    """What each process said about itself, and how regularly its commands came."""
+    """Return a table of each process's status counters and the regularity of its commands."""
     said: dict[str, list[dict[str, float]]] = {}
     for owner, _, _, status in messages(run.folder, frozenset({"status"})):
         said.setdefault(owner, []).append({name: float(value) for name, value in status.counters.items()})
@@ -48,7 +48,7 @@ def processes(run: Run, s: Summary) -> str:
 
 
 def radio(run: Run, _s: Summary) -> str:
-    """As configured; and as it was for each robot, by the gaps in the rows of the table that all tell all."""
+    """Return tables of the configured link model and of each robot's loss, by gaps in the received team table rows."""
     radio = run.scenario.radio
     rows = [
         ("delay", in_ms(1000.0 * radio.delay_s)),
@@ -63,7 +63,7 @@ def radio(run: Run, _s: Summary) -> str:
             came, missed = float(status.counters["rows_heard"]), float(status.counters["rows_lost"])
             before = heard.setdefault(owner, [0.0, 0.0, 0.0, 0.0])
             ended = before[:2] if came >= before[2] else [before[0] + before[2], before[1] + before[3]]
-            heard[owner] = [*ended, came, missed]  # of lives that have ended, and of this one
+            heard[owner] = [*ended, came, missed]  # sums of ended incarnations, then counts of the present one
     shares = [(owner, a + c, b + d) for owner, (a, b, c, d) in sorted(heard.items())]
     lost = [
         (owner, f"{came:.0f}", f"{missed:.0f}", f"{100.0 * missed / max(came + missed, 1.0):.1f} %")

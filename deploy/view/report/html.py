@@ -1,4 +1,4 @@
-"""Tables, words and numbers of an HTML page."""
+"""Formatting of tables, texts and numbers for an HTML page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ NONE = "–"
 
 
 def table(heads: Cells, rows: Sequence[Cells], text: Sequence[int] = ()) -> str:
-    """`text`: columns of words, which stand to the left."""
+    """Return an HTML table. `text`: indices of the left-aligned text columns."""
     if not rows:
         return "<p>None.</p>"
 

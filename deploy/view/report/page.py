@@ -1,4 +1,4 @@
-"""The report's page: sections of tables and figures, one below the other; of two runs, side by side."""
+"""Page of the report: sections of tables and figures; two runs are shown side by side."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROWS_MAX = 150
 
 
 def of(runs: Sequence[Run]) -> str:
-    """The whole page."""
+    """Return the whole page as HTML, for one or two runs."""
     sums = [summary.read(run.folder) for run in runs]
     title = " and ".join(f"{s.scenario}, seed {s.seed}" for s in sums)
     parts = [_side_by_side(runs, sums, lambda run, s: _head(run, s))]
@@ -134,7 +134,7 @@ def _faults(run: Run, s: Summary) -> str:
 
 
 def _recovery(run: Run, fault: event_log.FaultDone) -> tuple[str, str]:
-    """When a chain without the victim was first spoken of, and when one with it again; from the fault on."""
+    """Return the times from the fault to the first chain without the victim, and to the next chain with it."""
     without: float | None = None
     for line in event_log.of_kind([e for e in run.events if e["t"] >= fault.at_s], "chain"):
         member = fault.target in line.get("chain", [])
@@ -184,7 +184,7 @@ SECTIONS: tuple[tuple[str, Callable[[Run, Summary], str]], ...] = (
 
 
 def _compared(a: Summary, b: Summary) -> str:
-    """Figures of both, and the second less the first."""
+    """Return a table of values of both runs, and the difference second minus first."""
     rows: list[Cells] = [
         ("outcome", a.outcome, b.outcome, NONE if a.outcome == b.outcome else "differs"),
         _row("duration [s]", a.sim_duration_s, b.sim_duration_s, 1),

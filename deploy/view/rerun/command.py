@@ -1,4 +1,4 @@
-"""`lfa view`: a recording or a running fleet in the rerun viewer, in a browser, or as a picture without any display."""
+"""`lfa view`: show a recording or a running fleet in the rerun viewer, in a browser, or as a picture."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
     import rerun
 
     from lfa.world.description.scenario import Scenario
-from lfa.deploy.view.rerun.viewer import has_display, check_free_port, need_rerun, run_viewer
+from lfa.deploy.view.rerun.viewer import check_free_port, has_display, need_rerun, run_viewer
 
 RRD = "recording.rrd"
 PICTURE = "view.png"
-FLUSH_S = 0.33  # what a batch costs depends little on its size: at 0.1 s it would be more than twice as dear
+FLUSH_S = 0.33  # the cost of a batch depends little on its size: at 0.1 s the total would be more than twice as high
 PORT, WEB_PORT = 9876, 9090
-SHOT_S = 5.0  # of a running fleet, before its picture is taken
+SHOT_S = 5.0  # time drawn of a running fleet before its picture is taken
 
 
 def command(
-    folder: Annotated[Path | None, typer.Argument(metavar="[RUN]", help="A run folder; none: a running fleet.")] = None,
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
+    folder: Annotated[Path | None, typer.Argument(metavar="[RUN]", help="Run folder; default a running fleet.")] = None,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet; required when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router; default the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder written by lfa keys, for a secured fleet.")] = None,
     serve_web: Annotated[bool, typer.Option("--serve-web", help="Serve the viewer to a browser.")] = False,
-    screenshot: Annotated[Path | None, typer.Option(help="Write a PNG and end; needs no display.")] = None,
-    port: Annotated[int, typer.Option(help="Where viewers get their data.")] = PORT,
-    web_port: Annotated[int, typer.Option(help="Where a browser gets the viewer.")] = WEB_PORT,
+    screenshot: Annotated[Path | None, typer.Option(help="Write a PNG and exit; needs no display.")] = None,
+    port: Annotated[int, typer.Option(help="Port for the data of viewers.")] = PORT,
+    web_port: Annotated[int, typer.Option(help="Port for the viewer in a browser.")] = WEB_PORT,
 ) -> int:
     need_rerun()
     if serve_web:
@@ -65,7 +65,7 @@ def command(
 
 
 def converted(folder: Path) -> Path:
-    """`recording.rrd` of a run, made anew when it is older than the recording. Raises Refused."""
+    """Return the path of a run's `recording.rrd`, converted again when older than the recording. Raises Refused."""
     import rerun as rr
 
     from lfa.deploy.recording.mcap_reader import look_into, messages
@@ -93,11 +93,11 @@ def converted(folder: Path) -> Path:
         stream.disconnect()
         return unfinished.rename(rrd)
     finally:
-        unfinished.unlink(missing_ok=True)  # there still, when the recording was refused in the midst of it
+        unfinished.unlink(missing_ok=True)  # left over when the recording was refused midway
 
 
 def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: int, web_port: int) -> int:
-    """Draw a running fleet until Ctrl-C; viewers may come and go."""
+    """Draw a running fleet until Ctrl-C; viewers may connect and disconnect."""
     import rerun as rr
 
     from lfa.deploy.view.rerun.layout import layout

@@ -1,5 +1,4 @@
-"""The viewer's first sight of a fleet: the world on the left, who leads and how the radio is below it; errors, speeds
-and decisions on the right."""
+"""Initial layout of the viewer: world, leader and radio on the left; errors, speeds and decisions on the right."""
 
 from __future__ import annotations
 
@@ -14,9 +13,9 @@ LIVE_S = 60.0
 
 
 def layout(scenario: Scenario | None, robots: int, *, lasted_s: float | None = None) -> rrb.Blueprint:
-    """A blueprint: of a recording that lasted so long all of it, of a running fleet (None) the last minute.
+    """Return a blueprint that shows all of a recording of `lasted_s` [s], or the last minute of a running fleet (None).
 
-    Without a scenario the world's bounds are the viewer's guess.
+    Without a scenario the viewer chooses the bounds of the world.
     """
     few = robots <= NAMED_MAX
     axis = rrb.TimeAxis(view_range=_shown(lasted_s))
@@ -69,7 +68,7 @@ def _shown(lasted_s: float | None) -> rr.TimeRange:
 
 
 def _bounds(scenario: Scenario | None) -> rrb.VisualBounds2D | None:
-    """Everything that is known to stand somewhere."""
+    """Return bounds around start poses, route, obstacles and walls; None without a scenario."""
     if scenario is None:
         return None
     world, route = scenario.world, scenario.mission.leading.route_m

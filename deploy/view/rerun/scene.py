@@ -1,9 +1,9 @@
-"""A fleet as rerun draws it: messages in, entities out. The same code for a running fleet and for a recording.
+"""Conversion of a fleet's messages to rerun entities; the same code serves a running fleet and a recording.
 
-Rerun's 2-D views have y downwards: everything in `map` is drawn at (x, -y), so that left is left. Rows pile up per
-entity and leave together with `flush`. Entities: `world/robotN` (pose, with its body and its scan below), `slots`,
-`links` and `trails` of each robot, `map` and `planned` of who leads through unknown ground, `errors`, `speeds`,
-`lease`, `radio`, `processes` and `log`.
+Rerun's 2-D views have y downwards: everything in `map` is drawn at (x, -y), so that left is left. Rows are collected
+per entity and sent together by `flush`. Entities: `world/robotN` (pose, with its body and its scan below), `slots`,
+`links` and `trails` of each robot, `map` and `planned` of the leader on unknown ground, `errors`, `speeds`, `lease`,
+`radio`, `processes` and `log`.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ SPEED_EVERY = 5
 NAMED_MAX = 10  # more names than this would hide the robots
 SOFT, GHOST = (150, 150, 150), (190, 190, 190)
 OUTLINE = rr.components.Radius.ui_points(1.6)
-"""Of robots: seen from any distance."""
+"""Line width of a robot's outline, visible at any zoom."""
 RADIO_S = 10.0
-"""The share of lost rows is of the last so many seconds."""
+"""Time window [s] of the share of lost rows."""
 LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
 PLANNED = (204, 121, 167)
 ROLE_COLOURS = {"leader": LEADS, "follower": FOLLOWS, "waiting": WAITS, "gone": GONE}
@@ -42,7 +42,7 @@ ALARMS = ("fault", "contact", "failed", "died", "slowed")
 
 
 class Scene:
-    """Draws into one recording stream."""
+    """Scene of one fleet, drawn into one recording stream."""
 
     def __init__(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
@@ -60,10 +60,10 @@ class Scene:
         self._mission_known = False
         self._named = True
 
-    # --- what stands still -----------------------------------------------------------------------------------------
+    # --- static entities -------------------------------------------------------------------------------------------
 
     def ground(self, world: WorldSpec) -> None:
-        """Walls, terrain and obstacles."""
+        """Draw walls, terrain and obstacles."""
         for entity, what in static_scene.standing(world):
             self._always(entity, what)
         for index, obstacle in enumerate(world.obstacles):
@@ -71,20 +71,20 @@ class Scene:
                 self._row("transform", f"world/obstacles/{index}", 0.0, (*obstacle.center_m, 0.0))
 
     def mission(self, mission: Any) -> None:
-        """Route and goal; once."""
+        """Draw route and goal; only the first call has an effect."""
         if self._mission_known:
             return
         self._mission_known, self._radius_m = True, float(mission.radius_m)
         self._named = len(mission.robots) <= NAMED_MAX
         route = [(float(x), -float(y)) for x, y in mission.leading.route_m]
-        if mission.leading.motion != "explore":  # there the way is found, and shown as `planned`
+        if mission.leading.motion != "explore":  # an exploring leader's route is drawn as `planned`
             self._always("world/route", rr.LineStrips2D([[(0.0, 0.0), *route]], colors=SOFT, radii=0.015))
         self._always("world/goal", rr.Points2D([route[-1]], colors=LEADS, radii=0.15, labels=["goal"]))
         for n, robot in enumerate(mission.robots):
             self._dress(robot, n, len(mission.robots))
 
     def _dress(self, robot: int, n: int, of: int) -> None:
-        """Colours, widths and names that stay."""
+        """Set the static colours, widths and names of a robot's entities."""
         colour = PALETTE[n] if of <= len(PALETTE) else _shade(n / (of - 1))
         for series in ("errors/distance", "errors/bearing", "errors/heading", "speeds", "processes/lag", "radio"):
             self._always(f"{series}/robot{robot}", rr.SeriesLines(colors=colour, names=f"robot {robot}", widths=1.5))
@@ -95,10 +95,10 @@ class Scene:
         self._always(f"world/links/robot{robot}", rr.LineStrips2D.from_fields(colors=SOFT, radii=0.012))
         self._always(f"world/robot{robot}/scan", rr.Points2D.from_fields(colors=colour, radii=0.03))
 
-    # --- what comes ------------------------------------------------------------------------------------------------
+    # --- messages --------------------------------------------------------------------------------------------------
 
     def see(self, t: float, owner: str, topic: str, message: Any) -> None:
-        """A message (of the wire, or as read back from a recording) at world time `t` [s]."""
+        """Update the scene with a message, live or read from a recording, at world time `t` [s]."""
         robot = robot_id_of(owner)
         match topic:
             case "truth":
@@ -119,7 +119,7 @@ class Scene:
                 self._plan(t, owner, message)
 
     def flush(self) -> None:
-        """Send everything that has piled up."""
+        """Send all collected rows to the stream."""
         rows, self._rows = self._rows, {}
         for (kind, entity), of_entity in rows.items():
             times = rr.TimeColumn(TIMELINE, duration=np.array([t for t, _ in of_entity]))
@@ -166,7 +166,7 @@ class Scene:
         self._angle(f"errors/heading/robot{robot}", t, wrap(float(message.heading) - own[2]))
 
     def _angle(self, entity: str, t: float, angle: float) -> None:
-        """In degrees; where it passes +-180 the line has a gap, not a stroke across the plot."""
+        """Add an angle [rad], drawn in degrees, with a gap in the line where it wraps at +-180."""
         before = self._angles.get(entity, angle)
         self._angles[entity] = angle
         self._row("scalar", entity, t, nan if abs(angle - before) > pi else angle * 180.0 / pi)
@@ -182,7 +182,7 @@ class Scene:
         self._row("scalar", f"processes/lag/robot{robot}", t, float(counters.get("loop_lag_ms", 0.0)))
         heard, lost = float(counters.get("rows_heard", 0.0)), float(counters.get("rows_lost", 0.0))
         past = self._heard.setdefault(robot, deque())
-        if past and heard < past[-1][1]:  # it started anew
+        if past and heard < past[-1][1]:  # the process was restarted
             past.clear()
         past.append((t, heard, lost))
         while t - past[0][0] > RADIO_S:
@@ -192,7 +192,7 @@ class Scene:
             self._row("scalar", f"radio/robot{robot}", t, 100.0 * missed / (came + missed))
 
     def _plan(self, t: float, owner: str, message: Any) -> None:
-        """Route and a tile of the map of who leads; those of who led before go."""
+        """Draw the leader's route and one tile of its map; the tiles of an earlier leader are cleared."""
         if owner != self._planner:
             self._say(t, "world/map/tiles", rr.Clear(recursive=True))
             self._planner = owner
@@ -240,7 +240,7 @@ class Scene:
             self._leader = leader
             self._say(t, "lease/leader", rr.StateChange(state=leader))
 
-    # --- into rerun ------------------------------------------------------------------------------------------------
+    # --- output to rerun -------------------------------------------------------------------------------------------
 
     def _every(self, what: str, nth: int) -> bool:
         count = self._counts.get(what, 0)
@@ -280,7 +280,7 @@ _COLUMNS: dict[str, Callable[[Any], Any]] = {
 
 
 def _shade(part: float) -> tuple[int, int, int]:
-    """From blue to yellow with growing lightness: can be told apart with any colour vision."""
+    """Return a colour from blue to yellow with growing lightness, distinguishable with any colour vision."""
     dark, light = (40, 60, 140), (250, 220, 60)
     red, green, blue = (round(a + part * (b - a)) for a, b in zip(dark, light, strict=True))
     return red, green, blue

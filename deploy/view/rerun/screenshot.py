@@ -1,7 +1,7 @@
-"""A picture of a recording without a display: by rerun's own viewer on a virtual screen, or drawn by `catalogue.py`.
+"""Screenshot of a recording without a display: by rerun's viewer on a virtual screen, or drawn by `catalogue.py`.
 
-The viewer needs a screen (Xvfb will do) and Vulkan (Mesa's software driver will do). Where they are missing, the same
-layout is drawn without it, and the line that names the file says so.
+The viewer needs a screen (Xvfb suffices) and Vulkan (Mesa's software driver suffices). If they are missing, the same
+layout is drawn without the viewer, and the output line states it.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from lfa.deploy.view.rerun.viewer import quiet, viewer_path
 from lfa.protocol.errors import Refused
 
 SIZE, SCALE = "1600x1000", "2"
-"""Of the window in the toolkit's points, and how many pixels each has: what a screen's density would decide else."""
+"""Window size in the toolkit's points, and pixels per point, which would else depend on the screen's density."""
 SCREEN = "6600x4200x24"
-"""So large that the pointer, in its middle, lies beside the window and shows no hint over what it happens to be on."""
+"""Size and depth of the virtual screen: so large that the pointer, at its centre, is outside the window: no tooltip."""
 SHOT_S_MAX = 120.0
 
 
 def take(rrd: Path, picture: Path, folder: Path | None) -> str:
-    """Write `picture` of `rrd`; a line that says which file it is and who drew it. Raises Refused."""
+    """Write `picture` of `rrd` and return a line with its path and the tool that drew it. Raises Refused."""
     if picture.suffix != ".png" or not picture.resolve().parent.is_dir():
         raise Refused(f"--screenshot {picture}: must be a .png in a folder that exists")
     complaint = _by_viewer(rrd, picture)
@@ -40,7 +40,7 @@ def take(rrd: Path, picture: Path, folder: Path | None) -> str:
 
 
 def _by_viewer(rrd: Path, picture: Path) -> str | None:
-    """None when it worked, else what was missing."""
+    """Draw with rerun's viewer; return None on success, else the reason of the failure."""
     with _screen() as display:
         if display is None:
             return "no display, and no Xvfb on the PATH"
@@ -63,7 +63,7 @@ def _by_viewer(rrd: Path, picture: Path) -> str | None:
 
 @contextmanager
 def _screen() -> Iterator[str | None]:
-    """A display: the one that is there, else a virtual one for the moment, else None."""
+    """Yield a display: the present one, else a temporary virtual one, else None."""
     present = os.environ.get("DISPLAY")
     xvfb = shutil.which("Xvfb")
     if present or xvfb is None:

@@ -1,4 +1,4 @@
-"""What stands still in the view: walls, obstacles, terrain, pieces of a map. Pure: shapes in rerun's (x, -y)."""
+"""Static entities of the scene: walls, obstacles, terrain, map tiles. Pure functions; shapes in rerun's (x, -y)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Point = tuple[float, float]
 
 
 def standing(world: WorldSpec) -> Iterator[tuple[str, Any]]:
-    """Entity and drawing of everything that never changes its look; what moves is drawn around (0, 0)."""
+    """Yield entity path and drawing of each static entity; a moving obstacle is drawn around (0, 0)."""
     yield "world/map", rr.AnnotationContext([(0, "unseen", UNSEEN), (1, "free", FREE), (2, "occupied", OCCUPIED)])
     walls = [[(x1, -y1), (x2, -y2)] for x1, y1, x2, y2 in world.walls_m]
     if walls:
@@ -42,13 +42,13 @@ def moves(obstacle: Obstacle) -> bool:
 
 
 def tile(columns: int, cells: bytes) -> rr.SegmentationImage:
-    """A piece of a map, upper row first; to be put where `placed` says."""
+    """Return a map tile as an image, upper row first; `placed` gives its transform."""
     rows = np.frombuffer(cells, dtype=np.uint8).reshape(-1, columns)
     return rr.SegmentationImage(np.minimum(rows, 2)[::-1], opacity=1.0, draw_order=UNDER_ALL)
 
 
 def placed(corner_map: Point, cell_m: float, rows: int) -> rr.Transform3D:
-    """From pixels to metres: an image's origin is its upper left corner."""
+    """Return the transform from pixels to metres; the origin of an image is its upper left corner."""
     x, y = float(corner_map[0]), float(corner_map[1]) + rows * cell_m
     return rr.Transform3D(translation=[x, -y, 0.0], scale=cell_m)
 
@@ -59,7 +59,7 @@ def circle(radius_m: float, corners: int = 20) -> tuple[Point, ...]:
 
 
 def hatched(patch: Patch) -> Iterator[list[Point]]:
-    """Outline of a piece of floor at another height, and lines across it along its own x."""
+    """Yield the outline of a terrain patch, and hatch lines across it along its own x axis."""
     a, b = patch.half_x_m or patch.radius_m, patch.half_y_m or patch.radius_m
     corners = circle(patch.radius_m) if patch.radius_m > 0.0 else ((a, -b), (a, b), (-a, b), (-a, -b))
     yield [_laid(patch, u, v) for u, v in (*corners, corners[0])]

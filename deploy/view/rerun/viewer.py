@@ -1,4 +1,4 @@
-"""Start rerun's own viewer."""
+"""Start of rerun's viewer process, and checks of its prerequisites."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def run_viewer(*arguments: str) -> int:
-    """The viewer as a child, until it is closed; Ctrl-C and SIGTERM end it and us."""
+    """Run the viewer as a child process until it is closed; Ctrl-C and SIGTERM end child and parent."""
     child = subprocess.Popen(["rerun", *arguments], executable=viewer_path(), env=quiet())
     try:
         return child.wait()
@@ -28,7 +28,7 @@ def run_viewer(*arguments: str) -> int:
 
 
 def viewer_path() -> str:
-    """The rerun binary that came with the SDK."""
+    """Return the path of the rerun binary installed with the SDK."""
     return str(Path(sys.executable).with_name("rerun"))
 
 

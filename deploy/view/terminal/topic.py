@@ -1,4 +1,4 @@
-"""`lfa topic`: what travels in a running fleet, how often, and what it says."""
+"""`lfa topic`: list the topics of a running fleet, measure their rates, and print their messages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SPEAKERS = ("*", WITNESS_NAME, WORLD_NAME, OPERATOR_NAME, RECORDER_NAME, TRUTH_O
 
 
 class Rate(Struct, frozen=True):
-    """One channel as it was heard: messages a second, what the table of topics wants, bytes a message."""
+    """Measured traffic of one channel: rate [Hz], nominal rate of the topic table [Hz], mean message size [bytes]."""
 
     channel: str
     type: str
@@ -43,13 +43,13 @@ class Rate(Struct, frozen=True):
 
 
 def command(
-    action: Annotated[Literal["list", "echo", "hz"], typer.Argument(help="What to do.")],
-    topic: Annotated[str, typer.Argument(help="robot2/pose, robot2, pose, or nothing for all.")] = "",
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
-    count: Annotated[int, typer.Option(help="Echo: end after so many messages; 0 goes on.")] = 0,
-    seconds: Annotated[float, typer.Option(help="List and hz: how long to listen.")] = 2.0,
+    action: Annotated[Literal["list", "echo", "hz"], typer.Argument(help="Action on the topics.")],
+    topic: Annotated[str, typer.Argument(help="robot2/pose, robot2 or pose; default all topics.")] = "",
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet; required when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router; default the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder written by lfa keys, for a secured fleet.")] = None,
+    count: Annotated[int, typer.Option(help="Echo: number of messages to print; 0 for no limit.")] = 0,
+    seconds: Annotated[float, typer.Option(help="List and hz: time to listen [s].")] = 2.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON; echo always does.")] = False,
 ) -> int:
     wanted = expressions(topic)
@@ -67,7 +67,7 @@ def command(
 
 
 def expressions(text: str) -> frozenset[str]:
-    """The key expressions, after the fleet's part, that `robot2/pose`, `robot2` or `pose` means. Raises Refused."""
+    """Return the key expressions, without the fleet's part, for `robot2/pose`, `robot2` or `pose`. Raises Refused."""
     owner, _, name = text.partition("/")
     if not name and owner in TOPIC:
         owner, name = "*", owner
@@ -78,7 +78,7 @@ def expressions(text: str) -> frozenset[str]:
 
 
 def _echo(fleet: FleetAddress, wanted: frozenset[str], count: int, what: str) -> int:
-    """Every message as one line of JSON, with its channel."""
+    """Print every message as one line of JSON, with its channel."""
     left = count
     silent_at = clock.now() + SILENCE_S
     with listen(fleet, wanted, every=True) as ear:

@@ -1,4 +1,4 @@
-"""`lfa watch`: a table that lives, on a terminal of 80 columns; keys do things to the robots of an own fleet."""
+"""`lfa watch`: live table for a terminal of 80 columns; keys inject faults and commands into the user's own fleet."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ from lfa.protocol.errors import Refused
 if TYPE_CHECKING:
     from rich.console import Group, RenderableType
 
-REFRESH_S = 1.0  # drawing takes some 9 ms: twice a second it was a fifth of what all of it may cost
-FIRST_S = 1.3  # each process has told its status by then
+REFRESH_S = 1.0  # drawing takes some 9 ms: at 2 Hz it used a fifth of the total CPU budget
+FIRST_S = 1.3  # each process has published its status by then
 WIDTH_MIN, HEIGHT_MIN = 60, 12
 TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"})
 HEADS = ("robot", "role", "term", "ahead", "off mm", "turn °", "m/s", "age ms", "lag ms", "CPU %", "MiB", "state")
 SIDES = ("left", "right", "column", "zigzag")
-#        key   deed
+#        key   action
 DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
 HELP = "1-9 robot, k kill, s stop, c continue, x cut, h heal, f formation, q quit"
 ROLE_STYLES = {"leader": "bold green", "follower": "", "waiting": "yellow", "silent": "bold red", "unheard": "dim"}
 
 
 def command(
-    fleet: Annotated[str | None, typer.Option(help="Needed when several fleets run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Another router than the fleet's own here.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Folder of lfa keys, of a secured fleet.")] = None,
-    once: Annotated[bool, typer.Option("--once", help="Print the table once and end.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the rows once, as JSON.")] = False,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet; required when several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Endpoint of a router; default the fleet's own here.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Folder written by lfa keys, for a secured fleet.")] = None,
+    once: Annotated[bool, typer.Option("--once", help="Print the table once and exit.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the rows once as JSON and exit.")] = False,
 ) -> int:
     if not (once or as_json):
         _check_terminal()
@@ -103,7 +103,7 @@ def _live(ear: Subscriber, board: Board) -> int:
 
 
 class KeyHandler:
-    """What the keys do: digits choose a robot, letters do something to it. `said` is how the last one went."""
+    """Handler of key presses: digits select a robot, letters act on it. `said` is the result of the last key."""
 
     def __init__(self, ear: Subscriber) -> None:
         self._ear = ear
@@ -173,7 +173,7 @@ def _table(rows: list[RobotStatus], chosen: int | None) -> RenderableType:
 
 
 def _cells(row: RobotStatus) -> tuple[str, ...]:
-    """Units in the heads. Of a term number the last four digits: neighbours differ there."""
+    """Return the texts of a row; units are in the heads. A term is cut to its last four digits, where terms differ."""
     return (
         str(row.robot),
         row.role,
@@ -195,7 +195,7 @@ def _number(value: float | None, scale: float) -> str:
 
 
 def _timeline(board: Board, width: int) -> RenderableType:
-    """One character a second: the digit of who led, a dot for nobody."""
+    """Draw the leaders, one character a second: last digit of the leader's id, a dot for none."""
     from rich.text import Text
 
     room = max(10, width - 14)
@@ -210,7 +210,7 @@ def _ago(at: float) -> str:
 
 @contextlib.contextmanager
 def _raw_keys() -> Iterator[None]:
-    """Keys come one by one and unseen; the terminal is as before when this ends."""
+    """Switch the terminal to single keys without echo; its mode is restored on exit."""
     before = termios.tcgetattr(sys.stdin)
     tty.setcbreak(sys.stdin)
     try:
@@ -220,6 +220,6 @@ def _raw_keys() -> Iterator[None]:
 
 
 def _keys(within_s: float) -> str:
-    """What was pressed; waits that long for the first."""
+    """Return the keys pressed; waits at most `within_s` [s] for the first."""
     ready, _, _ = select.select([sys.stdin], [], [], within_s)
     return os.read(sys.stdin.fileno(), 32).decode(errors="ignore") if ready else ""

@@ -98,7 +98,9 @@ def test_the_quick_writer_writes_what_the_library_writes(stamps: list[int], flus
     for stream in (BytesIO(), BytesIO()):
         writer = ChunkWriter(stream, 200) if written else Writer(stream, 200)
         writer.start("", "lfa")
-        channels_of = [writer.register_channel(name, "json", 0) for name in ("/a", "/b")]
+        writer.add_metadata("run", {"seed": "1"})
+        schema = writer.register_schema("lfa.A", "jsonschema", b"{}")
+        channels_of = [writer.register_channel(name, "json", schema) for name in ("/a", "/b")]
         for n, stamp in enumerate(stamps):
             writer.add_message(channels_of[n % 2], stamp, b"%d" % n, stamp + n, n)
             if n == flush_at:

@@ -1,0 +1,1 @@
+"""Child processes on this machine: start, identify, signal, wait, terminate (Linux only). No fleet or ssh code here."""

@@ -1,0 +1,4 @@
+"""Figures of a recorded run, drawn with matplotlib.
+
+No computation of errors or episodes: that is in `deploy/analysis`.
+"""
