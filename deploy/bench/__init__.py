@@ -1,1 +1,1 @@
-"""Measurements: one file a bench name, each row beside its bar or its baseline."""
+"""Benchmarks: one module per bench name, each row beside its bar or baseline. Product code may not live or import here."""

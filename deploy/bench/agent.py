@@ -1,6 +1,6 @@
-"""What an agent costs: its share of a core and memory while a team of four drives, and how soon it speaks.
+"""`lfa bench agent`: an agent's share of a core and memory while a team of four drives, and the time to its first pose.
 
-Beside the agents, in the same run, a bare process (bare.py) does what one of them does on the wire and nothing else.
+In the same run a bare process (`harness/bare_process.py`) has the same traffic as one agent and computes nothing.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from lfa.world.description.load import load
 
 SCENARIO = "straight"
 LIKE = 3
-"""The robot that the bare process is to equal: one that follows and is followed."""
+"""Id of the robot whose traffic the bare process copies: a follower with a successor."""
 SETTLE_S = 5.0
 WATCHED_S = 30.0
 MIB = 2**20
 
 
 def run(as_json: bool) -> int:
-    """Print the rows; 0 when all hold."""
+    """Print the rows; return 0 if all hold, else 1."""
     return show(_rows(), as_json)
 
 
@@ -68,7 +68,7 @@ def _rows() -> Iterator[list[BenchRow]]:
 def _shares(
     team: Team, agents: Sequence[identity.Identity], process: subprocess.Popen[bytes]
 ) -> tuple[list[float], float]:
-    """Of each agent and of the bare process, in percent of a core, over the same time."""
+    """Return the shares of a core [%] of each agent and of the bare process, over the same time."""
     since, before, bare_before = clock.now(), [identity.cpu_s(agent) for agent in agents], cpu_s(process)
     pause(team, WATCHED_S)
     percent = 100.0 / (clock.now() - since)
@@ -77,7 +77,7 @@ def _shares(
 
 
 def _costs(shares: Sequence[float], bare_share: float) -> list[BenchRow]:
-    """What those shares [%] make as rows."""
+    """Return the rows of these shares [%]."""
     mean = statistics.mean(shares)
     return [
         row("agent", Quantity("share of a core, mean", "%", 5.0), mean),
@@ -88,7 +88,7 @@ def _costs(shares: Sequence[float], bare_share: float) -> list[BenchRow]:
 
 
 def _task(team: Team) -> bare_process.BareTask:
-    """What robot `LIKE` hears, and what it is heard to say, on keys of a fleet that nobody else is in."""
+    """Return a task with the subscriptions and the measured publications of robot `LIKE`, on keys of an unused fleet."""
     fleet, name, ahead = team.fleet.name, robot_name(LIKE), robot_name(LIKE - 1)
     agent = Agent(LIKE, 1, fleet, 1, team.scenario.mission)
     agent.tick(0.0)
@@ -115,7 +115,7 @@ def _task(team: Team) -> bare_process.BareTask:
 
 
 def _of_agent(where: str) -> bool:
-    """Not what its hardware says on the robot's own keys."""
+    """Return True for a key that the agent publishes, False for one of its hardware."""
     return where.split("/")[3] not in HARDWARE
 
 
@@ -124,7 +124,7 @@ def _elsewhere(team: Team) -> str:
 
 
 def _first_pose_s(team: Team, robot: int) -> float:
-    """Of an agent that is killed and started again, from its start on."""
+    """Kill and restart an agent; return the time [s] from its start to its first pose."""
     with listen(team.fleet, frozenset({f"{robot_name(robot)}/pose"})) as ear:
         team.signal(robot, signal.SIGKILL)
         at = clock.now()

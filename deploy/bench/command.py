@@ -1,7 +1,7 @@
-"""`lfa bench NAME`: one module a name in this package, each with `run(as_json, ...) -> exit code`.
+"""`lfa bench NAME`: one module per name in this package, each with `run(as_json, ...) -> exit code`.
 
-What else a bench takes (`rows`, `jobs`, `processes`, `kills`, `full`, `minutes`, `seeds`) is what its `run` has
-parameters for.
+The parameters of `run` define the other options of a bench (`rows`, `jobs`, `processes`, `kills`, `full`, `minutes`,
+`seeds`).
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from lfa.protocol.errors import Refused
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="What to measure, such as lidar.")],
+    name: Annotated[str, typer.Argument(help="Bench to run, for example lidar.")],
     as_json: Annotated[
-        bool, typer.Option("--json", help='Print {"rows": [...]}, each with value, bar and ok.')
+        bool, typer.Option("--json", help='Print {"rows": [...]} as JSON, each row with value, bar and ok.')
     ] = False,
-    rows: Annotated[str | None, typer.Option(help="Only rows with such names, as 'clean/*'.")] = None,
-    jobs: Annotated[int | None, typer.Option(help="Processes that measure at the same time.")] = None,
-    processes: Annotated[
-        bool, typer.Option("--processes", help="Also with real processes, against their bars.")
-    ] = False,
-    figures: Annotated[str | None, typer.Option(help="Draw into this folder.")] = None,
-    kills: Annotated[int | None, typer.Option(help="Rounds of each fault.")] = None,
-    full: Annotated[bool, typer.Option("--full", help="Many more rounds, with their tails.")] = False,
-    minutes: Annotated[float | None, typer.Option(help="How long to look on.")] = None,
-    seeds: Annotated[int | None, typer.Option(help="Runs of each scenario, from seed 1 on; pairs on each map.")] = None,
+    rows: Annotated[str | None, typer.Option(help="Run only rows whose names match this glob: 'clean/*'.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Number of parallel measuring processes.")] = None,
+    processes: Annotated[bool, typer.Option("--processes", help="Also measure with real processes.")] = False,
+    figures: Annotated[str | None, typer.Option(help="Draw figures into this folder.")] = None,
+    kills: Annotated[int | None, typer.Option(help="Number of rounds of each fault.")] = None,
+    full: Annotated[bool, typer.Option("--full", help="Run many more rounds, and report the p99.")] = False,
+    minutes: Annotated[float | None, typer.Option(help="Duration of a measurement [min].")] = None,
+    seeds: Annotated[
+        int | None, typer.Option(help="Number of runs of each scenario, from seed 1; of pairs on each map.")
+    ] = None,
 ) -> int:
-    """Exit code 1 when a row does not reach its bar."""
+    """Run a benchmark; exit with code 1 if a row misses its bar."""
     names = _names()
     if name not in names:
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
@@ -57,6 +57,6 @@ def command(
 
 
 def _names() -> list[str]:
-    """The modules of this package that can be run; finding out imports them."""
+    """Return the names of the modules of this package that have a `run`; they are imported to find out."""
     modules = (module.name for module in iter_modules(lfa.deploy.bench.__path__) if module.name != "command")
     return [name for name in modules if hasattr(import_module(f"lfa.deploy.bench.{name}"), "run")]

@@ -11,14 +11,14 @@ from lfa.deploy.bench.harness.rows import Case, measured, select, show
 
 
 def cases() -> list[Case]:
-    """The longest first, so that two jobs end together."""
+    """Return all cases in virtual time, the longest first, so that parallel jobs end at about the same time."""
     return [*string_stability.cases(), *agents.cases(), *table.cases()]
 
 
 def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, figures: str | None = None) -> int:
-    """0 when every chosen row holds, else 1. `rows` is a glob over row names, `figures` a folder to draw into.
+    """Print the rows whose names match the glob `rows`; return 0 if all hold, else 1. `figures` is an output folder.
 
-    `processes` adds real runs, one after the other and alone: beside a computation they would show its load.
+    `processes` adds real runs, one after the other and after the computations, whose load would distort them.
     """
     virtual, live = cases(), agents.process_cases() if processes else []
     chosen = select([*virtual, *live], rows)

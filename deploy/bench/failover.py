@@ -1,8 +1,9 @@
-"""How long a team of four real processes is without a leader, or a robot without its predecessor, after each fault.
+"""`lfa bench failover`: time that a team of four processes is without a leader, or a robot without its predecessor.
 
-All moments are header stamps of one machine's clock: the fault's, just before it is done; the first leader command of
-another robot that a gateway accepts, said by the world; the chain without the lost one, said by each survivor. The
-team stays up: a killed robot starts again with empty memory, and the next fault comes when the chain is whole again.
+All times are header stamps of one machine's clock: of the fault, taken just before it; of the first leader command of
+another robot that a gateway accepts, published by the world; of the chain without the lost robot, published by each
+survivor. The team keeps running: a killed robot restarts with empty memory, and the next fault follows when the chain
+is complete again.
 """
 
 from __future__ import annotations
@@ -27,39 +28,39 @@ ROUNDS = 30
 FULL_ROUNDS = 200
 NEARLY_ALL = 28.0 / 30.0
 PER_ROBOT_S = 5.0
-"""Patience for a team to be whole again."""
+"""Maximum time [s] per robot until the chain is complete again."""
 PATIENCE_S = 5.0
-"""A fault that is not got over by then counts as this long."""
+"""Maximum recovery time [s]; a fault without recovery by then counts as this long."""
 FROZEN_S_MIN = 0.6
-"""SIGSTOP and cuts last at least this long: well over T_grant, and below the link lease."""
+"""Minimum duration [s] of SIGSTOP and cuts: well over T_grant, and below the link lease."""
 GRANT_MS = 1000.0 * timing_of("std").grant_s
 
 
 class Took(Struct, frozen=True):
-    """What one fault took [ms]: to the new leader's first accepted command, to the chain at all survivors."""
+    """Recovery times [ms] of one fault: to the new leader's first accepted command, to the chain at all survivors."""
 
     command_ms: float
     chain_ms: float
 
     @property
     def is_whole(self) -> bool:
-        """Another one led and the chain closed, before patience ended."""
+        """True if another robot led and the chain closed within `PATIENCE_S`."""
         return max(self.command_ms, self.chain_ms) < 1000.0 * PATIENCE_S
 
 
 FaultAction = Callable[[Team, int], float]
-"""Does it to a robot; the moment of it."""
+"""Function that injects a fault into a robot and returns its time [s]."""
 
 
 class Kind(Struct, frozen=True):
-    """One row of the table of faults: what is done to the leader, how it comes back, and the bars."""
+    """One kind of fault on the leader: how it is injected and undone, and the bars."""
 
     name: str
     do: FaultAction
     undo: Callable[[Team, int], object] | None
     restarts: bool
     bars: tuple[tuple[Callable[[Took], float], str, str, float], ...]
-    """Of which time, its name, which statistic, and the most that it may be [ms]."""
+    """Bars, each with the time to judge, its name, the statistic, and its maximum [ms]."""
 
 
 def _command(took: Took) -> float:
@@ -91,14 +92,17 @@ KINDS = (
 )  # fmt: skip
 LARGE_TEAM = "kill among 16"
 LARGE, LARGE_ROUNDS_MAX = 16, 10
-"""More robots than voters. Each kill must be got over; how fast has no bar, since two cores full of such a team's
-processes, one of them starting again, measure the machine's scheduler."""
+"""Team size with more robots than voters, and its maximum number of rounds.
+
+The team must recover from each kill. The recovery time has no bar: with 16 agents on two cores, one of them starting,
+it depends on the machine's scheduler.
+"""
 FOLLOWER_KILLED = "follower killed"
 FOLLOWS_MS_MAX = 150.0
 
 
 def run(as_json: bool, rows: str = "*", kills: int = ROUNDS, full: bool = False) -> int:
-    """Print the rows; 0 when all hold. `kills` rounds of each fault, 200 of each when `full`."""
+    """Print the rows; return 0 if all hold, else 1. Runs `kills` rounds of each fault, 200 of each when `full`."""
     return show(_rows(rows, FULL_ROUNDS if full else kills, full), as_json)
 
 
@@ -136,12 +140,12 @@ def _row(name: str, what: str, statistic: str, times_ms: Sequence[float], bar: f
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """The least value that `share` of them do not exceed."""
+    """Return the least value that the fraction `share` of `values` does not exceed."""
     return sorted(values)[max(0, ceil(share * len(values) - 1e-9) - 1)]
 
 
 class _Bench:
-    """A team, started anew should it ever not come together again."""
+    """Team under test, restarted as a whole if its chain does not become complete again."""
 
     def __init__(self, robots: int) -> None:
         self._robots = robots
@@ -156,7 +160,7 @@ class _Bench:
         self._end()
 
     def round(self, kind: Kind) -> Took:
-        """One fault on whoever leads."""
+        """Inject one fault into the present leader; return the recovery times."""
         team, chain = self._whole()
         leader = chain[0]
         at = kind.do(team, leader)
@@ -170,7 +174,7 @@ class _Bench:
         return took
 
     def follower_round(self) -> float:
-        """A follower with one behind it is killed; until that one tracks the robot before it [ms]."""
+        """Kill a follower that has a successor; return the time [ms] until the successor tracks its new predecessor."""
         team, chain = self._whole()
         place = self._random.randrange(1, self._robots - 1)
         at = team.signal(chain[place], signal.SIGKILL)
@@ -190,7 +194,7 @@ class _Bench:
         return _ms(at, follows_at if follows_at < inf else None)
 
     def _whole(self) -> tuple[Team, tuple[int, ...]]:
-        """The team with all in one chain, at a random moment."""
+        """Return the team once all robots are in one chain, after a random delay of up to 0.1 s."""
         while True:
             try:
                 team = self._team or self._start()
@@ -215,7 +219,7 @@ class _Bench:
 
 
 def _got_over(team: Team, at: float, leader: int, survivors: Sequence[int]) -> Took:
-    """Wait until another one leads and all survivors have closed the chain."""
+    """Wait until another robot leads and all survivors have closed the chain; return both times."""
 
     def command_at() -> float | None:
         return team.first("leader_command", at, lambda e: e.data["robot"] != leader)

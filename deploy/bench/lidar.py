@@ -1,7 +1,7 @@
-"""Rays per second of the batch lidar on one core, beside a plain loop over the engine's own ray query.
+"""`lfa bench lidar`: rays per second of the batch lidar on one core, beside a plain loop over pymunk's ray query.
 
-The world is the one in which peers were measured (conventions.md section 2): 20 obstacles, half of them round, and
-outer walls; 10 m of range over 360 degrees, 360 beams.
+The world is the one in which peer projects were measured (conventions.md section 2): 20 obstacles, half of them round,
+and outer walls; 10 m of range over 360 degrees, 360 beams.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ TEAMS = (4, 20, 100)
 BEAMS = 360
 SIDE_M = 20.0
 RAYS_PER_S_MIN = 1e6
-"""The bar: a million rays a second on one core."""
+"""Minimum number of rays per second on one core."""
 MEASURE_S = 0.3
 TRIES = 3
 
 
 def rows() -> list[dict[str, Any]]:
-    """One row a team size: `value` in rays/s, `ratio` to the naive loop measured in the same run."""
+    """Return one row per team size: `value` [rays/s], `ratio` to the naive loop measured in the same run."""
     return [_row(robots) for robots in TEAMS]
 
 
 def run(as_json: bool) -> int:
-    """Print the rows as a table or as JSON; 0 when all reach their bars, else 1."""
+    """Print the rows as a table or as JSON; return 0 if all reach their bars, else 1."""
     measured = rows()
     if as_json:
         print(json.dumps({"rows": measured}))
@@ -65,7 +65,7 @@ def _row(robots: int) -> dict[str, Any]:
 
 
 def _rays_per_s(robots: int, scan: Callable[[], object]) -> float:
-    """Best of `TRIES`, in processor time of this thread's process."""
+    """Return the best rate [rays/s] of `TRIES`, in processor time of this process."""
     scan()
     best = 0.0
     for _ in range(TRIES):
@@ -98,7 +98,7 @@ def _poses(robots: int) -> list[Pose2D]:
 
 
 def _space(scenario: Scenario, poses: list[Pose2D]) -> tuple[pymunk.Space, list[pymunk.Shape]]:
-    """The same world in pymunk; the robots' circles in the second place, to be left out of their own scans."""
+    """Return the same world in pymunk, and the robots' circles, which their own scans must exclude."""
     space = pymunk.Space()
     ground = space.static_body
     for x1, y1, x2, y2 in scenario.world.walls_m:
@@ -119,7 +119,7 @@ def _space(scenario: Scenario, poses: list[Pose2D]) -> tuple[pymunk.Space, list[
 
 
 def _naive_scan(space: pymunk.Space, circles: list[pymunk.Shape], poses: list[Pose2D], lidar: Lidar) -> list[float]:
-    """What one would write first: one query a beam."""
+    """Return the ranges [m] of all beams with one query per beam, the simplest implementation."""
     ranges = []
     for pose, circle in zip(poses, circles, strict=True):
         for beam in range(lidar.beams):

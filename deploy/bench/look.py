@@ -1,5 +1,7 @@
-"""What looking costs: shares of a core beside a running team of four at full rates, what it does to the agents' loop
-lag, how large and how slow files of a two-minute run are, and how soon `lfa --help` answers.
+"""`lfa bench look`: cost of observing a running team of four at full rates.
+
+Measured are shares of a core, the effect on the agents' loop lag, size and creation time of the files of a two-minute
+run, and the response time of `lfa --help`.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def run(as_json: bool) -> int:
-    """Print the rows; 0 when all hold."""
+    """Print the rows; return 0 if all hold, else 1."""
     return show(_rows(), as_json)
 
 
@@ -71,7 +73,7 @@ def _rows() -> Iterator[list[BenchRow]]:
 
 
 def _help() -> list[BenchRow]:
-    """Beside a bare start of the interpreter, so that a slow machine is no slow command."""
+    """Measure `lfa --help` against a bare start of the interpreter, to separate a slow machine from a slow command."""
     bare = statistics.median(_took([sys.executable, "-c", "pass"]) for _ in range(STARTS))
     told = statistics.median(_took([*LFA, "--help"]) for _ in range(STARTS))
     return [
@@ -82,7 +84,7 @@ def _help() -> list[BenchRow]:
 
 
 def _recorder(team: Team, place: Path) -> list[BenchRow]:
-    """The process of `lfa run`, on this team."""
+    """Measure the recorder process of `lfa run` on this team."""
     folder = make(place / "run", team.scenario)
     task = RecorderTask(
         str(folder), About("endless", "bench", 0, team.fleet.name), team.fleet.endpoint, str(place / "none")
@@ -103,7 +105,7 @@ def _recorder(team: Team, place: Path) -> list[BenchRow]:
 
 
 def _watch(team: Team) -> list[BenchRow]:
-    """On a terminal of 80 columns that nobody looks at."""
+    """Measure `lfa watch` on a pseudo-terminal of 80 columns."""
     terminal, inside = os.openpty()
     termios.tcsetwinsize(inside, (24, 80))
     threading.Thread(target=_drain, args=(terminal,), daemon=True).start()
@@ -124,7 +126,7 @@ def _drain(terminal: int) -> None:
 
 
 def _files() -> Iterator[list[BenchRow]]:
-    """Of a run of two minutes."""
+    """Measure size and creation time of the files of a two-minute run."""
     place = Path(tempfile.mkdtemp(prefix="lfa-"))
     try:
         folder = simulate.run(replace(endless(ROBOTS), time_limit_s=RUN_S), 1, place / "run").folder
@@ -162,7 +164,7 @@ def _took(words: Sequence[str]) -> float:
 
 
 def _lags(team: Team, ear: Subscriber, duration_s: float) -> float:
-    """Median over the agents' largest lags of each second [ms]."""
+    """Return the median [ms] of the agents' loop lags, each the largest of one second."""
     ear.take()
     pause(team, duration_s)
     told = [message for _, message in ear.take() if isinstance(message, Status)]

@@ -1,9 +1,9 @@
-"""`lfa bench motion`: whole teams in virtual time through every shipped scenario, and through unknown ground.
+"""`lfa bench motion`: complete teams in virtual time in every shipped scenario, and on unknown maps.
 
-Each case is one scenario over several seeds, or random pairs of start and goal on a map; a run is good when it ends at
-its goal without contact, without a broken invariant and with nobody left behind. One that is not good says why.
-Maps of the Nav2 project are looked for in `shared/data/maps`, beside the checkout or above it; without them their rows
-are left out, which is said.
+Each case is one scenario over several seeds, or random pairs of start and goal on a map. A run is good if it ends at
+its goal without contact, without a violated invariant and without a robot left behind; otherwise the cause is printed.
+Maps of the Nav2 project are searched in `shared/data/maps`, beside the checkout or above it; without them their rows
+are skipped with a message.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ FOUND_IN = Path("shared") / "data" / "maps"
 
 
 class BenchMap(Struct, frozen=True):
-    """A map that the robots do not know, and the pairs of start and goal that are drawn on it."""
+    """Map that the robots do not know, and the parameters of the start and goal pairs drawn on it."""
 
     name: str
     shipped: bool = False
     robots: int = 4
     apart_m: float = 8.0
-    """Least distance of start and goal: no route is shorter."""
+    """Minimum straight distance [m] between start and goal; no route is shorter."""
     clear_m: float = 0.45
-    """Least clearance of both."""
+    """Minimum clearance [m] of start and goal."""
     pairs: int = 20
     sets: tuple[str, ...] = ()
 
@@ -54,7 +54,7 @@ GROUNDS = (
 
 
 def cases(seeds: int | None) -> list[Case]:
-    """`seeds` runs of each scenario, and so many pairs on each map that is there; None: as many as the bars ask for."""
+    """Return the cases: `seeds` runs per scenario and pairs per available map; None: the numbers that the bars need."""
     from lfa.world.description.load import shipped
 
     of_each = seeds or SEEDS
@@ -69,7 +69,7 @@ def _unknown(ground: BenchMap, count: int) -> Case:
 
 
 def map_of(ground: BenchMap) -> Path | None:
-    """The `map.yaml`; None where it is not there."""
+    """Return the path of the map's YAML file, or None if it does not exist."""
     from lfa.world.description.load import SCENARIOS
 
     if ground.shipped:
@@ -79,7 +79,7 @@ def map_of(ground: BenchMap) -> Path | None:
 
 
 def run(as_json: bool, rows: str = "scenario/*", jobs: int = 1, seeds: int | None = None) -> int:
-    """0 when every chosen row holds, else 1. `rows` is a glob over row names."""
+    """Print the rows whose names match the glob `rows`; return 0 if all hold, else 1."""
     for ground in GROUNDS:
         if map_of(ground) is None and fnmatchcase(f"unknown/{ground.name}", rows.rsplit("/good", 1)[0]):
             where = f"{FOUND_IN / ground.name}.yaml"
@@ -88,18 +88,21 @@ def run(as_json: bool, rows: str = "scenario/*", jobs: int = 1, seeds: int | Non
 
 
 def scenario_good(name: str, seeds: int) -> tuple[float]:
-    """How many of the seeds from 1 end well."""
+    """Return the number of good runs of the scenario, over seeds 1 to `seeds`."""
     return (float(sum(_good(name, seed, ()) for seed in range(1, seeds + 1))),)
 
 
 def pairs_good(ground: BenchMap, count: int) -> tuple[float]:
-    """How many random pairs on the map end well."""
+    """Return the number of good runs over `count` random pairs on the map."""
     drawn = enumerate(pairs(ground, count), start=1)
     return (float(sum(_good("explore", number, sets, ground.robots) for number, sets in drawn)),)
 
 
 def pairs(ground: BenchMap, count: int) -> list[tuple[str, ...]]:
-    """So many pairs on free ground that a chain can be laid out at and reaches, each as `--set` takes it."""
+    """Return up to `count` random pairs in free space, each as arguments of `--set`.
+
+    The scenario `explore` must load with each pair: the chain fits at the start, and a route leads to the goal.
+    """
     from lfa.world.description import maps
     from lfa.world.description.load import load
 
@@ -139,7 +142,7 @@ def _good(name: str, seed: int, sets: Sequence[str], robots: int | None = None) 
         summary = simulate(scenario, seed, folder / "run", parse_all(scenario.mission, scenario.faults, ())).summary
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    if summary.outcome == "interrupted":  # the run was told to end, and the bench with it
+    if summary.outcome == "interrupted":  # a signal ended the run, so the bench ends too
         raise KeyboardInterrupt
     wrong = complaint(summary)
     options = ("" if robots is None else f" --robots {robots}") + "".join(f" --set {one}" for one in sets)
@@ -149,7 +152,7 @@ def _good(name: str, seed: int, sets: Sequence[str], robots: int | None = None) 
 
 
 def complaint(summary: Summary) -> str | None:
-    """Why a run is not good; None when it is."""
+    """Return the reason why a run is not good, or None if it is good."""
     contacts = sum(robot.contacts for robot in summary.robots)
     if summary.exit_code != 0:
         return summary.reason or ", ".join(one.name for one in summary.assertions if not one.ok)

@@ -1,7 +1,7 @@
-"""The shapes of the paper's figures (control.md 7.1) over many seeds of both paths: each property with its worst value.
+"""`lfa bench paper`: properties of the paper's figures (control.md 7.1) over many seeds of both paths, worst value each.
 
-Every run is a simulated one in a process of its own; what compares runs (path 1 with path 2, rank correlations over the
-pooled spikes, iteration 2 with 1) is judged over all of them.
+Every run is simulated in its own process. Properties that compare runs (path 1 with path 2, rank correlations over the
+pooled avoidance episodes, iteration 2 with 1) are evaluated over all runs.
 """
 
 from __future__ import annotations
@@ -25,19 +25,21 @@ SEEDS = 20
 
 
 class PaperRow(Struct, frozen=True):
+    """One printed row: a property of a figure over all runs."""
+
     name: str
     value: float | None
-    """The worst of all runs; None: nothing of the kind happened in any."""
+    """Worst value of all runs; None if no run has a value."""
     unit: str
     bar: str
     holds: int
-    """In so many runs, of those that had anything to judge."""
+    """Number of runs in which the property holds, out of the `of` runs that have a value."""
     of: int
     ok: bool
 
 
 def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1) -> int:
-    """Print the rows; 0 when every property holds for every seed."""
+    """Print the rows; return 0 if every property holds for every seed, else 1."""
     rows = _rows(seeds, jobs)
     if as_json:
         print(msgspec.json.encode({"rows": rows}).decode())
@@ -48,7 +50,10 @@ def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1) -> int:
 
 
 def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
-    """The findings on one run, what is kept of it and of its iteration 2; nothing is left behind on disk."""
+    """Simulate one run and its iteration 2; return the findings on the first and the kept data of both.
+
+    The run folders are removed.
+    """
     from lfa.deploy.analysis.paper.checks import of_run
     from lfa.deploy.analysis.run_data import Run
     from lfa.deploy.run.load import rebuild_scenario
@@ -91,7 +96,7 @@ def _row(name: str, found: Sequence[Finding]) -> PaperRow:
 
 
 def _badness(finding: Finding) -> float:
-    """How far on the wrong side of its bar a value is."""
+    """Return how far a value is on the failing side of its bar."""
     assert finding.value is not None
     rule, bar, *_ = finding.bar.split()
     off = finding.value - float(bar)

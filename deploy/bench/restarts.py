@@ -1,5 +1,7 @@
-"""A robot killed and started again with empty memory, a hundred times at random moments in ten minutes: it always
-comes back into the chain, and the journals of the whole run break no invariant."""
+"""`lfa bench restarts`: 100 restarts of a robot with empty memory at random times in ten minutes.
+
+The robot must always return to the chain, and the journals of the whole run must violate no invariant.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,11 @@ ROBOTS = 4
 RESTARTS = 100
 EVERY_S = 6.0
 REJOIN_S = 30.0
-"""Patience; it should take t_remove and a second at most."""
+"""Maximum time [s] to wait for the whole chain; t_remove plus one second should suffice."""
 
 
 def run(as_json: bool, kills: int = RESTARTS) -> int:
-    """Print the rows; 0 when all hold."""
+    """Print the rows; return 0 if all hold, else 1."""
     return show(_rows(kills), as_json)
 
 

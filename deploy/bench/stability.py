@@ -1,6 +1,6 @@
-"""How often the lease changes hands while nothing is wrong: on a busy machine, and on a radio that loses a fifth.
+"""`lfa bench stability`: lease holder changes without a fault, on a busy machine and at a packet loss of 20 %.
 
-Two of the three are real processes for as long as is looked on; the third is the same agents in virtual time.
+Two of the three cases run real processes in real time; the third runs the same agents in virtual time.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ LOSS = 0.2
 WARM_UP_S = 5.0
 LOOK_S = 0.05
 START_S = 60.0
-"""For a chain to come together in bad weather."""
+"""Maximum time [s] until the chain is complete, at a high packet loss."""
 BUSY = "import os\nwhile os.getppid() == {parent}:\n    sum(range(20000))"
 
 
 class Watch:
-    """Counts changes of the robot that leads, and of the chain, from the accepted leader commands and chains told."""
+    """Counters of leader changes and chain changes, from the accepted leader commands and the chain events."""
 
     def __init__(self) -> None:
         self.holder_changes = 0
@@ -49,6 +49,7 @@ class Watch:
         self._version: tuple[object, ...] = ()
 
     def see(self, event: Event) -> None:
+        """Update the counters with an event; a chain event counts only if its version is newer than the last."""
         match event.kind:
             case "leader_command":
                 robot = event.data["robot"]
@@ -62,7 +63,7 @@ class Watch:
 
 
 def run(as_json: bool, rows: str = "*", minutes: float = MINUTES) -> int:
-    """Print the rows; 0 when the lease never changed hands. Takes twice `minutes` and a little more."""
+    """Print the rows; return 0 if the lease holder never changed. The run takes a little more than twice `minutes`."""
     return show(_rows(rows, 60.0 * minutes), as_json)
 
 
@@ -111,7 +112,7 @@ def _look_on(team: Team, for_s: float) -> None:
 
 
 def _simulated(scenario: Scenario, duration_s: float) -> Watch:
-    """Whole agents in virtual time, on bodies without an engine."""
+    """Run agents in virtual time, on kinematic bodies without a physics engine; return the counters."""
     watch, since = Watch(), WARM_UP_S
     simulator = Simulator(Radio(loss=LOSS), seed=1)
 
@@ -131,7 +132,7 @@ def _simulated(scenario: Scenario, duration_s: float) -> Watch:
 
 @contextmanager
 def _busy(cores: int) -> Iterator[None]:
-    """So many processes that do nothing but compute; they end with us, however we end."""
+    """Run `cores` processes that only compute; each ends when this process ends, also after a SIGKILL."""
     command = [sys.executable, "-c", BUSY.format(parent=os.getpid())]
     burners = [subprocess.Popen(command) for _ in range(cores)]
     try:

@@ -1,7 +1,7 @@
-"""What the world costs: physics, sensors, terrain and messages of robots that drive about, in processor time a second.
+"""`lfa bench world`: processor time of the world per second, for physics, sensors, terrain and messages.
 
-In process, over the world's own time: bytes of commands in, bytes of everything that it says out, without journal and
-wire. With `--processes` also the world's process of a real run, wire and journal included.
+In process, the world runs in its own time: encoded commands in, encoded messages out, without journal and transport.
+With `--processes` the world's process of a real run is measured too, with transport and journal.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from lfa.world.description.scenario import Lidar
 from lfa.world.world import World
 
 BARS = {4: 15.0, 20: 60.0}
-"""Percent of a core, by robots, with 180 beams at 10 Hz (issue: the world)."""
+"""Maximum share of a core [%] by number of robots, with 180 beams at 10 Hz (issue: the world)."""
 SIMULATED_S = 10.0
 COMMAND_S = 0.02
 REAL_S = 10.0
@@ -38,12 +38,12 @@ FLEET, TERM = "bench", Term(5, 1, 1)
 
 
 def run(as_json: bool, processes: bool = False) -> int:
-    """Print the rows; 0 when all hold."""
+    """Print the rows; return 0 if all hold, else 1."""
     return show(_rows(processes), as_json)
 
 
 def scenario_of(robots: int) -> Scenario:
-    """The shipped course with all kinds of terrain, drawn."""
+    """Return the shipped scenario `terrain`, which has all kinds of terrain, drawn with seed 1."""
     scenario = load("terrain", ["time_limit_s=100000"], robots)
     return draw(replace(scenario, world=replace(scenario.world, lidar=Lidar(beams=180, rate_hz=10.0))), 1)
 
@@ -57,7 +57,7 @@ def _rows(processes: bool) -> Iterator[list[BenchRow]]:
 
 
 def simulated(scenario: Scenario) -> float:
-    """Processor time per second of the world's time, with every robot driving and turning."""
+    """Return the processor time [s] per second of the world's time, with every robot driving and turning."""
     world = World(FLEET, scenario, 1, 1, start_at=0.0)
     host = NodeHost(world, Journal(None, Heading(JOURNAL_VERSION, WORLD_NAME, 1, 0, {})))
     now, number = 0.0, 0
@@ -77,7 +77,7 @@ def simulated(scenario: Scenario) -> float:
 
 
 def _command(scenario: Scenario, robot: int, number: int, now: float) -> bytes:
-    """Straight on with a slow weave, over whatever comes: some robots climb, some get stuck, some push others."""
+    """Return an encoded command to drive ahead while weaving; robots climb terrain, get stuck, and push each other."""
     turn = 0.3 if (number // 50 + robot) % 2 else -0.3
     first = scenario.mission.robots[0]
     header = Header(robot_name(robot), 1, number, now)

@@ -39,8 +39,7 @@ def agents() -> list[Running]:
 
 def _agent(identity: Identity) -> Running | None:
     words = identity.arguments
-    names = {word.rpartition("/")[2] for word in words[:3]}
-    if not names & {"lfa.agents.cli", "lfa-agent"}:
+    if not programs(words) & {"lfa.agents.cli", "lfa-agent"}:
         return None
     robot = whole_number(option(words, "--id", ""))
     if robot is None:
@@ -48,6 +47,11 @@ def _agent(identity: Identity) -> Running | None:
     endpoint = option(words, "--connect", default_endpoint())
     keys = option(words, "--keys", "")
     return Running(robot, option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)
+
+
+def programs(words: Sequence[str]) -> set[str]:
+    """Return what a command line may run: the last parts of its first words, `python -P -m MODULE` or a script."""
+    return {word.rpartition("/")[2] for word in words[:4]}
 
 
 def option(words: Sequence[str], name: str, default: str) -> str:

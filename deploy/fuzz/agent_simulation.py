@@ -1,8 +1,8 @@
-"""Whole agents under a schedule of faults: what `lease_simulation.py` is for leases alone.
+"""Simulation of complete agents under a fault schedule; `lease_simulation.py` simulates the leases alone.
 
-Agents, witness and world are the real ones, in the simulator, with the codec of the real thing; bodies have no engine.
-It takes what `fault_injector.py` does to an arena. All gateways live and die with the one world, which goes on from where
-it was; a robot and its gateway are on the robot, so a cut never parts them.
+Agents, witness, world and codec are the real ones, run by the simulator; bodies have no physics engine.
+It accepts the calls of `fault_injector.py`. All gateways start and end with the one world, which resumes from its last
+state; a robot and its gateway share a machine, so a cut never separates them.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ ROAD_M = 100.0
 
 
 class Gale(LinkModel):
-    """The arena's weather and cuts, on the simulator's links."""
+    """Link conditions and cuts of a schedule, applied to the simulator's links."""
 
     def __init__(self, whole: AgentSimulation) -> None:
         super().__init__(Radio(), whole.random)
@@ -181,7 +181,7 @@ class AgentSimulation:
             self.simulator.terminate(robot_name(robot_id))
 
     def hand_over(self, robot_id: int) -> None:
-        """An operator asks all for it; whoever leads obeys."""
+        """Send an operator's request to all agents; the leader obeys."""
         self.simulator.say(self._operator.orders_key, encode(self._operator.orders("handover", self.now)))
 
     def pause(self, robot_id: int) -> None:

@@ -208,7 +208,7 @@ def columns(lines: list[str], schedule: Schedule) -> Trace:
 
 
 def describe(schedule: Schedule) -> str:
-    """A schedule's weather in one line, its faults in one line each."""
+    """Return a schedule as text: the link conditions in one line, then one line for each fault."""
     calm = schedule.weather
     head = f"{schedule.robots} robots, witness {schedule.witness}, {schedule.profile}, delay <= {calm.delay_max} s"
     lines = [f"{head}, loss {calm.loss}, duplicate {calm.duplicate}, tail {calm.tail}"]

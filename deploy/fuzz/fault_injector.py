@@ -39,7 +39,7 @@ class Played(Struct):
 
 
 class Faults:
-    """Carries out a schedule's faults on an arena, counts those that took effect, and heals."""
+    """Injector of a schedule's faults into a simulation: counts those that took effect, then heals."""
 
     def __init__(self, arena: Stage, schedule: Schedule) -> None:
         self.arena = arena
@@ -135,7 +135,7 @@ class Faults:
             self.arena.hint(target, *seers, up=True)
 
     def heal(self) -> None:
-        """The faults are over: everyone is connected, and a quorum lives (all do when nobody remembers a leader)."""
+        """End the faults: connect everyone and restart processes until a quorum runs (all of them when none remembers a leader)."""
         arena = self.arena
         arena.heal()
         weather = arena.weather

@@ -1,4 +1,4 @@
-"""The gateways of the arena: one for each robot, with a clock of its own, and the commands that reach it."""
+"""Simulated gateways: one for each robot, with its own clock, and the commands that reach it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class GatewayHost(Struct):
 
 
 class GatewaySimulation(Network):
-    """A network with gateways on it. Lives of processes and gateways are counted together."""
+    """Network with gateways. Incarnations of processes and gateways are counted together."""
 
     def __init__(
         self,

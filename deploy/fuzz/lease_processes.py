@@ -1,4 +1,4 @@
-"""The processes of the arena: each runs one lease by its own clock, and commands its robot while it leads."""
+"""Simulated processes: each runs one lease by its own clock, and commands its robot while it leads."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class LeaseSimulation(Hosts):
         timing, gateways_at = timing_of(self.mission.profile), WITNESS_ID if gateways_at_world else None
         super().__init__(seed, ids, weather or LinkConditions(), gateways_at, timing, rates or {}, gateway_type)
         self.wall_ms: dict[int, int] = {}
-        """How far each host's wall clock is wrong: terms of lives that begin there start above it."""
+        """Error [s] of each host's wall clock: terms of incarnations that begin there start above that clock."""
 
     # --- lives -------------------------------------------------------------------------------------------------
 
@@ -101,7 +101,7 @@ class LeaseSimulation(Hosts):
             self.carry_out(process, process.lease.request_handover(process.clock.local(self.now)))
 
     def forget(self, *lost: Member) -> None:
-        """The operator's word to every robot that lives, now."""
+        """Deliver the operator's message to every running robot, now."""
         for process in self.processes.values():
             if process.alive and process.id != WITNESS_ID:
                 self.deliver(process, "request_forget", (lost,))

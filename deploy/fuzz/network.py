@@ -70,7 +70,7 @@ Trace = Callable[[float, int, str], None]
 
 
 class Network:
-    """Time, chance, weather and cuts between `ids`; a gateway is addressed as minus its robot's id."""
+    """Simulated network between `ids`: time, chance, link conditions and cuts. A gateway's address is minus its robot's id."""
 
     def __init__(self, seed: int, ids: tuple[int, ...], weather: LinkConditions, gateways_at: int | None) -> None:
         """`gateways_at`: the id on whose host all gateways are; None: each is on its robot's."""

@@ -1,7 +1,7 @@
-"""What `lfa fuzz` does to a team: the fault model as data, and schedules drawn from a seed.
+"""Fault model of `lfa fuzz` as data, and schedules drawn from a seed.
 
-Each seed draws its own kind of weather and its own few kinds of fault (a swarm): a schedule in which everything happens
-a little tests less than many in which some things happen a lot. Faults fall in the first 4 s, then everything heals.
+Each seed draws its own link conditions and its own few kinds of fault (swarm testing): many schedules with few kinds of
+frequent faults test more than one schedule with all kinds of rare faults. Faults fall in the first 4 s, then everything heals.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ CALM_SHARE = 0.05
 SINGLE_SHARE = 0.05
 """Schedules in which a leader is killed and nothing else happens: the next in the chain leads (L6)."""
 LEADER_SHARE = 0.4
-"""Of the faults with one target, how many are aimed at whoever leads at that moment."""
+"""Share of the faults with one target that are aimed at the leader of that moment."""
 
 LEADER = -1
 
 
 class ScheduledFault(Struct, frozen=True):
-    """One thing done at true time `at`. `targets` are ids, LEADER is whoever leads then."""
+    """Fault injected at true time `at` [s]. `targets` are ids; LEADER means the leader of that moment."""
 
     at: float
     kind: str
@@ -54,7 +54,7 @@ class Schedule(Struct, frozen=True):
 
     @property
     def is_single(self) -> bool:
-        """A leader is killed in fair weather, and that is all."""
+        """Schedule with perfect links and one fault: the leader is killed."""
         kinds = [fault.kind for fault in self.faults]
         return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.weather == FAIR
 
@@ -84,7 +84,7 @@ KINDS: tuple[str, ...] = (
 
 
 def draw(seed: int) -> Schedule:
-    """The schedule of a seed. Weather is the same whatever `lfa fuzz` does with it."""
+    """Draw the schedule of a seed. The link conditions do not depend on the faults."""
     random = Random(seed)
     robots = random.randint(2, 6)
     witness = random.random() < 0.9

@@ -13,7 +13,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agents, one_fleet, option
+from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agents, one_fleet, option, programs
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
@@ -135,7 +135,7 @@ def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> 
 
 def _is_common(name: str, words: Sequence[str], agent: Running) -> bool:
     """Return True if a command line is that of the world, or of the router, of the agent's fleet."""
-    called = {word.rpartition("/")[2] for word in words[:3]}
+    called = programs(words)
     if name == "world":
         return bool(called & {"lfa.world.cli", "lfa-world"}) and option(words, "--fleet", "fleet") == agent.fleet
     listens = {word.removeprefix("--listen=") for word in words} if "--listen" in " ".join(words) else {*DEFAULT_LISTEN}

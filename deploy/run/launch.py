@@ -1,7 +1,7 @@
-"""`lfa run`: router, recorder, world and agents as processes of this machine, from start to verdict to nothing left.
+"""`lfa run`: starts router, recorder, world and agents as processes of this machine, and ends them all.
 
-The launcher starts them, watches the bus as an onlooker, does the faults, and ends them all. Should it be killed
-itself, the kernel ends router, world and agents (`parent_death.py`), and the recorder closes the run folder.
+The launcher starts them, observes the bus, injects the faults, and terminates them. If the launcher itself is killed,
+the kernel ends router, world and agents (`parent_death.py`), and the recorder closes the run folder.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class _Aborted(Exception):
 
 
 class _Launch:
-    """One run: the crew, the onlooker's view of it, and what is still to be done to it."""
+    """One run: its processes, the observed state, and the faults that are still due."""
 
     def __init__(self, drawn: Scenario, folder: Path, about: About, sockets: Path, faults: Sequence[Fault]) -> None:
         self._mission = drawn.mission
@@ -127,7 +127,7 @@ class _Launch:
         self._inbox = Inbox()
         self._bus: ZenohBus | None = None
         self._air = LinkModel(CLEAR, Random(0))
-        """The weather as ordered, by whomever: one that starts again during it is told."""
+        """Link conditions as last ordered, by the script or by hand; a process that restarts receives them."""
         self._repeat_weather_until = 0.0
         self.summed_up = False
         """The recorder has written `summary.json`."""

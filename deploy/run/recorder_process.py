@@ -1,4 +1,4 @@
-"""The recorder process: hears everything of one fleet, writes it down, and closes the run folder whoever dies.
+"""The recorder process: records all messages of one fleet and closes the run folder, whichever process dies.
 
 The launcher holds the other end of its standard input. One line of JSON there is the verdict; an end of file without
 one means that the launcher died: then the run is called aborted, and what the launcher would have cleaned up is

@@ -123,7 +123,7 @@ class _Run:
         return Verdict("aborted", "the world fell silent")
 
     def _do(self, deed: FaultAction, victim: int | str) -> None:
-        """A deed on one that is not there, or is there already, does nothing, as a signal would."""
+        """Apply a fault action. One on an absent process, or a start of a running one, has no effect, as a signal has none."""
         if deed in ORDERS:
             self._order(deed, victim)
             return
@@ -146,7 +146,7 @@ class _Run:
                 self._add(self._agent(victim))
 
     def _order(self, deed: FaultAction, target: int | str) -> None:
-        """An operator's word: about the weather it goes to the air, else to all agents."""
+        """Deliver an operator's message: link conditions to the link model, anything else to all agents."""
         now = self._simulator.now
         self._say("fault", deed=deed, robot=target, t=now)
         said = note(self._operator, now, deed, target, self._scenario.mission.robots)

@@ -105,4 +105,4 @@ def _name(arguments: tuple[str, ...]) -> str:
     module = arguments[arguments.index("-m") + 1]
     if module == "lfa.agents.cli":
         return f"robot{arguments[arguments.index('--id') + 1]}"
-    return module.split(".")[0] if module == "lfa.world.cli" else module.split(".")[-1]
+    return {"lfa.world.cli": "world", "lfa.deploy.run.recorder_process": "recorder"}.get(module, module.split(".")[-1])

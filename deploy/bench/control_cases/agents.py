@@ -1,8 +1,8 @@
-"""The same control with everything around it: whole agents, codec, world and lease, in virtual time or as processes.
+"""Control cases with complete agents, codec, world and lease, in virtual time or as processes.
 
-Three rows of the string table with ten whole followers must agree with the bare chain to 1 %; the scenarios straight,
-circle and figure_eight must keep the bars of control.md section 6, the "good" ones simulated, the "must" ones as
-processes.
+Three rows of the string stability table with ten complete followers must agree with the bare chain to 1 %. The
+scenarios straight, circle and figure_eight must reach the bars of control.md section 6: the "good" bars simulated, the
+"must" bars as processes.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ FOLLOWERS = 10
 OMEGA_RADPS = 2.0
 PERIODS = 8
 BEGIN_S = 5.0
-"""The chain stands together."""
+"""Time [s] at which the leader starts to move; the chain is complete by then."""
 SETTLED_S = 20.0
-"""The wave has reached the last robot."""
+"""Time [s] after `BEGIN_S` at which the wave has reached the last robot."""
 CLOCKS_BEGIN_S, CLOCKS_END_S = 25.0, 40.0
 REPEATED = ("vel, 40 ms", "vel, 80 ms 5 %", "vel, 80 ms 20 %")
 
@@ -62,7 +62,7 @@ GOOD, MUST = (1.0, 2.0, 0.2, 0.3), (5.0, 10.0, 1.0, 2.0)
 
 
 def cases() -> list[Case]:
-    """In virtual time."""
+    """Return the cases that run in virtual time."""
     quantities = (Quantity(f"N={FOLLOWERS} over the bare chain", "ratio", 1.0, "same"),)
     repeated = [
         Case(f"agents/{scheme.name}", quantities, partial(against_bare, scheme))
@@ -74,19 +74,19 @@ def cases() -> list[Case]:
 
 
 def process_cases() -> list[Case]:
-    """As real processes on this machine: each takes as long as it takes."""
+    """Return the cases that run as processes on this machine, in real time."""
     return [_scenario("processes", "run", name, MUST) for name in SCENARIOS]
 
 
 def against_bare(scheme: Scheme) -> tuple[float]:
-    """Amplification of ten whole followers over that of ten bare ones, under one sine on the leader's speed."""
+    """Return the amplification of ten complete followers over that of ten bare ones, for a sine on the leader's speed."""
     bare = speed_wave(scheme, OMEGA_RADPS, FOLLOWERS)
     whole = _whole(scheme)
     return ((whole[FOLLOWERS] / whole[0]) / (bare[FOLLOWERS] / bare[0]),)
 
 
 class Waving(PathFollower):
-    """A leader that goes straight on with a sine on its speed."""
+    """Path follower of a leader that drives straight ahead with a sine on its speed."""
 
     def __init__(self, mission: Mission, now: Callable[[], float]) -> None:
         super().__init__(mission.leading, mission.limits)
@@ -100,7 +100,7 @@ class Waving(PathFollower):
 
 
 def _whole(scheme: Scheme) -> list[float]:
-    """Rms deviation of each robot's true speed, the leader first [m/s]."""
+    """Return the rms deviation [m/s] of each robot's true speed, the leader first."""
     mission = Mission(
         robots=tuple(range(1, FOLLOWERS + 2)),
         profile="wifi",
@@ -129,7 +129,7 @@ def _whole(scheme: Scheme) -> list[float]:
 
 
 def _gather(simulator: Simulator, scenario: Scenario, clocks: dict[str, LocalClock]) -> list[Agent]:
-    """World, witness and agents of `scenario`, each on its clock; the agents."""
+    """Add the world, witness and agents of `scenario` to the simulator, each with its clock; return the agents."""
     agents = [Agent(robot, 1, FLEET, 1) for robot in scenario.mission.robots]
     nodes: list[Node] = [World(FLEET, scenario, 1, 1, start_at=0.0, bodies=Kinematic), Witness(FLEET, 1, 1), *agents]
     for node in nodes:
@@ -146,7 +146,7 @@ CLOCKS = {
 
 
 def clock_errors() -> tuple[float]:
-    """Distance rms [mm] of the worst follower on the circle, 20 ms apart, each machine with a clock of its own."""
+    """Return the distance rms [mm] of the worst follower on the circle, with a delay of 20 ms and one clock per host."""
     simulator = Simulator(Radio(delay_s=0.02, jitter_s=0.001), seed=1)
     scenario = load("circle")
     sums, count = [0.0, 0.0, 0.0], 0
@@ -165,7 +165,7 @@ def clock_errors() -> tuple[float]:
 
 
 def _let_wave(agent: Agent, lead: PathFollower) -> None:
-    """No mission can ask a leader for a wave: what it drives is replaced once it has one."""
+    """Replace the path follower of an agent that has one, since no mission can specify a speed wave."""
     assert agent._driver is not None
     agent._driver.leading.lead = lead
 
@@ -191,7 +191,11 @@ def _scenario(how: str, command: str, name: str, bars: tuple[float, float, float
 
 
 def scenario_errors(command: str, name: str) -> tuple[float, ...]:
-    """Of `lfa sim NAME` or `lfa run NAME`: rms of the worst follower, from summary.json; nan for a failed run."""
+    """Run `lfa sim NAME` or `lfa run NAME`; return the worst follower's errors from summary.json, nan if it failed.
+
+    The values are the rms of distance [mm], bearing [deg] and heading [deg], the settling time [s], and the number of
+    contacts of all robots.
+    """
     with tempfile.TemporaryDirectory(prefix="lfa-bench-") as folder:
         out = Path(folder) / "run"
         argv = [sys.executable, "-c", "from lfa.deploy.cli import main; main()", command, name]

@@ -1,4 +1,4 @@
-"""What the tables say, drawn: errors over time, and amplification over frequency beside the theory of control.md 5.1.
+"""Figures of the control bench: errors over time, amplification over frequency with the theory of control.md 5.1.
 
 Fig. 11 (a)-(d) of the paper is drawn from a run of its scenario: `lfa sim paper_fig11`.
 """
@@ -18,11 +18,11 @@ RUN_S = 60.0
 FREQUENCIES_RADPS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
 HOPS = 3
 DRAWN = {"vel, DR, 20 ms": 0.02, "vel, DR, 100 ms": 0.1, "vel, 40 ms": None, "pose, DR, 20 ms": None}
-"""Schemes, and the latency of those whose |G| is known in closed form."""
+"""Latency [s] of each drawn scheme; None if its |G| is not known in closed form."""
 
 
 def draw(folder: Path) -> list[Path]:
-    """Draw all figures into `folder`; their paths."""
+    """Draw all figures into `folder`; return their paths."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -31,7 +31,7 @@ def draw(folder: Path) -> list[Path]:
 
 
 def _errors(path: Path) -> Path:
-    """Three followers in left echelon on the figure-eight, from 0.15 m and 0.2 rad off."""
+    """Draw three followers in left echelon on the figure-eight, starting 0.15 m and 0.2 rad off their slots."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(3, 3, figsize=(12, 7), sharex=True, sharey="row", constrained_layout=True)
@@ -65,7 +65,10 @@ def _errors(path: Path) -> Path:
 
 
 def _amplification(path: Path) -> Path:
-    """Of one hop: measured over three, and sup |G| = |(1 + K tau) j w + K| / |j w + K| for dead reckoning."""
+    """Draw the amplification of one hop: measured over three hops, and the theory for dead reckoning.
+
+    The theory is sup |G| = |(1 + K tau) j w + K| / |j w + K|.
+    """
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(8, 5), constrained_layout=True)

@@ -1,7 +1,7 @@
-"""String stability (control.md 5.4): does what the leader does grow or fade along a chain of a hundred?
+"""String stability (control.md 5.4): amplification of the leader's motion along a chain of 100 followers.
 
 The chain is causal: one run of 100 followers gives the ratios at 3, 10, 50 and 100. Longitudinal: a sine on the
-leader's speed, the worst of several frequencies. Lateral: a sum of small sines on its heading, one run a mode.
+leader's speed, the worst of several frequencies. Lateral: a sum of small sines on its heading, one run per mode.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from lfa.protocol.mission import FormationSpec, Side
 PLACES = (3, 10, 50, 100)
 SLOW_RADPS, FAST_RADPS = (0.2, 0.5), (1.0, 2.0, 4.0, 8.0)
 SLOW_FOLLOWERS = 10
-"""|G| grows with frequency in every scheme: the slow sines, which cost most time, are run on a short chain.
+"""Number of followers for the slow sines, which take the most time; |G| grows with frequency in every scheme.
 
-The worst hop is looked for there too: further back a chain that amplifies is saturated.
+The worst hop is taken over the same number of followers, since an amplifying chain saturates further back.
 """
 PERIODS = 8
 MEASURE_S_MAX = 100.0
-"""At 0.2 rad/s that is three periods."""
+"""Maximum measuring time [s]; three periods at 0.2 rad/s."""
 CRUISE_MPS = 0.5
 RAMP_MPS2 = 0.4
 SETTLE_S = 10.0
@@ -41,7 +41,7 @@ SEPARATION_M = 1.2
 
 
 class Scheme(Struct, frozen=True):
-    """One row of 5.4 with its reference ratios at N = 3, 10, 50, 100 and of the worst hop; None: saturated."""
+    """One row of section 5.4, with the reference ratios at N = 3, 10, 50, 100 and of the worst hop; None: saturated."""
 
     name: str
     mode: str
@@ -51,11 +51,11 @@ class Scheme(Struct, frozen=True):
     loss: float
     reference: tuple[float | None, ...]
     good: tuple[float | None, ...] = (None,) * 5
-    """Bars of section 6, where there are any."""
+    """Bars of section 6 for the same five ratios; None where there is none."""
     gains: Gains = Gains()
     extrapolation_max_s: float = 0.5
     headway_s: float = 0.02
-    """How late a hop passes on what its predecessor does."""
+    """Delay [s] with which a hop passes on its predecessor's motion."""
     slow_radps: tuple[float, ...] = SLOW_RADPS
     fast_radps: tuple[float, ...] = FAST_RADPS
 
@@ -63,7 +63,7 @@ class Scheme(Struct, frozen=True):
 _BUFFER = (None, 1.005, 1.01, 1.02, None)
 #      name                         mode        buffer latency jitter loss   N=3     10      50      100     hop
 SCHEMES = (
-    # Without feed-forward |G| is below 1 at once, and 1 only for the slowest waves. Its lag needs more than m = 0.5.
+    # Without feed-forward |G| is 1 only for the slowest waves and below 1 otherwise. Its lag requires m > 0.5.
     Scheme("pose, no feed-forward", "pose",     0.0,   0.02,   0.0,   0.0,  (1.00,   1.00,   0.999,  0.998,  1.000),
            gains=Gains(feed_forward=0.0, m_mps=0.65, b_m=0.3), extrapolation_max_s=0.0, headway_s=0.8, slow_radps=(),
            fast_radps=(0.02,)),
@@ -93,22 +93,22 @@ SCHEMES = (
 
 HEADING_RADPS = (0.2, 0.4, 0.8, 1.5, 3.0)
 WAVE_S = 20.0 * pi
-"""All of `HEADING_RADPS` have whole periods in it."""
+"""Measuring time [s]; a whole number of periods of each frequency in `HEADING_RADPS`."""
 HOP_SPARE = 1.05
-"""A wave is passed on by the way k |cos phi| per hop; this much later it has settled."""
+"""Settling time of a wave per hop, as a multiple of the time to travel the distance k |cos phi| of a hop."""
 
 
 class Mode(Struct, frozen=True):
-    """A lateral row of 5.4: reference amplitude ratios after the given numbers of hops, one a frequency."""
+    """A lateral row of section 5.4, with reference amplitude ratios by number of hops, one per frequency."""
 
     name: str
     side: Side
     filter_m: float
     trace: bool
     after: dict[int, tuple[float | None, ...]]
-    """None where a reference is that of a saturated chain."""
+    """Reference ratios by number of hops; None if the reference chain is saturated."""
     amplitude_rad: float = 0.012
-    """Of each sine of the leader's heading: small, so that they do not disturb each other."""
+    """Amplitude [rad] of each sine of the leader's heading; small, so that the sines do not interact."""
 
 
 MODES = (
@@ -133,6 +133,7 @@ TRACE_FOLLOWERS = 100
 
 
 def cases() -> list[Case]:
+    """Return the lateral, longitudinal and path-tracking cases."""
     return [
         *(_lateral(mode) for mode in MODES),
         *(_longitudinal(scheme) for scheme in SCHEMES),
@@ -143,7 +144,7 @@ def cases() -> list[Case]:
 
 def _longitudinal(scheme: Scheme) -> Case:
     names = [*(f"N={n}" for n in PLACES), "worst hop"]
-    # With losses the reference is one draw of a scatter: less amplification than it is as good.
+    # With packet loss the reference is one random sample; a smaller amplification also passes.
     rule: Rule = "no worse" if scheme.loss > 0.0 else "near"
     quantities = tuple(
         Quantity(name, "ratio", good) if good is not None else Quantity(name, "ratio", reference, rule)
@@ -153,7 +154,10 @@ def _longitudinal(scheme: Scheme) -> Case:
 
 
 def longitudinal(scheme: Scheme, places: Sequence[int] = PLACES) -> tuple[float, ...]:
-    """Speeds' rms deviations over the leader's at each place, and the worst hop's, at the worst frequency."""
+    """Return the speed amplification at each place and that of the worst hop, each at its worst frequency.
+
+    Amplification is the rms deviation of the speed over that of the leader, or of the predecessor for a hop.
+    """
     runs = [(omega, min(SLOW_FOLLOWERS, places[-1])) for omega in scheme.slow_radps]
     runs += [(omega, places[-1]) for omega in scheme.fast_radps]
     worst, worst_hop = [0.0] * len(places), 0.0
@@ -167,7 +171,7 @@ def longitudinal(scheme: Scheme, places: Sequence[int] = PLACES) -> tuple[float,
 
 
 def speed_wave(scheme: Scheme, omega: float, followers: int) -> list[float]:
-    """Rms deviation of the speed of each robot, the leader first, under a sine of `omega` on the leader's [m/s]."""
+    """Return the rms speed deviation [m/s] of each robot, leader first, for a sine of `omega` [rad/s] on its speed."""
     slots = slots_of(FormationSpec(side="column", separation_m=SEPARATION_M), range(2, followers + 2))
     chain = Chain(
         Setup(
@@ -215,7 +219,7 @@ def _lateral(mode: Mode) -> Case:
 
 
 def lateral(mode: Mode) -> tuple[float, ...]:
-    """Amplitude of each frequency of the heading at each place, over the leader's."""
+    """Return the heading amplitude at each place over the leader's, for each frequency."""
     followers = max(mode.after)
     count = len(next(iter(mode.after.values())))
     omegas = HEADING_RADPS[:count]
@@ -249,7 +253,7 @@ def _trace_path(name: str, weather: ChainLink, delay_s: float) -> Case:
 
 
 def trace_path(weather: ChainLink, delay_s: float) -> tuple[float, ...]:
-    """Rms distance [mm] of robots' paths from the leader's, over one lap of a small figure-eight."""
+    """Return the rms distance [mm] of the robots at `PLACES` from the leader's path, over one lap of a figure-eight."""
     slots: tuple[Slot, ...] = slots_of(FormationSpec(side="column"), range(2, TRACE_FOLLOWERS + 2))
     setup = Setup(slots, trace=True, delay_s=delay_s, weather=weather, judged=False)
     chain = Chain(setup)
@@ -270,7 +274,7 @@ def trace_path(weather: ChainLink, delay_s: float) -> tuple[float, ...]:
 
 
 def _off(path: PoseHistory, x: float, y: float, near_s: float) -> float:
-    """Distance [m] of a point from `path`, looked for around arc length `near_s`."""
+    """Return the distance [m] of a point from `path`; the search starts at arc length `near_s` [m]."""
     s = near_s
     for _ in range(20):
         point = path.at(s)

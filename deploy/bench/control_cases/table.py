@@ -1,4 +1,4 @@
-"""The table of control.md section 6 on the bare chain: one leader, three followers, paths x formations x conditions."""
+"""Table of control.md section 6 on the bare chain: one leader, three followers, paths x formations x conditions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RUN_S = 120.0
 SETTLED_M = 0.05
 START_M, START_RAD = 0.15, 0.2
 RESTING = 1e-3
-"""[m/s, rad/s] Slower is standing."""
+"""Maximum speed [m/s, rad/s] of a robot at rest."""
 DEGREES = 180.0 / pi
 STEPS_TIMED, TRIES = 4000, 5
 
@@ -35,7 +35,7 @@ FORMATIONS: dict[str, tuple[Side, bool]] = {
 }
 SLOW_NETWORK = ChainLink(delay_s=0.1, jitter_s=0.04, loss=0.1)
 NOISE_FILTER_M = 0.36
-"""0.6 k |cos phi| of the 60 degree slots: rigid slots amplify noise along the chain (5.4)."""
+"""Heading filter length [m], 0.6 k |cos phi| of the 60 degree slots; rigid slots amplify noise along the chain (5.4)."""
 
 #   condition   settle F1, F3 [s]   distance [mm]: straight and circle, eight   bearing, heading [deg]
 BARS: dict[str, tuple[float, float, float, float, float | None, float]] = {
@@ -46,6 +46,7 @@ BARS: dict[str, tuple[float, float, float, float, float | None, float]] = {
 
 
 def cases() -> list[Case]:
+    """Return the cases of the grid, of the events, and of the time per step."""
     grid = [_steady(condition, path, formation) for condition in BARS for path in PATHS for formation in FORMATIONS]
     return [*grid, *_events(), _step_time()]
 
@@ -63,11 +64,12 @@ def _steady(condition: str, path: str, formation: str) -> Case:
 
 
 def slots(side: Side, followers: int = len(FOLLOWERS)) -> tuple[Slot, ...]:
+    """Return the slots of the followers, from robot 2 on, for a formation side."""
     return slots_of(FormationSpec(side=side), range(2, followers + 2))
 
 
 def setup_of(condition: str, formation: str, seed: int = 1) -> Setup:
-    """The chain of one row of the table."""
+    """Return the setup of the chain for one row of the table."""
     side, on_trace = FORMATIONS[formation]
     weather = SLOW_NETWORK if condition == "network" else ChainLink()
     noisy = condition == "noise"
@@ -82,9 +84,9 @@ def setup_of(condition: str, formation: str, seed: int = 1) -> Setup:
 
 
 def steady(condition: str, path: str, formation: str, setup: Setup | None = None) -> tuple[float, ...]:
-    """(settle F1, F3 [s], distance rms [mm], bearing, heading rms [deg]); rms of the worst follower.
+    """Return (settle F1, F3 [s], distance rms [mm], bearing, heading rms [deg]); rms of the worst follower.
 
-    Settled is within 5 cm for good; the rms values are those of the second half.
+    A follower has settled when it stays within 5 cm of its slot; the rms values cover the second half of the run.
     """
     setup = setup_of(condition, formation) if setup is None else setup
     chain = Chain(setup, astray(setup.slots, setup.seed))
@@ -107,7 +109,7 @@ def steady(condition: str, path: str, formation: str, setup: Setup | None = None
 
 
 def astray(followers: tuple[Slot, ...], seed: int) -> list[Pose2D]:
-    """Start poses: every follower 0.15 m and 0.2 rad off its slot, in random directions."""
+    """Return start poses with each follower 0.15 m and 0.2 rad off its slot, in random directions."""
     chance = Random(seed)
     starts = [Pose2D()]
     for pose in in_slots(Pose2D(), followers):
@@ -159,7 +161,10 @@ _CLOCKS = (
 
 
 def paper_start(gains: Gains) -> tuple[float, ...]:
-    """All at (0, 0, 0), at rest; the slots are to the left."""
+    """Return (settle F1, F3 [s], largest distance error [m]) of a start at rest with all robots at (0, 0, 0).
+
+    The slots are to the left.
+    """
     setup = Setup(slots("left"), gains=gains)
     chain = Chain(setup, [Pose2D()] * 4)
     leader = Leader(straight, setup.slots, setup.limits)
@@ -175,7 +180,7 @@ def paper_start(gains: Gains) -> tuple[float, ...]:
 
 
 def goal() -> tuple[float, float]:
-    """From the leader's standstill until F1, F3 stand for good."""
+    """Return the times [s] from the leader's standstill until F1 and F3 stay at rest."""
     setup = Setup(slots("left"))
     chain = Chain(setup)
     leader = Leader(straight, setup.slots, setup.limits, stop_at_m=10.0)
@@ -189,7 +194,10 @@ def goal() -> tuple[float, float]:
 
 
 def change(first: Side, second: Side) -> tuple[float, ...]:
-    """Of the formation at cruise speed. Recovered: within 5 cm of the new slot for good."""
+    """Change the formation at cruise speed; return (recovered F1, F3 [s], least separation [m], largest acceleration).
+
+    A follower has recovered when it stays within 5 cm of its new slot. The acceleration is a fraction of the limit.
+    """
     setup = Setup(slots(first))
     chain = Chain(setup)
     leader = Leader(straight, setup.slots, setup.limits)
@@ -212,14 +220,17 @@ def change(first: Side, second: Side) -> tuple[float, ...]:
 
 
 def _strain(limits: Limits, before: Twist, after: Twist) -> float:
-    """Largest acceleration of a step as a share of the drive's; a hair above 1 is rounding."""
+    """Return the largest acceleration of a step as a fraction of the drive's limit, rounded to 9 decimals."""
     linear = abs(after.linear_x - before.linear_x) / (limits.a_max_mps2 * CONTROL_PERIOD_S)
     angular = abs(after.angular_z - before.angular_z) / (limits.alpha_max_radps2 * CONTROL_PERIOD_S)
     return round(max(linear, angular), 9)
 
 
 def closing() -> tuple[float, float]:
-    """The first of two followers is gone: the second takes its place, 1.2 m further on."""
+    """Remove the first of two followers, so that the second takes its place, 1.2 m ahead.
+
+    Return the time [s] until it stays within 5 cm of the new slot, and the least separation [m].
+    """
     setup = Setup(slots("left", 2))
     chain = Chain(setup)
     leader = Leader(straight, setup.slots, setup.limits)
@@ -238,7 +249,7 @@ def closing() -> tuple[float, float]:
 
 
 def clocks(offset_s: float, drift: float) -> tuple[float, ...]:
-    """Steady errors on the figure-eight, left, when neighbours' clocks differ."""
+    """Return the steady errors on the figure-eight, left formation, with different clocks of neighbouring robots."""
     setup = Setup(slots("left"), clock_offset_s=offset_s, clock_drift=drift)
     return steady("clean", "figure_eight", "left", setup)[2:]
 
@@ -249,7 +260,10 @@ def _step_time() -> Case:
 
 
 def step_time() -> tuple[float]:
-    """Observer and law: a message heard, the predecessor asked, a command made; best of several means [us]."""
+    """Return the time [us] of one follower step: receive a message, estimate the predecessor, compute a command.
+
+    The value is the least of `TRIES` means over `STEPS_TIMED` steps, in processor time.
+    """
     robot = Chain(Setup(slots("left", 1))).robots[0]
     twist = Twist(0.5, 0.1)
     best = float("inf")

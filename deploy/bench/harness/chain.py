@@ -1,7 +1,7 @@
-"""A chain of followers on the bare law: formation, observer, controller, without agents, codec and engine.
+"""Bare chain of followers: formation, observer and controller, without agents, codec and physics engine.
 
-Virtual time in steps of one control period. Each step: messages arrive, every robot computes its command from what it
-knows, publishes (pose, command), then all move along exact arcs. Everything random comes from one seed.
+Virtual time advances in steps of one control period. In each step messages arrive, every robot computes its command
+from its own data and publishes (pose, command), then all move along exact arcs. One seed gives all random numbers.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from lfa.protocol.messages.team import PoseStamped, Slot
 from lfa.protocol.mission import Limits
 
 FIX_EVERY = 5
-"""Control periods between two localisation fixes: 10 Hz."""
+"""Number of control periods between two localisation fixes: 10 Hz."""
 
 
 class ChainLink(Struct, frozen=True):
-    """Between two robots: latency [s], uniform jitter on top of it [s], loss probability."""
+    """Link between two robots: latency [s], uniform jitter added to it [s], loss probability."""
 
     delay_s: float = 0.02
     jitter_s: float = 0.0
@@ -40,17 +40,17 @@ class ChainLink(Struct, frozen=True):
 
 
 class Blur(Struct, frozen=True):
-    """Of localisation, standard deviations; the robots then know their poses from odometry and fixes only."""
+    """Standard deviations of localisation noise; with it, robots estimate their poses from odometry and fixes only."""
 
     fix_m: float = 0.005
     fix_rad: float = 0.5 * pi / 180.0
     dropout: float = 0.1
     odometry: float = 0.01
-    """Of the wheels' speed, as a fraction."""
+    """Standard deviation of the wheel speed, as a fraction of the speed."""
 
 
 class Setup(Struct, frozen=True):
-    """How a chain is built; `slots` are those of its followers in order."""
+    """Configuration of a chain; `slots` are those of its followers in order."""
 
     slots: tuple[Slot, ...]
     gains: Gains = Gains()
@@ -65,16 +65,16 @@ class Setup(Struct, frozen=True):
     weather: ChainLink = ChainLink()
     blur: Blur | None = None
     clock_offset_s: float = 0.0
-    """Of each robot's clock against that of the one before it."""
+    """Offset [s] of each robot's clock from that of its predecessor."""
     clock_drift: float = 0.0
-    """Of every second robot's clock."""
+    """Rate error of every second robot's clock, as a fraction."""
     judged: bool = True
-    """Whether `Chain.errors` is wanted."""
+    """True if `Chain.errors` is computed."""
     seed: int = 1
 
 
 class ChainErrors(Struct, frozen=True):
-    """Of one follower, from the true poses: architecture.md section 5 says what each is."""
+    """Errors of one follower, from the true poses; architecture.md section 5 defines each."""
 
     slot_m: float
     distance_m: float
@@ -83,7 +83,7 @@ class ChainErrors(Struct, frozen=True):
 
 
 class ChainRobot:
-    """One follower: what it is, what it knows, and a second slot computed from the truth to judge it by."""
+    """One follower: its state and estimates, and a second slot computed from the true poses as reference."""
 
     def __init__(self, setup: Setup, index: int, pose: Pose2D) -> None:
         gains, limits = setup.gains, setup.limits
@@ -111,10 +111,10 @@ class ChainRobot:
 
 
 class Chain:
-    """A leader that goes as it is told and its followers."""
+    """Leader with a given twist in each step, and its followers."""
 
     def __init__(self, setup: Setup, starts: Sequence[Pose2D] | None = None) -> None:
-        """`starts` of all robots, the leader first; by default all stand in their slots."""
+        """Place the robots at `starts`, the leader first; by default all stand in their slots."""
         self.setup = setup
         self.time_s = 0.0
         self.leader_pose = Pose2D() if starts is None else starts[0]
@@ -130,7 +130,7 @@ class Chain:
         self._leader_knowing = None if setup.blur is None else Knowing(setup.blur, self._chance)
 
     def step(self, leader_twist: Twist) -> None:
-        """One control period of all."""
+        """Advance all robots by one control period; `leader_twist` is in the leader's frame."""
         now, dt = self.time_s, CONTROL_PERIOD_S
         self._deliver(now)
         self.leader_twist = leader_twist
@@ -150,7 +150,7 @@ class Chain:
         self.time_s = now + dt
 
     def lose(self, index: int) -> ChainRobot:
-        """Follower `index` is gone, and the one behind it closes over it. Messages under way are lost."""
+        """Remove follower `index` and return it; its successor closes the gap. Messages in transit are lost."""
         gone = self.robots.pop(index)
         if index < len(self.robots):
             heir = self.robots[index]
@@ -159,7 +159,7 @@ class Chain:
         return gone
 
     def errors(self, index: int) -> ChainErrors:
-        """Of follower `index` (from 0) before the last move."""
+        """Return the errors of follower `index` (from 0) before the last move."""
         return self._errors[index]
 
     def _judge(self, dt: float) -> None:
@@ -202,7 +202,7 @@ class Chain:
             robot.pose = along_arc(robot.pose, robot.twist, dt)
 
     def _clock(self, place: int, now: float) -> float:
-        """What the clock of the robot at `place` in the chain reads."""
+        """Return the clock reading [s] of the robot at `place` in the chain."""
         return now * (1.0 + self.setup.clock_drift * (place % 2)) + self.setup.clock_offset_s * place
 
     def _publish(self, now: float, known: list[tuple[Pose2D, Twist]]) -> None:
@@ -226,12 +226,12 @@ class Chain:
             predecessor = self.robots[index].predecessor
             local = self._clock(index + 1, arrived)
             predecessor.heard(message, local)
-            # The way back is as long: what the predecessor reports of our messages.
+            # The reverse link has the same delay: the predecessor reports the arrival of this robot's messages.
             predecessor.clock.reported(self._clock(index, arrived + delay_s) - self._clock(index + 1, arrived), local)
 
 
 class Knowing:
-    """What one robot's own hardware tells it, and the estimator that makes a pose of it."""
+    """Simulated odometry and localisation of one robot, and the pose estimator that uses them."""
 
     def __init__(self, blur: Blur, chance: Random) -> None:
         self._blur = blur
@@ -242,6 +242,7 @@ class Knowing:
         self._ticks = 0
 
     def drove(self, twist: Twist, dt: float) -> None:
+        """Update the noisy odometry with the true `twist` over `dt` [s]."""
         blur, gauss = self._blur, self._chance.gauss
         v = twist.linear_x * (1.0 + gauss(0.0, blur.odometry))
         omega = twist.angular_z * (1.0 + gauss(0.0, blur.odometry))
@@ -249,6 +250,7 @@ class Knowing:
         self._odometer_m += abs(v) * dt
 
     def pose(self, now: float, true: Pose2D, twist: Twist) -> Pose2D:
+        """Update the estimator with odometry and, when due, a noisy fix of `true`; return the estimated pose."""
         blur, gauss = self._blur, self._chance.gauss
         header = Header("driver", 1, self._ticks, now)
         stamp = GatewayStamp(1, now)
@@ -268,7 +270,7 @@ class Knowing:
 
 
 def in_slots(leader: Pose2D, slots: Sequence[Slot]) -> list[Pose2D]:
-    """Poses of the followers that stand in their slots, all heading as the leader does."""
+    """Return the poses of followers that stand in their slots, all with the leader's heading."""
     poses = []
     for slot in slots:
         angle = leader.theta + slot.phi

@@ -1,4 +1,4 @@
-"""A process that is looked at beside a running team: started, left alone for a while, and ended."""
+"""Child process that is measured beside a running team: start, wait, processor time, end."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from lfa.protocol import clock
 def started(
     words: Sequence[str], stdin: int = subprocess.DEVNULL, stdout: int = subprocess.DEVNULL
 ) -> Iterator[subprocess.Popen[bytes]]:
+    """Start the command `words`; terminate it with SIGTERM when the block ends."""
     process = subprocess.Popen(words, stdin=stdin, stdout=stdout, stderr=subprocess.DEVNULL)
     try:
         yield process
@@ -25,7 +26,7 @@ def started(
 
 
 def pause(team: Team, duration_s: float) -> None:
-    """The team's own news are heard meanwhile, so that they do not pile up."""
+    """Wait for `duration_s`, and receive the team's messages meanwhile so that they do not accumulate."""
     until = clock.now() + duration_s
     while clock.now() < until:
         team.listen()
@@ -33,6 +34,7 @@ def pause(team: Team, duration_s: float) -> None:
 
 
 def cpu_s(process: subprocess.Popen[bytes]) -> float:
+    """Return the processor time [s] that a running process has used."""
     identity = processes.identify(process.pid)
     assert identity is not None, "it has ended"
     return processes.cpu_s(identity)

@@ -1,4 +1,4 @@
-"""Rows of a bench: what was measured beside the bar to be reached, by several processes, as a table or JSON."""
+"""Rows of a bench: measured value and bar, measured by several processes, printed as a table or JSON."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from lfa.protocol.errors import Refused
 NEAR = 0.10
 SAME = 0.01
 FOLLOWS_MIN = 0.9
-"""An amplification below this is not that of a chain that follows."""
+"""Minimum amplification of a chain whose robots follow."""
 NEAR_FLOOR = 0.02
-"""Amplitude ratios are given to two decimals: a smaller difference is none."""
+"""Minimum tolerance of the rule "near"; reference amplitude ratios have two decimals."""
 ROUNDED = 6
-"""Significant digits of a printed value."""
+"""Number of significant digits of a printed value."""
 
 
 Rule = Literal["at most", "at least", "near", "same", "no worse"]
 
 
 class Quantity(Struct, frozen=True):
-    """One thing that a case measures. Without a bar it is only reported."""
+    """Quantity that a case measures; without a bar it is only reported."""
 
     name: str
     unit: str
@@ -36,28 +36,31 @@ class Quantity(Struct, frozen=True):
 
 
 class Case(Struct, frozen=True):
-    """One run and all that is read from it; `measure` gives one value a quantity, and must be picklable."""
+    """One run and its quantities; `measure` returns one value per quantity and must be picklable."""
 
     name: str
     quantities: tuple[Quantity, ...]
     measure: Callable[[], Sequence[float]]
 
     def row_names(self) -> list[str]:
+        """Return the names of the case's rows, one per quantity."""
         return [f"{self.name}/{quantity.name}" for quantity in self.quantities]
 
 
 class BenchRow(Struct, frozen=True):
+    """One printed row: measured value, bar and result."""
+
     name: str
     value: float
     unit: str
     bar: float | None
     ratio: float | None
-    """Value over bar."""
+    """Value divided by the bar; None without a bar or with a bar of 0."""
     ok: bool
 
 
 def row(case: str, quantity: Quantity, value: float) -> BenchRow:
-    """A value that is not finite never reaches a bar."""
+    """Return the row of a measured value; a value that is not finite never passes."""
     bar = quantity.bar
     value = float(f"{value:.{ROUNDED}g}")
     ratio = None if not bar else float(f"{value / bar:.4g}")
@@ -82,7 +85,7 @@ def _holds(quantity: Quantity, value: float) -> bool:
 
 
 def select(cases: Sequence[Case], glob: str) -> list[Case]:
-    """The cases with a row whose name matches. Raises `Refused` when there is none."""
+    """Return the cases with a row whose name matches `glob`. Raises `Refused` if there is none."""
     chosen = [case for case in cases if any(fnmatchcase(name, glob) for name in case.row_names())]
     if not chosen:
         groups = sorted({case.name.split("/")[0] for case in cases})
@@ -91,7 +94,7 @@ def select(cases: Sequence[Case], glob: str) -> list[Case]:
 
 
 def measured(cases: Sequence[Case], jobs: int, glob: str = "*") -> Iterator[list[BenchRow]]:
-    """The matching rows of each case, in the order of the cases, as they become known."""
+    """Yield the matching rows of each case, in the order of the cases, as soon as they are measured."""
     if jobs <= 1 or len(cases) == 1:
         for case in cases:
             yield _matching(case, case.measure(), glob)
@@ -108,7 +111,7 @@ def _matching(case: Case, values: Sequence[float], glob: str) -> list[BenchRow]:
 
 
 def show(rows: Iterator[list[BenchRow]], as_json: bool) -> int:
-    """Print as they come (a table) or at the end (JSON); 0 when every row holds, else 1."""
+    """Print the rows, one by one (table) or at the end (JSON); return 0 if every row holds, else 1."""
     done: list[BenchRow] = []
     for some in rows:
         done += some
@@ -124,6 +127,7 @@ def show(rows: Iterator[list[BenchRow]], as_json: bool) -> int:
 
 
 def line(one: BenchRow) -> str:
+    """Return a row as one line of the table."""
     bar = "-" if one.bar is None else f"{one.bar:g}"
     mark = "ok" if one.ok else "BELOW THE BAR"
     return f"{one.name:<52}{one.value:>12.5g} {one.unit:<6} bar {bar:>8}  {mark}"

@@ -1,7 +1,7 @@
-"""A live team kept running under a bench or a test: real processes, faults at its hand, and what it says heard.
+"""Team of real processes that a bench or a test keeps running, with fault injection and received messages.
 
-All processes of one machine read one clock (`lfa.protocol.clock`), and every header carries its sender's: moments of
-different processes can be subtracted here, and only here.
+All processes of one machine read one clock (`lfa.protocol.clock`), and every header carries a stamp of the sender's
+clock. So only here may stamps of different processes be subtracted.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ from lfa.world.description.load import Scenario
 POLL_S = 0.001
 START_S_MAX = 20.0
 SPEAKING_S = 0.15
-"""Whoever has sent no pose for this long is not there."""
+"""Time [s] without a pose after which a robot counts as absent."""
 SETTLED_S = 0.5
 REST_MPS = 1e-3
-"""Who is no faster stands."""
+"""Maximum speed [m/s] of a robot at rest."""
 ANEW_S = 3.0
-"""Routers whose link has come back may not know any more what is listened to (`ZenohBus.resubscribe`)."""
+"""Period [s] of renewing subscriptions; routers may lose them when their link was down (`ZenohBus.resubscribe`)."""
 EVENTS_MAX = 4096
 TOPICS = ("event", "tracking", "pose", "truth", "status")
 
@@ -56,11 +56,11 @@ Table = Callable[[Sequence[ProcessSpec], Path], Sequence[ProcessSpec]]
 
 
 class Broken(Exception):
-    """The team did not become what was waited for."""
+    """Error: the team did not reach the awaited state, or a process is missing."""
 
 
 def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
-    """A slow round course of half an hour, with room between robots for one that goes back to the tail."""
+    """Return a scenario of slow laps on a circle, some 30 min, with room for a robot that returns to the tail."""
     radius_m, corners = 10.0, 16
     turns = (2.0 * pi * n / corners for n in range(1, corners * laps - corners // 2))
     route_m = tuple((radius_m * sin(turn), radius_m * (1.0 - cos(turn))) for turn in turns)
@@ -75,7 +75,7 @@ def _name(whom: int | str) -> str:
 
 
 class Team:
-    """Router, world and agents of `scenario`; on leaving the block none of them is left, nor anything on disk."""
+    """Router, world and agents of `scenario`; at the end of the block all processes and files are removed."""
 
     def __init__(
         self,
@@ -84,9 +84,10 @@ class Team:
         credentials: Credentials | None = None,
         fleet: str | None = None,
     ) -> None:
-        """`table` makes of the usual rows, and the folder of sockets, those that are started: all but the recorder.
+        """Prepare the run folder and the process table; nothing is started yet.
 
-        `credentials` are what the onlooker shows to a router that asks for some; the rules there know `fleet`.
+        `table` maps the usual rows and the folder of sockets to the rows to start; the recorder is never started.
+        `credentials` are those of the observer session for a router with access control, whose rules name `fleet`.
         """
         self.scenario = scenario
         self.folder = Path(tempfile.mkdtemp(prefix="lfa-"))
@@ -103,9 +104,9 @@ class Team:
         self.events: list[Event] = []
         self.tracking: list[Tracking] = []
         self.speeds_mps: dict[int, float] = {}
-        """True speed of each robot, as the world last said."""
+        """True speed [m/s] of each robot in the world's last message."""
         self.moved_at: dict[int, float] = {}
-        """When each robot last moved, by the world's stamp."""
+        """Time [s] of the last motion of each robot, by the world's stamp."""
         self._poses: dict[int, PoseStamped] = {}
         self._chains: dict[int, tuple[tuple[Any, ...], tuple[int, ...]]] = {}
 
@@ -133,42 +134,43 @@ class Team:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def judged(self) -> JournalVerdict:
-        """End all processes, then check the journals of their whole lives.
+        """End all processes, then check the journals of all incarnations and return the verdict.
 
-        Read one after the other while they grow, a late one would tell of a PROPOSE whose promises an early one lacks.
+        Journals read one after the other while they grow would be inconsistent: one read late may contain a PROPOSE
+        whose promises are missing in one read early.
         """
         self._processes.kill_all()
         return verify(self.folder / "run")
 
     @property
     def fleet(self) -> FleetAddress:
-        """For those who look on."""
+        """Address of the fleet for observer sessions."""
         return FleetAddress(self._about.fleet, self._endpoint, ())
 
     # --- what can be done to it ------------------------------------------------------------------------------------
 
     def signal(self, whom: int | str, number: signal.Signals) -> float:
-        """Signal an agent by its robot's id, or another process by its name; the moment just before."""
+        """Signal an agent by its robot's id or a process by its name; return the time [s] just before. Raises Broken."""
         at, name = clock.now(), _name(whom)
         if not self._processes.signal(name, number):
             raise Broken(f"{name} is not there to be signalled")
         return at
 
     def process_of(self, name: str) -> Identity:
-        """Raises Broken when it does not run."""
+        """Return the identity of the process `name`. Raises Broken if it does not run."""
         identity = self._processes.identity(name)
         if identity is None:
             raise Broken(f"{name} does not run")
         return identity
 
     def restart(self, *ended: int | str) -> None:
-        """Start processes again that have ended: agents with empty memory, a world from where it was."""
+        """Restart processes that have ended: agents with empty memory, a world from its saved state. Raises Broken."""
         for whom in ended:
             name = _name(whom)
             if not self._processes.wait([name], START_S_MAX):
                 raise Broken(f"{name} does not end")
             if isinstance(whom, int):
-                self._poses.pop(whom, None)  # what its earlier life said counts no more
+                self._poses.pop(whom, None)  # messages of the earlier incarnation are obsolete
                 self._chains.pop(whom, None)
             self._processes.start(self._rows[name].restarted())
 
@@ -179,25 +181,27 @@ class Team:
         return self._rows[name]
 
     def order(self, command: str, **arguments: Any) -> float:
-        """Say an operator's word to all; the moment just before."""
+        """Publish an operator command to all; return the time [s] just before."""
         assert self._bus is not None
         at = clock.now()
         self._bus.publish(self._operator.orders_key, encode(self._operator.orders(command, at, **arguments)))
         return at
 
     def cut_off(self, *robots: int) -> float:
-        """No message passes between `robots` and everybody else, world included; the moment just before."""
+        """Block all messages between `robots` and the others, world included; return the time [s] just before."""
         inside = [robot_name(robot) for robot in robots]
         outside = [robot_name(r) for r in self.scenario.mission.robots if r not in robots] + [WORLD_NAME]
         pairs = [pair for a in inside for b in outside for pair in ((a, b), (b, a))]
         return self.order(WEATHER, cut=pairs)
 
     def heal(self) -> float:
+        """Heal the partition; return the time [s] just before."""
         return self.order(WEATHER, heal=True)
 
     # --- what is heard of it ---------------------------------------------------------------------------------------
 
     def listen(self) -> None:
+        """Receive all pending messages and update the state of the team."""
         for arrival in self._inbox.take():
             where = address(arrival.key)
             if not isinstance(arrival.payload, bytes) or where is None:
@@ -229,12 +233,16 @@ class Team:
                 self._catch_up(robot, counters["config_n"], counters["config_seq"])
 
     def _catch_up(self, robot: int, n: float, seq: float) -> None:
-        """A robot says which config it holds: its chain is that of whoever said the same, had we missed its event."""
+        """Update a robot's chain from the config version in its status, in case its chain event was lost.
+
+        The chain is that of a robot that reported the same version.
+        """
         known = max(self._chains.values(), default=None)
         if known is not None and (known[0][0][0], known[0][1]) == (n, seq):
             self._chains[robot] = known
 
     def wait_until(self, holds: Callable[[], bool], complaint: str, within_s: float = START_S_MAX) -> None:
+        """Receive messages until `holds()` is true. Raises Broken with `complaint` after `within_s`."""
         until = clock.now() + within_s
         while True:
             self.listen()
@@ -245,7 +253,7 @@ class Team:
             clock.sleep(POLL_S)
 
     def chain(self) -> tuple[int, ...]:
-        """The chain that all of its speaking members agree on; empty when they do not, or not all of it speaks."""
+        """Return the chain on which all present robots agree; empty if they disagree or a member is absent."""
         speaking = [robot for robot in self.scenario.mission.robots if self._speaks(robot)]
         said = {self._chains.get(robot) for robot in speaking}
         if len(said) != 1 or (agreed := said.pop()) is None:
@@ -262,7 +270,7 @@ class Team:
         return leaders[0] if len(leaders) == 1 else None
 
     def await_chain(self, length: int, within_s: float = START_S_MAX) -> tuple[int, ...]:
-        """The chain, once it has been one and the same of `length` robots for `SETTLED_S`."""
+        """Wait until one chain of `length` robots has been stable for `SETTLED_S`, and return it. Raises Broken."""
         since = clock.now()
         anew_at = since + ANEW_S
         last: tuple[int, ...] = ()
@@ -284,17 +292,18 @@ class Team:
         return last
 
     def describe(self) -> str:
+        """Return the roles and chains of the robots as text, for error messages."""
         roles = {r: str(p.role) for r, p in sorted(self._poses.items()) if self._speaks(r)}
         chains = {robot: chain for robot, (_, chain) in sorted(self._chains.items())}
         return f"roles {roles}, chains {chains}"
 
     def first(self, kind: str, since: float, fits: Callable[[Event], bool]) -> float | None:
-        """When the first fitting event since then was, by the clock of its sender."""
+        """Return the stamp [s] of the first `kind` event since `since` that `fits`, by its sender's clock, or None."""
         stamps = [e.header.stamp for e in self.events if e.kind == kind and e.header.stamp >= since and fits(e)]
         return min(stamps, default=None)
 
     def adopted(self, since: float, robots: Sequence[int], fits: Callable[[Sequence[int]], bool]) -> float | None:
-        """When the last of `robots` adopted a chain that fits; None while one of them has not."""
+        """Return the time [s] when the last of `robots` adopted a chain that `fits`; None until all have."""
         first: dict[str, float] = {}
         for event in self.events:
             if event.kind == "chain" and event.header.stamp >= since and fits(event.data["chain"]):

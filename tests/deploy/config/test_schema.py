@@ -33,7 +33,7 @@ def test_every_key_of_every_shipped_scenario_is_documented(path: Path) -> None:
 def test_a_key_has_its_unit_default_and_meaning() -> None:
     key = PATHS["mission.formation.separation_m"]
     assert (key.unit, key.default) == ("m", "1.2")
-    assert "distance to the predecessor" in key.text
+    assert "to the predecessor" in key.text
     assert PATHS["title"].default == ""
     assert "assert.failover_max_ms" in PATHS
 

@@ -170,7 +170,7 @@ def test_told_to_stop_it_brakes_and_is_done() -> None:
 
 
 def test_a_driver_needs_the_base_install_only() -> None:
-    unwanted = tuple(name for name in NEVER_ON_A_ROBOT if name != "deploy")
+    unwanted = tuple(name for name in NEVER_ON_A_ROBOT if name != "lfa.deploy")
     code = f"import lfa.deploy.robot.cli, sys; print([name for name in {unwanted} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=True)
     assert done.stdout.strip() == "[]"

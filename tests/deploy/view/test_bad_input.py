@@ -136,7 +136,7 @@ def test_without_a_display_a_picture_is_made_beside_the_recording(
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(shutil, "which", lambda _name: None)  # no Xvfb either: drawn without the viewer
-    assert report.command(copied) == 0
+    assert view.command(copied) == 0
     said = capsys.readouterr()
     assert str(copied / "view.png") in said.out
     assert said.err.startswith("no display here")

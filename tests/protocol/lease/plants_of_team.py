@@ -131,7 +131,7 @@ def full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
         config = honest(*arguments)
         return Config(config.version, config.voters, config.tie, None, config.chain)
 
-    patch.setattr(lfa.protocol.lease.lease, "of_full_house", of_full_house)
+    patch.setattr(lfa.protocol.lease.lease, "unanimous_config", of_full_house)
 
 
 def replaced_lives_make_a_full_house(patch: pytest.MonkeyPatch) -> None:

@@ -197,13 +197,13 @@ def one_highest_fenced_term(patch: pytest.MonkeyPatch) -> None:
 
 
 def rounds_that_restart(patch: pytest.MonkeyPatch) -> None:
-    honest = Holder.given
+    honest = Holder.transferred
 
     def given(self: Holder, number: int, since: float) -> None:
         honest(self, number, since)
         self._round = 0
 
-    patch.setattr(Holder, "given", given)
+    patch.setattr(Holder, "transferred", given)
 
 
 def stamp_read_after_the_check(patch: pytest.MonkeyPatch) -> None:

@@ -30,13 +30,13 @@ def arrival(at: float, topic: str) -> Arrival:
 
 def test_who_looks_in_often_is_not_woken_by_hello() -> None:
     header = Header("robot1", 1, 1, 0.0)
-    for patient, body, wakes in (
+    for defers, body, wakes in (
         (True, Hello(None), False),
         (False, Hello(None), True),
         (True, Release(Term(1, 1, 1)), True),
     ):
         wake = Wake()
-        inbox = Inbox(wake, patient=patient)
+        inbox = Inbox(wake, defer_hellos=defers)
         inbox.put(Arrival(0.0, "lfa/f/robot1/lease/all", encode(LeaseNote(header, body))))
         assert wake.wait(0.0) == wakes
         assert len(inbox.take()) == 1
@@ -46,7 +46,7 @@ def test_a_leader_at_ease_is_not_woken_by_grants() -> None:
     note = encode(LeaseNote(Header("robot2", 1, 1, 0.0), Grant(Term(1, 1, 1), 7, Version(), 0.5)))
     for defer_grants in (True, False):
         wake = Wake()
-        inbox = Inbox(wake, patient=True)
+        inbox = Inbox(wake, defer_hellos=True)
         inbox.defer_grants = defer_grants
         inbox.put(Arrival(0.0, "lfa/f/robot2/lease/robot1", note))
         assert wake.wait(0.0) != defer_grants

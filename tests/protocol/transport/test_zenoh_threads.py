@@ -38,7 +38,8 @@ def _printed(script: str) -> str:
 SCRIPT = """
 import os, sys
 from lfa.protocol.transport.bus import Inbox
-from lfa.protocol.transport.zenoh_bus import ZenohBus, answers
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
 while not answers(sys.argv[1]):
     pass
 ZenohBus(sys.argv[1], Inbox()).close()
@@ -56,7 +57,8 @@ import sys
 from lfa.protocol import clock
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.topics import address
-from lfa.protocol.transport.zenoh_bus import ZenohBus, answers
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
 while not answers(sys.argv[1]):
     pass
 inboxes = Inbox(every=True), Inbox(every=True)
@@ -86,7 +88,8 @@ import sys, threading
 from pathlib import Path
 from lfa.protocol import clock
 from lfa.protocol.transport.bus import Inbox
-from lfa.protocol.transport.zenoh_bus import ZenohBus, answers
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+from lfa.protocol.transport.zenoh_config import answers
 here = threading.local()
 class Remembering(Inbox):
     most = 0

@@ -17,6 +17,7 @@ from lfa.deploy.recording.mcap_reader import messages
 from lfa.deploy.run.simulate import run
 from lfa.deploy.view.rerun import command
 from lfa.deploy.view.rerun.screenshot import take
+from lfa.deploy.view.rerun.viewer import viewer_path
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import load
 
@@ -33,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _rows(rrd: Path) -> Counter[str]:
     """Rows of each entity that change with time, as rerun itself counts them."""
-    told = subprocess.run([command.viewer_path(), "rrd", "print", str(rrd)], capture_output=True, text=True, check=True)
+    told = subprocess.run([viewer_path(), "rrd", "print", str(rrd)], capture_output=True, text=True, check=True)
     found: Counter[str] = Counter()
     for line in told.stdout.splitlines():
         chunk = re.search(r"with (\d+) rows .* - /(world/\S+) - data columns: \[(.*)\]", line)
@@ -94,7 +95,7 @@ def test_map_and_route_of_who_explores_are_in_the_view(tmp_path: Path) -> None:
     scenario = load("explore", ["time_limit_s=4.0"], 2)
     folder = run(scenario, 1, tmp_path / "run").folder
     told = subprocess.run(
-        [command.viewer_path(), "rrd", "print", str(command.converted(folder))],
+        [viewer_path(), "rrd", "print", str(command.converted(folder))],
         capture_output=True,
         text=True,
         check=True,
@@ -107,7 +108,7 @@ def test_terrain_and_the_share_of_lost_rows_are_in_the_view(tmp_path: Path) -> N
     scenario = load("terrain", ["time_limit_s=4.0", "radio.loss=0.3"], 2)
     folder = run(scenario, 1, tmp_path / "run").folder
     told = subprocess.run(
-        [command.viewer_path(), "rrd", "print", str(command.converted(folder))],
+        [viewer_path(), "rrd", "print", str(command.converted(folder))],
         capture_output=True,
         text=True,
         check=True,
