@@ -16,13 +16,16 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/lfa run paper_path1 --fault 'kill leader at 20 s'
 
-# Tests of real processes wait more than they compute: three workers on two cores, at most two teams at a time.
+# Three workers: two run the teams of real processes, mostly waiting, and one computes meanwhile (tests/conftest.py).
+# Bytecode, also where the environment says not to write any: without it each of some 600 processes compiles its own.
+test test-fast: export PYTHONDONTWRITEBYTECODE =
+test test-fast: export PYTHONPYCACHEPREFIX = $(CURDIR)/$(VENV)/bytecode
 test: $(STAMP)
-	$(BIN)/pytest -n 3 --dist loadfile
+	$(BIN)/pytest -n 3 --dist loadgroup
 
 # The tests that start no process.
 test-fast: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadfile -m 'not processes and not hosts and not campaign'
+	$(BIN)/pytest -n 2 --dist loadgroup -m 'not processes and not hosts and not campaign'
 
 # Machines as network namespaces, each with its own router and sshd; skipped, with the reason, where that cannot be.
 # The whole of it, with bars that must be met; the short form asks what happens, not how fast.

@@ -1,16 +1,17 @@
 """For all tests: an example of a property may take as long as the machine takes, since speed belongs to `lfa bench`;
-Ctrl-C means what it says, also to a run that a shell has started in the background, where it is ignored; and at most
-two teams of processes run at a time, each with a runtime folder of its own.
+and Ctrl-C means what it says, also to a run that a shell has started in the background, where it is ignored.
+
+Workers of pytest-xdist with `--dist loadgroup`: all tests with real processes are in two groups, each run by one
+worker, one test after the other, so that there are no more than two teams at a time. Tests that share a fixture of
+their module stay together, so that it is made once. Each worker has a runtime folder of its own.
 """
 
 from __future__ import annotations
 
-import fcntl
 import os
+import shutil
 import signal
 import tempfile
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -20,53 +21,42 @@ settings.load_profile("unhurried")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-TEAMS_MAX = 2
-RUN = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
-SLOTS = Path(tempfile.gettempdir()) / f"lfa-tests-{os.getuid()}-{RUN}"
-"""Folder of the lock files of one test run, one for each team that may run."""
+RUNTIME = tempfile.mkdtemp(prefix="lfa-", dir="/tmp")
+os.environ["XDG_RUNTIME_DIR"] = RUNTIME  # now: some modules ask for the default endpoint when they are imported
+
+PROCESSES = ("tests/processes/", "tests/protocol/transport/test_zenoh_threads.py")
+"""Tests below these paths start real processes, whether they say so or not."""
+FIRST_GROUP = ("test_run.py", "test_looking.py")
+"""Files that take about as long as all others with real processes."""
+NICE = 10
 
 
-class TeamSlot:
-    """Right of one worker to run a team of processes, kept from the first to the last such test of a file."""
-
-    def __init__(self) -> None:
-        self._held: int | None = None
-
-    def acquire(self) -> None:
-        """Wait until fewer than `TEAMS_MAX` workers run teams. The kernel releases what a dead worker held."""
-        if self._held is not None:
-            return
-        SLOTS.mkdir(mode=0o700, exist_ok=True)
-        worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-        handle = os.open(SLOTS / f"team{worker % TEAMS_MAX}", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        self._held = handle
-
-    def release(self) -> None:
-        """Let the next worker run a team."""
-        if self._held is not None:
-            os.close(self._held)
-            self._held = None
+def pytest_unconfigure() -> None:
+    """Remove the runtime folder."""
+    shutil.rmtree(RUNTIME, ignore_errors=True)
 
 
-_slot = TeamSlot()
+@pytest.hookimpl(tryfirst=True)  # before pytest chooses by marker, and before a worker reads the groups
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests that start processes, and tell xdist which tests stay together."""
+    for item in items:
+        if item.nodeid.startswith(PROCESSES):
+            item.add_marker("processes")
+        if hasattr(config, "workerinput") and (group := _group(item)):
+            item.add_marker(pytest.mark.xdist_group(group))
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
-    """Hold a team's slot around the tests of a file that start processes, their shared fixtures included."""
+def _group(item: pytest.Item) -> str:
+    """Return the group of a test; empty when any worker may run it at any time."""
     if item.get_closest_marker("processes"):
-        _slot.acquire()
-    try:
-        return (yield)
-    finally:
-        if nextitem is None or nextitem.path != item.path:
-            _slot.release()
+        return f"processes {1 if item.path.name in FIRST_GROUP else 2}"
+    fixtures = item._fixtureinfo.name2fixturedefs.values()  # type: ignore[attr-defined]
+    shared = [one for many in fixtures for one in many if one.scope == "module"]
+    return str(item.path) if shared else ""
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _runtime_folder() -> Iterator[None]:
-    """Give each worker its own default endpoint."""
-    with tempfile.TemporaryDirectory(prefix="lfa-") as place, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_RUNTIME_DIR", place)
-        yield
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Let a worker that computes give way to those that keep time. The groups of processes are handed out first."""
+    if hasattr(item.config, "workerinput") and not item.get_closest_marker("processes"):
+        os.setpriority(os.PRIO_PROCESS, 0, NICE)

@@ -1,1 +1,4 @@
-"""Benchmarks: one module per bench name, each row beside its bar or baseline. Product code may not live or import here."""
+"""Benchmarks: one module per bench name, each row beside its bar or baseline.
+
+No code that a running fleet needs may live here.
+"""

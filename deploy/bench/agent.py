@@ -88,7 +88,7 @@ def _costs(shares: Sequence[float], bare_share: float) -> list[BenchRow]:
 
 
 def _task(team: Team) -> bare_process.BareTask:
-    """Return a task with the subscriptions and the measured publications of robot `LIKE`, on keys of an unused fleet."""
+    """Return a task with the subscriptions and measured publications of robot `LIKE`, on keys of an unused fleet."""
     fleet, name, ahead = team.fleet.name, robot_name(LIKE), robot_name(LIKE - 1)
     agent = Agent(LIKE, 1, fleet, 1, team.scenario.mission)
     agent.tick(0.0)

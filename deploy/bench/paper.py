@@ -1,4 +1,4 @@
-"""`lfa bench paper`: properties of the paper's figures (control.md 7.1) over many seeds of both paths, worst value each.
+"""`lfa bench paper`: worst values of the properties of the paper's figures (control.md 7.1), over seeds of both paths.
 
 Every run is simulated in its own process. Properties that compare runs (path 1 with path 2, rank correlations over the
 pooled avoidance episodes, iteration 2 with 1) are evaluated over all runs.

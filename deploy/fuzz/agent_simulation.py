@@ -59,7 +59,7 @@ class Gale(LinkModel):
 
 
 class Life:
-    """One life of an agent or of the witness."""
+    """One incarnation of an agent or of the witness."""
 
     def __init__(self, simulator: Simulator, node: Agent | Witness, member: Member, clock: LocalClock) -> None:
         self.node = node
@@ -68,23 +68,24 @@ class Life:
         self.clock = clock
         self.paused = False
         self.leaving = False
-        """Was told to exit, and says its last words."""
+        """True after a request to exit, while the process sends its last messages."""
         self.drawn: tuple[str, bytes] | None = None
-        """The last command said as leader: what a pause may hold back."""
+        """Key and payload of the last command published as leader; a pause may hold it back."""
         self.simulator = simulator
 
     @property
     def alive(self) -> bool:
+        """True while this incarnation runs in the simulator."""
         return self.simulator.lives(self.node)
 
     @property
     def lease(self) -> Lease | None:
-        """None in the first moment of a life."""
+        """Lease of the node; None just after its start."""
         return self.node.lease
 
 
 class Hardware(Struct):
-    """One life of the world, and so of all gateways."""
+    """One incarnation of the world, and so of all gateways."""
 
     world: World
     clock: LocalClock
@@ -92,8 +93,10 @@ class Hardware(Struct):
 
 
 class AgentSimulation:
+    """Simulation of a team with the same operations as `LeaseSimulation`."""
+
     def __init__(self, schedule: Schedule, road_m: float = ROAD_M) -> None:
-        """Nobody has started yet; the goal is `road_m` straight ahead of the first robot."""
+        """Create the simulation without starting a process; the goal is `road_m` [m] ahead of the first robot."""
         self.random = Random(schedule.seed)
         leading = Leading(route_m=((road_m, 0.0),))
         robots = tuple(range(1, schedule.robots + 1))
@@ -103,7 +106,7 @@ class AgentSimulation:
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
         self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max if schedule.faults else float("inf")
-        """What leaves before the faults end and would arrive later never does."""
+        """True time [s] of the latest arrival; messages that would arrive later are lost."""
         self.wall_ms: dict[int, int] = {}
         self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots
         self.rates = schedule.rates
@@ -121,34 +124,36 @@ class AgentSimulation:
         self.listen(())
 
     def listen(self, checkers: Sequence[Checker]) -> None:
-        """Tell these checkers, and only these, what happens from here on."""
+        """Notify these checkers, and only these, of all events from now on."""
         self._listeners = listeners(checkers)
 
-    # --- the course of time ------------------------------------------------------------------------------------
+    # --- virtual time ------------------------------------------------------------------------------------------
 
     @property
     def now(self) -> float:
+        """True time [s]."""
         return self.simulator.now
 
     def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
-        """`what(*arguments)` when true time reaches `time`."""
+        """Schedule the call `what(*arguments)` at true time `time` [s]."""
         self.simulator.at(time, lambda: what(*arguments))
 
     def run(self, until: float) -> AgentSimulation:
+        """Execute all events up to true time `until` [s]."""
         self.simulator.run(until)
         return self
 
-    # --- lives -------------------------------------------------------------------------------------------------
+    # --- incarnations ------------------------------------------------------------------------------------------
 
     def start_all(self) -> AgentSimulation:
-        """The world with its gateways, then everybody at once."""
+        """Start the world with its gateways, then all other processes at once."""
         self._start_world(World(FLEET, self._scenario, 1, self._next_life(), start_at=None, bodies=Kinematic))
         for robot_id in self.ids:
             self.start(robot_id)
         return self
 
     def start(self, robot_id: int) -> None:
-        """A new life, with empty memory; a living one of the same id ends first."""
+        """Start a new incarnation with empty memory; a running one of the same id is killed first."""
         if robot_id in self.processes:
             self.kill(robot_id)
         member = Member(robot_id, self._next_life())
@@ -167,6 +172,7 @@ class AgentSimulation:
         self._add(node, clock)
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
+        """Kill the process (SIGKILL); with `hinted`, connected processes see its token vanish."""
         life = self.processes[robot_id]
         if life.alive:
             self.simulator.kill(robot_name(robot_id), hinted=hinted)
@@ -175,6 +181,7 @@ class AgentSimulation:
             self._tell("ends", self.now, life.member)
 
     def exit(self, robot_id: int) -> None:
+        """Request the process to exit (SIGTERM); a paused process ignores it."""
         life = self.processes[robot_id]
         if life.alive and not life.paused:
             life.leaving = True
@@ -185,12 +192,13 @@ class AgentSimulation:
         self.simulator.say(self._operator.orders_key, encode(self._operator.orders("handover", self.now)))
 
     def pause(self, robot_id: int) -> None:
+        """Pause the process (SIGSTOP)."""
         if self.processes[robot_id].alive:
             self.processes[robot_id].paused = True
             self.simulator.pause(robot_name(robot_id))
 
     def resume(self, robot_id: int, shuffled: bool = False) -> None:
-        """SIGCONT: the command that was about to leave leaves, then all that came is handled."""
+        """Resume the process (SIGCONT): send the command held back, then handle the kept messages."""
         life = self.processes[robot_id]
         if life.paused and life.alive:
             life.paused = False
@@ -199,13 +207,14 @@ class AgentSimulation:
             self.simulator.resume(robot_name(robot_id), shuffled=shuffled)
 
     def start_gateway(self, robot_id: int) -> None:
-        """The world, and with it everybody's gateway, goes on from where it was."""
+        """Restart the world, and with it all gateways, from its saved state."""
         if not self.gateways[robot_id].alive:
             memory = self.gateways[robot_id].world.memory()
             scenario = resumed(self._scenario, memory)
             self._start_world(World(FLEET, scenario, 1, self._next_life(), None, Kinematic, memory))
 
     def kill_gateway(self, robot_id: int) -> None:
+        """Kill the world, and with it all gateways."""
         hardware = self.gateways[robot_id]
         if hardware.alive:
             hardware.alive = False
@@ -213,39 +222,43 @@ class AgentSimulation:
             self._say(WITNESS_ID, "world dies")
 
     def hint(self, about: int, *observers: int, up: bool = False) -> None:
+        """Deliver a liveliness event about `about` to `observers`, true or false."""
         member = self.processes[about].member
         event = (PeerUp if up else PeerDown)(robot_name(about), member.incarnation)
         self.simulator.hint(event, [robot_name(observer) for observer in observers])
 
     def latch(self, robot_id: int, incarnation: int) -> None:
-        """The robot's gateway sees its agent's token vanish, whatever is true."""
+        """Deliver the liveliness event of the agent's vanished token to the robot's gateway, true or false."""
         self.simulator.hint(PeerDown(robot_name(robot_id), incarnation), [WORLD_NAME])
 
     # --- the network -------------------------------------------------------------------------------------------
 
     def part(self, pairs: set[tuple[int, int]]) -> None:
-        """From now on nothing passes from the first to the second of each pair."""
+        """Block all messages from the first to the second id of each pair."""
         self.cuts |= pairs
         self._tell("parts", self.now, self.cuts)
 
     def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
+        """Remove the cuts of these directed pairs."""
         self.cuts -= pairs
         self._tell("parts", self.now, self.cuts)
 
     def heal(self) -> None:
+        """Remove all cuts."""
         self.cuts.clear()
         self._tell("parts", self.now, self.cuts)
 
     def lose_late(self, within_s: float) -> None:
-        """Nothing is on its way for longer than that (`late_at`); from now on nothing is late."""
+        """Remove the limit `late_at` on arrivals: late messages of the faults have already been dropped."""
         self.late_at = float("inf")
 
     def step_wall(self, robot_id: int, by_s: float) -> None:
-        """A host's wall clock is set wrong."""
+        """Set a host's wall clock wrong by `by_s` [s]."""
         self.wall_ms[robot_id] = round(by_s * 1000.0)
         self._tell("wall_steps", self.now, robot_id)
 
     def tell_healed(self) -> None:
+        """Notify the checkers of the ended processes, and that the last fault is over."""
         for life in self.processes.values():
             if not life.alive:
                 self._tell("ends", self.now, life.member)
@@ -269,7 +282,7 @@ class AgentSimulation:
         self._lives += 1
         return self._lives
 
-    # --- what the checkers are told ----------------------------------------------------------------------------
+    # --- facts for the checkers --------------------------------------------------------------------------------
 
     def _tell(self, what: str, *facts: Any) -> None:
         for listen in self._listeners[what]:
@@ -294,7 +307,7 @@ class AgentSimulation:
     def _at_gateways(
         self, hardware: Hardware, receive: Callable[[Received], list[Envelope]], received: Received
     ) -> list[Envelope]:
-        """What reaches the world; what its gateways make of it."""
+        """Pass a message to the world, and notify the checkers of commands and fences that its gateways accepted."""
         where, message = address(received.key) if received.key else None, received.message
         if where is None or not isinstance(message, CmdVel | LeaseNote):
             return receive(received)
@@ -321,21 +334,22 @@ class AgentSimulation:
         if self.trace is not None:
             self.trace(self.now, who, what)
 
-    # --- what is asked of it -----------------------------------------------------------------------------------
+    # --- queries -----------------------------------------------------------------------------------------------
 
     def leaders(self) -> list[int]:
-        """Ids whose lease is valid at this moment by their own clocks."""
+        """Return the ids whose lease is valid now by their own clocks."""
         living = [(i, life, life.lease) for i, life in sorted(self.processes.items()) if life.alive]
         return [i for i, life, lease in living if lease is not None and lease.may_command(life.clock.local(self.now))]
 
     def lease_of(self, robot_id: int) -> Lease:
+        """Return the lease of the newest incarnation of an id, which must have started."""
         lease = self.processes[robot_id].lease
         assert lease is not None, robot_id
         return lease
 
 
 def _before(node: Agent | Witness, hear: Callable[[Received], None]) -> None:
-    """Give `hear` all that comes to the node, just before the node gets it."""
+    """Call `hear` with every message that the node receives, just before the node gets it."""
     receive = node.receive
 
     def heard(received: Received) -> list[Envelope]:
@@ -346,11 +360,11 @@ def _before(node: Agent | Witness, hear: Callable[[Received], None]) -> None:
 
 
 def _refused(world: World, robot: int | None) -> int:
-    """How many commands that robot's gateway has refused so far."""
+    """Return the number of commands that the robot's gateway has refused so far."""
     gateway = world.gateways.get(robot) if robot is not None else None
     return 0 if gateway is None else sum(gateway.refused.values())
 
 
 def _place(name: str) -> int:
-    """The id of a place in the air: 0 is the world with the witness."""
+    """Return the host id of a node; 0 is the host of the world and the witness."""
     return WITNESS_ID if name == WORLD_NAME else robot_id_of(name) or WITNESS_ID

@@ -1,6 +1,6 @@
-"""`lfa fuzz`: hunt for schedules that break an invariant; shrink, trace and reproduce them.
+"""`lfa fuzz`: search for fault schedules that violate an invariant; shrink, trace and reproduce them.
 
-A seed is a schedule is a run: the same seed on the same commit fails the same way.
+A seed determines the schedule and the run: the same seed on the same commit fails in the same way.
 """
 
 from __future__ import annotations
@@ -27,20 +27,21 @@ from lfa.protocol.names import whole_number
 Player = Callable[[Schedule, Trace | None], Played]
 
 CHUNKS: dict[Player, int] = {play: 50, play_whole: 4}
-"""Seeds that one worker plays at a time."""
+"""Number of seeds per task of a worker process."""
 SEEDS: dict[Player, str] = {play: "1000", play_whole: "60"}
+"""Default of `--seeds`."""
 KINDS_CLAIM_SEEDS = 60
-"""From this many seeds on every kind of fault must have taken effect."""
+"""Minimum number of seeds from which on every kind of fault must have taken effect."""
 SEEDS_MAX = 100_000_000
 FAILURES_SHOWN_MAX = 5
 TELL_EVERY_S = 10.0
 COLUMN = 30
 SKIPPED = ("extends", "hello", "grant", "nack")
-"""What happens all the time and explains little; `propose` is told for a term's first rounds only."""
+"""Prefixes of frequent trace lines that explain little; `propose` is printed for a term's first rounds only."""
 
 
 class Tally(Struct):
-    """What a number of seeds came to."""
+    """Sum of the results of several seeds."""
 
     seeds: int = 0
     elections: int = 0
@@ -49,6 +50,7 @@ class Tally(Struct):
     """Violations by seed."""
 
     def add(self, other: Tally) -> None:
+        """Add the results of other seeds."""
         self.seeds += other.seeds
         self.elections += other.elections
         self.faults = dict(Counter(self.faults) + Counter(other.faults))
@@ -56,16 +58,19 @@ class Tally(Struct):
 
 
 def command(
-    seeds: Annotated[str | None, typer.Option(help="How many (1000, or 60 whole), or which (5000..5999).")] = None,
-    seed: Annotated[int | None, typer.Option(help="Play this one only.")] = None,
-    whole: Annotated[bool, typer.Option("--whole", help="Whole agents and the world, not leases alone.")] = False,
+    seeds: Annotated[
+        str | None, typer.Option(help="Number of seeds (1000; 60 with --whole) or range 5000..5999.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Run only this seed.")] = None,
+    whole: Annotated[bool, typer.Option("--whole", help="Simulate complete agents and the world.")] = False,
     verbose: Annotated[
-        bool, typer.Option("-v", "--verbose", help="With --seed: the trace, robots in columns.")
+        bool, typer.Option("-v", "--verbose", help="With --seed: print the trace, one column per robot.")
     ] = False,
-    jobs: Annotated[int, typer.Option(help="Processes that play at once.")] = 1,
-    out: Annotated[Path, typer.Option(help="Where traces of failed seeds are written.")] = Path("runs/fuzz"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print the tally as JSON.")] = False,
+    jobs: Annotated[int, typer.Option(help="Number of parallel processes.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for the traces of failed seeds.")] = Path("runs/fuzz"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print the totals as JSON.")] = False,
 ) -> int:
+    """Search for fault schedules that violate an invariant of the lease protocol; exit with code 1 if one does."""
     player = play_whole if whole else play
     if seed is not None and seeds is not None:
         raise Refused(f"--seed {seed} with --seeds {seeds}: must be one of the two")
@@ -77,7 +82,7 @@ def command(
 
 
 def parse_seeds(text: str) -> range:
-    """`1000` or `5000..5999`. Raises Refused for anything else."""
+    """Return the seeds of `1000` (0 to 999) or `5000..5999`. Raises Refused for other texts."""
     first, dots, last = text.partition("..")
     low, high = whole_number(first), whole_number(last)
     if low is None or (high is None and dots):
@@ -135,7 +140,7 @@ def _hunt(seeds: range, jobs: int, out: Path, as_json: bool, player: Player) -> 
 
 
 def so_far(tally: Tally, of: int, seconds: float) -> str:
-    """How a long hunt stands: also what is known of one that was ended early."""
+    """Return the progress of a long search as text; it is also the result of one that is interrupted."""
     rate = f"{60.0 * tally.seeds / seconds:.0f} a minute"
     faults = sum(tally.faults.values())
     failed = f"{len(tally.failed)} failed {sorted(tally.failed)[:FAILURES_SHOWN_MAX] or ''}".rstrip()
@@ -163,7 +168,10 @@ def _play_part(part: tuple[range, Player]) -> Tally:
 
 
 def shrink(schedule: Schedule, name: str, player: Player = play) -> Schedule:
-    """Fewer faults that still break invariant `name`: halves, then quarters, ..., then single ones are left out."""
+    """Return a schedule with fewer faults that still violates invariant `name`.
+
+    Halves of the faults are left out first, then quarters, and so on down to single faults.
+    """
     size = max(len(schedule.faults) // 2, 1)
     while True:
         index, smaller = 0, False
@@ -179,12 +187,12 @@ def shrink(schedule: Schedule, name: str, player: Player = play) -> Schedule:
 
 
 def again(seed: int, player: Player) -> str:
-    """The command that plays a seed once more."""
+    """Return the command line that runs a seed again."""
     return f"lfa fuzz {'--whole ' if player is play_whole else ''}--seed {seed} -v"
 
 
 def _explain(seed: int, out: Path, player: Player) -> Path:
-    """Write the shrunk schedule of a failed seed and its trace."""
+    """Write the shrunk schedule of a failed seed and its trace; return the path."""
     small = shrink(draw(seed), player(draw(seed), None).violations[0].name, player)
     lines: list[str] = []
     played = player(small, columns(lines, small))
@@ -196,7 +204,7 @@ def _explain(seed: int, out: Path, player: Player) -> Path:
 
 
 def columns(lines: list[str], schedule: Schedule) -> Trace:
-    """A trace that fills `lines`: time in milliseconds, then one column for the witness and one for each robot."""
+    """Return a trace that appends to `lines`: time [ms], then one column for the witness and one for each robot."""
     ids = range(schedule.robots + 1)
     lines.append("      ms  " + "".join(f"{'witness' if i == 0 else f'robot{i}':<{COLUMN}}" for i in ids).rstrip())
 
@@ -219,4 +227,5 @@ def describe(schedule: Schedule) -> str:
 
 
 def said(violation: Violation) -> str:
+    """Return a violation as one line of text."""
     return f"{violation.name} at {violation.at:.4f} s: {violation.text}"

@@ -1,4 +1,4 @@
-"""One schedule of faults carried out on lease and gateway cores in virtual time, with every invariant watched."""
+"""Execution of one fault schedule in virtual time, on leases and gateways or on complete agents, with all checkers."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 
 Stage = Union["LeaseSimulation", "AgentSimulation"]
-"""Where a schedule is played: leases alone, or whole agents."""
+"""Simulation that executes a schedule: leases only, or complete agents."""
 EXIT_S = 0.3
-"""Enough for the last words of a process that is told to exit."""
+"""Time [s] sufficient for the last messages of a process that was requested to exit."""
 
 
 class Played(Struct):
-    """What one schedule came to."""
+    """Result of one schedule."""
 
     schedule: Schedule
     violations: list[Violation]
     counts: Counter[str]
-    """Faults that took effect, by kind."""
+    """Number of faults that took effect, by kind."""
     elections: int
     arena: Stage
 
@@ -50,7 +50,7 @@ class Faults:
         arena.at(FAULTS_UNTIL_S, self.heal)
 
     def _target(self, fault: ScheduledFault) -> int | None:
-        """The id meant, None when nobody is there to be hit."""
+        """Return the id of the fault's target, or None if no such process is running."""
         target = fault.targets[0] if fault.targets else WITNESS_ID
         if target == LEADER:
             leaders = self.arena.leaders()
@@ -60,7 +60,7 @@ class Faults:
 
     def _do(self, fault: ScheduledFault) -> None:
         target = self._target(fault)
-        # What a fault began ends with the faults: L1-L4 count from there.
+        # The effects of a fault end at FAULTS_UNTIL_S at the latest: L1-L4 count from there.
         arena, lasts = self.arena, min(self.arena.now + fault.duration_s, FAULTS_UNTIL_S)
         done = True
         match fault.kind:
@@ -135,7 +135,10 @@ class Faults:
             self.arena.hint(target, *seers, up=True)
 
     def heal(self) -> None:
-        """End the faults: connect everyone and restart processes until a quorum runs (all of them when none remembers a leader)."""
+        """End all faults: reconnect everyone and start processes until a quorum runs.
+
+        All processes start if `revive_all` is set, or if no running process remembers a leader.
+        """
         arena = self.arena
         arena.heal()
         weather = arena.weather
@@ -164,12 +167,12 @@ class Faults:
 
 
 def play(schedule: Schedule, trace: Trace | None = None) -> Played:
-    """Run one schedule on leases and gateways alone. The same schedule gives the same answer, whatever ran before."""
+    """Run one schedule on leases and gateways only. The result depends on the schedule alone, not on earlier runs."""
     return _play(schedule, trace, _arena)
 
 
 def play_whole(schedule: Schedule, trace: Trace | None = None) -> Played:
-    """The same with whole agents, witness and world."""
+    """Run one schedule on complete agents, witness and world."""
     from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 
     return _play(schedule, trace, AgentSimulation)
@@ -204,9 +207,9 @@ def _play(schedule: Schedule, trace: Trace | None, stage: Callable[[Schedule], S
 
 
 def _checkers(schedule: Schedule) -> list[type[Checker]]:
-    """All invariants that this schedule puts to the test."""
+    """Return the checkers of all invariants that apply to this schedule."""
     kinds = [*SAFETY, *AFTER_FAULTS, StopsWithoutQuorum]
-    if not schedule.faults and schedule.profile != "fast":  # which 20 % of loss may cost its leader (design, section 7)
+    if not schedule.faults and schedule.profile != "fast":  # 20 % loss may cost "fast" its leader (design, 7)
         kinds.append(Steady)
     if schedule.is_single:
         kinds.append(NextInChain)

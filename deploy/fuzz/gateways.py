@@ -12,7 +12,7 @@ from lfa.protocol.messages.robot import CmdVel
 
 
 class GatewayHost(Struct):
-    """One life of one robot's gateway, and its clock."""
+    """One incarnation of one robot's gateway, and its clock."""
 
     gateway: Gateway
     clock: SimulatedClock
@@ -33,19 +33,19 @@ class GatewaySimulation(Network):
         rates: dict[int, float],
         gateway_type: type[Gateway],
     ) -> None:
-        """`rates`: of clocks other than 1, by id; minus an id is its gateway's."""
+        """Create the network without gateway. `rates` are clock rates by id, a gateway's by minus the id; default 1."""
         super().__init__(seed, ids, weather, gateways_at)
         self.timing = timing
         self.rates = rates
         self.gateways: dict[int, GatewayHost] = {}
         self.accepted: list[tuple[float, CmdVel]] = []
-        """Leader commands that a gateway obeyed."""
+        """Leader commands that a gateway accepted, each with its true time [s]."""
         self._gateway_type = gateway_type
         self._lives = 0
         self._grant_s = timing.grant_s
 
     def start_gateway(self, robot_id: int, at: float | None = None) -> None:
-        """A new life of a robot's gateway; `at` may lie in the past: it has then been up since."""
+        """Start a new incarnation of a robot's gateway; with `at` in the past it has been running since then."""
         born_at = self.now if at is None else at
         self._lives += 1
         clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
@@ -58,13 +58,13 @@ class GatewaySimulation(Network):
         self.gateways[robot_id].alive = False
 
     def latch(self, robot_id: int, incarnation: int) -> None:
-        """The robot's gateway sees its agent's token vanish, whatever is true."""
+        """Deliver the liveliness event of the agent's vanished token to the robot's gateway, true or false."""
         host = self.gateways.get(robot_id)
         if host is not None and host.alive:
             host.gateway.agent_down(incarnation, host.clock.local(self.now))
 
     def stamp(self, robot_id: int) -> GatewayStamp | None:
-        """The newest gateway stamp that reached the robot: one hop old. None when it hears no gateway."""
+        """Return the newest gateway stamp that reached the robot, one hop old; None if it is disconnected."""
         host = self.gateways.get(robot_id)
         delay = self.random.uniform(0.0005, 0.002)
         if host is None or not host.alive or self.now - delay < host.born_at:
@@ -74,7 +74,7 @@ class GatewaySimulation(Network):
         return host.gateway.stamp(host.clock.local(self.now - delay))
 
     def command(self, robot_id: int, cmd: CmdVel) -> None:
-        """`cmd` leaves the robot's process for its gateway."""
+        """Send `cmd` from the robot's process to its gateway."""
         for delay in self.delays(robot_id, -robot_id):
             self.at(self.now + delay, self._commanded, robot_id, cmd)
 
@@ -93,7 +93,7 @@ class GatewaySimulation(Network):
             tell(self.now, robot_id, cmd.term)
 
     def fence(self, robot_id: int, body: LeaseBody) -> tuple[Member, Fenced] | None:
-        """The gateway's answer, and who speaks."""
+        """Return the gateway as sender and its answer to a FENCE; None for other messages or a gateway that is down."""
         host = self.gateways.get(robot_id)
         if host is None or not host.alive or not isinstance(body, Fence):
             return None

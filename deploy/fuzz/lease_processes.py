@@ -28,16 +28,16 @@ from lfa.protocol.names import robot_name
 
 FORWARD = Twist(0.5, 0.0)
 FOLLOW_PERIOD_S = 0.1
-"""Followers command more rarely here than on the road: enough to carry terms to their gateways."""
+"""Command period [s] of followers; longer than that of real robots, but it carries terms to their gateways."""
 ROUNDING_S = 1e-9
-"""Of converting a time from one clock to another and back."""
+"""Rounding error [s] of converting a time from one clock to another and back."""
 INBOX_SIZE_MAX = 500
-"""Messages kept for a process that is paused."""
+"""Maximum number of messages kept for a paused process."""
 NEVER = float("inf")
 
 
 class Process:
-    """One life of one robot's (or the witness's) lease, with its own clock."""
+    """One incarnation of one robot's (or the witness's) lease, with its own clock."""
 
     def __init__(self, member: Member, lease: Lease, clock: SimulatedClock) -> None:
         self.member = member
@@ -47,43 +47,45 @@ class Process:
         self.alive = True
         self.paused = False
         self.leaving = False
-        """Was told to exit, and says its last words."""
+        """True after a request to exit, while the process sends its last messages."""
         self.commanding = False
         self.inbox: list[tuple[str, Any]] = []
-        """What came during a pause."""
+        """Messages received during a pause: method of the lease and its arguments."""
         self.wakes_at = NEVER
         """True time of the earliest wake-up on the heap."""
         self.drawn: CmdVel | None = None
-        """The last command computed as leader: what a pause may hold back."""
+        """Last command computed as leader; a pause may hold it back."""
 
 
 class Hosts(GatewaySimulation):
-    """Gateways and processes; `processes` holds the newest life of each id, alive or not."""
+    """Gateways and processes; `processes` holds the newest incarnation of each id, alive or not."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.processes: dict[int, Process] = {}
         self.log: list[tuple[float, int, Effect]] = []
-        """Every effect but messages and renewals."""
+        """`BecomeLeader` and `StepDown` effects, each with its true time [s] and the id."""
         self._addresses = {name: to for i in self.ids for name, to in ((robot_name(i), i), (f"gateway{i}", -i))}
         self._others = {i: tuple(other for other in self.ids if other != i) for i in self.ids}
 
-    # --- what comes --------------------------------------------------------------------------------------------
+    # --- inputs ------------------------------------------------------------------------------------------------
 
     def deliver(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
-        """Call the lease, or keep the call for the end of a pause."""
+        """Call the method of the lease, or keep the call until the end of a pause."""
         if not process.paused:
             self.take(process, method, arguments)
         elif len(process.inbox) < INBOX_SIZE_MAX:
             process.inbox.append((method, arguments))
 
     def take(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
+        """Call the method of the lease at its local time, and execute the effects."""
         if method == "receive" and type(arguments[1]) is Promise:
             for tell in self._tell["promises"]:
                 tell(self.now, arguments[0], arguments[1])
         self.carry_out(process, getattr(process.lease, method)(*arguments, process.clock.local(self.now)))
 
     def wake_at(self, process: Process, true: float) -> None:
+        """Schedule a wake-up of the process at a true time [s], unless an earlier one is scheduled."""
         if true < process.wakes_at:
             process.wakes_at = true
             self.at(true, self._wake, process)
@@ -110,9 +112,10 @@ class Hosts(GatewaySimulation):
         if answered is not None:
             self._post(answered[0], self.host_of_gateway(robot_id), src.id, answered[1])
 
-    # --- what goes ---------------------------------------------------------------------------------------------
+    # --- outputs -----------------------------------------------------------------------------------------------
 
     def carry_out(self, process: Process, effects: list[Effect]) -> None:
+        """Execute the effects of a lease; end the process if the lease is released, else update its wake-up."""
         for effect in effects:
             if self.trace is not None:
                 self.trace(self.now, process.id, told(effect))
@@ -133,7 +136,7 @@ class Hosts(GatewaySimulation):
             self.wake_at(process, max(self.now, deadline))
 
     def _note(self, process: Process, effect: Effect) -> None:
-        """Tell the checkers of an effect that is no message; a new leader commands at once."""
+        """Notify the checkers of an effect other than a message; a new leader commands at once."""
         match effect:
             case AdoptChain(config=config):
                 for tell in self._tell["adopts"]:
@@ -156,12 +159,14 @@ class Hosts(GatewaySimulation):
             tell(self.now, process.member, term, process.clock.true(expiry))
 
     def tell_end(self, process: Process) -> None:
+        """Notify the checkers that a process has ended."""
         for tell in self._tell["leads_no_more"]:
             tell(self.now, process.member)
         for tell in self._tell["ends"]:
             tell(self.now, process.member)
 
     def tell_token(self, member: Member, up: bool) -> None:
+        """Deliver the liveliness event of a member to the connected processes, each after a random delay."""
         for other in list(self.processes.values()):
             connected = (member.id, other.id) not in self.cuts
             if other.alive and other.id != member.id and connected:
@@ -182,7 +187,7 @@ class Hosts(GatewaySimulation):
             self._post(process.member, process.id, self._addresses[send.to], body)
 
     def _post(self, src: Member, here: int, to: int, body: LeaseBody) -> None:
-        """`here` is where it leaves: the id of a host. A negative `to` is a gateway."""
+        """Send a message from the host `here`; a negative `to` addresses a gateway."""
         start = self.now
         if self.filter is not None:
             extra = self.filter(src.id, to, body)
@@ -196,7 +201,7 @@ class Hosts(GatewaySimulation):
                 self.at(start + delay, self._arrive, src, to, body)
 
     def _witness(self, process: Process, body: LeaseBody) -> None:
-        """Tell the checkers what leaves a process. A PROPOSE by its holder is its own voter's grant as well."""
+        """Notify the checkers of a message of a process. A PROPOSE by its holder is also a grant of its own voter."""
         if isinstance(body, Grant):
             self._tell_grant(process, body)
         elif isinstance(body, Propose):
@@ -216,7 +221,7 @@ class Hosts(GatewaySimulation):
     # --- commands ----------------------------------------------------------------------------------------------
 
     def lead(self, process: Process) -> None:
-        """The leader's control period: read the stamp, then the clock, then the lease, then send."""
+        """Run one control period of the leader: read the stamp, then the clock, then the lease, then send."""
         lease = process.lease
         if not process.alive or lease.role is not Role.LEADER:
             process.commanding = False
@@ -237,6 +242,7 @@ class Hosts(GatewaySimulation):
         lease.commanded(local)
 
     def follow(self, process: Process) -> None:
+        """Send one command of a follower under the term of its config, and schedule the next."""
         if not process.alive:
             return
         self.at(self.now + FOLLOW_PERIOD_S, self.follow, process)

@@ -1,7 +1,7 @@
-"""A small world for leases alone: processes with clocks of their own, gateways, a faulty network, virtual time.
+"""Simulation of leases without agents: processes and gateways with own clocks, a faulty network, virtual time.
 
-Directed tests and `lfa fuzz` drive it; checkers (`deploy/analysis/verification/safety.py`, `liveness.py`) are told what leaves
-processes and gateways, in true time, which no process knows.
+Directed tests and `lfa fuzz` drive it. The checkers (`deploy/analysis/verification/safety.py`, `liveness.py`) receive
+the outputs of processes and gateways with the true time, which no process knows.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from lfa.protocol.names import WITNESS_ID
 
 
 class LeaseSimulation(Hosts):
+    """Simulation of the leases of one team; starts, ends, pauses and disturbs its processes at true times."""
+
     def __init__(
         self,
         robots: int = 4,
@@ -42,10 +44,10 @@ class LeaseSimulation(Hosts):
         self.wall_ms: dict[int, int] = {}
         """Error [s] of each host's wall clock: terms of incarnations that begin there start above that clock."""
 
-    # --- lives -------------------------------------------------------------------------------------------------
+    # --- incarnations ------------------------------------------------------------------------------------------
 
     def start_all(self, at: float = 0.0, gateways_shut_s: float = 0.0) -> LeaseSimulation:
-        """Everybody starts at once; gateways have been up before."""
+        """Start all processes at true time `at` [s]; the gateways refuse commands until `gateways_shut_s` later."""
         for robot_id in self.mission.robots:
             self.start_gateway(robot_id, at - self.timing.grant_s + gateways_shut_s)
         for robot_id in self.ids:
@@ -53,7 +55,7 @@ class LeaseSimulation(Hosts):
         return self
 
     def start(self, robot_id: int) -> None:
-        """A new life, with empty memory; a living one of the same id ends first."""
+        """Start a new incarnation with empty memory; a running one of the same id is killed first."""
         if robot_id in self.processes and self.processes[robot_id].alive:
             self.kill(robot_id)
         self._lives += 1
@@ -76,7 +78,7 @@ class LeaseSimulation(Hosts):
         self.wake_at(process, self.now)
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
-        """SIGKILL. With `hinted`, those who are connected hear of the token within `hint_delay_max`."""
+        """Kill the process (SIGKILL); with `hinted`, connected ones see its token vanish within `hint_delay_max`."""
         process = self.processes[robot_id]
         if not process.alive:
             return
@@ -89,29 +91,30 @@ class LeaseSimulation(Hosts):
             self.at(self.now + self.random.uniform(0.001, 0.005), self.latch, robot_id, process.member.incarnation)
 
     def exit(self, robot_id: int) -> None:
-        """SIGTERM: the process says its last words and ends. One that is paused does not hear it."""
+        """Request the process to release its lease and exit (SIGTERM); a paused process ignores it."""
         process = self.processes[robot_id]
         if process.alive and not process.paused:
             process.leaving = True
             self.carry_out(process, process.lease.request_release(process.clock.local(self.now)))
 
     def hand_over(self, robot_id: int) -> None:
+        """Request a hand-over of the lease from the process, unless it is paused."""
         process = self.processes[robot_id]
         if process.alive and not process.paused:
             self.carry_out(process, process.lease.request_handover(process.clock.local(self.now)))
 
     def forget(self, *lost: Member) -> None:
-        """Deliver the operator's message to every running robot, now."""
+        """Deliver the operator's `forget` command for `lost` to every running robot, now."""
         for process in self.processes.values():
             if process.alive and process.id != WITNESS_ID:
                 self.deliver(process, "request_forget", (lost,))
 
     def pause(self, robot_id: int) -> None:
-        """SIGSTOP: what comes is kept, the clock goes on."""
+        """Pause the process (SIGSTOP): incoming messages are kept, its clock goes on."""
         self.processes[robot_id].paused = True
 
     def resume(self, robot_id: int, shuffled: bool = False) -> None:
-        """SIGCONT: the command that was about to leave leaves, then everything that came is handled."""
+        """Resume the process (SIGCONT): send the command held back, then handle the kept messages."""
         process = self.processes[robot_id]
         if not process.paused:
             return
@@ -128,34 +131,35 @@ class LeaseSimulation(Hosts):
         self.wake_at(process, self.now)
 
     def hint(self, about: int, *observers: int, up: bool = False) -> None:
-        """A token that comes or goes as `observers` see it, whatever is true."""
+        """Deliver a liveliness event about `about` to `observers`, true or false."""
         member = self.processes[about].member
         for observer in observers:
             if self.processes[observer].alive:
                 self.deliver(self.processes[observer], "hint", (member.id, member.incarnation, up))
 
     def step_wall(self, robot_id: int, by_s: float) -> None:
-        """A host's wall clock is set wrong; no other clock can be stepped."""
+        """Set a host's wall clock wrong by `by_s` [s]; no other clock can be stepped."""
         self.wall_ms[robot_id] = round(by_s * 1000.0)
         for tell in self._tell["wall_steps"]:
             tell(self.now, robot_id)
 
     def lose_late(self, within_s: float) -> None:
-        """What is on its way and would need longer than that never arrives."""
+        """Drop the messages in transit that would arrive later than `within_s` [s] from now."""
         self.lose(self.now + within_s, (self._arrive, self._at_gateway, self._commanded))
 
     def tell_healed(self) -> None:
-        """The last fault is over."""
+        """Notify the checkers that the last fault is over."""
         for tell in self._tell["heals"]:
             tell(self.now, 4.0 * self.weather.delay_max)
 
-    # --- what tests ask ----------------------------------------------------------------------------------------
+    # --- queries of tests --------------------------------------------------------------------------------------
 
     def leaders(self) -> list[int]:
-        """Ids whose lease is valid at this moment by their own clocks."""
+        """Return the ids whose lease is valid now by their own clocks."""
         return [
             i for i, p in sorted(self.processes.items()) if p.alive and p.lease.may_command(p.clock.local(self.now))
         ]
 
     def lease_of(self, robot_id: int) -> Lease:
+        """Return the lease of the newest incarnation of an id."""
         return self.processes[robot_id].lease

@@ -1,7 +1,7 @@
 """True time and a faulty network for leases in virtual time.
 
-One heap of (true time, number, event). Everything random comes from one generator, so the same seed and the same calls
-do the same. A message that leaves where something is cut is lost; one that is on its way arrives.
+Events are in one heap of (true time, number, event). All random numbers come from one generator, so the same seed and
+the same calls give the same run. A message sent over a cut link is lost; one already in transit arrives.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, S
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Term
 
 REORDER_S = 0.15
-"""More than three heartbeats of the profile std."""
+"""Maximum delay [s] of a message held back; more than three heartbeats of the profile std."""
 
 
 class SimulatedClock(Struct, frozen=True):
-    """local = offset + rate * true."""
+    """Clock with local = offset + rate * true; offset in seconds."""
 
     offset: float = 0.0
     rate: float = 1.0
@@ -35,21 +35,21 @@ class SimulatedClock(Struct, frozen=True):
 
 
 class LinkConditions(Struct):
-    """What the network does to messages that leave now; times in seconds."""
+    """Link conditions for messages sent now; times in seconds."""
 
     delay_min: float = 0.0003
     delay_max: float = 0.002
     loss: float = 0.0
     duplicate: float = 0.0
     tail: float = 0.0
-    """Probability of an exponential delay on top, of mean `tail_mean`."""
+    """Probability of an additional exponential delay of mean `tail_mean`."""
     tail_mean: float = 0.05
     reorder: float = 0.0
-    """Probability that a message is held back for up to `REORDER_S`: later ones overtake it."""
+    """Probability that a message is held back for up to `REORDER_S`, so that later ones overtake it."""
     hint_delay_max: float = 0.005
 
     def delays(self, random: Random) -> Sequence[float]:
-        """How long each copy of a message takes; none when it is lost."""
+        """Return the delay [s] of each copy of a message; empty if it is lost."""
         chance = random.random
         if self.loss and chance() < self.loss:
             return ()
@@ -64,16 +64,19 @@ class LinkConditions(Struct):
 
 
 Filter = Callable[[int, int, LeaseBody], float | None]
-"""(from, to, body) -> extra delay [s]; None loses the message. Gateways are addressed as minus their robot's id."""
+"""Function (from, to, body) -> extra delay [s]; None drops the message. A gateway's address is minus its robot's id."""
 Trace = Callable[[float, int, str], None]
-"""(true time [s], id, what it did): for people."""
+"""Function (true time [s], id, text of the action) that writes a readable trace."""
 
 
 class Network:
-    """Simulated network between `ids`: time, chance, link conditions and cuts. A gateway's address is minus its robot's id."""
+    """Simulated network between `ids`: time, random numbers, link conditions, cuts.
+
+    A gateway's address is minus its robot's id.
+    """
 
     def __init__(self, seed: int, ids: tuple[int, ...], weather: LinkConditions, gateways_at: int | None) -> None:
-        """`gateways_at`: the id on whose host all gateways are; None: each is on its robot's."""
+        """Create the network. `gateways_at` is the host of all gateways; None: each gateway is on its robot's host."""
         self.random = Random(seed)
         self.now = 0.0
         self.ids = ids
@@ -81,25 +84,25 @@ class Network:
         self.filter: Filter | None = None
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
-        """Directed pairs of ids between which nothing passes."""
+        """Directed pairs of ids between which no message passes."""
         self._gateways_at = gateways_at
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._number = 0
         self.listen(())
 
     def listen(self, checkers: Sequence[Checker]) -> None:
-        """Tell these checkers, and only these, what happens from here on."""
+        """Notify these checkers, and only these, of all events from now on."""
         self._tell = listeners(checkers)
 
-    # --- the course of time ------------------------------------------------------------------------------------
+    # --- virtual time ------------------------------------------------------------------------------------------
 
     def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
-        """`what(*arguments)` when true time reaches `time`."""
+        """Schedule the call `what(*arguments)` at true time `time` [s]."""
         self._number += 1
         heappush(self._heap, (time, self._number, what, arguments))
 
     def run(self, until: float) -> Self:
-        """All that happens up to true time `until`."""
+        """Execute all events up to true time `until` [s]."""
         while self._heap and self._heap[0][0] <= until:
             self.now, _, what, arguments = heappop(self._heap)
             what(*arguments)
@@ -107,28 +110,30 @@ class Network:
         return self
 
     def lose(self, by: float, arrivals: tuple[Callable[..., None], ...]) -> None:
-        """What would arrive after true time `by`, by one of these calls, never does."""
+        """Drop the scheduled calls of `arrivals` that are later than true time `by` [s]."""
         self._heap = [event for event in self._heap if event[0] <= by or event[2] not in arrivals]
         heapify(self._heap)
 
     # --- cuts --------------------------------------------------------------------------------------------------
 
     def cut(self, *groups: tuple[int, ...]) -> None:
-        """Nothing passes between different groups, either way; ids in no group form one."""
+        """Block all messages between different groups, in both directions; ids in no group form one group."""
         rest = tuple(i for i in self.ids if not any(i in g for g in groups))
         sides = [*groups, rest]
         self.part({(a, b) for one in sides for other in sides if one is not other for a in one for b in other})
 
     def part(self, pairs: set[tuple[int, int]]) -> None:
-        """From now on nothing passes from the first to the second of each pair."""
+        """Block all messages from the first to the second id of each pair."""
         self.cuts |= pairs
         self._tell_cuts()
 
     def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
+        """Remove the cuts of these directed pairs."""
         self.cuts -= pairs
         self._tell_cuts()
 
     def heal(self) -> None:
+        """Remove all cuts."""
         self.cuts.clear()
         self._tell_cuts()
 
@@ -139,10 +144,11 @@ class Network:
     # --- messages ----------------------------------------------------------------------------------------------
 
     def host_of_gateway(self, robot_id: int) -> int:
+        """Return the id of the host on which a robot's gateway runs."""
         return robot_id if self._gateways_at is None else self._gateways_at
 
     def delays(self, here: int, to: int) -> Sequence[float]:
-        """How long each copy of a message takes from host `here`; none when it is lost."""
+        """Return the delay [s] of each copy of a message from host `here` to the address `to`; empty if it is lost."""
         there = to if to >= 0 else self.host_of_gateway(-to)
         if here == there:
             return (0.0001 + 0.0004 * self.random.random(),)
@@ -152,7 +158,7 @@ class Network:
 
 
 def told(effect: Effect) -> str:
-    """An effect in the few words that a column has room for."""
+    """Return a short text of an effect that fits a column of the trace."""
     match effect:
         case Send(to=to, body=body):
             detail = f" r{body.round}" if isinstance(body, Propose | Grant) else ""
@@ -167,8 +173,10 @@ def told(effect: Effect) -> str:
 
 
 def body_term(body: LeaseBody) -> str:
+    """Return the term of a message as text; empty for HELLO, which has none."""
     return "" if isinstance(body, Hello) else short(body.term)
 
 
 def short(term: Term) -> str:
+    """Return a term as text without its issuer's incarnation."""
     return f"{term.n}.{term.issuer}"

@@ -1,7 +1,7 @@
 """Fault model of `lfa fuzz` as data, and schedules drawn from a seed.
 
-Each seed draws its own link conditions and its own few kinds of fault (swarm testing): many schedules with few kinds of
-frequent faults test more than one schedule with all kinds of rare faults. Faults fall in the first 4 s, then everything heals.
+Each seed draws its own link conditions and its own few kinds of fault (swarm testing): many schedules with a few
+frequent kinds of fault test more than one with all kinds, each rare. Faults occur in the first 4 s, then all heal.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ DURATION_S = 8.0
 WARM_UP_S = 0.6
 FAULTS_MEAN = 30
 CALM_SHARE = 0.05
-"""Schedules without a fault: nobody may stop leading (L5)."""
+"""Fraction of schedules without a fault, in which no leader may step down (L5)."""
 SINGLE_SHARE = 0.05
-"""Schedules in which a leader is killed and nothing else happens: the next in the chain leads (L6)."""
+"""Fraction of schedules with the kill of a leader as only fault, after which the next in the chain leads (L6)."""
 LEADER_SHARE = 0.4
 """Share of the faults with one target that are aimed at the leader of that moment."""
 
@@ -39,7 +39,7 @@ class ScheduledFault(Struct, frozen=True):
 
 
 class Schedule(Struct, frozen=True):
-    """Everything that a seed draws."""
+    """Team, link conditions and faults drawn from one seed."""
 
     seed: int
     robots: int
@@ -50,7 +50,7 @@ class Schedule(Struct, frozen=True):
     faults: tuple[ScheduledFault, ...]
     weather: LinkConditions
     revive_all: bool
-    """At the end of the faults every dead process starts again; else only as many as a quorum needs."""
+    """True if every dead process restarts at the end of the faults; else only as many as a quorum needs."""
 
     @property
     def is_single(self) -> bool:
@@ -79,8 +79,11 @@ KINDS: tuple[str, ...] = (
     "gateway",
     "witness",
 )
-"""Kinds that a schedule may draw; `burst` is a short total loss, `gateway` and `witness` are a crash with a restart,
-`clock_step` sets a wall clock wrong (no other clock can be stepped), and two times in three the process restarts."""
+"""Kinds of fault that a schedule may draw.
+
+`burst` is a short total loss, `gateway` and `witness` are a crash with a restart. `clock_step` sets a wall clock wrong
+(no other clock can be stepped), and two times in three the process restarts.
+"""
 
 
 def draw(seed: int) -> Schedule:
@@ -119,7 +122,7 @@ def _when(fault: ScheduledFault) -> float:
 
 
 def _rate(random: Random) -> float:
-    """Two clocks in three run as fast or as slow as is allowed."""
+    """Return a clock rate; two in three are the fastest or slowest allowed."""
     return 1.0 + CLOCK_RATE_ERROR * random.choice((-1.0, 1.0, random.uniform(-1.0, 1.0)))
 
 
@@ -168,6 +171,6 @@ def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> ScheduledF
 
 
 def without(schedule: Schedule, *indices: int) -> Schedule:
-    """The same schedule with some faults left out."""
+    """Return the schedule without the faults at `indices`."""
     kept = tuple(fault for index, fault in enumerate(schedule.faults) if index not in indices)
     return structs.replace(schedule, faults=kept)

@@ -1,4 +1,4 @@
-"""How a run ends, in either mode: on a signal or a verdict, with a summary, figures and an exit code."""
+"""End of a run in either mode: on a signal or a verdict, with summary, figures and exit code."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lfa.deploy.recording.run_folder import About
 
 
 class Ended(Struct, frozen=True):
-    """A run that is over; `signal` is what ended it, if anything did."""
+    """Finished run; `signal` is the signal that ended it, if any."""
 
     folder: Path
     summary: Summary
@@ -29,7 +29,7 @@ class Ended(Struct, frozen=True):
 
     @property
     def exit_code(self) -> int:
-        """128 + signal as shells count (130, 143), else what the summary says."""
+        """Exit code: 128 + signal as in shells (130, 143), else that of the summary."""
         return self.summary.exit_code if self.signal is None else 128 + self.signal
 
 
@@ -39,7 +39,7 @@ def verdict_of(interrupts: Interrupts) -> Verdict | None:
 
 
 def reread(folder: Path, ended_by: signal.Signals | None) -> Ended:
-    """A run whose summary somebody else has written."""
+    """Return a finished run whose summary the recorder process has written."""
     return Ended(folder, summaries.read(folder), ended_by)
 
 
@@ -52,7 +52,7 @@ def finish(
     ended_by: signal.Signals | None,
     recording: Recording | None = None,
 ) -> Ended:
-    """Read the closed recording back and write `summary.json`."""
+    """Read the closed recording, write `summary.json`, and return the finished run."""
     summary = summarize(folder, about, verdict, duration_s, faults_left)
     summary.recording = recording
     summaries.write(folder, summary)
@@ -60,7 +60,10 @@ def finish(
 
 
 def report(ended: Ended, *, figures: bool, as_json: bool, junit: Path | None = None) -> int:
-    """Draw, write the judgements as JUnit XML where wanted, print, and return the exit code. Raises Refused."""
+    """Draw figures, print the summary, write assertions as JUnit XML if requested; return the exit code.
+
+    Raises Refused.
+    """
     if figures:
         from lfa.deploy.view.figures.command import draw
 

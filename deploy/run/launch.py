@@ -1,6 +1,6 @@
-"""`lfa run`: starts router, recorder, world and agents as processes of this machine, and ends them all.
+"""`lfa run`: a scenario with router, recorder, world and agents as processes of this machine.
 
-The launcher starts them, observes the bus, injects the faults, and terminates them. If the launcher itself is killed,
+The launcher starts them, observes the bus, injects the faults, and ends them all. If the launcher itself is killed,
 the kernel ends router, world and agents (`parent_death.py`), and the recorder closes the run folder.
 """
 
@@ -49,9 +49,9 @@ SHOW_EVERY_S = 0.2
 START_S_MAX = 20.0
 SILENCE_S_MAX = 5.0
 SOCKET_FOLDER_MAX = 60
-REVIVE_S_MIN = 1.0  # between two starts of a process that fails again and again
-NEWS_S = 2.0  # how long a robot that starts again is told the weather
-RECORDER_S_MAX = 30.0  # to read the recording back and sum it up
+REVIVE_S_MIN = 1.0  # minimum time between two starts of a failing process
+NEWS_S = 2.0  # how long the link conditions are repeated after a restart
+RECORDER_S_MAX = 30.0  # to read the recording and write the summary
 
 
 def command(
@@ -66,6 +66,7 @@ def command(
     junit: JUnit = None,
     as_json: AsJson = False,
 ) -> int:
+    """Run a scenario as processes on this machine; exit with the code of its summary."""
     chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     if junit is not None:
@@ -75,7 +76,7 @@ def command(
 
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
-    """Run `scenario` as processes; when this returns, none of them is left. Raises Refused for a bad `out`."""
+    """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out`."""
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
     about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}")
@@ -92,13 +93,13 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
 
 
 def _socket_folder() -> Path:
-    """A new private folder with a short name: a socket's path must not have more than 107 bytes."""
+    """Create a private folder with a short name: a socket's path is limited to 107 bytes."""
     usual = tempfile.gettempdir()
     return Path(tempfile.mkdtemp(prefix="lfa-", dir=usual if len(usual) <= SOCKET_FOLDER_MAX else "/tmp"))
 
 
 class _Aborted(Exception):
-    """One of the processes that a run cannot do without has failed."""
+    """Error: a process that the run requires has failed."""
 
 
 class _Launch:
@@ -114,7 +115,7 @@ class _Launch:
         self._restart = drawn.restart
         self._revive_at: dict[str, float] = {}
         self._restarted: list[str] = []
-        """Processes started again of which nobody was told yet."""
+        """Restarted processes whose `restarted` event is not yet published."""
         self._schedule = FaultSchedule(faults)
         self._undone: list[str] = []
         self._doomed: set[str] = set()
@@ -127,15 +128,15 @@ class _Launch:
         self._inbox = Inbox()
         self._bus: ZenohBus | None = None
         self._air = LinkModel(CLEAR, Random(0))
-        """Link conditions as last ordered, by the script or by hand; a process that restarts receives them."""
+        """Link conditions as last ordered, by the script or by hand; they are repeated to a process that restarts."""
         self._repeat_weather_until = 0.0
         self.summed_up = False
-        """The recorder has written `summary.json`."""
+        """True once the recorder has written `summary.json`."""
 
     # --- from start to verdict ----------------------------------------------------------------------------------
 
     def play(self, interrupts: Interrupts) -> RunResult:
-        """All of the run; nothing that was started is left when this returns or raises."""
+        """Execute the whole run; all processes have ended when this returns or raises."""
         view = progress()
         try:
             verdict = self._watch(interrupts, view)
@@ -167,7 +168,7 @@ class _Launch:
         return verdict_of(interrupts) or self._referee.verdict or Verdict("aborted")
 
     def _start(self, interrupts: Interrupts) -> None:
-        """Router first, then the recorder, so that nothing goes unheard; world and agents in no order."""
+        """Start the router, then the recorder, so that it misses no message; then world and agents in any order."""
         router, recorder, *others = self._rows
         self._processes.start(router)
         self._await(router.name, lambda: answers(self._endpoint), interrupts)
@@ -192,7 +193,7 @@ class _Launch:
                 raise _Aborted(f"{name} was not ready within {START_S_MAX:g} s")
             clock.sleep(STEP_S)
 
-    # --- what comes -----------------------------------------------------------------------------------------------
+    # --- received messages ------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
         for arrival in self._inbox.take():
@@ -210,7 +211,7 @@ class _Launch:
             self._heard_at = at
             self._began_at = at if self._began_at is None else self._began_at
             self._time.see(at, message.time_s)
-            while self._restarted:  # not before: what is said while the router is away is lost
+            while self._restarted:  # only now: messages published while the router is down are lost
                 name = self._restarted.pop(0)
                 self._say("restarted", name=name, robot=robot_id_of(name), t=message.time_s)
         elif isinstance(message, Event) and message.header.sender == OPERATOR_NAME:
@@ -225,15 +226,15 @@ class _Launch:
         self._standing.see(message)
 
     def _expect(self, event: Event) -> None:
-        """Somebody does a fault by hand (`lfa fault`): that death is no accident."""
+        """Register a fault by hand (`lfa fault`), so that the end of its process is not reported as a failure."""
         robot, deed = event.data.get("robot"), event.data.get("deed")
         if event.kind == "fault" and deed in ("kill", "terminate") and robot in self._mission.robots:
             self._doomed.add(robot_name(robot))
 
-    # --- what must go on -------------------------------------------------------------------------------------------
+    # --- supervision -----------------------------------------------------------------------------------------------
 
     def _check(self, view: Progress) -> None:
-        """Without router, recorder or world there is no run; an agent's death is what the others are for."""
+        """Check all processes: abort the run if router, recorder or world has ended, and report ended agents."""
         for name in (ROUTER_NAME, RECORDER_NAME, WORLD_NAME):
             if not self._revives(name, view):
                 self._needs(name)
@@ -254,7 +255,7 @@ class _Launch:
             raise _Aborted("nothing is heard of the world")
 
     def _revives(self, name: str, view: Progress) -> bool:
-        """Start it again when it has failed and the scenario says so; False when its end is for good."""
+        """Restart a failed process if the scenario's restart policy says so; return False if it does not apply."""
         policy = self._restart.get(name, self._restart.get("robots") if name.startswith("robot") else None)
         if policy != "on-failure" or not self._processes.failed(name):
             return False
@@ -287,7 +288,7 @@ class _Launch:
             self._publish(self._operator.orders_key, again)
 
     def _do(self, deed: FaultAction, victim: int | str) -> bool:
-        """False when there is nobody to do it to, or somebody already."""
+        """Execute a fault action; return False if its process is not running, or for a restart already running."""
         if deed in ORDERS:
             self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
             self._publish(
@@ -317,9 +318,9 @@ class _Launch:
     # --- the end ---------------------------------------------------------------------------------------------------
 
     def _end(self, word: RunResult) -> None:
-        """Agents and world, then the recorder, which sums up, then the router; each with a grace."""
+        """End agents and world, then the recorder, which writes the summary, then the router, each with a timeout."""
         team = [row.name for row in self._rows if row.name not in (ROUTER_NAME, RECORDER_NAME)]
-        # When it is said: on a busy machine some of the team are gone before this comes to the recorder.
+        # Stamped when published: on a busy machine some agents have ended before the recorder receives it.
         self._say("over", t=self._time.of(clock.now()))
         self._processes.terminate(team)
         if self._processes.runs(RECORDER_NAME):

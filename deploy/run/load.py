@@ -1,4 +1,4 @@
-"""The scenario that a person asked for, checked as far as it can be before anything starts."""
+"""Loading of the requested scenario, with all checks that are possible before a process starts."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from lfa.world.description.load import Scenario
 def rebuild_scenario(
     scenario: str, overrides: Sequence[str], robots: int | None, seed: int | None, map_from: Path | None
 ) -> tuple[Scenario, int]:
-    """The scenario and the seed (0 when not given); with `map_from` the paper's iteration 2.
+    """Return the scenario and the seed (0 by default); with `map_from`, prepare the paper's iteration 2.
 
-    That is the world of the earlier run in that folder (its seed, unless another is given), with what its robots met
-    told to the team as known. Raises Refused with one line.
+    Iteration 2 is the world of the earlier run in that folder (with its seed, unless another is given), with the
+    obstacles that its robots met as known obstacles of the team. Raises Refused with one line.
     """
     chosen = load_scenario(scenario, overrides, robots)
     if map_from is None:

@@ -1,4 +1,4 @@
-"""The table of processes of a run."""
+"""Table of the processes of a run: command line and restart arguments of each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
 
 
 def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[ProcessSpec]:
-    """The table of processes of a run, in the order in which they are started."""
+    """Return the processes of a run in the order in which they are started."""
     team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
     world = ("lfa.world.cli", str(folder / SCENARIO), "--seed", str(about.seed), "--state", str(folder), *team)
     return [

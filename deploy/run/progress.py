@@ -1,4 +1,4 @@
-"""Live progress: a table that is redrawn on a terminal, a line now and then elsewhere."""
+"""Live progress of a run: a table that is redrawn on a terminal, otherwise a line every 5 s."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ REDRAW_HZ = 5.0
 
 
 class Progress(Protocol):
-    """Where a person looks while a run goes on. It goes to stderr: stdout is for what comes out at the end."""
+    """Display of a run's progress on stderr; stdout is reserved for the result."""
 
     def show(self, standing: FleetState, leader: int | None) -> None: ...
 
     def note(self, standing: FleetState, text: str) -> None:
-        """Something happened."""
+        """Print a line about an occurrence, with the world's time [s]."""
 
     def close(self) -> None: ...
 
 
 def progress() -> Progress:
+    """Return the display that fits stderr: a table on a terminal, otherwise lines."""
     return _OnTerminal() if sys.stderr.isatty() else _InLines()
 
 

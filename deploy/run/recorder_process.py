@@ -1,8 +1,8 @@
 """The recorder process: records all messages of one fleet and closes the run folder, whichever process dies.
 
-The launcher holds the other end of its standard input. One line of JSON there is the verdict; an end of file without
-one means that the launcher died: then the run is called aborted, and what the launcher would have cleaned up is
-cleaned up here. Start: `python -m lfa.deploy.run.recorder_process TASK`, with a `RecorderTask` as JSON.
+The launcher writes to its standard input. One line of JSON there is the verdict. An end of file without a line means
+that the launcher died: the run is then aborted, and this process cleans up in its place. Start:
+`python -m lfa.deploy.run.recorder_process TASK`, with a `RecorderTask` as JSON.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from lfa.protocol.topics import RECORDER_NAME, TOPIC, address, alive_key, key
 from lfa.protocol.transport.bus import Arrival, Inbox, Wake
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 
-INBOX_SIZE_MAX = 65536  # a minute of a fleet of four, should the disk be slow
+INBOX_SIZE_MAX = 65536  # one minute of a fleet of four, in case the disk is slow
 WAIT_S = 0.05
-LAST_WORDS_S = 0.2  # what is still on its way when the verdict comes
+LAST_WORDS_S = 0.2  # for messages in transit when the verdict arrives
 
 
 class RecorderTask(Struct, frozen=True):
-    """What to record, where to, and which folder of sockets goes when the launcher cannot remove it."""
+    """Task of the recorder: run folder, fleet, endpoint, and the folder of sockets to remove if the launcher dies."""
 
     folder: str
     about: About
@@ -48,7 +48,7 @@ class RecorderTask(Struct, frozen=True):
 
 
 class RunResult(Struct, frozen=True):
-    """The verdict, as the launcher sends it."""
+    """Result of a run, as the launcher sends it."""
 
     verdict: Verdict
     duration_s: float
@@ -56,6 +56,7 @@ class RunResult(Struct, frozen=True):
 
 
 def main() -> None:
+    """Record until a line, an end of file, or a signal arrives, then close the run folder."""
     task = msgspec.json.decode(sys.argv[1], type=RecorderTask)
     told = Wake()
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -77,7 +78,7 @@ def main() -> None:
 
 
 def _listen(word: list[RunResult], told: Wake) -> None:
-    """Wait for the launcher's line, or for its end."""
+    """Wait for the launcher's line or the end of its output."""
     line = sys.stdin.buffer.readline()
     if line.endswith(b"\n"):
         word.append(msgspec.json.decode(line, type=RunResult))
@@ -85,7 +86,7 @@ def _listen(word: list[RunResult], told: Wake) -> None:
 
 
 class _Tape:
-    """The bus on one side, the recorder on the other."""
+    """Connection of the bus to the recorder."""
 
     def __init__(self, task: RecorderTask) -> None:
         fleet = task.about.fleet
@@ -104,7 +105,7 @@ class _Tape:
         self._bus.announce(fleet, RECORDER_NAME, self._incarnation)
 
     def drain(self) -> None:
-        """Write down all that came."""
+        """Record all pending messages."""
         for arrival in self._inbox.take():
             heard = self._heard(arrival)
             if heard is None:
@@ -117,7 +118,7 @@ class _Tape:
         self._recorder.flush_when_due(self._time.of(clock.now()))
 
     def _count_missing(self, where: str, header: Header) -> None:
-        """A gap in a sender's numbers is messages that never came: the recorder should lose none."""
+        """Count the gaps in a sender's sequence numbers, which are lost messages; the recorder should lose none."""
         owner_and_topic = "/".join(where.split("/")[2:4])
         stream = (owner_and_topic, header.sender, header.incarnation)
         before = self._last_seq.get(stream, header.seq - 1)
@@ -125,6 +126,7 @@ class _Tape:
         self._last_seq[stream] = max(before, header.seq)
 
     def close(self, verdict: Verdict) -> Recording:
+        """Record the end of the run, close recorder and bus, and return the counts."""
         now = clock.now()
         end = self._operator.says("end", now, outcome=verdict.outcome, reason=verdict.reason)
         self._recorder.record(self._time.of(now), self._operator.key, end)
@@ -137,7 +139,7 @@ class _Tape:
         return recording
 
     def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
-        """Key and message to be recorded; a liveliness change is an event of the recorder's own."""
+        """Return key and message to record; a liveliness change becomes an event published by the recorder."""
         match arrival.payload:
             case PeerUp(name=name, incarnation=life):
                 return self._key, self._says("peer_up", name, life)

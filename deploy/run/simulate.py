@@ -1,4 +1,4 @@
-"""`lfa sim`: a scenario in one process and virtual time, with agents, world, codec and journals as in real time."""
+"""`lfa sim`: a scenario in one process and virtual time, with the agents, world, codec and journals of `lfa run`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from lfa.world.world import World
 FLEET = "sim"
 JOURNAL_FLUSH_S = 1.0
 SILENCE_S_MAX = 1.0
-LEADER_WAIT_S = 0.01  # a fault on the leader waits for one, looking this often
+LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
 
 
 def command(
@@ -49,6 +49,7 @@ def command(
     junit: JUnit = None,
     as_json: AsJson = False,
 ) -> int:
+    """Run a scenario in virtual time in this process; exit with the code of its summary."""
     chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
     faults = parse_all(chosen.mission, chosen.faults, fault or ())
     if junit is not None:
@@ -58,7 +59,7 @@ def command(
 
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault] = ()) -> Ended:
-    """Run `scenario` as `seed` draws it; the run folder stands when this returns. Raises Refused for a bad `out`."""
+    """Run `scenario` drawn with `seed` and write the run folder. Raises Refused for a bad `out` or fault."""
     common = next((fault for fault in faults if fault.target in COMMON), None)
     if common is not None:
         raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
@@ -75,7 +76,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
 
 
 class _Run:
-    """The team in the simulator; the recorder and the referee hear all that is published."""
+    """Team in the simulator; recorder and referee receive all published messages."""
 
     def __init__(self, drawn: Scenario, seed: int, folder: Path, recorder: Recorder) -> None:
         self._scenario = drawn
@@ -92,7 +93,7 @@ class _Run:
         self.recording: Recording | None = None
 
     def play(self, schedule: FaultSchedule, interrupts: Interrupts) -> Verdict:
-        """Start the team, run until it is over, close the recording and the journals."""
+        """Start the team, run to the end, close the recording and the journals; return the verdict."""
         self._say("start", scenario=self._scenario.name, seed=self._seed)
         self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
         if self._scenario.mission.witness:
@@ -123,7 +124,7 @@ class _Run:
         return Verdict("aborted", "the world fell silent")
 
     def _do(self, deed: FaultAction, victim: int | str) -> None:
-        """Apply a fault action. One on an absent process, or a start of a running one, has no effect, as a signal has none."""
+        """Execute a fault action; it has no effect on an absent robot, nor has a restart on a running one."""
         if deed in ORDERS:
             self._order(deed, victim)
             return
@@ -146,7 +147,7 @@ class _Run:
                 self._add(self._agent(victim))
 
     def _order(self, deed: FaultAction, target: int | str) -> None:
-        """Deliver an operator's message: link conditions to the link model, anything else to all agents."""
+        """Execute an operator command: link conditions go to the link model, other commands to all agents."""
         now = self._simulator.now
         self._say("fault", deed=deed, robot=target, t=now)
         said = note(self._operator, now, deed, target, self._scenario.mission.robots)
@@ -180,7 +181,7 @@ class _Run:
         return self._lives[name]
 
     def _flush(self) -> None:
-        """Hand the journals to the kernel every so often, so that they do not pile up in memory."""
+        """Flush the journals now and every `JOURNAL_FLUSH_S`, to limit their use of memory."""
         for journal in self._journals.values():
             journal.flush()
         self._simulator.at(self._simulator.now + JOURNAL_FLUSH_S, self._flush)

@@ -1,8 +1,8 @@
-"""When a run is over, and how: watches what travels, decides once. Pure: time comes with the messages.
+"""Termination of a run: the verdict, decided once from the messages. Pure: time comes with the messages.
 
-A run has reached its goal when the leader of the present chain stands within the goal's tolerance and all robots of
-that chain have been at rest for `REST_S`. It has failed when an agent says so, and has run out of time when the
-world's clock passes the scenario's limit.
+A run has reached its goal when the leader of the present chain is within the goal's tolerance and all robots of that
+chain have been at rest for `REST_S`. It has failed when an agent publishes a `failed` event, and has run out of time
+when the world's clock passes the scenario's limit.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ REST_SPEED = 1e-3  # [m/s] and [rad/s]
 
 
 class Referee:
-    """Feed it every truth and event; `verdict` stays None until the run is over.
+    """Judge of a run from every Truth and Event; `verdict` is None until the run is over.
 
     `chain` is the present chain, `leader` the robot whose leader command of the highest term was accepted last.
     """
@@ -37,6 +37,7 @@ class Referee:
         self.verdict: Verdict | None = None
 
     def see(self, message: Message) -> Verdict | None:
+        """Update with a message and return the verdict, or None while the run goes on."""
         if self.verdict is None:
             match message:
                 case Truth():
@@ -75,7 +76,7 @@ class Referee:
 
 
 def _ids(said: object) -> tuple[int, ...]:
-    """The robot ids in an event's data, which may come from anybody."""
+    """Return the robot ids in an event's data, which any sender may have written."""
     return tuple(i for i in said if isinstance(i, int)) if isinstance(said, list | tuple) else ()
 
 

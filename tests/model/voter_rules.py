@@ -1,7 +1,7 @@
 """What a voter may promise and grant (E3, E15, E16), as pure functions of small numbers.
 
-The timed model decides with these; `refinement.py` shows that `lfa.protocol.lease.acceptor.Acceptor` decides the same in every
-state that it can reach. Terms and ids are small integers; 0 is "no term", holder None is "not bound".
+The timed model decides with these; `refinement.py` shows that `lfa.protocol.lease.acceptor.Acceptor` decides the same
+in every state that it can reach. Terms and ids are small integers; 0 is "no term", holder None is "not bound".
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""An onlooker at one router: what each robot's stream of poses is like there, and which chain stands."""
+"""Observer session at one router: longest silence in each robot's stream of poses, and the present chain."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ class Onlooker:
                 self.events.append(message)
 
     def begin(self) -> None:
-        """Measure from here on."""
+        """Discard earlier gaps and events, and start to measure."""
         self.listen()
         self._gaps.clear()
         self.events.clear()
 
     def gaps(self) -> dict[int, float]:
-        """Of each robot the longest silence so far, the one that lasts now among them."""
+        """Return the longest silence [s] of each robot since `begin`, including the present one."""
         now = clock.now()
         return {
             robot: max(self._gaps.get(robot, 0.0), now - self._last.get(robot, float("-inf"))) for robot in self.robots
@@ -79,7 +79,7 @@ class Onlooker:
 
 @contextmanager
 def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[Onlooker]:
-    """At machine `at`'s router, over its unix socket: no network lies between."""
+    """Open an observer session at machine `at`'s router over its unix socket, without a network in between."""
     part = machines.part(at)
     eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at}")), f"no router answers at {at}")
     with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS, every=True) as ear:

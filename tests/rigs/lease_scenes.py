@@ -1,4 +1,4 @@
-"""What the tests of voter, lease and team begin with: a voter, a lease among two others, a team that robot 1 leads."""
+"""Initial states for tests of the lease: a voter, a lease with two other voters, a simulated team led by robot 1."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TEAM = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))
 
 
 class Team(LeaseSimulation):
-    """An arena whose safety checkers are on, with everybody started and led by robot 1 at 1 s, or at `led_by`."""
+    """Lease simulation with safety checkers, run until robot 1 leads, at 1 s or at `led_by` [s]."""
 
     def __init__(self, robots: int = 4, led_by: float = 1.0, **options: object) -> None:
         super().__init__(robots, **options)  # type: ignore[arg-type]
@@ -44,16 +44,16 @@ class Team(LeaseSimulation):
         return True
 
     def changes(self, since: float = 1.0) -> list[tuple[int, str]]:
-        """Who became leader or stepped down since then."""
+        """Return each id that became leader or stepped down after `since`, with the name of the effect."""
         return [(who, type(effect).__name__) for at, who, effect in self.log if at > since]
 
     def led_at(self, since: float) -> float:
-        """When somebody first became leader after `since`."""
+        """Return the true time [s] when a process first became leader after `since`."""
         return next(at for at, _, effect in self.log if at > since and isinstance(effect, BecomeLeader))
 
 
 def config_of(term: Term, seq: int = 0) -> Config:
-    """Four robots and the witness, in their first lives."""
+    """Return the config of four robots and the witness, all in their first incarnation."""
     chain = tuple(Member(i, 1) for i in TEAM.robots)
     tie = Member(0, 1)
     return Config(Version(term, seq), (*chain, tie), tie, None, chain)
@@ -63,7 +63,7 @@ OLD = config_of(Term(1, 1, 1))
 
 
 def voter(now: float = 10.0) -> Acceptor:
-    """One that has been up for long."""
+    """Return a voter whose start-up wait is over."""
     return Acceptor(Term(), STD.grant_s, now - 1.0)
 
 
@@ -76,7 +76,7 @@ LOW, HIGH = Term(5, 1, 7), Term(6, 2, 8)
 
 
 def alone() -> Lease:
-    """Robot 1 of two with a witness; it has heard the others."""
+    """Return the lease of robot 1 of two, with a witness, after a HELLO of both others."""
     mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
     lease = Lease(Member(1, 7), mission, STD, 0.0, floor=0)
     for other in OTHERS:
@@ -92,7 +92,7 @@ def sent(effects: list[Effect], kind: type) -> list[LeaseBody]:
 
 
 def proposed(lease: Lease, at: float) -> Propose:
-    """What it proposes when both others promise at `at`."""
+    """Return the PROPOSE that the lease sends when both others promise at `at`."""
     [prepare] = sent(lease.tick(STD.grant_s), Prepare)
     assert isinstance(prepare, Prepare)
     promise = Promise(prepare.term, lease.config, None, True)
@@ -103,7 +103,7 @@ def proposed(lease: Lease, at: float) -> Propose:
 
 
 def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
-    """Robot 1 asked at `asked_at`; the others' grants came `slow_s` later."""
+    """Return the lease of robot 1, the time of its request, the time of the grants `slow_s` later, and the effects."""
     lease, asked_at = alone(), STD.grant_s + 0.001
     propose = proposed(lease, asked_at)
     at = asked_at + slow_s

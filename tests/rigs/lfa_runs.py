@@ -1,4 +1,4 @@
-"""Runs of `lfa` as a person starts them, and what is left of them afterwards."""
+"""Runs of the `lfa` command in processes, with a check for processes and sockets that remain afterwards."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def lfa(*arguments: str, timeout_s: float = 90.0) -> subprocess.CompletedProcess
 
 
 class Running:
-    """One `lfa run` in the background: its folder, its processes, its sockets."""
+    """One `lfa run` in the background, with its folder, processes and sockets."""
 
     def __init__(self, folder: Path, arguments: tuple[str, ...]) -> None:
         self.folder = folder
@@ -38,7 +38,7 @@ class Running:
         self.sockets = Path()
 
     def crew(self) -> dict[str, Identity]:
-        """The launcher's children, by name, as of the last call while it lived."""
+        """Return the launcher's children by name, including those known from earlier calls."""
         for identity in own_processes():
             if _parent(identity.pid) == self.launcher.pid and "-m" in identity.arguments:
                 self._known[_name(identity.arguments)] = identity
@@ -48,7 +48,7 @@ class Running:
         return self._known
 
     def wait_for(self, kind: str) -> None:
-        """Until an event of `kind` is in the run folder."""
+        """Wait until an event of `kind` is in the run folder."""
         eventually(lambda: any(line["kind"] == kind for line in self.events()), f"no event {kind!r} came")
         self.crew()
 
@@ -61,7 +61,7 @@ class Running:
         )
 
     def left(self) -> list[str]:
-        """What of this run still exists: processes, sockets."""
+        """Return the processes and sockets of this run that still exist."""
         processes = [name for name, identity in self._known.items() if identify(identity.pid) == identity]
         return processes + ([str(self.sockets)] if self.sockets.name and self.sockets.exists() else [])
 
@@ -72,7 +72,7 @@ class Running:
 
 @contextmanager
 def running(folder: Path, *arguments: str) -> Iterator[Running]:
-    """A run in the background; what is left of it at the end is killed, and only that."""
+    """Start a run in the background; at the end of the block its remaining processes, and only those, are killed."""
     run = Running(folder, arguments)
     try:
         yield run

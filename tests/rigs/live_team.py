@@ -1,4 +1,4 @@
-"""A live team that the tests of one file share: each begins with all four in one chain, and leaves it so."""
+"""Team of real processes shared by the tests of one file; all four robots are in one chain before and after each."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lfa.protocol.topics import address
 
 ROBOTS = 4
 WHOLE_S = 30.0
-"""Patience for a team to be whole again, on a machine that may be busy."""
+"""Maximum time [s] until all robots are in one chain again, on a machine that may be busy."""
 
 
 @contextmanager
@@ -28,13 +28,13 @@ def team() -> Iterator[Team]:
 
 
 def leads(live: Team, since: float) -> list[int]:
-    """Whose leader commands gateways accepted since then: each change once."""
+    """Return the robots whose leader commands gateways accepted after `since` [s], without repetitions."""
     robots = [e.data["robot"] for e in _commands(live) if e.header.stamp >= since]
     return [robot for n, robot in enumerate(robots) if n == 0 or robots[n - 1] != robot]
 
 
 def check_terms(live: Team) -> None:
-    """I2, seen from outside: over all gateways, leader commands never go back to an older term."""
+    """Assert I2 from outside: over all gateways, accepted leader commands never return to an older term."""
     newest = Term()
     for event in _commands(live):
         assert event.term is not None and event.term >= newest, (
@@ -56,11 +56,11 @@ def pass_time(live: Team, for_s: float) -> None:
 
 T_DR_S = 0.5
 LATE_S = 0.3
-"""What a busy machine may add before it moves bodies on; the bounds themselves are checked in virtual time."""
+"""Tolerance [s] for a busy machine that moves bodies late; the bounds themselves are checked in virtual time."""
 
 
 def last_heard(live: Team, robot: int, topic: str, senders: Sequence[str]) -> float:
-    """When the robot last heard one of these on that topic, by its journal."""
+    """Return the time [s] of the robot's last message of `senders` on `topic`, from its newest journal."""
     lives = (live.folder / "run" / "journal").glob(f"{robot_name(robot)}-*.bin")
     _, entries = journal.read(max(lives))
     places = ((entry.at, address(entry.key)) for entry in entries if entry.key)
@@ -68,9 +68,9 @@ def last_heard(live: Team, robot: int, topic: str, senders: Sequence[str]) -> fl
 
 
 def check_minority(live: Team, side: Sequence[int], others: Sequence[int], led: bool) -> None:
-    """`side`, in the order of the chain, has been without a quorum for a while: L7 from what its first one heard last.
+    """Assert L7 for `side`, in chain order, without a quorum: its first robot rests in time after its last message.
 
-    `led`: its first is the leader; otherwise that one's predecessor is the last of `others`.
+    With `led` the first robot is the leader; otherwise its predecessor is the last of `others`.
     """
     timing = timing_of(live.scenario.mission.profile)
     stop_s = live.scenario.mission.limits.v_max_mps / live.scenario.mission.limits.a_max_mps2

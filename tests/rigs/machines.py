@@ -1,6 +1,6 @@
-"""Machines to log in to: each network namespace with an sshd of its own, a throw-away key, and a home for the operator.
+"""Simulated machines with ssh access: network namespaces, each with its own sshd; one temporary key and operator home.
 
-The hosts share this machine's files; each has a state folder of its own, as the fleet file says.
+The hosts share this machine's file system; each has its own state folder, named in the fleet file.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from lfa.protocol import clock
 from tests.rigs.network_namespaces import Net, missing
 
 OPERATOR = 0
-"""The host that `lfa up` is run on; machine n of the fleet is host n."""
+"""Number of the host on which `lfa up` runs; machine n of the fleet is host n."""
 NAMES = "abcdefgh"
 SSHD = "/usr/sbin/sshd"
 LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def why_not() -> str | None:
-    """Why there can be no such machines here, None when there can."""
+    """Return the reason why such machines are impossible here, or None if they are possible."""
     if shutil.which("ssh-keygen") is None or not Path(SSHD).exists():
         return "needs openssh-server"
     return missing()
 
 
 class Machines:
-    """Hosts `a`, `b`, ... and the operator's, all in one switch."""
+    """Hosts `a`, `b`, ... and the operator's host, all on one switch."""
 
     def __init__(self, net: Net, folder: Path, count: int) -> None:
         self.net = net
@@ -48,7 +48,7 @@ class Machines:
         self._servers: dict[str, subprocess.Popen[bytes]] = {}
         self._known: set[Identity] = set()
 
-    # --- made and unmade -------------------------------------------------------------------------------------------
+    # --- set-up and removal ----------------------------------------------------------------------------------------
 
     def open(self) -> None:
         ssh = self.home / ".ssh"
@@ -64,7 +64,7 @@ class Machines:
             self.serve(name)
 
     def serve(self, name: str, authorized: str = "authorized") -> None:
-        """An sshd on that machine, in place of the one that may run there, and who may log in."""
+        """Start an sshd on the machine in place of a running one; `authorized` is the file of accepted keys."""
         if name in self._servers:
             self._end_server(self._servers.pop(name))
         settings = {
@@ -87,7 +87,7 @@ class Machines:
         self._servers[name] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
 
     def close(self) -> None:
-        """Whatever the fleet has left is ended, and only that."""
+        """End the remaining processes of the fleet, and only those."""
         for name in self.names:
             self.kill(name)
         for server in self._servers.values():
@@ -98,7 +98,7 @@ class Machines:
         server.kill()
         server.wait()
 
-    # --- what they are ---------------------------------------------------------------------------------------------
+    # --- properties ------------------------------------------------------------------------------------------------
 
     def address(self, name: str) -> str:
         return self.net.address(self._number(name))
@@ -107,7 +107,7 @@ class Machines:
         return self.folder / name
 
     def write(self, top: str = "", hosts: Mapping[str, Mapping[str, str]] | None = None, tail: str = "") -> Path:
-        """A fleet file of all machines; `hosts` says some things about some of them otherwise."""
+        """Write a fleet file of all machines and return its path; `hosts` overrides values of single machines."""
         lines = [top]
         for name in self.names:
             said = {"address": self.address(name), "user": "root", "python": sys.executable}
@@ -117,7 +117,7 @@ class Machines:
         return self.fleet_file
 
     def python(self, name: str, *, version: str | None = None, startup: str = "") -> str:
-        """A virtual environment that sees all that this one has; its `lfa` calls itself `version`."""
+        """Create a virtual environment with this one's packages, whose `lfa` reports `version`; return its python."""
         venv = self.folder / f"venv-{name}"
         site = venv / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
         site.mkdir(parents=True)
@@ -137,7 +137,7 @@ class Machines:
         return parts.read(self.state(name) / parts.PART)
 
     def processes(self, name: str) -> list[Identity]:
-        """Everything of the fleet that runs on that machine, by its state folder in the command line."""
+        """Return the processes of the fleet on that machine, found by its state folder in the command line."""
         mark = str(self.state(name))
         found = [
             one
@@ -153,10 +153,10 @@ class Machines:
             str(path) for path in self.state(name).glob("*.sock*")
         ]
 
-    # --- what is done there ----------------------------------------------------------------------------------------
+    # --- actions ---------------------------------------------------------------------------------------------------
 
     def lfa(self, *arguments: str, on: int = OPERATOR, timeout_s: float = 90.0) -> subprocess.CompletedProcess[str]:
-        """`lfa ARGUMENTS`, as the operator would type it on one of the hosts."""
+        """Run `lfa ARGUMENTS` on one of the hosts, by default on the operator's."""
         environment = {**os.environ, "HOME": str(self.home)}
         environment.pop("SSH_AUTH_SOCK", None)
         command = [*self.net.enter(on), *LFA, *arguments]
@@ -165,7 +165,7 @@ class Machines:
         )
 
     def kill(self, name: str) -> float:
-        """All processes of that machine at once, its supervisor first; the moment just before."""
+        """Kill all processes of that machine at once, its supervisor first; return the time [s] just before."""
         at = clock.now()
         found = self.processes(name)
         for one in sorted(found, key=lambda one: "lfa.deploy.fleet.host.supervisor" not in one.arguments):
@@ -187,7 +187,7 @@ class Machines:
 
 @contextmanager
 def machines(count: int) -> Iterator[Machines]:
-    """`count` machines and an operator's; none of their processes and files is left afterwards."""
+    """Create `count` machines and an operator's; all their processes and files are removed at the end of the block."""
     folder = Path(tempfile.mkdtemp(prefix="lfa-", dir="/tmp"))
     try:
         with Net(count + 1) as net:

@@ -1,6 +1,7 @@
-"""Several machines on one: network namespaces on a bridge, each with its own router, joined by tcp links.
+"""Several hosts on one machine: network namespaces on a bridge, each with its own router, connected by tcp links.
 
-Needs root, ip and nft. Names carry our pid, so that two runs do not meet; all of it is gone on leaving the block.
+Requires root, ip and nft. Names contain the process id, so that parallel runs do not collide; everything is removed at
+the end of the block.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
 PORT = 7447
 ROBOTS = 4
 WORLD_HOST = 0
-"""The host of world and witness; robot n is host n."""
+"""Number of the host of world and witness; robot n is on host n."""
 TABLE = "inet lfa"
 
 
 def missing() -> str | None:
-    """Why such a network cannot be made here, None when it can."""
+    """Return the reason why such a network is impossible here, or None if it is possible."""
     if os.geteuid() != 0:
         return "needs root, for network namespaces"
     absent = [tool for tool in ("ip", "nft") if shutil.which(tool) is None]
@@ -40,7 +41,7 @@ def missing() -> str | None:
 
 
 class Net:
-    """Hosts 0..N, all in one switch."""
+    """Hosts 0..N, all on one switch."""
 
     def __init__(self, hosts: int) -> None:
         self._switch = f"lfa{os.getpid()}s"
@@ -81,14 +82,14 @@ class Net:
         self._inside(self._switch, "ip", "link", "set", port, "master", "br0", "up")
 
     def enter(self, host: int) -> tuple[str, ...]:
-        """The words before a command that is to run on that host."""
+        """Return the command prefix that runs a command on that host."""
         return _enter(host)
 
     def address(self, host: int) -> str:
         return _ip(host)
 
     def unplug(self, host: int) -> None:
-        """Its cable is out: nothing comes in or goes out, and nobody is told."""
+        """Take the host's link down: no packet passes, and no process is notified."""
         self._inside(self._switch, "ip", "link", "set", f"p{host}", "down")
 
     def plug_in(self, host: int) -> None:
@@ -97,25 +98,25 @@ class Net:
     def _inside(self, name: str, *command: str) -> None:
         _run("ip", "netns", "exec", name, *command)
 
-    # --- what can be done to it ------------------------------------------------------------------------------------
+    # --- faults ----------------------------------------------------------------------------------------------------
 
     def cut(self, one: Sequence[int], other: Sequence[int]) -> None:
-        """No packet passes between the sides: dropped where they come in, as the air does it."""
+        """Drop all packets between the sides at their receivers, as the link model does."""
         for side, far in ((one, other), (other, one)):
             for host in side:
                 self._rules(host, f"ip saddr {{ {', '.join(_ip(f) for f in far)} }} drop")
 
     def reset(self, host: int) -> None:
-        """Every tcp link of that host is reset with the next packet, until `heal`."""
+        """Reset every tcp link of that host with its next packet, until `heal`."""
         self._rules(host, "ip saddr != 127.0.0.1 meta l4proto tcp reject with tcp reset")
 
     def lose(self, percent: int) -> None:
-        """So many of all packets between hosts are lost: on tcp links it shows as delay."""
+        """Drop `percent` of all packets between hosts; on tcp links the effect is delay."""
         for host in self.hosts:
             self._rules(host, f"ip saddr != 127.0.0.1 numgen random mod 100 < {percent} drop")
 
     def close_port(self, host: int, port: int) -> None:
-        """As a firewall does it: whoever knocks hears nothing."""
+        """Drop all packets to a port of the host without an answer, as a firewall does."""
         self._rules(host, f"meta l4proto {{ tcp, udp }} th dport {port} drop")
 
     def heal(self) -> None:
@@ -130,13 +131,16 @@ class Net:
 
 @contextmanager
 def team_on_hosts() -> Iterator[tuple[Team, Net]]:
-    """Four robots, each on its own host, and the world on another."""
+    """Start four robots, each on its own host, and the world on another."""
     with Net(ROBOTS + 1) as net, Team(endless(ROBOTS), _table) as team:
         yield team, net
 
 
 def _table(usual: Sequence[ProcessSpec], sockets: Path) -> list[ProcessSpec]:
-    """A router a host, and on each what lives there; the onlooker joins the world's router over its unix socket."""
+    """Return one router per host and the processes of each host.
+
+    The observer session uses the unix socket of the world's router.
+    """
     rows = [_router(host, sockets) for host in range(ROBOTS + 1)]
     for row in usual:
         host = WORLD_HOST if row.name == WORLD_NAME else robot_id_of(row.name)

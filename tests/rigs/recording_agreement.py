@@ -1,4 +1,4 @@
-"""What a recording and the journals of the same run say of the same messages."""
+"""Comparison of a recording with the journals of the same run: first and last message of each stream."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, address
 
 Stream = tuple[str, str, int]
-"""A channel, and one life of one sender on it."""
+"""Channel, sender and the sender's incarnation."""
 Ends = dict[Stream, tuple[Any, Any]]
 
 
@@ -29,7 +29,7 @@ def _noted(ends: Ends, channel: str, body: bytes) -> None:
 
 
 def recorded_ends(folder: Path) -> Ends:
-    """First and last message of each stream, as the `mcap` library reads them."""
+    """Return the first and last message of each stream, as read by the `mcap` library."""
     ends: Ends = {}
     for path in parts(folder):
         with path.open("rb") as stream:
@@ -39,7 +39,7 @@ def recorded_ends(folder: Path) -> Ends:
 
 
 def journalled_ends(folder: Path) -> Ends:
-    """The same, from the journals: each core run again, and what it said."""
+    """Return the first and last message of each stream, from a re-execution of the journals."""
     ends: Ends = {}
     for path in sorted((folder / "journal").glob("*.bin")):
         heading, entries = journal.read(path)
@@ -53,9 +53,10 @@ def journalled_ends(folder: Path) -> Ends:
 
 
 def differing(folder: Path, killed: tuple[str, ...] = ()) -> list[Stream]:
-    """Streams of which the two tell another first or last message, or one of them none.
+    """Return the streams whose first or last message differs, or is missing, between recording and journals.
 
-    What a process said in its last step before SIGKILL may be recorded and no more journalled: of these only the first.
+    Messages of a process's last step before SIGKILL may be recorded but not journalled, so for `killed` processes only
+    the first message is compared.
     """
     recorded, journalled = recorded_ends(folder), journalled_ends(folder)
     own = {stream for stream in recorded if stream[1] not in ("operator", "recorder")}

@@ -1,4 +1,4 @@
-"""A fleet behind a secured router, and what an attacker has: any certificate, any password, and Zenoh itself."""
+"""Fleet behind a secured router, and an attacker with Zenoh sessions and a choice of certificate and password."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from lfa.protocol.transport.credentials import Credentials, credentials
 FLEET, ROBOTS = "secured", 3
 WHOLE_S, HEARD_S = 20.0, 5.0
 TRAITOR = "robot3"
-"""The robot whose keys the attacker has: the last of the chain."""
+"""Robot whose keys the attacker has; the last of the chain."""
 REVOKED, ELSEWHERE = "robot4", "robot5"
-"""Members that do not run: one revoked, one whose place is machine `b`."""
+"""Members without a process: one revoked, one assigned to machine `b`."""
 
 
 class Attacked:
-    """The fleet, the folders of keys, and how to reach its router."""
+    """Fleet under attack: its team, the folders of keys, and the endpoints of its router."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -48,7 +48,7 @@ class Attacked:
         return credentials(self.home, name, clock.wall_ms())
 
     def _table(self, usual: Sequence[ProcessSpec], sockets: Path) -> list[ProcessSpec]:
-        """Robot 2 joins over tls with its certificate, everybody else over the unix socket by password."""
+        """Return the processes: robot 2 connects over tls with its certificate, all others over the unix socket."""
         self.unix = usual[0].arguments[-1]
         listen = ("lfa.deploy.fleet.host.router", "--listen", self.unix, "--listen", self.tls, *self._keys(True))
         rows = [ProcessSpec(ROUTER_NAME, listen)]
@@ -63,13 +63,13 @@ class Attacked:
         return ("--keys", str(self.home)) + (("--secure",) if secure else ())
 
     def drives_on(self) -> None:
-        """Everybody is in one chain, whose first robot leads it, and all poses keep coming."""
+        """Wait until all robots are in one chain whose first robot leads, and all publish poses."""
         self.team.wait_until(lambda: self.team.chain() == (1, 2, 3), "the fleet does not drive on", WHOLE_S)
 
-    # --- what an attacker opens -------------------------------------------------------------------------------------
+    # --- sessions of the attacker -----------------------------------------------------------------------------------
 
     def open(self, endpoint: str, name: str | None = TRAITOR, folder: Path | None = None, **more: Any) -> zenoh.Session:
-        """A session with the certificate and password of `name`, as `folder` has them."""
+        """Open a session with the certificate and password of `name` from `folder`, by default the stolen ones."""
         config: dict[str, Any] = {
             "mode": "client",
             "connect/endpoints": [endpoint],
@@ -87,7 +87,7 @@ class Attacked:
         return zenoh.open(parsed)
 
     def refused(self, endpoint: str, name: str | None = TRAITOR, folder: Path | None = None, **more: Any) -> bool:
-        """Whether the router lets no such session in."""
+        """Return True if the router refuses the session."""
         try:
             self.open(endpoint, name, folder, **more).close()  # type: ignore[no-untyped-call]
         except zenoh.ZError:
@@ -95,9 +95,9 @@ class Attacked:
         return False
 
     def passes(self, attack: Callable[[zenoh.Session], object], listen: str, name: str = TRAITOR) -> bool:
-        """Whether somebody who hears all on `listen` hears the bytes `b"attack"` of what `attack` does.
+        """Return True if a subscriber to `listen` receives `b"attack"`, or a deletion, after the call of `attack`.
 
-        Afterwards the attacker says something that it may say: when that has come, so would have the rest.
+        Afterwards the attacker publishes a permitted message; once that has arrived, all earlier ones would have too.
         """
         heard: list[tuple[str, bytes, bool]] = []
 
@@ -130,7 +130,7 @@ def tls(ca: Path, stem: Path) -> dict[str, Any]:
 
 
 def forge(folder: Path, name: str, ca_folder: Path, days: float = 1.0) -> Path:
-    """A folder with the password of `name` and a certificate by the authority in `ca_folder`; the folder."""
+    """Create `folder` with the password of `name` and a certificate of the authority in `ca_folder`; return it."""
     folder.mkdir()
     ca = authority.load(ca_folder / "ca.pem", ca_folder / "ca.key")
     authority.issue(folder / name, ca, name, (), days)

@@ -1,4 +1,4 @@
-"""A world with a hand on its wires, for the tests of the world as a Node."""
+"""Test rig of the world as a Node: it calls the deadlines, sends commands, and keeps the published messages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CHECKED_S = 1.0
 
 
 class Rig:
-    """A world with a hand on its wires: it ticks when due, and keeps what was said."""
+    """World with manual inputs: it ticks when due, and keeps the published messages."""
 
     def __init__(self, *overrides: str, scenario: str = "straight", seed: int = 1, **options: Any) -> None:
         self.world = World(FLEET, draw(load(scenario, overrides), seed), seed, incarnation=9, start_at=T0, **options)
@@ -35,7 +35,7 @@ class Rig:
         self._seq = 0
 
     def run(self, duration_s: float, twist: Twist | None = None, leader: int = 1) -> list[Envelope]:
-        """Tick for so long; with a `twist`, every robot is commanded it at 50 Hz. What was said meanwhile."""
+        """Tick for `duration_s`, commanding `twist` to every robot at 50 Hz if given; return the published messages."""
         before = len(self.said)
         end = self.now + duration_s
         while self.world.next_deadline() <= end + 1e-9:
@@ -66,7 +66,7 @@ class Rig:
         return sent
 
     def opened(self) -> Rig:
-        """Past the time for which a new gateway is shut (E13)."""
+        """Run until the new gateways accept commands (E13)."""
         self.run(STD.grant_s + 0.02)
         return self
 

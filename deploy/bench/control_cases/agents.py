@@ -79,7 +79,10 @@ def process_cases() -> list[Case]:
 
 
 def against_bare(scheme: Scheme) -> tuple[float]:
-    """Return the amplification of ten complete followers over that of ten bare ones, for a sine on the leader's speed."""
+    """Return the amplification of ten complete followers over that of ten bare ones, for a sine of the leader's speed.
+
+    Both are the speed deviation of the last follower over that of the leader.
+    """
     bare = speed_wave(scheme, OMEGA_RADPS, FOLLOWERS)
     whole = _whole(scheme)
     return ((whole[FOLLOWERS] / whole[0]) / (bare[FOLLOWERS] / bare[0]),)
@@ -146,7 +149,7 @@ CLOCKS = {
 
 
 def clock_errors() -> tuple[float]:
-    """Return the distance rms [mm] of the worst follower on the circle, with a delay of 20 ms and one clock per host."""
+    """Return the distance rms [mm] of the worst follower on the circle, with 20 ms delay and one clock per host."""
     simulator = Simulator(Radio(delay_s=0.02, jitter_s=0.001), seed=1)
     scenario = load("circle")
     sums, count = [0.0, 0.0, 0.0], 0

@@ -35,7 +35,7 @@ FORMATIONS: dict[str, tuple[Side, bool]] = {
 }
 SLOW_NETWORK = ChainLink(delay_s=0.1, jitter_s=0.04, loss=0.1)
 NOISE_FILTER_M = 0.36
-"""Heading filter length [m], 0.6 k |cos phi| of the 60 degree slots; rigid slots amplify noise along the chain (5.4)."""
+"""Heading filter length [m]: 0.6 k |cos phi| of the 60 degree slots; rigid slots amplify noise in the chain (5.4)."""
 
 #   condition   settle F1, F3 [s]   distance [mm]: straight and circle, eight   bearing, heading [deg]
 BARS: dict[str, tuple[float, float, float, float, float | None, float]] = {

@@ -150,7 +150,7 @@ class Team:
     # --- what can be done to it ------------------------------------------------------------------------------------
 
     def signal(self, whom: int | str, number: signal.Signals) -> float:
-        """Signal an agent by its robot's id or a process by its name; return the time [s] just before. Raises Broken."""
+        """Signal an agent by robot id or a process by name; return the time [s] just before. Raises Broken."""
         at, name = clock.now(), _name(whom)
         if not self._processes.signal(name, number):
             raise Broken(f"{name} is not there to be signalled")

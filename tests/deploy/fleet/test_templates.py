@@ -158,6 +158,7 @@ def test_every_pod_is_as_locked_up_as_its_namespace_demands() -> None:
 # --- Zenoh ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.processes
 def test_zenoh_takes_the_configurations_and_lfa_talks_through_them(tmp_path: Path) -> None:
     keys.make(tmp_path / "k", keys.spread("f", {"a": (), "machine-b": ()}, [1]))
     port = free_port()

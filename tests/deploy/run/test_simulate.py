@@ -33,7 +33,8 @@ def _summary(folder: Path, name: str = "straight", *overrides: str, seed: int = 
 def _bytes(folder: Path, hash_seed: str) -> tuple[bytes, bytes]:
     """events.jsonl and recording.mcap of one run in a process with that hash seed."""
     code = (
-        "import sys; from pathlib import Path; from lfa.deploy.run.simulate import run; from lfa.world.description.load import load;"
+        "import sys; from pathlib import Path; from lfa.deploy.run.simulate import run;"
+        "from lfa.world.description.load import load;"
         f"run(load('leader_killed', {list(SHORT)!r}), 5, Path(sys.argv[1]))"
     )
     environment = os.environ | {"PYTHONHASHSEED": hash_seed}

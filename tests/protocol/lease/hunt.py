@@ -1,4 +1,4 @@
-"""After how many schedules of `lfa fuzz` each planted bug is noticed: `python -m tests.protocol.lease.hunt [--seeds 100]`.
+"""After how many schedules of `lfa fuzz` each planted bug is noticed: `python -m tests.protocol.lease.hunt`.
 
 Prints a row a bug, as Markdown, as they come. Random schedules alone miss what a directed test sees at once: that is
 what the table is for.
