@@ -125,7 +125,7 @@ class Machines:
         (venv / "bin/python").symlink_to(Path(sys.executable).resolve())
         (venv / "pyvenv.cfg").write_text(f"home = {Path(sys.executable).resolve().parent}\n")
         (site / "all.pth").write_text("".join(f"{path}\n" for path in sys.path if path.endswith("-packages")))
-        (site / "here.pth").write_text(f"{Path.cwd()}\n")
+        (site / "here.pth").write_text(f"{Path(__file__).parents[2] / '.namespace'}\n")
         (site / "sitecustomize.py").write_text(startup)
         if version is not None:
             (site / f"lfa-{version}.dist-info").mkdir()
