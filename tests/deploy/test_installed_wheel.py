@@ -50,7 +50,7 @@ def test_the_base_install_has_an_agent_and_no_flat_name(wheel: Path, tmp_path: P
 
 def test_with_its_extras_it_simulates_and_runs(wheel: Path, tmp_path: Path) -> None:
     commands = _environment(tmp_path, wheel, "[world,view,deploy]")
-    short = ("straight", "--robots", "2", "--set", "time_limit_s=2.0", "--no-figures")
+    short = ("straight", "--robots", "2", "--set", "mission.leading.route_m=[[1.0, 0.0]]", "--no-figures")
     (tmp_path / "world.py").write_text("raise SystemExit('a file beside the user')\n")
     for deed in ("sim", "run"):
         _ran(commands / "lfa", deed, *short, "--out", tmp_path / deed, cwd=tmp_path)
