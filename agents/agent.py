@@ -200,7 +200,8 @@ class Agent:
 
     def _obey(self, note: OperatorNote, now: float, lease: Lease) -> None:
         """Obey an operator's command. Only the leader changes the formation, or hands the lease to the next in the
-        chain."""
+        chain.
+        """
         if note.command == "forget":
             self._forget(note, now, lease)
         if lease.role is not Role.LEADER:
@@ -333,14 +334,16 @@ class Agent:
 
     def _chain(self, lease: Lease) -> tuple[int, ...]:
         """Return the ids of the lease's chain, computed anew only when the config has changed (called many times a
-        step)."""
+        step).
+        """
         if lease.config is not self._config:
             self._config, self._chain_ids = lease.config, lease.chain
         return self._chain_ids
 
     def _command(self, twist: Twist, role: Role, now: float) -> None:
         """Publish a command. The gateway's stamp is read before the lease is checked (lease.md section 5): no stamp, no
-        command."""
+        command.
+        """
         sensors = self._team.fresh_sensors(now)
         if sensors is None or self._lease is None:
             return

@@ -207,7 +207,8 @@ class Navigator:
 
     def _mates(self, now: float) -> list[Pose2D]:
         """Return the known poses of the team-mates: the predecessor's from its pose messages, the others' from the
-        table."""
+        table.
+        """
         places = [self._team.pose_of(robot, now) for robot in self._mission.robots if robot != self._id]
         if self.predecessor is not None:
             sighting = self.predecessor.at(now)
@@ -216,7 +217,8 @@ class Navigator:
 
     def _strangers(self, pose: Pose2D, now: float) -> list[Point]:
         """Return the team-mates that this robot does not follow, in `base_link`: no controller keeps a distance to
-        them."""
+        them.
+        """
         ahead = None if self.predecessor is None else self.predecessor.robot
         c, s, mates = cos(pose.theta), sin(pose.theta), []
         for robot in self._mission.robots:

@@ -64,7 +64,8 @@ class StuckPolicy:
 
     def _left_out(self, lease: Lease, driver: Navigator, now: float) -> frozenset[int]:
         """Return the robots left out of the chain: stuck robots outside of it stay out, also the former leader that
-        handed the lease over; the other stuck ones are left out once the leader has waited for them."""
+        handed the lease over; the other stuck ones are left out once the leader has waited for them.
+        """
         before = self._led_before
         if before is not None and now >= self._reign_from + NEWS_S and not self._team.stuck(before, now):
             self._led_before = None

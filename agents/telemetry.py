@@ -44,7 +44,8 @@ class Reports:
         pose: Pose2D, twist: Twist, now: float,
     ) -> None:  # fmt: skip
         """Publish the pose after each control step; tracking and the table's row less often. `near` holds the ids of
-        the neighbours in the chain."""
+        the neighbours in the chain.
+        """
         outbox, odometer_m = self._outbox, driver.estimator.odometer_m
         header = outbox.header("pose", now)
         outbox.publish("pose", PoseStamped(header, pose.x, pose.y, 0.0, pose.theta, twist, odometer_m, role, term))
@@ -72,7 +73,8 @@ class Reports:
 
     def obstacle(self, driver: Navigator, pose: Pose2D, now: float) -> None:
         """Publish the obstacle that this robot deals with: at once when it changes, then twice a second while it
-        lasts."""
+        lasts.
+        """
         decision = driver.decision
         if decision is None:
             self._next_obstacle = 0.0
@@ -111,7 +113,8 @@ def status(
     role: Role, term: Term, version: Version | None, now: float,
 ) -> None:  # fmt: skip
     """Publish the diagnostics (as in ROS). `driver` is None before the mission is known; `missing` lists the robots
-    that are absent (E18)."""
+    that are absent (E18).
+    """
     counters: dict[str, float] = {
         "loop_lag_ms": round(1000.0 * vitals.loop_lag_s, 3),
         "tick_p99_ms": round(1000.0 * vitals.tick_p99_s, 3),

@@ -114,7 +114,8 @@ class Detour:
 
     def _not_passed(self, points: Sequence[Point], wanted: Twist) -> list[Point]:
         """Return `points` without those beside the robot that are inside its clearance by no more than the scan's
-        noise: it has nearly passed them."""
+        noise: it has nearly passed them.
+        """
         sign = 1.0 if wanted.linear_x > 0.0 else -1.0
         kept_m = self._radius_m + NARROW_M - NOISE_M
         return [(x, y) for x, y in points if sign * x > BESIDE * abs(y) or hypot(x, y) < kept_m]
@@ -165,7 +166,8 @@ class Detour:
 
     def _row(self, points: Sequence[Point], openings: Openings, free_m: float) -> DecisionRow | None:
         """Return the table's row for the obstacle. An opening counts as wide as the robot needs, whatever lies beside
-        it."""
+        it.
+        """
         nose_m = free_along(points, AHEAD, self._radius_m)
         # A bend towards what is already beside the robot does not tell how far the way straight ahead is free.
         ahead_m = self._radius_m + (nose_m if self._kept_m < NARROW_M else min(free_m, nose_m))
@@ -227,7 +229,8 @@ class Detour:
 
     def _say(self, action: str, free_m: float, bearing: float, row: DecisionRow | None, now: float) -> None:
         """Record the decision for the log. Its action keeps its name for a while, unless the robot is or was
-        blocked."""
+        blocked.
+        """
         before = self.decision
         held = before is not None and now - self._acted_at < HOLD_S and "blocked" not in (action, before.action)
         if before is not None and (held or action == before.action):
@@ -249,6 +252,7 @@ class Detour:
 
     def _braking(self, points: Sequence[Point], margin_m: float) -> float:
         """Return the speed [m/s] from which the robot can stop before an obstacle ahead, with `margin_m` on either
-        side."""
+        side.
+        """
         free_m = free_along(points, AHEAD, self._radius_m + margin_m)
         return sqrt(self._limits.a_max_mps2 * max(0.0, free_m - 0.1))

@@ -1,5 +1,6 @@
 """Avoidance of moving obstacles: slow down, wait or make room, by the predicted closest approach (control.md section
-7)."""
+7).
+"""
 
 from __future__ import annotations
 

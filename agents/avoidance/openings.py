@@ -33,7 +33,8 @@ to it."""
 
 class Openings(Struct, frozen=True):
     """Open direction nearest to the wanted one on either side, and the one that leads back; None where there is
-    none."""
+    none.
+    """
 
     left: float | None
     right: float | None

@@ -1,5 +1,6 @@
 """Last function before `cmd_vel`: each published command is finite, within the drive's limits, and slow enough to stop
-before the obstacles of the scan."""
+before the obstacles of the scan.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, l
 
 def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits) -> Twist:
     """Return `wanted`, slowed towards each of `mates` (centres in `base_link`) to stop within half of the room between:
-    the other robot may approach under the same rule."""
+    the other robot may approach under the same rule.
+    """
     v = wanted.linear_x
     sign = 1.0 if v >= 0.0 else -1.0
     turn = wanted.angular_z * TURN_S

@@ -49,7 +49,8 @@ def chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
 
 def _spread(footing: Costmap, goal: int, start: int, toward: bytearray) -> Iterator[int]:
     """Expand A* from `goal`. `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. The
-    last number yielded is negative when `start` was reached; otherwise no cell is left."""
+    last number yielded is negative when `start` was reached; otherwise no cell is left.
+    """
     grid, near, prices = footing.grid, footing.near, footing.prices
     columns, scores = grid.columns, grid.scores
     steps = tuple(

@@ -32,7 +32,8 @@ Box = tuple[float, float, float, float]
 
 class Costmap:
     """Costmap of one search. `near` is a copy of the grid's nearness, so that cells are blocked for this search
-    only."""
+    only.
+    """
 
     def __init__(self, grid: Grid, prices: bytes) -> None:
         """Create a costmap of `grid` with `prices` as returned by `prices_of`."""
@@ -61,7 +62,8 @@ class Costmap:
 
     def settled(self, point: Point) -> int | None:
         """Return the nearest cell to `point` in which a robot can stand, within `SETTLE_CELLS`; None if there is
-        none."""
+        none.
+        """
         cell = self.grid.cell(*point)
         if cell is None:
             return None

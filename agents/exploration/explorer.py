@@ -1,5 +1,6 @@
 """Exploration of unknown ground: every robot maps all the time, so that a new leader has a map; the leader also
-plans."""
+plans.
+"""
 
 from __future__ import annotations
 

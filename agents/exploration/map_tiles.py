@@ -1,6 +1,7 @@
 """Tiles of a leader's map for views: one tile at a time, so that a message is bounded and the work of a control step
 does not grow with the map. Every other tile is one near the robot that has changed; in between, all known tiles are
-sent in turn, for views that join late."""
+sent in turn, for views that join late.
+"""
 
 from __future__ import annotations
 

@@ -36,7 +36,8 @@ CHECK_S = 0.2
 
 class Planner:
     """Planner of one robot with one goal. `route` is the newest, in `map`; `unreachable` is the reason if there is
-    none."""
+    none.
+    """
 
     def __init__(self, grid: Grid, goal: Point, radius_m: float, keepout: Sequence[Box] = ()) -> None:
         self._grid = grid

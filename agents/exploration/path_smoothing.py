@@ -41,7 +41,8 @@ def straightened(footing: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, 
 
 def smoothed(footing: Costmap, points: list[Point]) -> Iterator[list[Point]]:
     """Move each point to the middle of its neighbours, as far as that does not bring it nearer to a wall; yield the
-    points."""
+    points.
+    """
     for _ in range(SMOOTHINGS):
         for n in range(1, len(points) - 1):
             (ax, ay), (x, y), (bx, by) = points[n - 1 : n + 2]

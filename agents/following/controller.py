@@ -55,7 +55,8 @@ class Reference(Struct, frozen=True, gc=False):
 
 class Controller(Protocol):
     """Controller from slot to twist. `step` is called at `config.CONTROL_HZ`; the caller enforces the drive's
-    limits."""
+    limits.
+    """
 
     def reset(self, own_pose: Pose2D, own_twist: Twist) -> None:
         """Restart from the present state: at the start, after an override, when data were stale."""

@@ -254,7 +254,8 @@ class Follower:
 
 class PaperVelocity:
     """Form A of the observer in the loop: replaces the slot's velocity, and does not use the predecessor's turn
-    rate."""
+    rate.
+    """
 
     def __init__(self) -> None:
         self._observer = SlotVelocityObserver()

@@ -51,7 +51,8 @@ class Observer:
 
     def heard(self, stamp: float, pose: Pose2D, twist: Twist) -> bool:
         """Update with a sampled pose; return False when it is refused: not finite, implausible, not newer, or an
-        outlier."""
+        outlier.
+        """
         if not (isfinite(stamp) and plausible(pose, twist)):
             self.refused += 1
             return False

@@ -49,7 +49,8 @@ def phi_of(side: Side, angle_rad: float, index: int) -> float:
 
 def paper_phi(side: Side, phi: float) -> float:
     """Return phi^d for the paper's input phi in [0, pi], with (32) and (33) corrected. Raise `Refused` at pi/2, where
-    they jump."""
+    they jump.
+    """
     if not 0.0 <= phi <= pi or phi == pi / 2:
         raise Refused(f"phi = {phi:g}: must be in [0, pi] and not pi/2, where (32) and (33) jump by pi/2")
     if phi < pi / 2:
@@ -89,13 +90,15 @@ def check_slot(slot: Slot, separation_min_m: float) -> Slot:
 
 class Formation:
     """Orientation requests of one team: the highest (term, number) counts, whether messages are late, repeated or
-    lost."""
+    lost.
+    """
 
     def __init__(
         self, spec: FormationSpec, robots: Sequence[int], separation_min_m: float, *, trace: bool = False
     ) -> None:
         """Create with `robots` in the order of the first chain; `spec` and `trace` hold until a leader requests
-        otherwise."""
+        otherwise.
+        """
         self._separation_min_m = separation_min_m
         self._spec = spec
         self._slots = {slot.robot: slot for slot in slots_of(spec, robots[1:])}
@@ -162,14 +165,16 @@ def leader_speed_cap(slots: Sequence[Slot], curvature: float, limits: Limits, ma
 
 def leader_speed_floor(slots: Sequence[Slot], curvature: float) -> float:
     """Return the minimum leader speed [m/s] at which every slot has a direction of motion; inf when one stands
-    still."""
+    still.
+    """
     slowest = min([1.0, *speed_factors(slots, curvature)])
     return SLOT_SPEED_MIN_MPS / slowest if slowest > 1e-6 else float("inf")
 
 
 def radius_min(slots: Sequence[Slot], factor_max: float) -> float:
     """Return the minimum leader radius [m], for both turn directions, at which no robot needs more than `factor_max`
-    v."""
+    v.
+    """
     low, high = 0.01, 1e4
     for _ in range(60):
         middle = sqrt(low * high)

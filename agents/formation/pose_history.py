@@ -161,7 +161,8 @@ class PoseHistory:
 
     def at(self, s: float) -> TracePoint:
         """Return the point at arc length `s`; beyond either end the path is extended straight. Needs one `add`
-        before."""
+        before.
+        """
         index = bisect_right(self._s, s)
         if index == 0:
             return _straight(self._poses[0], s - self._s[0])

@@ -45,7 +45,8 @@ class FormationCommands:
 
     def lead(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
         """Run one control step of the leader: requests that are due on the route, and the present request once a
-        second."""
+        second.
+        """
         orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
         while self._next < len(orientations) and orientations[self._next].at_m <= lead.progress_m:
             self.order(orientations[self._next].side, "mission", followers, term, now)
@@ -68,7 +69,8 @@ class FormationCommands:
 
     def _column_where_narrow(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
         """Order column before a bend that the formation cannot follow, and where obstacles are known (the route passes
-        them)."""
+        them).
+        """
         slots = [self._formation.slot_of(robot) for robot in followers]
         if self._formation.trace or all(map(_behind, slots)):
             return

@@ -77,7 +77,8 @@ class PathFollower:
 
     def __init__(self, leading: Leading, limits: Limits, radius_m: float = 0.15) -> None:
         """Create a path follower; `radius_m` is the room that a robot needs beside known obstacles
-        (`Leading.known_m`)."""
+        (`Leading.known_m`).
+        """
         self._leading = leading
         self._radius_m = radius_m
         self._limits = limits
@@ -131,7 +132,8 @@ class PathFollower:
 
     def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
         """Return the distance [m] to the next bend in which `slots` would slow the leader below `COLUMN_BELOW_MPS`, or
-        None."""
+        None.
+        """
         if self._route is None:
             return None
         first, last = self._route.segment(self._s), self._route.segment(self._s + within_m)

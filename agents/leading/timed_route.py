@@ -19,7 +19,8 @@ LAG_M_MAX = 5.0
 
 class Timetable:
     """Timetable of one leader. Its clock starts when it begins to lead, at the time that is due at its present
-    place."""
+    place.
+    """
 
     def __init__(self, leading: Leading) -> None:
         self._leading = leading

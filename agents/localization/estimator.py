@@ -50,7 +50,8 @@ class _Odometry(Struct, frozen=True, gc=False):
 
 class Estimator:
     """Pose estimator of one robot. All stamps are of the driver's clock; its offset to the own clock is estimated
-    here."""
+    here.
+    """
 
     def __init__(self, noise: EstimatorNoise = NOISE) -> None:
         self._noise = noise

@@ -92,6 +92,7 @@ def is_ditch(features: Sequence[GroundFeature], lines: int) -> bool:
 
 def bridged_lines(features: Sequence[tuple[int, GroundFeature]], limits: Limits) -> set[int]:
     """Return the lines with a gap that wheels bridge and that a neighbouring line shows too, unlike a round hole's
-    rim."""
+    rim.
+    """
     narrow = {line for line, f in features if f.kind == "pothole" and f.width_m <= limits.bridge_gap_m}
     return {line for line in narrow if line - 1 in narrow or line + 1 in narrow}

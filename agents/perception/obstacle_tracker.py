@@ -100,7 +100,8 @@ class Tracker:
         self, points_map: Sequence[Point], eye: Point, mates: Sequence[Point], mate_m: float, now: float
     ) -> None:
         """Update with one scan's points in beam order, seen from `eye`; points within `mate_m` of a team-mate are left
-        out."""
+        out.
+        """
         self._seen = []
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
         clusters = _clusters(points_map)
@@ -124,7 +125,8 @@ class Tracker:
 
     def nearest(self, x: float, y: float, now: float) -> tuple[Feature, float] | None:
         """Return the obstacle of the newest scan nearest to (x, y) in `map`, and its distance [m]; None if there is
-        none."""
+        none.
+        """
         apart = [
             (min((px - x) ** 2 + (py - y) ** 2 for px, py in points), n) for n, (points, _) in enumerate(self._seen)
         ]
@@ -136,7 +138,8 @@ class Tracker:
 
     def shows(self, x: float, y: float, within_m: float) -> bool:
         """Return whether an obstacle of the newest scan, not a wall, has its centre within `within_m` of (x, y) in
-        `map`."""
+        `map`.
+        """
         things = (thing for _, thing in self._seen if isinstance(thing, _Track) or thing.kind != "wall")
         return any(hypot(thing.x - x, thing.y - y) < within_m for thing in things)
 

@@ -92,7 +92,8 @@ def _straight(x: float, y: float, half_width_m: float) -> float:
 
 def _bent(x: float, y: float, from_center: float, radius: float, half_width_m: float) -> float:
     """Return the distance on a left bend about (0, radius), driven forwards, until the body meets the point, which is
-    on the bend and `from_center` away from that centre."""
+    on the bend and `from_center` away from that centre.
+    """
     if hypot(x, y) < half_width_m:
         return inf if x <= 0.0 else 0.0
     # The body touches the point while the angle between them, seen from the bend's centre, is at most `touching`.

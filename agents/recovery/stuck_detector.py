@@ -51,7 +51,8 @@ class StuckMonitor:
         self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
-        move."""
+        move.
+        """
         if self.backing_out:
             return
         held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
@@ -93,7 +94,8 @@ class StuckMonitor:
 
 class StuckConditions:
     """Conditions S1 to S5 of one robot on its way; `reset` on arrival, while it waits for its team, and on a
-    restart."""
+    restart.
+    """
 
     def __init__(self, *, again: bool = True) -> None:
         """Create the conditions. Without `again`, U-turns and coming back (S3) do not count: an explorer does both."""
@@ -112,7 +114,8 @@ class StuckConditions:
 
     def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> str | None:
         """Return the reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before
-        limits."""
+        limits.
+        """
         self._note(pose, action, now)
         if pose_age_s > POSE_LOST_S:
             return POSE_LOST
@@ -143,7 +146,8 @@ class StuckConditions:
 
     def _comes_back(self, now: float) -> bool:
         """Return whether the robot entered its cell `CELL_ENTRIES` times lately: that many are kept, the oldest
-        first."""
+        first.
+        """
         entries = self._entries.get(self._cell) if self._cell is not None else None
         return entries is not None and len(entries) == CELL_ENTRIES and now - entries[0] <= CELL_S
 

@@ -76,4 +76,4 @@ class FleetState:
         if role == "follower" and tracking is not None:
             return tracking.state
         note = self._notes.get(robot, "")
-        return "" if role == "gone" or note == role else note
+        return "" if role in ("gone", note) else note

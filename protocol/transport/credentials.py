@@ -25,7 +25,8 @@ _UTC_TIME, _CONTEXT_0 = 0x17, 0xA0
 
 class Credentials(Struct, frozen=True):
     """Paths of the files that prove the identity `name`; secure routers also require `password_file`
-    (`user:password`), None if there is none."""
+    (`user:password`), None if there is none.
+    """
 
     name: str
     ca: Path

@@ -55,7 +55,8 @@ class RegisterState:
         mutant: str = "",
     ) -> None:
         """`restarts`: the ids of which one may die and start again. `cold`: everybody starts blank.
-        `head_ties`: without the witness, the leader that writes is tie-breaker."""
+        `head_ties`: without the witness, the leader that writes is tie-breaker.
+        """
         assert mutant in ("", *MUTANTS), mutant
         self.ids = tuple(range(robots + 1))
         self.witness = robots

@@ -20,7 +20,7 @@ LOOK_STEP_M = 0.05
 Curvature = Callable[[float], float]
 
 
-def straight(s: float) -> float:
+def straight(_s: float) -> float:
     """Return the curvature [1/m] of a straight line: 0."""
     return 0.0
 

@@ -132,7 +132,8 @@ def test_a_robot_that_something_is_too_near_to_creeps_out_where_it_comes_no_near
 
 def test_a_robot_beside_which_something_stands_does_not_back_off_from_it() -> None:
     """Were a bend towards a team-mate beside it taken for what is before its nose, two that turn round side by side in
-    a pocket would back into it and wedge there (paper_path1, seed 7)."""
+    a pocket would back into it and wedge there (paper_path1, seed 7).
+    """
     detour = Detour(RADIUS_M, LIMITS)
     thing = BlockingObstacle("wall", 0.5)
     twist = detour.steer(circle(0.03, 0.35, 0.15), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: thing)

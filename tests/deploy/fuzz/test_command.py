@@ -52,7 +52,8 @@ def test_a_planted_bug_is_found_shrunk_and_still_fails() -> None:
 @pytest.mark.parametrize(("bars", "violations"), [(True, 0), (False, 1)])
 def test_i4_a_fence_holds_though_its_gateway_starts_anew(bars: bool, violations: int) -> None:
     """A voter that slept adopts a term late, and the next at once: its first bond outlasts the shut start of the
-    gateway, the lease that it was for does not (seed 15427)."""
+    gateway, the lease that it was for does not (seed 15427).
+    """
     checker, old, new, voter = OneBond(timing_of("std")), Member(2, 9), Member(5, 12), Member(4, 11)
     terms = Term(4, 2, 9), Term(5, 5, 12)
     for term, holder in zip(terms, (old, new), strict=True):

@@ -26,7 +26,8 @@ class Order:
 
 def test_who_asks_for_the_mission_listens_first(tmp_path: Path) -> None:
     """The world answers within a millisecond: one answer in six passed by, and the next question is half a second
-    later."""
+    later.
+    """
     bus = Order()
     journal = Journal(tmp_path, Heading(JOURNAL_VERSION, "witness", 1, 1, {}))
     _NodeRunner(Witness("f", 1, 1), bus, Inbox(), journal, None).step(0.5)
