@@ -29,7 +29,7 @@ class RobotHardware:
         noise = scenario.world.noise
         self.id = robot_id
         self.name = robot_name(robot_id)
-        self.gateway = Gateway(robot_id, incarnation, timing_of(scenario.mission.profile), now)
+        self.gateway = Gateway(robot_id, incarnation, timing_of(scenario.mission.profile), now, scenario.mission.limits)
         self.odometry = WheelOdometry(noise, seed, robot_id)
         self._localizer = Localizer(noise, seed, robot_id)
         self._range_noise = RangeNoise(noise, scenario.world.lidar, seed, robot_id)

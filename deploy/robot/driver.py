@@ -71,7 +71,9 @@ class Driver:
                 if self._robot_id not in mission.robots:
                     self.refusal = f"id {self._robot_id}: not in the mission, which has robots {list(mission.robots)}"
                     return []
-                self._gateway = Gateway(self._robot_id, self.incarnation, timing_of(mission.profile), now)
+                self._gateway = Gateway(
+                    self._robot_id, self.incarnation, timing_of(mission.profile), now, mission.limits
+                )
                 self._base = self._make_base(mission.limits, now)
                 self._next = now
             case CmdVel() as cmd if gateway is not None:

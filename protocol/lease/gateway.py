@@ -1,32 +1,40 @@
 """The actuator gateway of one robot: the only path to its actuators, and therefore the place where a lost lease ends.
 
-A false leader does harm by its commands only. So terms are enforced at the actuators, on one clock: a
-command is obeyed if its term is not below the highest seen, and if it echoes a time of this gateway's own clock that is
-younger than the deadman D. A command computed before a pause carries an old time, whatever its sender's state (rule
+A false leader does harm by its commands only. So terms are enforced at the actuators, on one clock: a command is obeyed
+if its term is not below the highest seen, and if it echoes a time of this gateway's own clock that is not in the future
+and younger than the deadman D. A command computed before a pause carries an old time, whatever its sender's state (rule
 E12). The world holds the gateways of simulated robots; a real robot's driver holds its own.
 """
 
 from __future__ import annotations
 
+from math import isfinite
+
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.mission import Limits
 
 SHUT, OLD_INCARNATION, OLD_TERM, FOREIGN_HOLDER = "shut", "old_incarnation", "old_term", "foreign_holder"
 FOREIGN_STAMP, OLD_STAMP, LATCHED, TWO_HOLDERS = "foreign_stamp", "old_stamp", "latched", "two_holders"
+FUTURE_STAMP, REORDERED, BAD_TWIST = "future_stamp", "reordered", "bad_twist"
 
 
 class Gateway:
     """Fence, stamp age check, deadman and latch of robot `robot_id`; `now` is the gateway's own monotonic time [s]."""
 
-    def __init__(self, robot_id: int, incarnation: int, timing: Timing, now: float) -> None:
+    def __init__(
+        self, robot_id: int, incarnation: int, timing: Timing, now: float, limits: Limits | None = None
+    ) -> None:
+        """Create a gateway that is shut for `T_grant` (E13); `limits` are those of its drive, None without a drive."""
         self.robot_id = robot_id
         self.incarnation = incarnation
         self.term_max: Term = NO_TERM
         self.refused: dict[str, int] = {}
         """Number of refused commands by reason."""
         self._deadman_s = timing.deadman_s
+        self._limits = limits
         # E13: an earlier incarnation of this gateway may have confirmed a fence unknown to this one. Every lease below
         # that fence has expired after T_grant.
         self._shut_until = now + timing.grant_s
@@ -38,6 +46,8 @@ class Gateway:
         self._twist = STILL
         self._stamped_at = float("-inf")
         """Time [s] of this gateway that the last obeyed command echoes; it gives the age of the command's input."""
+        self._seq = -1
+        """Sequence number of the last obeyed command, in its incarnation."""
 
     def command(self, cmd: CmdVel, now: float) -> str | None:
         """Obey `cmd` and return None, or count and return the reason of refusal."""
@@ -45,14 +55,14 @@ class Gateway:
         if reason is not None:
             self.refused[reason] = self.refused.get(reason, 0) + 1
             return reason
-        self._obeyed = cmd.header.incarnation
+        self._obeyed, self._seq = cmd.header.incarnation, cmd.header.seq
         if cmd.term > self.term_max:
             self.term_max, self._holder = cmd.term, cmd.holder
         elif self._holder == 0:
             self._holder = cmd.holder
         if cmd.as_leader:
             self._latched = None
-        self._twist, self._stamped_at = cmd.twist, cmd.gateway.time
+        self._twist, self._stamped_at = self._within_limits(cmd.twist), cmd.gateway.time
         return None
 
     def _objection(self, cmd: CmdVel, now: float) -> str | None:
@@ -68,11 +78,30 @@ class Gateway:
             return TWO_HOLDERS
         if cmd.gateway.incarnation != self.incarnation:
             return FOREIGN_STAMP
+        if cmd.gateway.time > now:
+            return FUTURE_STAMP
         if now - cmd.gateway.time > self._deadman_s or cmd.gateway.time < self._stamped_at:
             return OLD_STAMP
+        if (
+            cmd.gateway.time == self._stamped_at
+            and cmd.header.incarnation == self._obeyed
+            and cmd.header.seq < self._seq
+        ):
+            return REORDERED
+        if not (isfinite(cmd.twist.linear_x) and isfinite(cmd.twist.angular_z)):
+            return BAD_TWIST
         if cmd.as_leader and self._latched is not None and cmd.term <= self._latched:
             return LATCHED
         return None
+
+    def _within_limits(self, twist: Twist) -> Twist:
+        """Return `twist` [m/s, rad/s], each part limited to what the drive can do."""
+        if self._limits is None:
+            return twist
+        v = min(max(twist.linear_x, -self._limits.v_reverse_max_mps), self._limits.v_max_mps)
+        omega_max = self._limits.omega_max_radps
+        omega = min(max(twist.angular_z, -omega_max), omega_max)
+        return twist if (v, omega) == (twist.linear_x, twist.angular_z) else Twist(v, omega)
 
     def fence(self, fence: Fence, now: float) -> Fenced:
         """Refuse all terms below `fence.term` from now on, brake if it is new, and return the confirmation (E11)."""

@@ -41,6 +41,8 @@ PLANTED: tuple[Bug, ...] = (
         "usual_bugs::test_bug_3_a_stepped_wall_clock_changes_nothing"),
     Bug("bug 4", "check, pause, act: the age of stamps is not checked", time.gateway_without("old_stamp"),
         "lease::test_bug_4_the_command_of_a_zombie_is_refused"),
+    Bug("rule E12", "a time that is still to come is believed", time.gateway_without("future_stamp"),
+        "gateway::test_e12_a_time_that_the_gateway_has_not_reached_is_refused_and_the_deadman_fires", (1e9,)),
     Bug("bug 5", "the end of a lease is not told", time.lease_end_not_told,
         "usual_bugs::test_bug_5_the_end_of_a_lease_is_told"),
     Bug("bug 5", "the end of a lease is not noticed", time.expired_leader_goes_on,

@@ -1,5 +1,7 @@
 """The gateway of one robot: E11 to E14, and usual bugs 4 and 8 of the design's list at the actuator."""
 
+from math import inf, nan
+
 import pytest
 
 from lfa.protocol.geometry import STILL, Twist
@@ -8,6 +10,7 @@ from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Fence, GatewayStamp, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.mission import Limits
 
 STD = timing_of("std")
 GO = Twist(0.5, 0.1)
@@ -22,10 +25,19 @@ def opened(robot_id: int = 1) -> Gateway:
 
 
 def command(
-    at: float, n: int = 3, *, holder: int = 1, as_leader: bool = True, life: int = 5, gateway: int = 9, issuer: int = 1
+    at: float,
+    n: int = 3,
+    *,
+    holder: int = 1,
+    as_leader: bool = True,
+    life: int = 5,
+    gateway: int = 9,
+    issuer: int = 1,
+    seq: int = 0,
+    twist: Twist = GO,
 ) -> CmdVel:
     stamp = GatewayStamp(gateway, at)
-    return CmdVel(Header("robot1", life, 0, 0.0), GO, Term(n, issuer, 1), holder, as_leader, stamp)
+    return CmdVel(Header("robot1", life, seq, 0.0), twist, Term(n, issuer, 1), holder, as_leader, stamp)
 
 
 def test_e12_a_fresh_command_of_the_newest_term_moves_the_robot() -> None:
@@ -46,6 +58,40 @@ def test_e12_a_zombies_command_carries_an_old_moment_and_is_refused() -> None:
     gateway = opened()
     drawn = command(OPEN)
     assert gateway.command(drawn, OPEN + STD.deadman_s + 0.001) == "old_stamp"
+
+
+@pytest.mark.parametrize("ahead_s", [1e-6, 0.1, 1e9])
+def test_e12_a_time_that_the_gateway_has_not_reached_is_refused_and_the_deadman_fires(ahead_s: float) -> None:
+    gateway = opened()
+    assert gateway.command(command(OPEN + ahead_s), OPEN) == "future_stamp"
+    assert gateway.twist(OPEN) == STILL
+    assert gateway.command(command(OPEN, seq=1), OPEN) is None, "later commands are obeyed"
+    assert gateway.twist(OPEN + STD.deadman_s + 0.001) == STILL
+
+
+def test_e12_of_commands_that_echo_one_time_the_newest_counts() -> None:
+    gateway, back = opened(), Twist(-0.1, 0.0)
+    assert gateway.command(command(OPEN, seq=7, twist=back), OPEN) is None
+    assert gateway.command(command(OPEN, seq=6), OPEN) == "reordered"
+    assert gateway.twist(OPEN) == back
+    assert gateway.command(command(OPEN, seq=8), OPEN) is None
+
+
+@pytest.mark.parametrize("bad", [Twist(nan, 0.0), Twist(0.0, inf), Twist(-inf, nan)])
+def test_e12_a_twist_that_is_no_number_is_refused(bad: Twist) -> None:
+    gateway = opened()
+    assert gateway.command(command(OPEN, twist=bad), OPEN) == "bad_twist"
+    assert gateway.twist(OPEN) == STILL
+
+
+@pytest.mark.parametrize(
+    ("wanted", "passed"),
+    [(Twist(9.0, -9.0), Twist(1.0, -2.0)), (Twist(-1.0, 0.5), Twist(-0.3, 0.5)), (Twist(0.4, 0.1), Twist(0.4, 0.1))],
+)
+def test_e12_a_gateway_passes_on_no_more_than_its_drive_can_do(wanted: Twist, passed: Twist) -> None:
+    gateway = Gateway(1, 9, STD, 0.0, Limits())
+    assert gateway.command(command(OPEN, twist=wanted), OPEN) is None
+    assert gateway.twist(OPEN) == passed
 
 
 def test_e12_a_moment_of_an_earlier_life_of_the_gateway_is_refused() -> None:
