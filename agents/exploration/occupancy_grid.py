@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from math import ceil, cos, floor, hypot, inf, sin
 
+from lfa.agents.perception.scan import READING_M_MIN
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.robot import LaserScan
 
@@ -107,10 +108,10 @@ class Mapping:
 
     def _trace(self, scan: LaserScan, pose: Pose2D, mates: tuple[Point, ...]) -> Iterator[int]:
         """Process one beam per step; yield the number of cells that it passed."""
-        count = len(scan.ranges_m)
+        count, low_m = len(scan.ranges_m), max(scan.range_min_m, READING_M_MIN)
         for n in range(0, count, max(1, ceil(count / RAYS_MAX))):
             r = scan.ranges_m[n]
-            if r != r or r < scan.range_min_m:  # noqa: PLR0124 (nan, at a third of the cost of isnan)
+            if r != r or r < low_m:  # noqa: PLR0124 (nan, at a third of the cost of isnan)
                 continue
             angle = pose.theta + scan.angle_min + n * scan.angle_increment
             c, s = cos(angle), sin(angle)

@@ -11,6 +11,9 @@ from lfa.protocol.messages.robot import LaserScan
 SIGHT_M = 2.5
 """Range [m] beyond which points do not matter to a robot that stops within half a metre."""
 STRAIGHT_RADPS = 1e-3
+READING_M_MIN = 0.05
+"""Range [m] below which a reading is none, whatever `range_min_m` allows: some scanners report 0 for no echo. Half a
+cell of the explorer's map, so that no reading marks the robot's own cell."""
 ROUNDED = 1.0 + 1e-9
 """Factor that covers the rounding error of a square."""
 
@@ -27,7 +30,7 @@ class Surroundings:
     def scan(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
         """Update with a scan made at `pose_map`. Out-of-range and bad readings give no points (REP-117)."""
         x, y, angle, step = pose_map.x, pose_map.y, pose_map.theta + scan.angle_min, scan.angle_increment
-        low, high = scan.range_min_m, min(SIGHT_M, scan.range_max_m)
+        low, high = max(scan.range_min_m, READING_M_MIN), min(SIGHT_M, scan.range_max_m)
         self._points_map = [
             (x + r * cos(angle + i * step), y + r * sin(angle + i * step))
             for i, r in enumerate(scan.ranges_m)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import cos, floor, hypot, inf, pi, sin
 
 import pytest
+from msgspec.structs import replace
 
 from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, REACH, Grid, Mapping, Point
 from lfa.protocol.geometry import Pose2D
@@ -110,3 +111,11 @@ def test_a_beam_that_leaves_the_grid_is_followed_to_its_rim() -> None:
     far = mapped([(scan_of_room(pose, half_m=7.0), pose)])
     assert occupied(far.grid) == []
     assert any(far.grid.scores)
+
+
+def test_a_range_of_zero_marks_nothing_whatever_the_scanners_minimum_says() -> None:
+    """SICK picoScan reports 0.0 for no echo with `range_min` 0.0; a robot must not wall itself in."""
+    room = scan_of_room(Pose2D())
+    zeros = replace(room, range_min_m=0.0, ranges_m=(0.0,) * BEAMS)
+    grid = mapped([(zeros, Pose2D())] * 5).grid
+    assert not any(grid.scores)

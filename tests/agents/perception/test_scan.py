@@ -4,6 +4,7 @@ from math import hypot, inf, nan, pi
 
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from lfa.agents.perception.scan import SIGHT_M, Surroundings, free_along, without
 from lfa.protocol.geometry import Pose2D, Twist, along_arc
@@ -29,6 +30,12 @@ def test_out_of_range_too_near_and_bad_beams_are_no_points() -> None:
     seen = Surroundings()
     seen.scan(scan(inf, -inf, nan, SIGHT_M + 1.0), Pose2D(), 0.0)
     assert seen.points(Pose2D()) == []
+
+
+def test_a_range_of_zero_is_no_point_whatever_the_scanners_minimum_says() -> None:
+    seen = Surroundings()
+    seen.scan(replace(scan(0.0, 0.04, 1.0, inf), range_min_m=0.0), Pose2D(), 0.0)
+    assert len(seen.points(Pose2D())) == 1
 
 
 def test_a_known_team_mate_is_left_out() -> None:
