@@ -12,6 +12,7 @@ import typer
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
 from lfa.deploy.fleet.host.log_tail import FOLLOW_S
 from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.terminal_text import visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
@@ -83,5 +84,5 @@ def _print(said: LogLines, as_json: bool, *, alone: bool) -> None:
         if as_json:
             print(msgspec.json.encode({"host": host, "process": said.name, "line": line}).decode())
         else:
-            print(line if alone else f"{host}/{said.name}: {line}")
+            print(visible(line if alone else f"{host}/{said.name}: {line}"))
     sys.stdout.flush()

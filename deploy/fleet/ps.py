@@ -10,6 +10,7 @@ import msgspec
 import typer
 
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
+from lfa.deploy.terminal_text import cell, visible
 from lfa.protocol import clock
 from lfa.protocol.names import robot_id_of
 
@@ -45,7 +46,7 @@ def command(
         console = Console(width=max(WIDTH_MIN, shutil.get_terminal_size().columns))
         console.print(table(facts))
         for name in silent:
-            print(f"host {name} is silent")
+            print(f"host {visible(name)} is silent")
     return 1 if silent or not facts or any(row["state"] != "running" for row in facts) else 0
 
 
@@ -84,5 +85,5 @@ def table(facts: list[dict[str, Any]]) -> Table:
         style = "" if row["state"] == "running" else "bold red"
         says = row["says"] if row["state"] == "running" and row["says"] else row["ended"]
         cells = (row["host"], row["process"], row["state"], str(row["pid"] or ""), str(row["starts"]))
-        made.add_row(*cells, f"{row['up_s']:.0f} s", says, style=style)
+        made.add_row(*map(cell, (*cells, f"{row['up_s']:.0f} s", says)), style=style)
     return made

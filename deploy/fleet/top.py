@@ -14,6 +14,7 @@ from lfa.deploy.client.team_status import Board
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
 from lfa.deploy.fleet.ps import rows as processes
 from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.terminal_text import cell
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
@@ -90,7 +91,6 @@ def _facts(view: FleetView, board: Board) -> dict[str, Any]:
 def _screen(view: FleetView, board: Board) -> Group:
     from rich.console import Group
     from rich.table import Table
-    from rich.text import Text
 
     facts = _facts(view, board)
     robots = {robot_name(row["robot"]): row for row in facts["robots"]}
@@ -101,23 +101,24 @@ def _screen(view: FleetView, board: Board) -> Group:
     for row in facts["processes"]:
         robot = robots.get(row["process"], {})
         style = "bold red" if row["state"] != "running" else "bold green" if robot.get("role") == "leader" else ""
-        made.add_row(row["host"], row["process"], row["state"], str(row["starts"]), *_cells(row, robot), style=style)
+        cells = (row["host"], row["process"], row["state"], str(row["starts"]), *_cells(row, robot))
+        made.add_row(*map(cell, cells), style=style)
     who = "nobody leads" if facts["leader"] is None else f"robot {facts['leader']} leads"
     silent = f"; silent: {', '.join(facts['silent'])}" if facts["silent"] else ""
-    return Group(Text(f"fleet {facts['fleet']}: {who}{silent}", style="bold"), made)
+    return Group(cell(f"fleet {facts['fleet']}: {who}{silent}", style="bold"), made)
 
 
 def _cells(row: dict[str, Any], robot: dict[str, Any]) -> tuple[str, ...]:
-    def cell(name: str, form: str, factor: float = 1.0) -> str:
+    def shown(name: str, form: str, factor: float = 1.0) -> str:
         value = robot.get(name)
         return "" if value is None else form.format(factor * value)
 
     return (
         robot.get("role", ""),
-        cell("predecessor", "{:.0f}"),
-        cell("error_m", "{:.0f} mm", 1000.0),
-        cell("pose_age_s", "{:.0f} ms", 1000.0),
-        cell("cpu_percent", "{:.0f} %"),
-        cell("rss_mib", "{:.0f} M"),
+        shown("predecessor", "{:.0f}"),
+        shown("error_m", "{:.0f} mm", 1000.0),
+        shown("pose_age_s", "{:.0f} ms", 1000.0),
+        shown("cpu_percent", "{:.0f} %"),
+        shown("rss_mib", "{:.0f} M"),
         row["ended"] if row["state"] != "running" else robot.get("state", ""),
     )

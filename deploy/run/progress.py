@@ -6,6 +6,7 @@ import sys
 from typing import TYPE_CHECKING, Protocol
 
 from lfa.deploy.client.fleet_state import FleetState
+from lfa.deploy.terminal_text import cell, visible
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -40,10 +41,10 @@ class _InLines:
         if standing.time_s >= self._next_s or leader != self._leader:
             self._next_s = standing.time_s + LINE_EVERY_S
             self._leader = leader
-            print(standing.line(leader), file=sys.stderr, flush=True)
+            print(visible(standing.line(leader)), file=sys.stderr, flush=True)
 
     def note(self, standing: FleetState, text: str) -> None:
-        print(f"{standing.time_s:7.1f} s  {text}", file=sys.stderr, flush=True)
+        print(visible(f"{standing.time_s:7.1f} s  {text}"), file=sys.stderr, flush=True)
 
     def close(self) -> None:
         pass
@@ -61,7 +62,7 @@ class _OnTerminal:
         self._live.update(_table(standing, leader))
 
     def note(self, standing: FleetState, text: str) -> None:
-        self._live.console.print(f"{standing.time_s:7.1f} s  {text}", highlight=False)
+        self._live.console.print(cell(f"{standing.time_s:7.1f} s  {text}"))
 
     def close(self) -> None:
         self._live.stop()
@@ -70,9 +71,9 @@ class _OnTerminal:
 def _table(standing: FleetState, leader: int | None) -> Table:
     from rich.table import Table
 
-    table = Table(title=standing.headline(leader), title_justify="left", box=None, padding=(0, 2))
+    table = Table(title=cell(standing.headline(leader)), title_justify="left", box=None, padding=(0, 2))
     for heading in ("", "role", "distance error", "state"):
         table.add_column(heading, justify="right" if heading == "distance error" else "left")
     for row in standing.rows():
-        table.add_row(*row)
+        table.add_row(*map(cell, row))
     return table

@@ -21,6 +21,7 @@ import typer
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.client.team_status import Board, RobotStatus
 from lfa.deploy.operate import fault, formation
+from lfa.deploy.terminal_text import cell, visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
@@ -151,11 +152,11 @@ def _screen(ear: Subscriber, board: Board, hand: KeyHandler, width: int, height:
     more = f", {len(rows) - len(shown)} more robots" if len(shown) < len(rows) else ""
     events = list(board.events)[-left:] if left > 0 else []
     return Group(
-        Text(f"fleet {ear.fleet.name}: {who}{more}", style="bold", no_wrap=True),
+        Text(visible(f"fleet {ear.fleet.name}: {who}{more}"), style="bold", no_wrap=True),
         _table(shown, hand.chosen),
         _timeline(board, width),
-        *(Text(f" {_ago(e.at):>6} {e.who:<9} {e.what}", no_wrap=True, overflow="ellipsis") for e in events),
-        Text(hand.said, style="cyan", no_wrap=True, overflow="ellipsis"),
+        *(Text(visible(f" {_ago(e.at):>6} {e.who:<9} {e.what}"), no_wrap=True, overflow="ellipsis") for e in events),
+        Text(visible(hand.said), style="cyan", no_wrap=True, overflow="ellipsis"),
         Text(HELP, style="dim", no_wrap=True, overflow="ellipsis"),
     )
 
@@ -168,7 +169,9 @@ def _table(rows: list[RobotStatus], chosen: int | None) -> RenderableType:
         left = head in ("role", "state")
         table.add_column(head, justify="left" if left else "right", no_wrap=True, overflow="ellipsis")
     for row in rows:
-        table.add_row(*_cells(row), style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, ""))
+        table.add_row(
+            *map(cell, _cells(row)), style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, "")
+        )
     return table
 
 

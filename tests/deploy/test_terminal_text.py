@@ -1,0 +1,65 @@
+"""Foreign text on the terminal is text: no markup is obeyed, no control character reaches the terminal."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from lfa.deploy.client.team_status import RobotStatus
+from lfa.deploy.fleet import ps
+from lfa.deploy.terminal_text import visible
+from lfa.deploy.view.terminal import watch
+
+HOSTILE = (
+    "ok [/red] x",
+    "[link=file:///etc/passwd]click[/link]",
+    "\x1b]0;pwned\x07\x1b[2J",
+    "a\u202eb",
+    "\x9b2J",
+    "x\r\ny",
+)
+
+
+def _printed(what: Any) -> str:
+    console = Console(width=200, file=io.StringIO(), force_terminal=True, color_system=None)
+    console.print(what)
+    written: str = console.file.getvalue()  # type: ignore[attr-defined]
+    return written
+
+
+@pytest.mark.parametrize("says", HOSTILE)
+@pytest.mark.parametrize("field", ["host", "process", "state", "says", "ended"])
+def test_ps_shows_a_hostile_text_as_text(says: str, field: str) -> None:
+    row = {
+        "host": "a",
+        "process": "robot3",
+        "state": "running",
+        "pid": 1,
+        "starts": 1,
+        "up_s": 1.0,
+        "says": "",
+        "ended": "",
+    }
+    if field == "ended":
+        row["state"] = "failed"
+    written = _printed(ps.table([{**row, field: says}]))
+    assert visible(says) in written
+    assert not set(written.replace("\n", "")) & set("\x1b\x07\x9b\u202e\r")
+
+
+@pytest.mark.parametrize("says", HOSTILE)
+def test_watch_shows_a_hostile_state_as_text(says: str) -> None:
+    row = RobotStatus(1, "leader", 7, None, None, None, 0.0, 0.1, says, None, None, None)
+    assert visible(says) in _printed(watch._table([row], None))
+
+
+@pytest.mark.parametrize("text", ["plain", "Größe 3 °", "a\tb"])
+def test_what_is_printable_stays(text: str) -> None:
+    assert visible(text) == text
+
+
+def test_a_control_character_is_written_out() -> None:
+    assert visible("\x1b[2J") == r"\x1b[2J"
