@@ -27,7 +27,7 @@ MODULES = frozenset(
 )
 WORDS = (
     "beliefs?", "plight", "distress", "footing", "crew", "deeds?", "reigns?", "lives", "full house", "weather",
-    "motors", "arena", "onlookers?", "chronicle", "tether", "glimpsed", "at ease", "whoever", "so much",
+    "arena", "onlookers?", "chronicle", "tether", "glimpsed", "at ease", "whoever", "so much",
     "none of these", "voice", "said of", "it is that",
 )  # fmt: skip
 """Words of the old language that mean nothing else here; each as a pattern."""

@@ -51,11 +51,17 @@ class Base(Protocol):
 
 
 class SimulatedBase:
-    """Simulated motor with the mission's limits on an empty plane, from `start` in `map`; its scanner sees nothing."""
+    """Simulated motor with the mission's limits on an empty plane, from `start` in `map`; its scanner sees nothing.
+
+    Like a good motor controller it brakes by itself when commands stop coming.
+    """
 
     FIX_S = 0.1
+    COMMAND_S_MAX = 0.25
+    """Age [s] of the last command at which the motor controller brakes by itself: its driver has died or hangs."""
     BEAMS, RANGE_MIN_M, RANGE_MAX_M = 36, 0.1, 10.0
     TURN = 6.283185307179586
+    STEP_S = 0.02
 
     def __init__(self, start: Pose2D, limits: Limits, now: float) -> None:
         self._start = start
@@ -64,11 +70,12 @@ class SimulatedBase:
         self._twist, self._wanted = STILL, STILL
         self._odometer_m = 0.0
         self._at = now
+        self._commanded_at = now
         self._fix_at = now
 
     def drive(self, twist: Twist, now: float) -> None:
         self._move(now)
-        self._wanted = twist
+        self._wanted, self._commanded_at = twist, now
 
     def read(self, now: float) -> Reading:
         self._move(now)
@@ -81,8 +88,17 @@ class SimulatedBase:
         return Reading(self._pose_odom, self._twist, self._odometer_m, pose_map, scan)
 
     def _move(self, now: float) -> None:
-        """Integrate up to `now`: the twist moves towards the wanted one within the limits, then stays constant."""
-        dt_s, self._at = now - self._at, now
+        """Integrate up to `now`: with the last command until that is too old, then braking to rest."""
+        obeyed_until = self._commanded_at + self.COMMAND_S_MAX
+        self._integrate(min(now, obeyed_until))
+        if now > obeyed_until:
+            self._wanted = STILL
+            while self._at < now:
+                self._integrate(min(now, self._at + self.STEP_S))
+
+    def _integrate(self, until: float) -> None:
+        """Integrate up to `until`: the twist moves towards the wanted one within the limits, then stays constant."""
+        dt_s, self._at = max(0.0, until - self._at), max(until, self._at)
         limits = self._limits
         linear = min(limits.v_max_mps, max(-limits.v_reverse_max_mps, self._wanted.linear_x))
         angular = min(limits.omega_max_radps, max(-limits.omega_max_radps, self._wanted.angular_z))

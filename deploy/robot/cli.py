@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
+import shutil
 import sys
 from math import isfinite
 from pathlib import Path
@@ -14,6 +16,7 @@ from typing import NoReturn
 
 from lfa.deploy.robot.base import SimulatedBase
 from lfa.deploy.robot.driver import Driver
+from lfa.deploy.robot.watchdog import Watchdog
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
@@ -46,6 +49,8 @@ def start(arguments: argparse.Namespace) -> int:
 
     fleet = fleet_name(arguments.fleet)
     driver = Driver(fleet, arguments.id, wall_ms, make_base)
+    if arguments.stop_command:
+        driver.alive = _watchdog(arguments.stop_command).alive
     known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
     endpoint = arguments.connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")
@@ -58,7 +63,17 @@ def start(arguments: argparse.Namespace) -> int:
         known,
         notify,
     )
-    return run([driver], options, wall_ms)
+    try:
+        return run([driver], options, wall_ms)
+    finally:
+        driver.brake(clock.now())
+
+
+def _watchdog(command: str) -> Watchdog:
+    words = shlex.split(command)
+    if not words or shutil.which(words[0]) is None:
+        raise Refused(f"--stop-command {command!r}: must be a command that exists here and stops the motors")
+    return Watchdog(words)
 
 
 def _pose(text: str) -> Pose2D:
@@ -88,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
     add("--connect", metavar="ENDPOINT", help="router, as tcp/127.0.0.1:7447; a,b: tried in turn")
     add("--keys", type=Path, metavar="DIR", help="this machine's key folder from `lfa keys`")
+    add("--stop-command", metavar="COMMAND", help="stops the motors; a second process runs it when this one is silent")
     add("--link", choices=sorted(LINK_LEASES_MS), default="std", help="timeout of a silent link: 0.5, 1 or 2 s")
     return parser
 

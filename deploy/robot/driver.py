@@ -9,6 +9,7 @@ the router or the network is gone: it runs here, on this machine's clock, and de
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from math import inf
 from typing import Any
 
@@ -34,7 +35,15 @@ REFUSAL_EVERY_S = 0.2
 class Driver:
     """Driver of robot `robot_id`; `make_base(limits, now)` opens its hardware once the mission is known."""
 
-    def __init__(self, fleet: str, robot_id: int, incarnation: int, make_base: Callable[[Limits, float], Base]) -> None:
+    def __init__(
+        self,
+        fleet: str,
+        robot_id: int,
+        incarnation: int,
+        make_base: Callable[[Limits, float], Base],
+        alive: Callable[[float], None] = lambda now: None,
+    ) -> None:
+        """Create a driver; `alive(now)` is called after each control period in which the hardware answered."""
         self.name = f"{DRIVER_PREFIX}{robot_id}"
         self.incarnation = incarnation
         self.finished = False
@@ -52,6 +61,7 @@ class Driver:
         self._robot_id = robot_id
         self._robot = robot_name(robot_id)
         self._make_base = make_base
+        self.alive = alive
         self._base: Base | None = None
         self._gateway: Gateway | None = None
         self._cut_off = False
@@ -91,20 +101,34 @@ class Driver:
                 self._cut_off = True
             case Stop():
                 self.finished = True
-                if self._base is not None:
-                    self._base.drive(STILL, now)
+                self.brake(now)
         return []
 
     def tick(self, now: float) -> list[Envelope]:
-        """Drive the twist that the gateway lets through, and return the hardware's measurements as messages."""
+        """Drive the twist that the gateway lets through, and return the hardware's measurements as messages.
+
+        An error of the hardware ends the driver; its last command to the motors is a stop.
+        """
         if self.finished:
             return []
         if self._gateway is None or self._base is None:
             self._next = now + ASK_S
             return [Envelope(key(self._fleet, self.name, "ask"), Ask(self._header("ask", now), "mission"))]
         self._next = max(self._next + PERIOD_S, now)
-        self._base.drive(self._gateway.twist(now), now)
-        return self._said(self._base.read(now), self._gateway, now)
+        try:
+            self._base.drive(self._gateway.twist(now), now)
+            reading = self._base.read(now)
+        except Exception:
+            self.brake(now)
+            raise
+        self.alive(now)
+        return self._said(reading, self._gateway, now)
+
+    def brake(self, now: float) -> None:
+        """Command a stop, whatever else has failed: the last act on every way out of the process."""
+        if self._base is not None:
+            with suppress(Exception):  # broken hardware may refuse the stop as well; the watchdog is left then
+                self._base.drive(STILL, now)
 
     def _said(self, reading: Reading, gateway: Gateway, now: float) -> list[Envelope]:
         sent: list[Message] = [

@@ -8,7 +8,7 @@ from math import inf, isclose
 
 import pytest
 
-from lfa.deploy.robot.base import SimulatedBase
+from lfa.deploy.robot.base import Reading, SimulatedBase
 from lfa.deploy.robot.driver import PERIOD_S, Driver
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.lease.timing import timing_of
@@ -161,6 +161,39 @@ def test_each_term_in_which_it_leads_is_one_event() -> None:
             bench.hear("lfa/f/robot2/cmd_vel", CmdVel(header, GO, term, 2, True, stamp))
     events = [m for m in bench.all(Event) if isinstance(m, Event) and m.kind == "leader_command"]
     assert [(event.term, event.data) for event in events] == [(Term(n, 2, 1), {"robot": 2}) for n in (5, 6)]
+
+
+def test_hardware_that_raises_hears_a_stop_last() -> None:
+    """A driver whose serial line breaks ends; its wheels must not keep the last command."""
+    bench = Bench().begin().run(0.5, GO)
+    base = bench.base
+    assert base is not None and base._wanted == GO
+
+    def broken(_now: float) -> Reading:
+        raise OSError(5, "serial line gone")
+
+    base.read = broken  # type: ignore[method-assign]
+    with pytest.raises(OSError, match="serial line gone"):
+        bench.driver.tick(bench.driver.next_deadline())
+    assert base._wanted == STILL
+
+
+def test_motors_whose_driver_hangs_brake_by_themselves() -> None:
+    base = SimulatedBase(Pose2D(), Limits(), 0.0)
+    for n in range(100):
+        base.drive(Twist(0.5, 0.0), 0.02 * n)
+    before = base.read(2.0)
+    after = base.read(12.0)
+    assert after.twist == STILL
+    braking_m = 0.5 * 0.5 / (2.0 * Limits().a_max_mps2)
+    assert after.odometer_m - before.odometer_m < 0.5 * SimulatedBase.COMMAND_S_MAX + braking_m + 0.02
+
+
+def test_it_reports_each_period_in_which_the_hardware_answered() -> None:
+    bench, reports = Bench(), []
+    bench.driver.alive = reports.append
+    bench.begin().run(1.0, GO)
+    assert len(reports) >= 50
 
 
 def test_told_to_stop_it_brakes_and_is_done() -> None:

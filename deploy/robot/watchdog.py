@@ -1,0 +1,64 @@
+"""Watchdog process of a driver: runs a stop command when the driver falls silent, dies or hangs.
+
+The watchdog does not share the driver's fate: it is a process of its own with only a pipe from the driver. The
+driver writes a byte after each control period in which the hardware answered. The end of the pipe, or silence for
+`SILENT_S`, means that nobody controls the motors any more.
+
+Start: `python -m lfa.deploy.robot.watchdog SILENT_S COMMAND...`.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+SILENT_S = 0.25
+"""Silence [s] of the driver after which the stop command runs: more than twelve control periods of 20 ms."""
+
+
+class Watchdog:
+    """Driver's side: starts the watchdog process, and keeps it quiet with `alive`."""
+
+    def __init__(self, command: Sequence[str]) -> None:
+        """Start the process; `command` stops the motors. Raises OSError when it cannot be started."""
+        words = [sys.executable, "-P", "-m", "lfa.deploy.robot.watchdog", str(SILENT_S), *command]
+        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, start_new_session=True)
+        assert self._process.stdin is not None
+        self._pipe = self._process.stdin.fileno()
+        os.set_blocking(self._pipe, False)
+
+    def alive(self, _now: float) -> None:
+        """Report a control period in which the hardware answered. A full or broken pipe does not stop the driver."""
+        with suppress(BlockingIOError, BrokenPipeError):
+            os.write(self._pipe, b".")
+
+
+def watch(pipe: int, silent_s: float, command: Sequence[str]) -> int:
+    """Wait for the driver's first report, then run `command` at each silence, and at the end; return its exit code."""
+    stopped = True  # before the first report no motor has been commanded
+    while True:
+        ready, _, _ = select.select([pipe], [], [], None if stopped else silent_s)
+        if ready and os.read(pipe, 4096):
+            stopped = False
+            continue
+        if not stopped or ready:
+            code = subprocess.run(command, check=False).returncode
+            stopped = True
+        if ready:
+            return code
+
+
+def main() -> int:
+    """Run the watchdog on standard input."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # what ends the driver must not end its watchdog first
+    return watch(sys.stdin.fileno(), float(sys.argv[1]), sys.argv[2:])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

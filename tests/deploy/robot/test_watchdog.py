@@ -1,0 +1,58 @@
+"""The driver's watchdog process: it stops the motors when the driver dies or hangs, and not while it lives."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lfa.deploy.robot.watchdog import SILENT_S
+from tests.rigs.lfa_runs import eventually
+
+pytestmark = pytest.mark.processes
+
+DRIVER = """
+import sys, time
+from lfa.deploy.robot.watchdog import Watchdog
+dog = Watchdog([sys.executable, "-c", "open(%r, 'a').write('stop ')"])
+for n in range(int(sys.argv[1])):
+    dog.alive(0.0)
+    if n == 20:
+        print("drives", flush=True)
+    time.sleep(0.02)
+"""
+FOR_EVER, HALF_A_MINUTE = "100000", "1500"
+
+
+def _driver(place: Path, periods: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-P", "-c", DRIVER % str(place / "stopped"), periods]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def _stops(place: Path) -> int:
+    path = place / "stopped"
+    return path.read_text().count("stop") if path.exists() else 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSTOP])
+def test_a_driver_that_is_killed_or_hangs_has_its_motors_stopped(number: signal.Signals, tmp_path: Path) -> None:
+    with _driver(tmp_path, FOR_EVER) as driver:
+        assert driver.stdout is not None
+        assert driver.stdout.readline() == "drives\n"
+        assert _stops(tmp_path) == 0, "a driver that lives is left alone"
+        os.kill(driver.pid, number)
+        eventually(lambda: _stops(tmp_path) == 1, "nobody stopped the motors")
+        driver.kill()
+
+
+def test_a_driver_that_ends_has_its_motors_stopped(tmp_path: Path) -> None:
+    with _driver(tmp_path, "30"):
+        eventually(lambda: _stops(tmp_path) == 1, "nobody stopped the motors")
+
+
+def test_the_silence_that_is_waited_for_is_a_quarter_of_a_second() -> None:
+    assert SILENT_S == 0.25
