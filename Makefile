@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-fast test-hosts test-hosts-short test-campaign lint bench fuzz model planted same pages clean setup
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign lint bench fuzz model planted same pages clean setup
 
 setup: $(STAMP)
 
@@ -16,17 +16,21 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/lfa run paper_path1 --fault 'kill leader at 20 s'
 
-# First what computes, on two workers; then the teams of real processes, one at a time, for they keep time.
+# First what computes, on two workers; then the teams of real processes, two at a time, for they keep time and mostly wait.
 # Bytecode, also where the environment says not to write any: without it each of some 600 processes compiles its own.
 test test-fast: export PYTHONDONTWRITEBYTECODE =
 test test-fast: export PYTHONPYCACHEPREFIX = $(CURDIR)/$(VENV)/bytecode
 test: $(STAMP)
 	$(BIN)/pytest -n 2 --dist loadgroup -m 'not processes and not hosts and not campaign'
-	$(BIN)/pytest -m 'processes and not hosts and not campaign'
+	$(BIN)/pytest -n 2 --dist loadgroup -m 'processes and not hosts and not campaign and not wheel'
 
 # The tests that start no process.
 test-fast: $(STAMP)
 	$(BIN)/pytest -n 2 --dist loadgroup -m 'not processes and not hosts and not campaign'
+
+# The wheel, built and installed with and without extras: fetches packages.
+test-wheel: $(STAMP)
+	$(BIN)/pytest -m wheel tests/deploy/test_installed_wheel.py
 
 # Machines as network namespaces, each with its own router and sshd; skipped, with the reason, where that cannot be.
 # The whole of it, with bars that must be met; the short form asks what happens, not how fast.

@@ -8,10 +8,13 @@ their module stay together, so that it is made once. Each worker has a runtime f
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import signal
 import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 from hypothesis import settings
@@ -29,11 +32,30 @@ PROCESSES = ("tests/processes/", "tests/protocol/transport/test_zenoh_threads.py
 FIRST_GROUP = ("test_run.py", "test_looking.py")
 """Files that take about as long as all others with real processes."""
 NICE = 10
+RUN = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
+TEAMS = os.path.join(tempfile.gettempdir(), f"lfa-teams-{os.getuid()}-{RUN}")
+"""Lock file of this run of the tests: shared by teams that run, exclusive for a test that needs the machine alone."""
 
 
-def pytest_unconfigure() -> None:
-    """Remove the runtime folder."""
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the runtime folder, and the lock file when all workers are done."""
     shutil.rmtree(RUNTIME, ignore_errors=True)
+    if not hasattr(config, "workerinput"):
+        with suppress(OSError):
+            os.unlink(TEAMS)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Let a test that is marked `alone` wait for the other team, and the other team for it."""
+    if not item.get_closest_marker("processes"):
+        return (yield)
+    handle = os.open(TEAMS, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH)
+        return (yield)
+    finally:
+        os.close(handle)
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest chooses by marker, and before a worker reads the groups

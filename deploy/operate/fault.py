@@ -31,6 +31,7 @@ from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent
 
+RESTART_S_MAX, ORDER_EVERY_S = 2.0, 0.3  # time [s] to wait for a restart, and between two orders
 SENT_S = 0.05  # delay [s] so that the event about a fault leaves before the fault
 
 
@@ -100,10 +101,13 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
         if robot is None:
             raise Refused(f"restart {target!r}: must be a robot's id, such as 3")
         bus.follow(frozenset({operator.key}))
-        bus.publish(operator.orders_key, encode(operator.orders(RESTART, clock.now(), robot=robot)))
-        until = clock.now() + LISTEN_S
+        until, again = clock.now() + RESTART_S_MAX, 0.0
         while not any(_is_done(arrival, robot) for arrival in inbox.take()):
-            if clock.now() > until:
+            now = clock.now()
+            if now >= again:  # the launcher may not have noticed yet that the robot's last process is gone
+                bus.publish(operator.orders_key, encode(operator.orders(RESTART, now, robot=robot)))
+                again = now + ORDER_EVERY_S
+            if now > until:
                 raise Refused(f"robot {robot} of {fleet}: runs already, or no lfa run is there that starts it again")
             clock.sleep(SENT_S)
     finally:

@@ -13,7 +13,7 @@ INSTALL_S_MAX = 600
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 FLAT = "import importlib.util as u; print([n for n in ('agents', 'world', 'protocol', 'deploy') if u.find_spec(n)])"
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.wheel]
 
 
 def _ran(*words: str | Path, cwd: Path) -> str:

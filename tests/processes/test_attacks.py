@@ -271,6 +271,7 @@ def test_old_messages_of_another_played_again_on_its_key(fleet: Attacked) -> Non
     assert not before & set(heard)
 
 
+@pytest.mark.alone
 def test_a_flood(fleet: Attacked) -> None:
     """As fast as it can, on its own keys and on others': nobody but robot 3 loses its place, and poses keep coming."""
     poses = Counter[str]()
