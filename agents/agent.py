@@ -14,7 +14,7 @@ from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
 from lfa.agents.stuck_policy import StuckPolicy
-from lfa.agents.team_state import TeamState
+from lfa.agents.team_state import SENSORS_S_MAX, TeamState
 from lfa.agents.telemetry import Reports, status
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Twist
@@ -67,6 +67,7 @@ class Agent:
         self._next_ask = 0.0
         self._next_control = 0.0
         self._arrived = False
+        self._lost_input: str | None = None
         self._pending_release = False
         self.defer_grants = False
         """True while grants can wait for the next control step: the lease lasts well beyond it."""
@@ -307,7 +308,8 @@ class Agent:
             role = Role.WAITING
         command = driver.drive(role, self._chain(lease), pose, twist, now)
         self._command(command, role, now)
-        told = driver.published(twist)
+        self._watch_inputs(driver, now)
+        told = STILL if driver.estimator.age_s(now) > SENSORS_S_MAX else driver.published(twist)
         self._reports.place(driver, self._team, self._neighbours(), role, lease.term, pose, told, now)
         self._reports.decision(driver.decision, lease.term, now)
         self._reports.obstacle(driver, pose, now)
@@ -321,6 +323,14 @@ class Agent:
         if role is Role.LEADER and not self._arrived and driver.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
+
+    def _watch_inputs(self, driver: Navigator, now: float) -> None:
+        """Publish an event when an input of the robot's own hardware is lost, and when it is back."""
+        lost = driver.lost_input(now)
+        if lost != self._lost_input:
+            self._lost_input = lost
+            data = {"state": "back"} if lost is None else {"state": "lost", "input": lost}
+            self._event("input", now, data)
 
     def _hand_over(self, lease: Lease, now: float) -> None:
         self._command(STILL, Role.FOLLOWER, now)

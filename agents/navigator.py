@@ -24,9 +24,10 @@ from lfa.agents.localization.estimator import Estimator
 from lfa.agents.perception.obstacle_model import ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, without
+from lfa.agents.perception.scan_age import LOST_S, ScanAge
 from lfa.agents.recovery.back_up import BackUp
-from lfa.agents.recovery.stuck_detector import StuckMonitor
-from lfa.agents.team_state import TeamState
+from lfa.agents.recovery.stuck_detector import POSE_LOST, POSE_LOST_S, SCAN_LOST, StuckMonitor
+from lfa.agents.team_state import SENSORS_S_MAX, TeamState
 from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
@@ -65,6 +66,7 @@ class Navigator:
         self.predecessor: Predecessor | None = None
         self._obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
         self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
+        self.scan_age = ScanAge()
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing()
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
@@ -88,6 +90,12 @@ class Navigator:
         """Reason why this robot is stuck; None when it is not."""
         return self._stuck_monitor.reason
 
+    def lost_input(self, now: float) -> str | None:
+        """Return the input of the robot's own hardware that is too old to drive by; None when all is well."""
+        if self.estimator.age_s(now) > SENSORS_S_MAX:
+            return "sensors"
+        return "scan" if self.scan_age.lost(now) else None
+
     @property
     def decision(self) -> Decision | None:
         """Present avoidance decision; None on the wanted motion."""
@@ -106,8 +114,9 @@ class Navigator:
         return self._last if abs(off_mps) < OBEYED_MPS and abs(off_radps) < OBEYED_RADPS else measured
 
     def see(self, scan: LaserScan, now: float) -> None:
+        """Update with a scan; one that only repeats the last counts as none."""
         known = self.estimator.pose_at(now)
-        if known is not None:
+        if known is not None and self.scan_age.update(scan, known[0], now):
             mates = self._mates(now)
             # An explorer does not track obstacles: its map shows them while they are there.
             self._obstacles.see(scan, known[0], mates, now, track=self.explore is None)
@@ -171,6 +180,7 @@ class Navigator:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
             wanted = self._ground_crossing.cross(wanted, now)
             wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
+            wanted = self.scan_age.limited(wanted, now)
         if not self._back_up_path.under_way:
             self._back_up_path.keep(pose)
         self._watch(role, pose, wanted, now)
@@ -203,7 +213,9 @@ class Navigator:
         decision = self.decision
         action = None if decision is None else decision.action
         leads = role is Role.LEADER and self.leading.under_way
-        self._stuck_monitor.watch(pose, wanted, action, self.estimator.age_s(now), now, leads=leads)
+        lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
+        lost = POSE_LOST if self.estimator.age_s(now) > POSE_LOST_S else lost
+        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads)
 
     def _mates(self, now: float) -> list[Pose2D]:
         """Return the known poses of the team-mates: the predecessor's from its pose messages, the others' from the

@@ -132,6 +132,8 @@ def status(
     text, level = "waiting for the mission", Level.WARN
     if driver is not None:
         text, level = (role.value, Level.OK) if driver.estimator.ready else ("waiting for sensors", Level.WARN)
+        if driver.estimator.ready and (lost := driver.lost_input(now)) is not None:
+            text, level = f"{role.value}, no {lost} any more", Level.ERROR
         if missing:
             text, level = f"waiting for {', '.join(robot_name(i) for i in missing)}", Level.WARN
         counters |= {"outliers": driver.estimator.outliers, "refused": driver.estimator.refused}

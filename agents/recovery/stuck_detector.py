@@ -18,7 +18,7 @@ BACK_S = 5.0
 CELL_M, CELL_ENTRIES, CELL_S = 0.5, 3, 30.0
 WAITING_S = 10.0
 POSE_LOST_S = 1.0
-POSE_LOST = "S5: own pose lost"
+POSE_LOST, SCAN_LOST = "S5: own pose lost", "S5: no scan comes any more"
 TURN_S_MIN = 1.0
 """Minimum time [s] between two U-turns; nearer ones count as one, since the action flickers."""
 FREED_M = 0.5
@@ -48,14 +48,14 @@ class StuckMonitor:
             self.out()
 
     def watch(
-        self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float, *, leads: bool
+        self, pose: Pose2D, wanted: Twist, action: str | None, lost: str | None, now: float, *, leads: bool
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
         move.
         """
         if self.backing_out:
             return
-        held = self._stuck.watch(pose, wanted, action, pose_age_s, now)
+        held = self._stuck.watch(pose, wanted, action, lost, now)
         if not leads:
             self._stands = None
         elif self._stands_for_s(pose, now) >= STANDS_S and held is None:
@@ -88,7 +88,7 @@ class StuckMonitor:
         if self.reason is None or self._at is None or self.backing_out:
             return
         freed = hypot(pose.x - self._at.x, pose.y - self._at.y) >= FREED_M
-        if freed or now - self._held_at >= CALM_S or self.reason == POSE_LOST:
+        if freed or now - self._held_at >= CALM_S or self.reason in (POSE_LOST, SCAN_LOST):
             self.out()
 
 
@@ -112,13 +112,13 @@ class StuckConditions:
     def reset(self) -> None:
         self.__init__(again=self._again)  # type: ignore[misc]
 
-    def watch(self, pose: Pose2D, wanted: Twist, action: str | None, pose_age_s: float, now: float) -> str | None:
+    def watch(self, pose: Pose2D, wanted: Twist, action: str | None, lost: str | None, now: float) -> str | None:
         """Return the reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before
-        limits.
+        limits, `lost` the reason of S5 while an input that it needs is missing.
         """
         self._note(pose, action, now)
-        if pose_age_s > POSE_LOST_S:
-            return POSE_LOST
+        if lost is not None:
+            return lost
         if action == "wait" and now - self._since > WAITING_S:
             return "S4: waited too long for what moves"
         if action == "blocked" and now - self._since > BLOCKED_S:

@@ -4,6 +4,7 @@ from lfa.agents.recovery.stuck_detector import (
     CALM_S,
     CELL_ENTRIES,
     FREED_M,
+    POSE_LOST,
     STANDS_S,
     STILL_S,
     TURNS,
@@ -19,7 +20,7 @@ AHEAD = Twist(0.4, 0.0)
 def watched(seconds: float, wanted: Twist = AHEAD, action: str | None = None, speed: float = 0.0) -> str | None:
     stuck, reason = StuckConditions(), None
     for n in range(round(seconds / 0.02)):
-        reason = stuck.watch(Pose2D(speed * 0.02 * n, 0.0, 0.0), wanted, action, 0.0, 0.02 * n)
+        reason = stuck.watch(Pose2D(speed * 0.02 * n, 0.0, 0.0), wanted, action, None, 0.02 * n)
     return reason
 
 
@@ -37,7 +38,7 @@ def stood(seconds: float, *, leads: bool, speed_mps: float = 0.0) -> str | None:
     """The plight of one that wants next to nothing, and says no other reason."""
     plight = StuckMonitor()
     for n in range(round(seconds / 0.02)):
-        plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, "left", 0.0, 0.02 * n, leads=leads)
+        plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, "left", None, 0.02 * n, leads=leads)
     return plight.reason
 
 
@@ -60,18 +61,18 @@ def test_S2_blocked_on_all_sides() -> None:
 def test_S3_turned_round_again_and_again() -> None:
     stuck, reason = StuckConditions(), None
     for n in range(TURNS):
-        stuck.watch(Pose2D(), STILL, "left", 0.0, 2.0 * n)
-        reason = stuck.watch(Pose2D(), STILL, "u_turn", 0.0, 2.0 * n + 1.0)
+        stuck.watch(Pose2D(), STILL, "left", None, 2.0 * n)
+        reason = stuck.watch(Pose2D(), STILL, "u_turn", None, 2.0 * n + 1.0)
     assert str(reason).startswith("S3")
 
 
 def test_S3_in_the_same_place_again_and_again() -> None:
     stuck, reason = StuckConditions(), None
     for n in range(CELL_ENTRIES):
-        reason = stuck.watch(Pose2D(0.1, 0.1, 0.0), AHEAD, None, 0.0, 4.0 * n)
+        reason = stuck.watch(Pose2D(0.1, 0.1, 0.0), AHEAD, None, None, 4.0 * n)
         if n < CELL_ENTRIES - 1:
             assert reason is None
-            stuck.watch(Pose2D(1.1, 0.1, 0.0), AHEAD, None, 0.0, 4.0 * n + 2.0)
+            stuck.watch(Pose2D(1.1, 0.1, 0.0), AHEAD, None, None, 4.0 * n + 2.0)
     assert str(reason).startswith("S3")
 
 
@@ -79,7 +80,7 @@ def test_noise_on_a_cells_border_is_no_coming_back() -> None:
     stuck = StuckConditions()
     for n in range(500):
         x = 0.5 + (0.004 if n % 2 else -0.004) + 0.0002 * n
-        assert stuck.watch(Pose2D(x, 0.1, 0.0), STILL, None, 0.0, 0.02 * n) is None
+        assert stuck.watch(Pose2D(x, 0.1, 0.0), STILL, None, None, 0.02 * n) is None
 
 
 def test_S4_waited_too_long_for_what_moves() -> None:
@@ -87,30 +88,30 @@ def test_S4_waited_too_long_for_what_moves() -> None:
 
 
 def test_S5_own_pose_lost() -> None:
-    assert str(StuckConditions().watch(Pose2D(), STILL, None, 2.0, 0.0)).startswith("S5")
+    assert str(StuckConditions().watch(Pose2D(), STILL, None, POSE_LOST, 0.0)).startswith("S5")
 
 
 def test_a_reset_forgets() -> None:
     stuck = StuckConditions()
     for n in range(200):
-        stuck.watch(Pose2D(), AHEAD, None, 0.0, 0.02 * n)
+        stuck.watch(Pose2D(), AHEAD, None, None, 0.02 * n)
     stuck.reset()
-    assert stuck.watch(Pose2D(), AHEAD, None, 0.0, 4.02) is None
+    assert stuck.watch(Pose2D(), AHEAD, None, None, 4.02) is None
 
 
 def in_a_plight() -> StuckMonitor:
     plight = StuckMonitor()
     for n in range(150):
-        plight.watch(Pose2D(), STILL, "blocked", 0.0, 0.02 * n, leads=False)
+        plight.watch(Pose2D(), STILL, "blocked", None, 0.02 * n, leads=False)
     assert plight.reason is not None
     return plight
 
 
 def test_who_is_stuck_is_so_until_it_is_half_a_metre_away() -> None:
     plight = in_a_plight()
-    plight.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.1, leads=False)
+    plight.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, None, 3.1, leads=False)
     assert plight.reason is not None
-    plight.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, 0.0, 3.2, leads=False)
+    plight.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, None, 3.2, leads=False)
     assert plight.reason is None
 
 

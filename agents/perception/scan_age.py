@@ -1,0 +1,84 @@
+"""Age of the last scan that counts, and the speed that it allows: a robot that sees nothing any more slows and stands.
+
+A scanner that hangs publishes nothing, or the same scan again and again. A repeated scan counts as none once the robot
+has moved far enough for its ranges to change.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import cos, hypot, inf, sin
+
+from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, wrap
+from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.topics import TOPIC
+
+SCAN_S_MAX = TOPIC["scan"].timeout_s or 0.35
+"""Age [s] of the last scan up to which it is as good as new; at twice this age the robot stands."""
+LOST_S = 5.0
+"""Age [s] of the last scan from which a robot counts as stuck (S5), so that its chain goes on without it."""
+MOVED_M, MOVED_RAD = 0.05, 0.05
+"""Motion since the last scan that counted, after which an equal scan cannot be a new one."""
+FACES_MIN, ACROSS = 3, 0.5
+"""Number of neighbouring beams on surfaces across the motion, and the least share of the motion across a surface, from
+which a motion must have changed the scan: between two long walls a robot may well see the same again."""
+
+
+class ScanAge:
+    """Age of the last scan that counts. A robot that never had a scan has no scanner, and is not limited."""
+
+    def __init__(self) -> None:
+        self._ranges: tuple[float, ...] | None = None
+        self._pose = Pose2D()
+        self._at: float | None = None
+
+    def update(self, scan: LaserScan, pose: Pose2D, now: float) -> bool:
+        """Take a scan made at `pose` in `map`; return whether it counts."""
+        if scan.ranges_m == self._ranges:
+            if _must_differ(scan, self._pose, pose):
+                return False
+        else:
+            self._ranges, self._pose = scan.ranges_m, pose
+        self._at = now
+        return True
+
+    def age_s(self, now: float) -> float:
+        """Return the age [s] of the last scan that counts; 0 for a robot without a scanner."""
+        return 0.0 if self._at is None else now - self._at
+
+    def lost(self, now: float) -> bool:
+        """Return whether the robot stands for want of a scan."""
+        return self.age_s(now) >= 2.0 * SCAN_S_MAX
+
+    def limited(self, wanted: Twist, now: float) -> Twist:
+        """Return `wanted`, scaled down from `SCAN_S_MAX` on, to a stop at twice that age."""
+        share = 2.0 - self.age_s(now) / SCAN_S_MAX
+        if share >= 1.0:
+            return wanted
+        return STILL if share <= 0.0 else Twist(share * wanted.linear_x, share * wanted.angular_z)
+
+
+def _must_differ(scan: LaserScan, before: Pose2D, now: Pose2D) -> bool:
+    """Return whether the motion from `before` to `now` must have changed the ranges of `scan`."""
+    seen = {r for r in scan.ranges_m if r < inf}
+    if abs(wrap(now.theta - before.theta)) > MOVED_RAD:
+        return len(seen) > 1
+    if distance(before, now) <= MOVED_M:
+        return False
+    dx, dy = now.x - before.x, now.y - before.y
+    c, s, way_m = cos(before.theta), sin(before.theta), hypot(dx, dy)
+    ahead, left = (c * dx + s * dy) / way_m, (c * dy - s * dx) / way_m
+    return _faces(scan, ahead, left) >= FACES_MIN
+
+
+def _faces(scan: LaserScan, ahead: float, left: float) -> int:
+    """Return the number of neighbouring beams whose surface lies across the direction (`ahead`, `left`)."""
+    angles = (scan.angle_min + n * scan.angle_increment for n in range(len(scan.ranges_m)))
+    points = [(r * cos(a), r * sin(a)) if 0.0 < r < inf else None for r, a in zip(scan.ranges_m, angles, strict=True)]
+    count = 0
+    for p, q in pairwise(points):
+        if p is not None and q is not None:
+            along_x, along_y = q[0] - p[0], q[1] - p[1]
+            length = hypot(along_x, along_y)
+            count += length > 0.0 and abs(ahead * along_y - left * along_x) > ACROSS * length
+    return count

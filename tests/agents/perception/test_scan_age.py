@@ -1,0 +1,77 @@
+"""The age of the scan acts: no scan or only repeated ones slow a robot, then stop it, then free its chain."""
+
+from __future__ import annotations
+
+from math import cos, inf, sin
+from pathlib import Path
+
+import pytest
+
+from lfa.agents.perception.scan_age import SCAN_S_MAX, ScanAge
+from lfa.deploy.recording import event_log
+from lfa.deploy.run.simulate import run
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.topics import TOPIC
+from lfa.world.description.load import load
+
+GO = Twist(0.4, 0.2)
+REPRODUCE = "lfa sim straight --set world.lidar.rate_hz=0.1"
+
+
+def scan(*ranges: float) -> LaserScan:
+    return LaserScan(Header("robot1", 1, 0, 0.0), 0.0, 0.1, 0.05, 8.0, ranges)
+
+
+def test_its_limit_is_the_topics() -> None:
+    assert TOPIC["scan"].timeout_s == SCAN_S_MAX
+
+
+def test_a_robot_without_a_scanner_is_not_limited() -> None:
+    assert ScanAge().limited(GO, 100.0) == GO
+
+
+def test_an_old_scan_slows_then_stops_and_a_new_one_lets_go() -> None:
+    age = ScanAge()
+    age.update(scan(1.0), Pose2D(), 10.0)
+    assert age.limited(GO, 10.0 + SCAN_S_MAX) == GO
+    half = age.limited(GO, 10.0 + 1.5 * SCAN_S_MAX)
+    assert (half.linear_x, half.angular_z) == (pytest.approx(0.2), pytest.approx(0.1))
+    assert age.limited(GO, 10.0 + 2.01 * SCAN_S_MAX) == STILL
+    assert age.lost(10.0 + 2.01 * SCAN_S_MAX)
+    age.update(scan(0.9), Pose2D(), 11.0)
+    assert age.limited(GO, 11.1) == GO
+
+
+WALL_AHEAD = tuple(1.0 / cos(0.1 * n) for n in range(8))
+"""A wall one metre ahead, from straight ahead to the left."""
+LONG_WALL = (*(inf,) * 8, *(0.55 / sin(0.1 * n) for n in range(8, 16)))
+"""A wall to the left, along the motion."""
+
+
+@pytest.mark.parametrize("motion", [Pose2D(0.04, 0.0, 0.0), Pose2D(0.0, 0.0, 0.04)])
+def test_a_scan_that_repeats_itself_while_the_robot_moves_is_none(motion: Pose2D) -> None:
+    age = ScanAge()
+    for n in range(20):
+        age.update(scan(*WALL_AHEAD), Pose2D(motion.x * n, 0.0, motion.theta * n), 0.1 * n)
+    assert age.limited(GO, 1.9) == STILL
+
+
+@pytest.mark.parametrize(
+    ("ranges", "step_m"), [(WALL_AHEAD, 0.0), ((inf, inf), 0.04), (LONG_WALL, 0.04)], ids=["rest", "open", "long wall"]
+)
+def test_equal_scans_are_scans_where_nothing_need_change(ranges: tuple[float, ...], step_m: float) -> None:
+    age = ScanAge()
+    for n in range(20):
+        assert age.update(scan(*ranges), Pose2D(step_m * n, 0.0, 0.0), 0.1 * n)
+    assert age.limited(GO, 1.9) == GO
+
+
+def test_a_scanner_that_stops_drives_nobody_into_an_obstacle(tmp_path: Path) -> None:
+    obstacle = "world.obstacles=[{center_m=[7.5, 0.1], radius_m=0.4}]"
+    sets = ["mission.leading.route_m=[[12.0, 0.0]]", "world.lidar.rate_hz=0.1", "time_limit_s=40.0", obstacle]
+    done = run(load("straight", sets, 3), 1, tmp_path / "run")
+    assert sum(robot.contacts for robot in done.summary.robots) == 0, REPRODUCE
+    lost = [line for line in event_log.of_kind(event_log.lines(done.folder), "input") if line["state"] == "lost"]
+    assert {line["robot"] for line in lost} == {1, 2, 3}, REPRODUCE
