@@ -125,9 +125,7 @@ def status(
         "rows_heard": team.rows_heard,
         "rows_lost": team.rows_lost,
     }
-    if (
-        version is not None
-    ):  # version of the config, and so of the chain: an observer that missed the event learns it here
+    if version is not None:  # of the config, and so of the chain: an observer that missed the event learns it here
         counters |= {"config_n": version.term.n, "config_seq": version.seq}
     text, level = "waiting for the mission", Level.WARN
     if driver is not None:

@@ -91,8 +91,6 @@ COMMANDS = (
     Command("completion", "lfa.deploy.completion", "Print a script that completes commands and options in your shell.",
           "lfa completion bash > ~/.local/share/bash-completion/completions/lfa"),
 )  # fmt: skip
-
-
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",

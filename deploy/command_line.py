@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.EISDIR, errno.ENOTDIR)
 """errno values of a file system that refuses a write during a run: not an error of the program (exit code 1)."""
-
-
 NAMES = (errno.ENAMETOOLONG, errno.ELOOP)
 """errno values of a path that cannot exist: bad input (exit code 2)."""
 

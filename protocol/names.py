@@ -5,11 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 WITNESS_ID = 0
-
-
 WITNESS_NAME = "witness"
-
-
 DIGITS_MAX = 18
 
 

@@ -31,7 +31,6 @@ PROCESSES = ("tests/processes/", "tests/protocol/transport/test_zenoh_threads.py
 """Tests below these paths start real processes, whether they say so or not."""
 FIRST_GROUP = ("test_run.py", "test_looking.py")
 """Files that take about as long as all others with real processes."""
-NICE = 10
 RUN = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
 TEAMS = os.path.join(tempfile.gettempdir(), f"lfa-teams-{os.getuid()}-{RUN}")
 """Lock file of this run of the tests: shared by teams that run, exclusive for a test that needs the machine alone."""
@@ -75,10 +74,3 @@ def _group(item: pytest.Item) -> str:
     fixtures = item._fixtureinfo.name2fixturedefs.values()  # type: ignore[attr-defined]
     shared = [one for many in fixtures for one in many if one.scope == "module"]
     return str(item.path) if shared else ""
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let a worker that computes give way to those that keep time. The groups of processes are handed out first."""
-    if hasattr(item.config, "workerinput") and not item.get_closest_marker("processes"):
-        os.setpriority(os.PRIO_PROCESS, 0, NICE)

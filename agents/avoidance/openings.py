@@ -11,21 +11,13 @@ from lfa.agents.perception.scan import Point
 from lfa.protocol.geometry import wrap
 
 STEP_RAD = pi / 24
-
-
 ASIDE_STEPS, ALL_STEPS = 18, 30
 """Steps of `STEP_RAD`: directions up to 135 degrees off the wanted one lead past an obstacle, the others back. Once a
 side is taken, it reaches beyond the opposite direction, so that it does not flip there."""
-
-
 WIDE_M = 0.20
 """Clearance [m] to the body's surface where there is room."""
-
-
 NARROW_M = 0.08
 """Minimum clearance [m] (control.md section 7), except beside obstacles that are nearer already."""
-
-
 BESIDE = 0.25
 """Ratio of forward to lateral distance below which a point counts as beside the robot, which comes at most 3 % nearer
 to it."""

@@ -49,9 +49,8 @@ class Leadership:
         self.explore: Explore | None = None
         self._timetable: Timetable | None = None
         if mission.leading.motion == "explore":
-            from lfa.agents.exploration.explorer import (
-                Explore,
-            )  # loads a map and a planner: only explorers pay that memory
+            # Imported here: only explorers pay the memory of a map and a planner.
+            from lfa.agents.exploration.explorer import Explore
 
             self.explore = Explore(mission)
         elif mission.leading.motion == "trajectory":

@@ -114,7 +114,6 @@ class PathFollower:
         """Replace the route by an own one (`explore`), starting at its nearest point."""
         self._route = Route(points, PLANNED_CORNER_RADIUS_M)
         self._s = self._route.nearest(pose.x, pose.y, 0.0, 2.0 * WINDOW_M)
-        self._profile_of = None
 
     @property
     def goal(self) -> Point:
@@ -215,9 +214,8 @@ class PathFollower:
         if hypot(points[0][0] - points[-1][0], points[0][1] - points[-1][1]) < 1e-6 and len(points) == 2:
             points[0] = (points[0][0] - 0.01, points[0][1])
         if self._leading.known_m:
-            from lfa.agents.leading.known_obstacles import (
-                past_known,
-            )  # imported only with obstacles known from an earlier run
+            # Imported here: only runs with obstacles known from an earlier run need it.
+            from lfa.agents.leading.known_obstacles import past_known
 
             if hypot(points[0][0] - pose.x, points[0][1] - pose.y) > CORNER_RADIUS_M:
                 points = [(pose.x, pose.y), *points]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from lfa.protocol.geometry import Pose2D, Twist
 
 POSITION_MAX_M = 1e6
-
-
 SPEED_MAX = 50.0
 """Maximum plausible speed [m/s, rad/s]: no robot of the fleet is faster."""
 

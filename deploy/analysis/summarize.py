@@ -19,8 +19,6 @@ from lfa.deploy.recording.run_folder import About, scenario_of
 
 LEFT_BEHIND_M = 0.5
 """Distance error [m] at the end of a run above which a follower counts as left behind."""
-
-
 OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
 
 

@@ -48,9 +48,8 @@ def start(arguments: argparse.Namespace) -> int:
         return SimulatedBase(start_map, limits, now)
 
     fleet = fleet_name(arguments.fleet)
-    driver = Driver(fleet, arguments.id, wall_ms, make_base)
-    if arguments.stop_command:
-        driver.alive = _watchdog(arguments.stop_command).alive
+    watchdog = () if arguments.stop_command is None else (_watchdog(arguments.stop_command).alive,)
+    driver = Driver(fleet, arguments.id, wall_ms, make_base, *watchdog)
     known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
     endpoint = arguments.connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")

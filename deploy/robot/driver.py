@@ -61,7 +61,7 @@ class Driver:
         self._robot_id = robot_id
         self._robot = robot_name(robot_id)
         self._make_base = make_base
-        self.alive = alive
+        self._alive = alive
         self._base: Base | None = None
         self._gateway: Gateway | None = None
         self._cut_off = False
@@ -121,7 +121,7 @@ class Driver:
         except Exception:
             self.brake(now)
             raise
-        self.alive(now)
+        self._alive(now)
         return self._said(reading, self._gateway, now)
 
     def brake(self, now: float) -> None:

@@ -9,19 +9,11 @@ from msgspec import Meta, Struct
 from lfa.protocol.geometry import NUMBER_MAX
 
 WIRE_VERSION = 1
-
-
 MESSAGE_BYTES_MAX = 64 * 1024
-
-
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 """Non-negative integer up to 2**53, so that increments still fit msgpack (2**64) and stay exact in JSON (2**53)."""
-
-
 Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
 """Time of one process's own clock, or a difference of two [s]; the bound also admits clocks that count from 1970."""
-
-
 Step = Annotated[float, Meta(ge=0.001, le=NUMBER_MAX)]
 """Distance [m] between two readings; positive, so that a loop over the readings ends."""
 

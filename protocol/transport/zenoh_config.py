@@ -15,27 +15,17 @@ from lfa.protocol.transport.credentials import Credentials
 
 LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000}
 """Silence [ms] after which a link counts as dead; radio has gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
-
-
 LINK_LEASE_MS = LINK_LEASES_MS["std"]
-
-
 QUEUE_BATCHES = dict.fromkeys(("real_time", "interactive_high", "data", "background"), 16)
 """Queue size [batches] per priority, Zenoh's maximum. With Zenoh's 2 for express messages, a link that a busy machine
 does not serve for a few milliseconds drops lease messages and commands: 70 to 370 of 7000 messages in 7 s at a load of
 8 on 2 cores; with 16 none."""
-
-
 FOLLOWED_AT_ONCE = ("cmd_vel",)
 """Topics not sent express: the pose published next in each control step is sent in the same write."""
-
-
 CLIENT_THREADS = 6
 """Number of threads of the one pool that reads, writes and keeps time. A client has one link at a time, and those that
 it lost within the last 10 s. In one pool, the thread that waited for the socket also reads it: a quarter fewer wake-ups
 than with one pool per task."""
-
-
 SECURE_PROTOCOLS = ("unixsock-stream", "tls", "quic")
 
 

@@ -27,8 +27,6 @@ from lfa.protocol.transport.zenoh_config import (
 ROUTER_RX_THREADS = (
     32  # more than the tcp links that can fail at once: each blocks one thread for 10 s (zenoh.md section 2)
 )
-
-
 UNIX_PATH_BYTES_MAX = 107
 
 

@@ -21,8 +21,6 @@ NEAR_FLOOR = 0.02
 """Minimum tolerance of the rule "near"; reference amplitude ratios have two decimals."""
 ROUNDED = 6
 """Number of significant digits of a printed value."""
-
-
 Rule = Literal["at most", "at least", "near", "same", "no worse"]
 
 

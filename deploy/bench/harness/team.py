@@ -50,8 +50,6 @@ ANEW_S = 3.0
 """Period [s] of renewing subscriptions; routers may lose them when their link was down (`ZenohBus.resubscribe`)."""
 EVENTS_MAX = 4096
 TOPICS = ("event", "tracking", "pose", "truth", "status")
-
-
 Table = Callable[[Sequence[ProcessSpec], Path], Sequence[ProcessSpec]]
 
 

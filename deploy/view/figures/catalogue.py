@@ -29,8 +29,6 @@ TERM_SHARE_MIN = 0.15  # share of the run's duration: a shorter bar has no room 
 FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": True, "grid.alpha": 0.3,
         "legend.fontsize": 8.0, "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
         "svg.hashsalt": "lfa"}  # fmt: skip
-
-
 Draw = Callable[[FigureBase, Run], None]
 
 

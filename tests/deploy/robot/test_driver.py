@@ -33,7 +33,8 @@ class Bench:
     def __init__(self) -> None:
         self.now = 10.0
         self.said: list[tuple[str, Message]] = []
-        self.driver = Driver("f", 2, 1, self._make)
+        self.reports: list[float] = []
+        self.driver = Driver("f", 2, 1, self._make, self.reports.append)
         self.base: SimulatedBase | None = None
 
     def _make(self, limits: Limits, now: float) -> SimulatedBase:
@@ -190,10 +191,8 @@ def test_motors_whose_driver_hangs_brake_by_themselves() -> None:
 
 
 def test_it_reports_each_period_in_which_the_hardware_answered() -> None:
-    bench, reports = Bench(), []
-    bench.driver.alive = reports.append
-    bench.begin().run(1.0, GO)
-    assert len(reports) >= 50
+    bench = Bench().begin().run(1.0, GO)
+    assert len(bench.reports) >= 50
 
 
 def test_told_to_stop_it_brakes_and_is_done() -> None:
