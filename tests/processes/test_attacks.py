@@ -109,7 +109,8 @@ def test_a_robots_certificate_in_the_routers_place(fleet: Attacked) -> None:
 
 
 def put(key: str, payload: bytes = b"attack") -> Callable[[zenoh.Session], object]:
-    return lambda session: [session.put(f"{BASE}/{key}", payload) for _ in range(3)]
+    block = zenoh.CongestionControl.BLOCK
+    return lambda session: [session.put(f"{BASE}/{key}", payload, congestion_control=block) for _ in range(3)]
 
 
 FORGED = {
