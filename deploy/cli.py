@@ -101,9 +101,9 @@ EXTRAS = {
 def main() -> None:
     """Run the `lfa` script. Exit codes: 0 ok, 1 a run or an assertion failed, 2 bad input, 130 and 143 on signals."""
     if sys.argv[1:] == ["--version"]:
-        from importlib.metadata import version
+        from lfa.deploy.version import version_line
 
-        print("lfa", version("lfa"))
+        print(version_line())
         sys.exit(0)
     if sys.argv[1:] in ([], ["-h"], ["--help"]):  # before the parser is imported: that import dominates
         print(overview())

@@ -34,9 +34,9 @@ ORDER = (
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
     "world/simulator", "world/cli",
 
-    "deploy/command_line", "deploy/terminal_text", "deploy/scenario_loading", "deploy/recording", "deploy/process",
-    "deploy/client", "deploy/faults", "deploy/analysis", "deploy/analysis/paper", "deploy/analysis/verification",
-    "deploy/operate",
+    "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/scenario_loading", "deploy/recording",
+    "deploy/process", "deploy/client", "deploy/faults", "deploy/analysis", "deploy/analysis/paper",
+    "deploy/analysis/verification", "deploy/operate",
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/run",
     "deploy/simulate", "deploy/fuzz", "deploy/fleet/plan", "deploy/config", "deploy/fleet/security",
     "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/robot", "deploy/bench/harness",

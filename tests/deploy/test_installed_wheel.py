@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.test_imports import PACKAGES, ROOT
+
 INSTALL_S_MAX = 600
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 FLAT = "import importlib.util as u; print([n for n in ('agents', 'world', 'protocol', 'deploy') if u.find_spec(n)])"
@@ -39,10 +41,16 @@ def _environment(place: Path, wheel: Path, extra: str) -> Path:
     return commands
 
 
+def test_the_wheel_says_that_its_packages_have_types(wheel: Path) -> None:
+    packed = set(zipfile.ZipFile(wheel).namelist())
+    assert {f"lfa/{package}/py.typed" for package in PACKAGES} <= packed
+
+
 def test_the_base_install_has_an_agent_and_no_flat_name(wheel: Path, tmp_path: Path) -> None:
     commands = _environment(tmp_path, wheel, "")
     assert "--role" in _ran(commands / "lfa-agent", "--help", cwd=tmp_path)
     assert "lfa run" in _ran(commands / "lfa", "--help", cwd=tmp_path)
+    assert _ran(commands / "lfa", "--version", cwd=tmp_path) == f"lfa {wheel.name.split('-')[1]}\n"
     assert _ran(commands / "python", "-P", "-c", FLAT, cwd=tmp_path).strip() == "[]"
     heavy = _ran(commands / "python", "-P", "-c", FLAT.replace("'agents'", "'numpy', 'rerun', 'pymunk'"), cwd=tmp_path)
     assert heavy.strip() == "[]"
