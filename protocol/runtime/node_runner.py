@@ -6,9 +6,6 @@ answers, and writes the journals once. It makes no other decision.
 
 from __future__ import annotations
 
-import ctypes
-import gc
-import resource
 import signal
 import sys
 from collections import deque
@@ -23,13 +20,15 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import OperatorNote
-from lfa.protocol.names import WITNESS_NAME, robot_id_of
-from lfa.protocol.node import Local, Node, Stop, Vitals
+from lfa.protocol.names import WITNESS_NAME
+from lfa.protocol.node import Local, Node, Stop
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.runtime.namesakes import refuse_double, refuse_twin
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.runtime.systemd import Notify
-from lfa.protocol.topics import OPERATOR_NAME, TOPIC, address, key, matches
+from lfa.protocol.runtime.vital_signs import VitalSigns, keep_one_heap, settle
+from lfa.protocol.topics import OPERATOR_NAME, key, matches
 from lfa.protocol.transport.bus import Arrival, Inbox, Links, Tokens, Wake
 from lfa.protocol.transport.credentials import Credentials
 from lfa.protocol.transport.link_model import WEATHER, Reception
@@ -38,11 +37,7 @@ from lfa.protocol.transport.zenoh_config import LINK_LEASE_MS, RouterAbsent
 
 CONNECT_RETRY_S = 0.2
 STOP_GRACE_S = 0.7  # for final messages: a fence round trip or the residual motion, in any profile
-VITALS_S = 1.0
-NAMESAKE_LEASES = 1.75  # of the two that are waited: a process that waits for its mission publishes only once a second
-TWIN_LEASES = 1.5
 WAIT_S_MAX = 0.5
-M_ARENA_MAX = -8  # malloc.h
 TICKS_KEPT = 1000
 """Number of tick durations kept, 20 s of control: ten of them lie above the 99th percentile."""
 
@@ -163,10 +158,11 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     Waits for a router without a time limit. Raises Refused (exit code 2) if a node cannot take part, or if its name
     already runs in the fleet.
     """
-    _libc("mallopt", M_ARENA_MAX, 1)  # one heap, not one for each of Zenoh's threads
+    keep_one_heap()
     wake = Wake()
     stop = _on_signals(wake)
     seats: list[_NodeRunner] = []
+    lease_s = options.lease_ms / 1000.0
     weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     try:
         for node in nodes:
@@ -174,15 +170,13 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
             bus = connect(options, inbox, stop)
             if bus is None:
                 return 0
-            dead = _refuse_double(bus, inbox, options, node)
+            dead = refuse_double(bus, inbox, options.fleet, lease_s, node)
             started_with = {"fleet": options.fleet, **node.started_with}
             heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
             seats.append(_NodeRunner(node, bus, inbox, Journal(options.journal, heading), weather_key))
             bus.announce(options.fleet, node.name, node.incarnation)
-            _refuse_twin(bus, options, node, dead)
-        gc.collect()
-        gc.freeze()
-        _libc("malloc_trim", 0)  # memory that the start used and freed
+            refuse_twin(bus, options.fleet, lease_s, node, dead)
+        settle()
         return _loop(seats, wake, stop, Notify(options.notify))
     finally:
         for seat in seats:
@@ -213,7 +207,7 @@ def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: 
     began = now = clock.now()
     notify.ready()
     stop_by = None
-    vitals = _VitalSigns(now)
+    vitals = VitalSigns(now)
     while True:
         deadline = min([seat.next_deadline() for seat in seats])
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
@@ -223,7 +217,7 @@ def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: 
         if vitals.due(now):
             notify.alive()
             for seat in seats:
-                seat.tell(vitals.of(seat), now)
+                seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable, seat.tick_p99_s()), now)
         if stop.told and stop_by is None:
             stop_by = now + STOP_GRACE_S
             for seat in seats:
@@ -260,114 +254,3 @@ def _on_signals(wake: Wake) -> _StopRequest:
     signal.signal(signal.SIGTERM, order)
     signal.signal(signal.SIGINT, order)
     return stop
-
-
-def _refuse_double(bus: ZenohBus, inbox: Inbox, options: Options, node: Node) -> list[int]:
-    """Wait two link leases for the token of an earlier incarnation of this name to vanish.
-
-    Returns the incarnations whose tokens remain but that are silent, hence presumed dead. Raises Refused if one of them
-    still publishes.
-    """
-    fleet, lease_s = options.fleet, options.lease_ms / 1000.0
-    dead = bus.living(fleet, node.name)
-    if not dead:
-        return []
-    bus.follow(frozenset({f"lfa/{fleet}/{node.name}/**"}))
-    heard: dict[int, float] = {}
-    patience_until = clock.now() + 2.0 * lease_s
-    while clock.now() < patience_until:
-        clock.sleep(0.05)
-        heard.update(_speakers(inbox))
-        dead = bus.living(fleet, node.name)
-        if not dead:
-            break
-    else:
-        if any(at > clock.now() - NAMESAKE_LEASES * lease_s for at in heard.values()):
-            raise _double(fleet, node)
-    bus.follow(frozenset())
-    inbox.take()
-    return dead
-
-
-def _refuse_twin(bus: ZenohBus, options: Options, node: Node, dead: list[int]) -> None:
-    """Resolve two simultaneous starts of one name, which see each other only after announcing: the younger gives way.
-
-    Neither publishes meanwhile, so only tokens count. The older waits long enough for the younger to leave first.
-    Raises Refused if another incarnation remains.
-    """
-
-    def twins() -> list[int]:
-        return [life for life in bus.living(options.fleet, node.name) if life not in (node.incarnation, *dead)]
-
-    found = twins()
-    if not found:
-        return
-    leases = TWIN_LEASES if min(found) < node.incarnation else 2.0 * TWIN_LEASES
-    patience_until = clock.now() + leases * options.lease_ms / 1000.0
-    while clock.now() < patience_until:
-        clock.sleep(0.05)
-        if not twins():
-            return
-    raise _double(options.fleet, node)
-
-
-def _double(fleet: str, node: Node) -> Refused:
-    other = "--id" if robot_id_of(node.name) else "--fleet"
-    return Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another {other}")
-
-
-def _speakers(inbox: Inbox) -> dict[int, float]:
-    """Return the incarnations that sent a well-formed message, with the arrival time [s] of the last one."""
-    heard: dict[int, float] = {}
-    for arrival in inbox.take():
-        where = address(arrival.key)
-        if where is None or where.topic not in TOPIC or not isinstance(arrival.payload, bytes):
-            continue
-        try:
-            message = decode(arrival.payload, TOPIC[where.topic].type)
-        except BadMessage:
-            continue
-        if message.header.sender == where.owner:
-            heard[message.header.incarnation] = arrival.at
-    return heard
-
-
-class _VitalSigns:
-    """Measurement of the process's own lag, processor share and memory, once a second."""
-
-    def __init__(self, now: float) -> None:
-        self._since = now
-        self._cpu_s = clock.cpu_s()
-        self._lag_s = 0.0
-        self._cpu_percent = 0.0
-
-    def lag(self, late_s: float) -> None:
-        self._lag_s = max(self._lag_s, late_s)
-
-    def due(self, now: float) -> bool:
-        if now < self._since + VITALS_S:
-            return False
-        cpu_s = clock.cpu_s()
-        self._cpu_percent = 100.0 * (cpu_s - self._cpu_s) / (now - self._since)
-        self._since, self._cpu_s = now, cpu_s
-        return True
-
-    def of(self, seat: _NodeRunner) -> Vitals:
-        lag_s, self._lag_s = self._lag_s, 0.0
-        dropped, undecodable = seat.inbox.dropped, seat.host.undecodable
-        return Vitals(lag_s, dropped, undecodable, self._cpu_percent, _resident_mib(), seat.tick_p99_s())
-
-
-def _libc(name: str, *numbers: int) -> None:
-    """Call a memory-saving function of glibc; do nothing with another C library."""
-    function = getattr(ctypes.CDLL(None), name, None)
-    if function is not None:
-        function(*numbers)
-
-
-def _resident_mib() -> float:
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-    except (OSError, IndexError, ValueError):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    return pages * resource.getpagesize() / 2**20

@@ -1,0 +1,88 @@
+"""Refusal of a second process of one name in a fleet: an earlier one still runs, or another starts at the same time.
+
+Two processes of one name would share its keys and its vote. A liveliness token alone does not prove that its owner
+runs: that of a killed process remains until its link's lease ends.
+"""
+
+from __future__ import annotations
+
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import BadMessage, decode
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.node import Node
+from lfa.protocol.topics import TOPIC, address
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.zenoh_bus import ZenohBus
+
+NAMESAKE_LEASES = 1.75  # of the two that are waited: a process that waits for its mission publishes only once a second
+TWIN_LEASES = 1.5
+
+
+def refuse_double(bus: ZenohBus, inbox: Inbox, fleet: str, lease_s: float, node: Node) -> list[int]:
+    """Wait two link leases for the token of an earlier incarnation of this name to vanish.
+
+    Returns the incarnations whose tokens remain but that are silent, hence presumed dead. Raises Refused if one of them
+    still publishes.
+    """
+    dead = bus.living(fleet, node.name)
+    if not dead:
+        return []
+    bus.follow(frozenset({f"lfa/{fleet}/{node.name}/**"}))
+    heard: dict[int, float] = {}
+    patience_until = clock.now() + 2.0 * lease_s
+    while clock.now() < patience_until:
+        clock.sleep(0.05)
+        heard.update(_speakers(inbox))
+        dead = bus.living(fleet, node.name)
+        if not dead:
+            break
+    else:
+        if any(at > clock.now() - NAMESAKE_LEASES * lease_s for at in heard.values()):
+            raise _double(fleet, node)
+    bus.follow(frozenset())
+    inbox.take()
+    return dead
+
+
+def refuse_twin(bus: ZenohBus, fleet: str, lease_s: float, node: Node, dead: list[int]) -> None:
+    """Resolve two simultaneous starts of one name, which see each other only after announcing: the younger gives way.
+
+    Neither publishes meanwhile, so only tokens count. The older waits long enough for the younger to leave first.
+    Raises Refused if another incarnation remains.
+    """
+
+    def twins() -> list[int]:
+        return [life for life in bus.living(fleet, node.name) if life not in (node.incarnation, *dead)]
+
+    found = twins()
+    if not found:
+        return
+    leases = TWIN_LEASES if min(found) < node.incarnation else 2.0 * TWIN_LEASES
+    patience_until = clock.now() + leases * lease_s
+    while clock.now() < patience_until:
+        clock.sleep(0.05)
+        if not twins():
+            return
+    raise _double(fleet, node)
+
+
+def _double(fleet: str, node: Node) -> Refused:
+    other = "--id" if robot_id_of(node.name) else "--fleet"
+    return Refused(f"{node.name} already runs in fleet {fleet!r}: end that one, or give another {other}")
+
+
+def _speakers(inbox: Inbox) -> dict[int, float]:
+    """Return the incarnations that sent a well-formed message, with the arrival time [s] of the last one."""
+    heard: dict[int, float] = {}
+    for arrival in inbox.take():
+        where = address(arrival.key)
+        if where is None or where.topic not in TOPIC or not isinstance(arrival.payload, bytes):
+            continue
+        try:
+            message = decode(arrival.payload, TOPIC[where.topic].type)
+        except BadMessage:
+            continue
+        if message.header.sender == where.owner:
+            heard[message.header.incarnation] = arrival.at
+    return heard
