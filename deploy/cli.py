@@ -94,6 +94,7 @@ COMMANDS = (
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
+    "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove",
 }  # fmt: skip
 """Modules outside the base install, each with the extra that installs it."""
 

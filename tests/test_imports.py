@@ -36,7 +36,7 @@ ORDER = (
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/scenario_loading", "deploy/recording",
     "deploy/process", "deploy/client", "deploy/faults", "deploy/analysis", "deploy/analysis/paper",
-    "deploy/analysis/verification", "deploy/operate",
+    "deploy/analysis/verification", "deploy/operate", "deploy/ros",
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/run",
     "deploy/simulate", "deploy/fuzz", "deploy/fleet/plan", "deploy/config", "deploy/fleet/security",
     "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/robot", "deploy/bench/harness",

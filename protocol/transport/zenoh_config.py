@@ -58,15 +58,15 @@ def client_session(endpoint: str, lease_ms: int, credentials: Credentials | None
     config = session_config("client", [], endpoint.split(","), lease_ms, credentials)
     login = {} if credentials is None else login_settings(credentials)
     if not login:
-        return _open(config, CLIENT_THREADS)
+        return open_session(config, CLIENT_THREADS)
     insert_settings(config, login)
     try:
-        return _open(config, CLIENT_THREADS)
+        return open_session(config, CLIENT_THREADS)
     except zenoh.ZError:  # a router without passwords rejects a session that shows one
-        return _open(session_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_THREADS)
+        return open_session(session_config("client", [], endpoint.split(","), lease_ms, credentials), CLIENT_THREADS)
 
 
-def _open(config: zenoh.Config, threads: int) -> zenoh.Session:
+def open_session(config: zenoh.Config, threads: int) -> zenoh.Session:
     """Open a session with one pool of `threads` threads, unless the environment sets ZENOH_RUNTIME.
 
     Zenoh reads ZENOH_RUNTIME at its first use in the process only; a child must not inherit it, as it may be a router.

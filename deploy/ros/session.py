@@ -1,0 +1,242 @@
+"""ROS nodes of this process: publishers, subscriptions, services and clients over one `RosSession`.
+
+Zenoh's threads only fill bounded queues and set the wake-up; the loop decodes what `take` returns. Bytes that are no
+message of the expected type are counted in `undecodable` and dropped.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from threading import Lock
+from typing import Any, Generic, TypeVar
+
+from msgspec import Struct
+
+from lfa.deploy.ros.types import BadRosMessage, from_cdr, request_type, response_type, to_cdr, type_hash
+from lfa.deploy.ros.wire import (
+    DEFAULT,
+    Distro,
+    Kind,
+    Qos,
+    RosEndpoint,
+    RosNode,
+    attachment,
+    read_attachment,
+)
+from lfa.protocol.transport.bus import Settable
+from lfa.protocol.transport.zenoh_ros import RosPublication, RosQuery, RosSession, Undeclarable
+
+T = TypeVar("T")
+QUEUE_MAX = 64
+"""Maximum number of samples or queries that wait for the loop; the oldest is dropped and counted."""
+
+
+class Counters(Struct):
+    """Traffic of all nodes of one session."""
+
+    published: int = 0
+    received: int = 0
+    undecodable: int = 0
+    dropped: int = 0
+
+
+class RosSpace:
+    """All nodes of one session in one ROS domain; nodes and endpoints share one counter of ids, as in rmw_zenoh."""
+
+    def __init__(
+        self,
+        session: RosSession,
+        domain: int,
+        distro: Distro,
+        wake: Settable,
+        wall_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        """`wake` is set when something arrives; `wall_ns` returns the UNIX time [ns] for attachments."""
+        self.session = session
+        self.domain = domain
+        self.distro = distro
+        self.wake = wake
+        self.wall_ns = wall_ns
+        self.counters = Counters()
+        self._next_id = 0
+
+    def take_id(self) -> int:
+        self._next_id += 1
+        return self._next_id - 1
+
+    def node(self, name: str, namespace: str = "") -> NodeHandle:
+        """Declare a node; it is listed until `close`."""
+        return NodeHandle(self, RosNode(self.domain, self.session.id, self.take_id(), namespace, name))
+
+
+class NodeHandle:
+    """One declared node with its endpoints."""
+
+    def __init__(self, space: RosSpace, node: RosNode) -> None:
+        self.space = space
+        self.node = node
+        self._declared: list[Undeclarable] = [space.session.token(node.token)]
+
+    def publisher(self, topic: str, of_type: str, qos: Qos = DEFAULT) -> RosPublisher:
+        return RosPublisher(self, self._endpoint("MP", topic, of_type, qos))
+
+    def subscription(self, topic: str, of_type: str, qos: Qos = DEFAULT) -> RosSubscription:
+        return RosSubscription(self, self._endpoint("MS", topic, of_type, qos))
+
+    def service(self, name: str, of_type: str) -> RosService:
+        return RosService(self, self._endpoint("SS", name, of_type, DEFAULT))
+
+    def client(self, name: str, of_type: str) -> RosClient:
+        return RosClient(self, self._endpoint("SC", name, of_type, DEFAULT))
+
+    def keep(self, declared: Undeclarable) -> None:
+        """Undeclare `declared` together with the node."""
+        self._declared.append(declared)
+
+    def close(self) -> None:
+        """Undeclare all endpoints and the node, the last declared first."""
+        while self._declared:
+            self._declared.pop().undeclare()
+
+    def _endpoint(self, kind: Kind, topic: str, of_type: str, qos: Qos) -> RosEndpoint:
+        space = self.space
+        return RosEndpoint(self.node, space.take_id(), kind, topic, of_type, type_hash(of_type, space.distro), qos)
+
+
+class RosPublisher:
+    """Publisher of one topic; its messages are numbered from 1."""
+
+    def __init__(self, node: NodeHandle, endpoint: RosEndpoint) -> None:
+        self._space = node.space
+        self._gid = endpoint.gid
+        self._number = 0
+        qos = endpoint.qos
+        kept = qos.depth if qos.latched else None
+        self._publication: RosPublication = node.space.session.publisher(endpoint.key, reliable=qos.reliable, kept=kept)
+        node.keep(self._publication)
+        node.keep(node.space.session.token(endpoint.token))
+
+    def heard(self) -> bool:
+        """Return True if someone subscribes; always True for a latched topic, which also counts for later ones."""
+        return self._publication.matched()
+
+    def publish(self, message: Any) -> None:
+        self._number += 1
+        space = self._space
+        space.counters.published += 1
+        self._publication.put(to_cdr(message), attachment(self._number, space.wall_ns(), self._gid))
+
+
+class RosSubscription:
+    """Subscription to one topic; `take` returns what came since the last call."""
+
+    def __init__(self, node: NodeHandle, endpoint: RosEndpoint) -> None:
+        self._space = node.space
+        self._type = endpoint.type
+        self._queue: _Queue[bytes] = _Queue(node.space)
+        qos = endpoint.qos
+        kept = qos.depth if qos.latched else None
+        node.keep(node.space.session.subscriber(endpoint.key, self._receive, kept=kept))
+        node.keep(node.space.session.token(endpoint.token))
+
+    def take(self) -> list[Any]:
+        """Return the messages received since the last call, oldest first."""
+        found = []
+        for payload in self._queue.drain():
+            try:
+                found.append(from_cdr(payload, self._type))
+            except BadRosMessage:
+                self._space.counters.undecodable += 1
+        return found
+
+    def _receive(self, _key: str, payload: bytes, _attached: bytes) -> None:
+        self._queue.put(payload)
+
+
+class Call(Struct, frozen=True):
+    """One call of a service; `answer` sends the response."""
+
+    request: Any
+    answer: Callable[[Any], None]
+
+
+class RosService:
+    """Service; `take` returns the calls since the last time, each to be answered."""
+
+    def __init__(self, node: NodeHandle, endpoint: RosEndpoint) -> None:
+        self._space = node.space
+        self._type = endpoint.type
+        self._queue: _Queue[RosQuery] = _Queue(node.space)
+        node.keep(node.space.session.service(endpoint.key, self._queue.put))
+        node.keep(node.space.session.token(endpoint.token))
+
+    def take(self) -> list[Call]:
+        found = []
+        for query in self._queue.drain():
+            attached = read_attachment(query.attachment)
+            try:
+                request = from_cdr(query.payload, request_type(self._type))
+            except BadRosMessage:
+                attached = None
+            if attached is None:  # without the caller's number and GID no answer could be built
+                self._space.counters.undecodable += 1
+                continue
+            found.append(Call(request, self._answer(query, attached.number, attached.gid)))
+        return found
+
+    def _answer(self, query: RosQuery, number: int, gid: bytes) -> Callable[[Any], None]:
+        def answer(response: Any) -> None:
+            query.reply(to_cdr(response), attachment(number, self._space.wall_ns(), gid))
+
+        return answer
+
+
+class RosClient:
+    """Client of one service."""
+
+    def __init__(self, node: NodeHandle, endpoint: RosEndpoint) -> None:
+        self._space = node.space
+        self._endpoint = endpoint
+        self._number = 0
+        node.keep(node.space.session.token(endpoint.token))
+
+    def call(self, request: Any, timeout_s: float) -> Any | None:
+        """Call the service and wait for its response; None if none comes in time or it cannot be read."""
+        self._number += 1
+        space, endpoint = self._space, self._endpoint
+        attached = attachment(self._number, space.wall_ns(), endpoint.gid)
+        payload = space.session.call(endpoint.key, to_cdr(request), attached, timeout_s)
+        if payload is None:
+            return None
+        try:
+            return from_cdr(payload, response_type(endpoint.type))
+        except BadRosMessage:
+            space.counters.undecodable += 1
+            return None
+
+
+class _Queue(Generic[T]):
+    """Bounded queue from Zenoh's threads to the loop."""
+
+    def __init__(self, space: RosSpace) -> None:
+        self._space = space
+        self._items: deque[T] = deque()
+        self._lock = Lock()
+
+    def put(self, item: T) -> None:
+        """Add an item, on any thread; the oldest goes if the queue is full."""
+        with self._lock:
+            self._space.counters.received += 1
+            if len(self._items) >= QUEUE_MAX:
+                self._items.popleft()
+                self._space.counters.dropped += 1
+            self._items.append(item)
+        self._space.wake.set()
+
+    def drain(self) -> list[T]:
+        with self._lock:
+            items = list(self._items)
+            self._items.clear()
+        return items
