@@ -14,7 +14,7 @@ TOKENS_MAX = 20_000
 """Maximum number of tokens kept: about 1000 nodes; further ones are dropped and counted."""
 
 
-class Candidate(Struct, frozen=True, order=True):
+class RobotCandidate(Struct, frozen=True, order=True):
     """Robot that the graph suggests: its domain, its namespace and the type of its command."""
 
     domain: int
@@ -66,14 +66,14 @@ class RosGraph:
         others = (one.node for one in self.endpoints("MP", topic) if one.node.session not in own_sessions)
         return sorted({node.full_name for node in others})
 
-    def robots(self, command: str, domain: int | None = None) -> list[Candidate]:
+    def robots(self, command: str, domain: int | None = None) -> list[RobotCandidate]:
         """Return the robots that listen to Twist or TwistStamped on a topic that ends with `command`."""
-        found: set[Candidate] = set()
+        found: set[RobotCandidate] = set()
         for one in self.endpoints("MS"):
             if not one.topic.endswith(f"/{command}") or one.type not in TWISTS:
                 continue
             if domain in (None, one.node.domain):
-                found.add(Candidate(one.node.domain, one.topic.removesuffix(f"/{command}"), TWISTS[one.type]))
+                found.add(RobotCandidate(one.node.domain, one.topic.removesuffix(f"/{command}"), TWISTS[one.type]))
         return sorted(found)
 
 

@@ -155,7 +155,7 @@ class RosSubscription:
         self._queue.put(payload)
 
 
-class Call(Struct, frozen=True):
+class ServiceCall(Struct, frozen=True):
     """One call of a service; `answer` sends the response."""
 
     request: Any
@@ -172,7 +172,7 @@ class RosService:
         node.keep(node.space.session.service(endpoint.key, self._queue.put))
         node.keep(node.space.session.token(endpoint.token))
 
-    def take(self) -> list[Call]:
+    def take(self) -> list[ServiceCall]:
         found = []
         for query in self._queue.drain():
             attached = read_attachment(query.attachment)
@@ -183,7 +183,7 @@ class RosService:
             if attached is None:  # without the caller's number and GID no answer could be built
                 self._space.counters.undecodable += 1
                 continue
-            found.append(Call(request, self._answer(query, attached.number, attached.gid)))
+            found.append(ServiceCall(request, self._answer(query, attached.number, attached.gid)))
         return found
 
     def _answer(self, query: RosQuery, number: int, gid: bytes) -> Callable[[Any], None]:

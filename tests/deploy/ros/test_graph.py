@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfa.deploy.ros import graph as graphs
-from lfa.deploy.ros.graph import Candidate, RosGraph
+from lfa.deploy.ros.graph import RobotCandidate, RosGraph
 from lfa.deploy.ros.types import type_hash
 from lfa.deploy.ros.wire import DEFAULT, RosEndpoint, RosNode
 from tests.deploy.ros.test_wire import GOLDEN
@@ -36,7 +36,7 @@ def test_nodes_and_endpoints_of_genuine_nodes_are_listed() -> None:
 def test_the_graph_tells_whether_a_robot_wants_twist_or_twist_stamped() -> None:
     graph = _of_genuine_nodes()
     graph.update(_twist("MS", "b", "/cmd_vel", stamped=False), up=True)
-    assert graph.robots("cmd_vel") == [Candidate(0, "", False), Candidate(0, "/robot3", True)]
+    assert graph.robots("cmd_vel") == [RobotCandidate(0, "", False), RobotCandidate(0, "/robot3", True)]
     assert graph.robots("cmd_vel", domain=7) == []
 
 
