@@ -22,6 +22,7 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.names import whole_number
 from lfa.protocol.node import Node
+from lfa.protocol.output import write_line
 from lfa.protocol.runtime.node_runner import Options, run
 from lfa.protocol.topics import fleet_name
 from lfa.protocol.transport.credentials import credentials
@@ -37,7 +38,7 @@ def main() -> None:
     try:
         sys.exit(start(_parser().parse_args()))
     except Refused as refused:
-        print(f"lfa-agent: {refused}", file=sys.stderr)
+        write_line(f"lfa-agent: {refused}", sys.stderr)
         sys.exit(2)
 
 

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from lfa.protocol.output import write_line
+
 if TYPE_CHECKING:
     import typer
 
@@ -28,6 +30,8 @@ def run_cli(name: str, app: typer.Typer) -> int:
         sys.stdout.reconfigure(errors="replace")  # a terminal without a degree sign must not fail
     try:
         code = app(standalone_mode=False, prog_name=name)
+        if sys.stdout is not None:
+            sys.stdout.flush()  # here, where a full disk is a line and no traceback
     except Refused as refused:
         return print_errors(name, *getattr(refused, "lines", (str(refused),)))
     except typer.TyperException as error:  # from the parser: unknown option, text for a number
@@ -60,7 +64,7 @@ def command_app(function: Callable[..., Any], help_text: str, example: str) -> t
 def print_errors(name: str, *texts: str) -> int:
     """Print each text as one line on stderr and return exit code 2."""
     for text in texts:
-        print(f"{name}: {' '.join(text.split())}", file=sys.stderr)
+        write_line(f"{name}: {' '.join(text.split())}", sys.stderr)
     return 2
 
 

@@ -23,8 +23,9 @@ MAY: dict[str, set[str]] = {
 }  # fmt: skip
 
 ORDER = (
-    "protocol/errors", "protocol/clock", "protocol/names", "protocol/mission", "protocol/mission_checks",
-    "protocol/geometry", "protocol/messages", "protocol/node", "protocol/topics", "protocol/outbox",
+    "protocol/errors", "protocol/output", "protocol/clock", "protocol/names", "protocol/mission",
+    "protocol/mission_checks", "protocol/geometry", "protocol/messages", "protocol/node", "protocol/topics",
+    "protocol/outbox",
     "protocol/lease", "protocol/transport", "protocol/runtime",
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",

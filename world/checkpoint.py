@@ -6,9 +6,7 @@ Bodies start at rest, as robots do after their driver died; gateways are new and
 
 from __future__ import annotations
 
-import os
 import sys
-from contextlib import suppress
 from math import cos, inf, sin
 from pathlib import Path
 from typing import Any
@@ -19,10 +17,13 @@ from msgspec.structs import replace
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.node import Envelope, Received
+from lfa.protocol.output import replace_file, write_line
 from lfa.world.description.scenario import STATE, Obstacle, Scenario
 from lfa.world.world import Memory, World
 
 EVERY_S = 0.1
+AGAIN_S = 5.0
+"""Time [s] until the next attempt after the disk refused a state."""
 
 
 def read(run: Path) -> Memory:
@@ -65,6 +66,7 @@ class Remembering:
         self._world = world
         self._path = run / STATE
         self._next_at = -inf
+        self._refused = False
 
     def receive(self, received: Received) -> list[Envelope]:
         return self._world.receive(received)
@@ -77,16 +79,13 @@ class Remembering:
         return sent
 
     def _keep(self) -> None:
-        """Write the state; on an I/O error (full disk) keep the last state and stop writing."""
-        fresh = self._path.with_suffix(".new")
-        try:
-            fresh.write_bytes(msgspec.json.encode(self._world.memory()))
-            os.replace(fresh, self._path)  # atomic: a reader finds one complete state or the other
-        except OSError as error:
-            print(f"{self._path}: {error.strerror}: the state is kept no more", file=sys.stderr, flush=True)
-            self._next_at = inf
-            with suppress(OSError):
-                fresh.unlink(missing_ok=True)
+        """Write the state; where that fails (full disk) keep the last state, and try again after AGAIN_S."""
+        reason = replace_file(self._path, msgspec.json.encode(self._world.memory()))
+        if reason:
+            self._next_at += AGAIN_S
+        if reason and not self._refused:
+            write_line(f"{self._path}: {reason}: the state on disk gets old", sys.stderr)
+        self._refused = bool(reason)
 
     def next_deadline(self) -> float:
         return self._world.next_deadline()

@@ -13,6 +13,7 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.witness import Witness
 from lfa.protocol.node import Node
+from lfa.protocol.output import write_line
 from lfa.protocol.runtime.node_runner import Options, run
 from lfa.protocol.topics import WORLD_NAME, fleet_name
 from lfa.protocol.transport.credentials import credentials
@@ -81,7 +82,7 @@ def main() -> None:
 
 
 def _refuse(line: str) -> NoReturn:
-    print(f"lfa-world: {line}", file=sys.stderr)
+    write_line(f"lfa-world: {line}", sys.stderr)
     sys.exit(2)
 
 

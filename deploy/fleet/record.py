@@ -21,6 +21,7 @@ from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.output import write_line
 
 POLL_S = 0.05
 SPLIT_MB = 256.0
@@ -52,7 +53,7 @@ def command(
         about = About(found.name, "onlooker", 0, found.name).metadata()
         recorder = Recorder(folder, about, split_bytes=round(1e6 * split_mb), keep=keep)
         kept = journals.of_processes(found.name)
-        print(f"records fleet {found.name} into {folder}", flush=True, file=sys.stderr if as_json else sys.stdout)
+        write_line(f"records fleet {found.name} into {folder}", sys.stderr if as_json else sys.stdout)
         begun, seen = clock.now(), WorldTime()
         while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
             clock.sleep(POLL_S)
@@ -65,13 +66,15 @@ def command(
         for line in wrong:
             print(f"lfa: {line}", file=sys.stderr)
     recording.dropped = ear.dropped
+    code = 0 if recording.messages and not recording.dropped and not recording.unwritten else 1
     if as_json:
         facts = {"folder": str(folder), "fleet": found.name, "journals": came}
         print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
-        return 0 if recording.messages and not recording.dropped else 1
+        return code
     files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
-    print(f"{recording.messages} messages, {ear.dropped} lost, {files}, {came} journals: {folder}")
-    return 0 if recording.messages and not ear.dropped else 1
+    lost = f"{ear.dropped} lost" + (f", {recording.unwritten} refused by the disk" if recording.unwritten else "")
+    print(f"{recording.messages} messages, {lost}, {files}, {came} journals: {folder}")
+    return code
 
 
 def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, begun: float) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
 
 from msgspec import Struct
 
@@ -17,6 +19,8 @@ from lfa.protocol import clock
 ROUTER_NAME = "router"
 GRACE_S = 2.0  # between SIGTERM and SIGKILL
 POLL_S = 0.01
+LAST_BYTES = 4096
+"""Number of bytes at the end of a log in which its last line is searched."""
 
 
 class ProcessSpec(Struct, frozen=True):
@@ -46,10 +50,13 @@ class ProcessGroup:
         self._children: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, row: ProcessSpec) -> None:
-        """Start a process and append its output to its log. Raises OSError when no process can be created."""
+        """Start a process and append its output to its log, if the disk gives one.
+
+        Raises OSError when no process can be created.
+        """
         death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
-        with self.log(row.name).open("ab") as log:
+        with self._open_log(row.name) as log:
             self._children[row.name] = processes.start(row.arguments, log, death, stdin, row.command_prefix)
 
     def runs(self, name: str) -> bool:
@@ -131,6 +138,17 @@ class ProcessGroup:
         """Return the identity of `name`, None while it does not run. A child keeps its pid until it is waited for."""
         return processes.identify(self._children[name].pid) if self.runs(name) else None
 
+    def _open_log(self, name: str) -> IO[bytes]:
+        try:
+            return self.log(name).open("ab")
+        except OSError:  # the process is more important than its log
+            return open(os.devnull, "ab")
+
     def _last_line(self, name: str) -> str:
-        lines = self.log(name).read_text(errors="replace").strip().splitlines()
+        try:
+            with self.log(name).open("rb") as log:
+                log.seek(max(0, log.seek(0, os.SEEK_END) - LAST_BYTES))
+                lines = log.read(LAST_BYTES).decode(errors="replace").strip().splitlines()
+        except OSError:
+            return ""
         return lines[-1] if lines else ""

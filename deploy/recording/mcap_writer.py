@@ -11,7 +11,6 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterable
 from struct import Struct
-from typing import IO
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -33,6 +32,8 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
+from lfa.protocol.output import AppendedFile
+
 COMPRESSION = "zstd"
 _MESSAGE = Struct("<BQHIQQ")
 """Record header (opcode, length), then message header (channel, sequence, log time, publish time)."""
@@ -43,11 +44,16 @@ _FOOTER_BYTES = 20
 
 
 class ChunkWriter:
-    """Writer of compressed chunks of up to `chunk_size` bytes into `stream`."""
+    """Writer of compressed chunks of up to `chunk_size` bytes into `file`.
 
-    def __init__(self, stream: IO[bytes], chunk_size: int) -> None:
-        self._stream = stream
+    A chunk that the disk refuses is dropped whole: the file stays readable, and goes on when there is room.
+    """
+
+    def __init__(self, file: AppendedFile, chunk_size: int) -> None:
+        self._file = file
         self._size_max = chunk_size
+        self.unwritten = 0
+        """Number of messages in dropped chunks."""
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
@@ -58,10 +64,9 @@ class ChunkWriter:
         self._chunk_from_ns, self._chunk_until_ns = 0, 0
         self._begin_chunk()
 
-    def start(self, profile: str, library: str) -> None:
-        """Write the file's beginning."""
-        self._stream.write(MCAP0_MAGIC)
-        self._stream.write(_bytes_of([Header(profile, library)]))
+    def start(self, profile: str, library: str) -> bool:
+        """Write the file's beginning; return False if the disk refuses it."""
+        return self._file.append(MCAP0_MAGIC + _bytes_of([Header(profile, library)]))
 
     def register_schema(self, name: str, encoding: str, data: bytes) -> int:
         """Add a schema; return its id."""
@@ -80,17 +85,12 @@ class ChunkWriter:
 
     def add_metadata(self, name: str, data: dict[str, str]) -> None:
         """Write a metadata record."""
-        offset, written = self._stream.tell(), _bytes_of([Metadata(name=name, metadata=data)])
-        self._metadata.append(MetadataIndex(offset=offset, length=len(written), name=name))
-        self._stream.write(written)
+        offset, written = self._file.size, _bytes_of([Metadata(name=name, metadata=data)])
+        if self._file.append(written):
+            self._metadata.append(MetadataIndex(offset=offset, length=len(written), name=name))
 
     def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
         """Add a message to the chunk in progress; times in ns."""
-        if not self._counts or log_time < self._from_ns:
-            self._from_ns = log_time
-        if log_time > self._until_ns:
-            self._until_ns = log_time
-        self._counts[channel_id] += 1
         if not self._indexes or log_time < self._chunk_from_ns:
             self._chunk_from_ns = log_time
         if log_time > self._chunk_until_ns:
@@ -106,15 +106,14 @@ class ChunkWriter:
             self._end_chunk()
 
     def flush(self) -> None:
-        """Write the chunk in progress, if it holds a message, and hand everything to the kernel."""
+        """Hand the chunk in progress to the kernel, if it holds a message."""
         self._end_chunk()
-        self._stream.flush()
 
     def finish(self) -> None:
-        """Write the last chunk, the summary and the footer; the stream stays open."""
+        """Write the last chunk, the summary and the footer, in one piece; the file stays open."""
         self._end_chunk()
-        self._stream.write(_bytes_of([DataEnd(0)]))
-        start, summary, offsets = self._stream.tell(), bytearray(), list[SummaryOffset]()
+        end = _bytes_of([DataEnd(0)])
+        start, summary, offsets = self._file.size + len(end), bytearray(), list[SummaryOffset]()
         for opcode, records in self._summary():
             written = _bytes_of(records)
             offsets.append(SummaryOffset(opcode, start + len(summary), len(written)))
@@ -124,7 +123,7 @@ class ChunkWriter:
         covered = _FOOTER.pack(Opcode.FOOTER, _FOOTER_BYTES, start, offsets_start)
         footer = Footer(summary_start=start, summary_offset_start=offsets_start, summary_crc=0)
         footer.summary_crc = zlib.crc32(covered, zlib.crc32(summary))
-        self._stream.write(bytes(summary) + _bytes_of([footer]) + MCAP0_MAGIC)
+        self._file.append(end + bytes(summary) + _bytes_of([footer]) + MCAP0_MAGIC)
 
     def _summary(self) -> Iterable[tuple[Opcode, Iterable[McapRecord]]]:
         """Yield the groups of the summary in their order."""
@@ -169,12 +168,15 @@ class ChunkWriter:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        offset, written = self._stream.tell(), _bytes_of([chunk])
+        offset, written = self._file.size, _bytes_of([chunk])
         index_at, offsets, indexes = offset + len(written), dict[int, int](), bytearray()
         for channel_id, index in self._indexes.items():
             offsets[channel_id] = index_at + len(indexes)
             indexes += _bytes_of([index])
-        self._stream.write(written + indexes)
+        if not self._file.append(written + indexes):
+            self._drop_chunk()
+            return
+        self._count_chunk()
         self._chunks.append(
             ChunkIndex(
                 message_start_time=chunk.message_start_time,
@@ -189,6 +191,19 @@ class ChunkWriter:
             )
         )
         self._begin_chunk()
+
+    def _count_chunk(self) -> None:
+        """Add the written chunk to the statistics of the file."""
+        self._from_ns = min(self._from_ns, self._chunk_from_ns) if self._chunks else self._chunk_from_ns
+        self._until_ns = max(self._until_ns, self._chunk_until_ns)
+        for channel_id, index in self._indexes.items():
+            self._counts[channel_id] += len(index.records)
+
+    def _drop_chunk(self) -> None:
+        """Count the messages of the chunk, and begin the next with the schemas and channels that it may have held."""
+        self.unwritten += sum(len(index.records) for index in self._indexes.values())
+        self._begin_chunk()
+        self._chunk += _bytes_of([*self._schemas, *self._channels])
 
 
 def _bytes_of(records: Iterable[McapRecord]) -> bytes:

@@ -6,8 +6,10 @@ lfa.deploy.run.recorder_process`) from the bus. It is outside the control path: 
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
+from errno import ENOSPC
 from pathlib import Path
-from typing import IO
 
 import msgspec
 from msgspec import Struct
@@ -17,6 +19,7 @@ from lfa.deploy.recording.mcap_writer import ChunkWriter
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of
+from lfa.protocol.output import AppendedFile, write_line
 from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
 
 RECORDING = "recording.mcap"
@@ -41,6 +44,8 @@ class Recording(Struct, kw_only=True):
     dropped: int = 0
     """Number of messages dropped because the recorder's inbox was full."""
     undecodable: int = 0
+    unwritten: int = 0
+    """Number of messages that the disk refused."""
 
 
 def parts(folder: Path) -> list[Path]:
@@ -66,8 +71,14 @@ class Recorder:
         self._bytes = 0
         self._messages = 0
         self._flushed_at = 0.0
-        self._events: IO[bytes] = open(folder / EVENTS, "wb", buffering=0)  # noqa: SIM115 (closed by close)
-        self._open()
+        self._unwritten = 0
+        self._refused = ""
+        """Why the disk took no message at the last attempt; empty: it took all."""
+        self._events = AppendedFile(folder / EVENTS, fresh=True)
+        reason = self._next_file()
+        if reason:
+            self._events.close()
+            raise OSError(ENOSPC, reason, str(folder))
 
     def record(self, t: float, key: str, message: Message) -> None:
         """Record `message`, sent on `key` at `t` [s] since the run's start; a negative `t` is recorded as 0."""
@@ -79,7 +90,7 @@ class Recorder:
         self._writer.add_message(channel, stamp_ns, mcap_channels.encode(message), stamp_ns, message.header.seq)
         self._messages += 1
         if isinstance(message, Event):
-            self._events.write(event_line(t, message))
+            self._events.append(event_line(t, message))
         if t >= self._flushed_at + FLUSH_S:
             self.flush_when_due(t)
 
@@ -87,34 +98,54 @@ class Recorder:
         """Close the chunk every FLUSH_S, so that everything before is readable even if this process dies."""
         if t >= self._flushed_at + FLUSH_S:
             self._flushed_at = t
+            before = self._writer.unwritten
             self._writer.flush()
-            if 0 < self._split_bytes <= self._stream.tell():
-                self._close()
-                self._open()
+            self._report("" if self._writer.unwritten == before else self._file.error)
+            if 0 < self._split_bytes <= self._file.size:
+                self._next_file()
 
     def close(self) -> Recording:
         """Finish both files and return the size of the recording."""
-        self._close()
+        self._finish_file()
         self._events.close()
-        return Recording(messages=self._messages, files=self._number, bytes=self._bytes)
+        messages = self._messages - self._unwritten
+        return Recording(messages=messages, files=self._number, bytes=self._bytes, unwritten=self._unwritten)
 
-    def _open(self) -> None:
-        """Open the next file; each file is readable without the others."""
+    def _report(self, reason: str) -> None:
+        """Print a line when the disk begins to refuse messages, and when it takes them again."""
+        if bool(reason) != bool(self._refused):
+            text = f"{reason}: messages are lost until there is room" if reason else "there is room again: goes on"
+            write_line(f"{self._file.path}: {text}", sys.stderr)
+        self._refused = reason
+
+    def _next_file(self) -> str:
+        """Go on in a new file, readable without the others; return why not, and stay in the old one, if any."""
+        name = RECORDING if self._number == 0 else PART.format(f"{self._number + 1:04}")
+        try:
+            file = AppendedFile(self._folder / name, fresh=True)
+        except OSError as error:
+            return error.strerror or str(error)
+        writer = ChunkWriter(file, CHUNK_BYTES_MAX)
+        if not writer.start(profile="", library="lfa"):
+            file.close()
+            return file.error
+        writer.add_metadata("run", self._about)
+        if self._number:
+            self._finish_file()
         self._number += 1
-        name = RECORDING if self._number == 1 else PART.format(f"{self._number:04}")
-        self._stream: IO[bytes] = open(self._folder / name, "wb")  # noqa: SIM115 (closed by _close)
-        self._writer = ChunkWriter(self._stream, CHUNK_BYTES_MAX)
-        self._writer.start(profile="", library="lfa")
-        self._writer.add_metadata("run", self._about)
+        self._file, self._writer = file, writer
         self._channels: dict[str, int] = {}
         self._schemas: dict[type, int] = {}
         if 0 < self._keep < self._number:
-            (self._folder / PART.format(f"{self._number - self._keep + 1:04}")).unlink(missing_ok=True)
+            with suppress(OSError):
+                (self._folder / PART.format(f"{self._number - self._keep + 1:04}")).unlink(missing_ok=True)
+        return ""
 
-    def _close(self) -> None:
+    def _finish_file(self) -> None:
         self._writer.finish()
-        self._bytes += self._stream.tell()
-        self._stream.close()
+        self._unwritten += self._writer.unwritten
+        self._bytes += self._file.size
+        self._file.close()
 
     def _open_channel(self, key: str, kind: type) -> int:
         """Register the channel of a key: `lfa/<fleet>/robot1/pose` is recorded as `/robot1/pose`."""

@@ -21,6 +21,7 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.mission import Limits
+from lfa.protocol.output import write_line
 from lfa.protocol.runtime.node_runner import Options, run
 from lfa.protocol.topics import fleet_name
 from lfa.protocol.transport.credentials import credentials
@@ -34,7 +35,7 @@ def main() -> None:
     try:
         sys.exit(start(_parser().parse_args()))
     except Refused as refused:
-        print(f"lfa-driver: {refused}", file=sys.stderr)
+        write_line(f"lfa-driver: {refused}", sys.stderr)
         sys.exit(2)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.terminal_text import cell, visible
+from lfa.protocol.output import write_line
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -29,7 +31,7 @@ class Progress(Protocol):
 
 def progress() -> Progress:
     """Return the display that fits stderr: a table on a terminal, otherwise lines."""
-    return _OnTerminal() if sys.stderr.isatty() else _InLines()
+    return _OnTerminal() if sys.stderr is not None and sys.stderr.isatty() else _InLines()
 
 
 class _InLines:
@@ -41,16 +43,18 @@ class _InLines:
         if standing.time_s >= self._next_s or leader != self._leader:
             self._next_s = standing.time_s + LINE_EVERY_S
             self._leader = leader
-            print(visible(standing.line(leader)), file=sys.stderr, flush=True)
+            write_line(visible(standing.line(leader)), sys.stderr)
 
     def note(self, standing: FleetState, text: str) -> None:
-        print(visible(f"{standing.time_s:7.1f} s  {text}"), file=sys.stderr, flush=True)
+        write_line(visible(f"{standing.time_s:7.1f} s  {text}"), sys.stderr)
 
     def close(self) -> None:
         pass
 
 
 class _OnTerminal:
+    """Table on a terminal; one that is closed ends the display and not the run."""
+
     def __init__(self) -> None:
         from rich.console import Console
         from rich.live import Live
@@ -59,13 +63,16 @@ class _OnTerminal:
         self._live.start()
 
     def show(self, standing: FleetState, leader: int | None) -> None:
-        self._live.update(_table(standing, leader))
+        with suppress(OSError):
+            self._live.update(_table(standing, leader))
 
     def note(self, standing: FleetState, text: str) -> None:
-        self._live.console.print(cell(f"{standing.time_s:7.1f} s  {text}"))
+        with suppress(OSError):
+            self._live.console.print(cell(f"{standing.time_s:7.1f} s  {text}"))
 
     def close(self) -> None:
-        self._live.stop()
+        with suppress(OSError):
+            self._live.stop()
 
 
 def _table(standing: FleetState, leader: int | None) -> Table:

@@ -29,6 +29,7 @@ from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import PeerDown, PeerUp
+from lfa.protocol.output import write_line
 from lfa.protocol.topics import RECORDER_NAME, TOPIC, address, alive_key, key
 from lfa.protocol.transport.bus import Arrival, Inbox, Wake
 from lfa.protocol.transport.zenoh_bus import ZenohBus
@@ -72,9 +73,13 @@ def main() -> None:
     tape.drain()
     last = word[0] if word else RunResult(Verdict("aborted", "the launcher died"), clock.now() - begun, ())
     recording = tape.close(last.verdict)
-    finish(Path(task.folder), task.about, last.verdict, last.duration_s, last.faults_left, None, recording)
     if not word:
         shutil.rmtree(task.sockets, ignore_errors=True)
+    try:
+        finish(Path(task.folder), task.about, last.verdict, last.duration_s, last.faults_left, None, recording)
+    except OSError as error:
+        write_line(f"{error.filename or task.folder}: {error.strerror}: there is no summary", sys.stderr)
+        sys.exit(1)
 
 
 def _listen(word: list[RunResult], told: Wake) -> None:
@@ -134,8 +139,8 @@ class _Tape:
         self._bus.close()
         recording.missing, recording.dropped = self._missing, self._inbox.dropped
         recording.undecodable = self._undecodable
-        lost = f"{recording.missing} missing, {recording.dropped} dropped"
-        print(f"{recording.messages} recorded, {recording.undecodable} undecodable, {lost}")
+        lost = f"{recording.missing} missing, {recording.dropped} dropped, {recording.unwritten} refused by the disk"
+        write_line(f"{recording.messages} recorded, {recording.undecodable} undecodable, {lost}", sys.stdout)
         return recording
 
     def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:

@@ -7,7 +7,7 @@ process does not lose them.
 
 from __future__ import annotations
 
-import os
+import errno
 import sys
 import zlib
 from collections.abc import Iterator, Sequence
@@ -18,8 +18,11 @@ import msgspec
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import AppendedFile, write_line
 
 JOURNAL_VERSION = 1
+PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+"""errno values of a disk that is full or failing: a robot that restarts goes on without a journal."""
 
 
 class Heading(Struct, frozen=True):
@@ -59,14 +62,23 @@ class Journal:
     """Writer of one node's journal; without a `directory` it writes nothing."""
 
     def __init__(self, directory: Path | None, heading: Heading) -> None:
-        """Create the file and write its heading. Raises OSError if the file cannot be created."""
-        self._file: int | None = None
+        """Create the file and write its heading. On a full disk there is no journal, as in `flush`.
+
+        Raises Refused where no file can be written, whatever room there is.
+        """
+        self._file: AppendedFile | None = None
         self._pending = bytearray()
         if directory is None:
             return
-        directory.mkdir(parents=True, exist_ok=True)
-        self._path = directory / f"{heading.node}-{heading.incarnation}.bin"
-        self._file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        path = directory / f"{heading.node}-{heading.incarnation}.bin"
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            self._file = AppendedFile(path)
+        except OSError as error:
+            if error.errno not in PASSING:
+                raise Refused(f"--journal {directory}: {error.strerror}: must be a folder to write to") from None
+            self._end(path, str(error.strerror))
+            return
         self._append(heading)
         self.flush()
 
@@ -78,18 +90,20 @@ class Journal:
         """Write all added entries to the file. On a full disk the journal ends and the robot continues."""
         if self._file is None or not self._pending:
             return
-        try:
-            os.write(self._file, self._pending)
-        except OSError as error:
-            print(f"{self._path}: {error.strerror}: the journal ends here", file=sys.stderr, flush=True)
-            os.close(self._file)
-            self._file = None
+        if not self._file.append(self._pending):
+            self._end(self._file.path, self._file.error)
         self._pending.clear()
 
     def close(self) -> None:
         self.flush()
         if self._file is not None:
-            os.close(self._file)
+            self._file.close()
+            self._file = None
+
+    def _end(self, path: Path, reason: str) -> None:
+        write_line(f"{path}: {reason}: the journal ends here", sys.stderr)
+        if self._file is not None:
+            self._file.close()
             self._file = None
 
     def _append(self, entry: Struct) -> None:

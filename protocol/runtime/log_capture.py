@@ -1,23 +1,20 @@
 """Log lines of a node's events, on standard error: for `lfa logs`, the system journal or a terminal.
 
-A robot never waits for a reader: a line that cannot be written at once (stopped terminal, full pipe) is dropped.
+A robot never waits for a reader, and no reader can end it (`protocol/output.py`).
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
-import select
-from typing import Any
+import sys
+from typing import Any, TextIO
 
 import msgspec
 
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import Event
+from lfa.protocol.output import write_line
 
-STDERR = 2
-LINE_BYTES_MAX = 1000
-"""Maximum length [bytes] of a line, below the size that a pipe writes atomically."""
+LINE_CHARACTERS_MAX = 1000
 EVENT_ENDING = "/event"
 """Last part of the keys that events are published on."""
 
@@ -31,18 +28,14 @@ def line(event: Event, wall_ms: int) -> str:
     return " ".join((at, event.header.sender, event.kind, *data, *term))
 
 
-def tell(payload: bytes, wall_ms: int, out: int = STDERR) -> None:
-    """Write the log line of the event in `payload` to the file descriptor `out`; ignore other payloads."""
+def tell(payload: bytes, wall_ms: int, stream: TextIO | None = None) -> None:
+    """Write the log line of the event in `payload` to `stream`, by default standard error; ignore other payloads."""
     try:
         event = decode(payload, Event)
     except BadMessage:
         return
-    text = line(event, wall_ms).encode(errors="replace")[:LINE_BYTES_MAX] if isinstance(event, Event) else b""
-    with contextlib.suppress(OSError):
-        poll = select.poll()
-        poll.register(out, select.POLLOUT)
-        if text and [what for _, what in poll.poll(0) if what == select.POLLOUT]:
-            os.write(out, text + b"\n")
+    if isinstance(event, Event):
+        write_line(line(event, wall_ms)[:LINE_CHARACTERS_MAX], sys.stderr if stream is None else stream)
 
 
 def _shown(value: Any) -> str:

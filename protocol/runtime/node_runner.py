@@ -22,6 +22,7 @@ from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import OperatorNote
 from lfa.protocol.names import WITNESS_NAME
 from lfa.protocol.node import Local, Node, Stop
+from lfa.protocol.output import write_line
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.namesakes import refuse_double, refuse_twin
@@ -193,11 +194,8 @@ def connect(options: Options, inbox: Inbox, stop: _StopRequest) -> ZenohBus | No
         except RouterAbsent:
             if not told:
                 why = "" if options.credentials is None else f", or none that lets {options.credentials.name} in"
-                print(
-                    f"no router at {options.endpoint}{why}: waiting for one (start it with: lfa-router)",
-                    file=sys.stderr,
-                    flush=True,
-                )
+                text = f"no router at {options.endpoint}{why}: waiting for one (start it with: lfa-router)"
+                write_line(text, sys.stderr)
                 told = True
             stop.wake.wait(CONNECT_RETRY_S)
     return None

@@ -24,5 +24,5 @@ class Notify:
             return
         import socket  # not loaded on a robot without systemd
 
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out, contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
             out.sendto(word, self._address)

@@ -13,6 +13,7 @@ import typer
 from lfa.deploy.command_line import command_app, run_cli
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import write_line
 from lfa.protocol.topics import HOST_PREFIX
 from lfa.protocol.transport.credentials import Credentials, credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
@@ -53,12 +54,12 @@ def command(
     endpoints = listen or [default_endpoint(), DEFAULT_TLS if secure else DEFAULT_TCP]
 
     close = open_router(endpoints, connect or (), LINK_LEASES_MS[link], _known(keys), secure)
-    print(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}", flush=True)
+    write_line(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}", sys.stdout)
     while signal.sigwait(ENDING | {signal.SIGHUP}) not in ENDING:
         try:
             _known(keys)
         except Refused as refused:
-            print(f"goes on as it was: {refused}", file=sys.stderr, flush=True)
+            write_line(f"goes on as it was: {refused}", sys.stderr)
             continue
         close()
         os.execv(sys.executable, sys.orig_argv)  # frees the QUIC port, which a closed session keeps

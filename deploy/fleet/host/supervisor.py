@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 from collections import OrderedDict
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -31,6 +32,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
 from lfa.protocol.messages.header import Header
+from lfa.protocol.output import replace_file, write_line
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
 from lfa.protocol.transport.bus import Inbox, Links
 from lfa.protocol.transport.zenoh_bus import ZenohBus
@@ -86,7 +88,8 @@ def end_orphans(folder: Path) -> list[str]:
 def sweep(folder: Path) -> None:
     """Remove the files that a supervisor could not remove itself: socket, its lock, ledger."""
     for name in (parts.SOCKET, f"{parts.SOCKET}.lock", LEDGER):
-        (folder / name).unlink(missing_ok=True)
+        with suppress(OSError):  # of a file system that became read-only: a later start replaces them
+            (folder / name).unlink(missing_ok=True)
 
 
 class _ManagedProcess:
@@ -125,6 +128,9 @@ class Supervisor:
         self._orders: OrderedDict[int, int] = OrderedDict()
         """Last sequence number of each operator, by incarnation."""
         self._book: Ledger | None = None
+        """Ledger on disk."""
+        self._refused = False
+        """True: the disk did not take the last ledger."""
         self._began = clock.now()
         self._tell_at = 0.0
         self._join_at = 0.0
@@ -187,7 +193,7 @@ class Supervisor:
         if ward.state != "running" or code is None:
             return False
         ward.ended = str(self._processes.exit_of(name))
-        print(ward.ended, flush=True)
+        write_line(ward.ended, sys.stdout)
         if ward.ordered_end:
             ward.ordered_end = False
             ward.start_at, ward.state = now, "waiting"
@@ -228,13 +234,13 @@ class Supervisor:
         book = Ledger(self._part.run, self._part.digest, me, tuple(child for child in children if child is not None))
         if book == self._book:
             return
-        self._book = book
-        draft = self._part.folder / f"{LEDGER}.new"
-        try:
-            draft.write_bytes(msgspec.json.encode(book))
-            draft.replace(self._part.folder / LEDGER)
-        except OSError as error:
-            print(f"{draft}: {error.strerror}", flush=True)
+        path = self._part.folder / LEDGER
+        reason = replace_file(path, msgspec.json.encode(book))
+        if reason and not self._refused:
+            write_line(f"{path}: {reason}: it is written when the disk takes it", sys.stdout)
+        self._refused = bool(reason)
+        if not reason:
+            self._book = book
 
     def _end(self) -> None:
         """Terminate robots and world in order, publish a last status, then terminate the router."""
@@ -297,7 +303,7 @@ class Supervisor:
         if len(self._orders) > OPERATORS_MAX:
             self._orders.popitem(last=False)
         self._obeyed = number
-        print(f"order: {order.deed} {order.target}", flush=True)
+        write_line(f"order: {order.deed} {order.target}", sys.stdout)
         if order.deed == "down" and here:
             self._ending = True
         elif order.deed == "restart":
@@ -343,12 +349,11 @@ def main() -> None:
         if living(part.folder) is not None:
             raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
         for orphan in end_orphans(part.folder):
-            print(f"ended an orphan of an earlier supervisor: {orphan}", flush=True)
+            write_line(f"ended an orphan of an earlier supervisor: {orphan}", sys.stdout)
         code = Supervisor(part).run()
     except Refused as refused:
-        print(f"lfa-supervise: {refused}", file=sys.stderr)
+        write_line(f"lfa-supervise: {refused}", sys.stderr)
         code = REFUSED_CODE
-    sys.stdout.flush()
     os._exit(code)  # a session that did not close would block the exit
 
 

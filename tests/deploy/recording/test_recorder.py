@@ -24,8 +24,10 @@ from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.simulation import TrueRobot, Truth
 from lfa.protocol.messages.team import Event, MissionNote, OperatorNote
+from lfa.protocol.output import AppendedFile
 from lfa.protocol.topics import TOPICS, key
 from lfa.world.description.load import shipped
+from tests.rigs.small_disk import fill, small_disk
 
 HEADER = Header("robot2", 7, 3, 12.5)
 
@@ -93,10 +95,11 @@ def test_a_recording_cut_off_anywhere_can_be_read(part: float, tmp_path_factory:
 
 
 @given(stamps=st.lists(st.integers(0, 2**40), max_size=30), flush_at=st.integers(0, 30))
-def test_the_quick_writer_writes_what_the_library_writes(stamps: list[int], flush_at: int) -> None:
-    written = []
-    for stream in (BytesIO(), BytesIO()):
-        writer = ChunkWriter(stream, 200) if written else Writer(stream, 200)
+def test_the_quick_writer_writes_what_the_library_writes(
+    stamps: list[int], flush_at: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path, stream = tmp_path_factory.mktemp("quick") / RECORDING, BytesIO()
+    for writer in (Writer(stream, 200), ChunkWriter(AppendedFile(path), 200)):
         writer.start("", "lfa")
         writer.add_metadata("run", {"seed": "1"})
         schema = writer.register_schema("lfa.A", "jsonschema", b"{}")
@@ -106,8 +109,7 @@ def test_the_quick_writer_writes_what_the_library_writes(stamps: list[int], flus
             if n == flush_at:
                 writer.flush()
         writer.finish()
-        written.append(stream.getvalue())
-    assert written[0] == written[1]
+    assert path.read_bytes() == stream.getvalue()
 
 
 def test_a_killed_recorder_loses_no_more_than_a_second(tmp_path: Path) -> None:
@@ -189,3 +191,31 @@ def test_every_message_becomes_an_object_of_its_schemas_type(message: Message) -
     written = mcap_channels.encode(message)
     assert json.loads(written) == json.loads(msgspec.json.encode(mcap_channels.plain(message)))
     msgspec.json.decode(written, type=mcap_channels.shape(type(message)))
+
+
+def test_a_full_disk_costs_messages_and_neither_recorder_nor_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with small_disk(tmp_path / "disk", 256) as disk:
+        recorder = Recorder(disk, {"seed": "1"})
+        filler = None
+        for step in range(1000):
+            t = step * 0.02
+            if step == 200:
+                filler = fill(disk)
+            if step == 600 and filler is not None:
+                filler.unlink()
+            recorder.record(t, key("f", "sim", "truth"), _truth(t))
+            recorder.record(t, key("f", "robot2", "event"), Event(HEADER, "role", None, {}))
+        recording = recorder.close()
+        seen = [t for _, _, t, _ in mcap_reader.messages(disk, frozenset({"truth"}))]
+        assert len(seen) + recording.unwritten // 2 == 1000
+        assert recording.messages == 2 * len(seen)
+        assert seen[0] < 1.0 and seen[-1] == pytest.approx(19.98), "it goes on when there is room"
+        assert [t for t in seen if 5.0 < t < 11.0] == []
+        assert all(line.endswith(b"}") for line in (disk / EVENTS).read_bytes().splitlines())
+    said = capsys.readouterr().err.splitlines()
+    assert [line.partition(": ")[2] for line in said] == [
+        "No space left on device: messages are lost until there is room",
+        "there is room again: goes on",
+    ]

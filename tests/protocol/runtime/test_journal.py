@@ -1,5 +1,7 @@
 """A journal is read up to its last whole entry, however its writer ended."""
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -57,6 +59,23 @@ def test_on_a_full_disk_the_journal_ends_with_a_line_and_its_writer_goes_on(
     written(tmp_path)
     said = capsys.readouterr().err
     assert said == f"{tmp_path / 'robot2-17.bin'}: No space left on device: the journal ends here\n"
+
+
+def test_a_full_disk_at_the_start_costs_the_journal_and_not_the_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object, **__: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "open", full)
+    Journal(tmp_path, HEADING).close()
+    assert "No space left on device: the journal ends here" in capsys.readouterr().err
+
+
+def test_a_journal_where_none_can_be_written_is_refused_in_a_line(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(Refused, match=r"--journal .*file.*: must be a folder to write to"):
+        Journal(tmp_path / "file", HEADING)
 
 
 def test_what_is_no_journal_is_refused(tmp_path: Path) -> None:

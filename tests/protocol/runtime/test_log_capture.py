@@ -20,18 +20,18 @@ def test_a_line_says_when_who_and_what() -> None:
 
 def test_an_event_is_told_and_nothing_else_is() -> None:
     out, into = os.pipe()
-    tell(encode(EVENT), 0, into)
-    tell(b"no event", 0, into)
-    os.close(into)
+    with os.fdopen(into, "w") as stream:
+        tell(encode(EVENT), 0, stream)
+        tell(b"no event", 0, stream)
     with os.fdopen(out) as told:
         assert told.read() == line(EVENT, 0) + "\n"
 
 
 def test_a_reader_that_does_not_read_holds_nobody_up() -> None:
     out, into = os.pipe()
-    for _ in range(10_000):  # far more than a pipe takes: this would hang
-        tell(encode(EVENT), 0, into)
-    os.close(out)
-    tell(encode(EVENT), 0, into)  # nor does one that has gone
-    os.close(into)
-    tell(encode(EVENT), 0, into)
+    with os.fdopen(into, "w") as stream:
+        for _ in range(10_000):  # far more than a pipe takes: this would hang
+            tell(encode(EVENT), 0, stream)
+        os.close(out)
+        tell(encode(EVENT), 0, stream)  # nor does one that has gone
+    tell(encode(EVENT), 0, stream)
