@@ -16,10 +16,11 @@ import msgspec
 
 from lfa.agents.agent import Agent
 from lfa.protocol import clock
+from lfa.protocol.config_file.mistake import apply_rules
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.witness import Witness
 from lfa.protocol.mission import Mission
-from lfa.protocol.mission_checks import check_mission
+from lfa.protocol.mission_checks import MISSION_RULES, check_mission
 from lfa.protocol.names import whole_number
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
@@ -31,6 +32,7 @@ from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 ROLES = ("leader", "follower", "witness")
 EXAMPLE = "example: lfa-agent --role follower --id 2"
 RIGHT_MISSION = "must be the [mission] of a scenario in a file of its own, without that heading, in TOML or JSON"
+_MISSION = "mission"
 
 
 def main() -> None:
@@ -38,7 +40,8 @@ def main() -> None:
     try:
         sys.exit(start(_parser().parse_args()))
     except Refused as refused:
-        write_line(f"lfa-agent: {refused}", sys.stderr)
+        for line in refused.lines:
+            write_line(f"lfa-agent: {line}", sys.stderr)
         sys.exit(2)
 
 
@@ -97,17 +100,29 @@ def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None)
 
 def read_mission(path: Path) -> Mission:
     """Return the mission of a JSON or TOML file. Raise `Refused` with the file, the key and what would be right."""
+    if path.suffix != ".json":
+        return _read_toml_mission(path)
     try:
-        data = path.read_bytes()
+        return check_mission(msgspec.json.decode(path.read_bytes(), type=Mission))
     except OSError as error:
         raise Refused(f"--mission {path}: {error.strerror}: {RIGHT_MISSION}") from None
-    decode = msgspec.json.decode if path.suffix == ".json" else msgspec.toml.decode
-    try:
-        return check_mission(decode(data, type=Mission))
     except Refused as refused:
         raise Refused(f"--mission {path}: {refused}") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise Refused(f"--mission {path}: {error}: {RIGHT_MISSION}") from None
+
+
+def _read_toml_mission(path: Path) -> Mission:
+    # Imported here: most agents receive their mission over Zenoh, and memory is short on a robot.
+    from lfa.protocol.config_file.conversion import convert
+    from lfa.protocol.config_file.toml_file import read_toml
+
+    file = read_toml(path, "the [mission] of a scenario in a file of its own, without that heading,").under(_MISSION)
+    mission, mistakes = convert(file.document, Mission, where=_MISSION)
+    apply_rules(MISSION_RULES, mission, mistakes)
+    if mistakes:
+        raise file.refuse(mistakes)
+    return mission
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ COMMANDS = (
     Command("list", "lfa.deploy.config.scenarios", "List the shipped scenarios.",
           "lfa list --json"),
     Command("validate", "lfa.deploy.config.validate",
-          "Check a scenario or fleet file; print a scenario as drawn for a seed.",
+          "Check a scenario or fleet file: `ok`, or every mistake with its line.",
           "lfa validate my_course.toml --set mission.leading.cruise_mps=0.3"),
     Command("schema", "lfa.deploy.config.schema",
           "Print all keys of a scenario or fleet file, as JSON schema or as a table.",

@@ -14,6 +14,8 @@ from lfa.protocol.output import write_line
 if TYPE_CHECKING:
     import typer
 
+    from lfa.protocol.errors import Refused
+
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.EISDIR, errno.ENOTDIR)
 """errno values of a file system that refuses a write during a run: not an error of the program (exit code 1)."""
 NAMES = (errno.ENAMETOOLONG, errno.ELOOP)
@@ -24,18 +26,10 @@ def run_cli(name: str, app: typer.Typer) -> int:
     """Run `app` on the command line and return the exit code. Used by all scripts of `deploy`."""
     import typer
 
-    from lfa.protocol.errors import Refused
-
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without a degree sign must not fail
     try:
-        code = app(standalone_mode=False, prog_name=name)
-        if sys.stdout is not None:
-            sys.stdout.flush()  # here, where a full disk is a line and no traceback
-    except Refused as refused:
-        return print_errors(name, *getattr(refused, "lines", (str(refused),)))
-    except typer.TyperException as error:  # from the parser: unknown option, text for a number
-        return print_errors(name, error.format_message())
+        return _called(name, app)
     except typer.Abort:
         return 130
     except BrokenPipeError:  # the reader of the pipe has exited
@@ -49,6 +43,22 @@ def run_cli(name: str, app: typer.Typer) -> int:
         where = f"{error.filename}: " if error.filename else ""
         print_errors(name, f"{where}{error.strerror}: must be a place that has room, and that this user may use")
         return 1
+
+
+def _called(name: str, app: typer.Typer) -> int:
+    """Run the command that is called, or print why its input is refused; return the exit code."""
+    import typer
+
+    from lfa.protocol.errors import Refused
+
+    try:
+        code = app(standalone_mode=False, prog_name=name)
+        if sys.stdout is not None:
+            sys.stdout.flush()  # here, where a full disk is a line and no traceback
+    except Refused as refused:
+        return print_refusal(name, refused)
+    except typer.TyperException as error:  # from the parser: unknown option, text for a number
+        return print_refusal(name, Refused(error.format_message()))
     return code if isinstance(code, int) else 0
 
 
@@ -66,6 +76,18 @@ def print_errors(name: str, *texts: str) -> int:
     for text in texts:
         write_line(f"{name}: {' '.join(text.split())}", sys.stderr)
     return 2
+
+
+def print_refusal(name: str, refused: Refused) -> int:
+    """Print each mistake as one line on stderr, with `--json` all of them on stdout too, and return exit code 2."""
+    if "--json" in sys.argv[1:]:
+        import msgspec
+
+        from lfa.protocol.config_file.mistake import RefusedFile
+
+        errors = refused.errors if isinstance(refused, RefusedFile) else [{"text": line} for line in refused.lines]
+        print(msgspec.json.encode({"errors": errors}).decode())
+    return print_errors(name, *refused.lines)
 
 
 PLAIN: dict[str, Any] = {

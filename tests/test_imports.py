@@ -23,10 +23,9 @@ MAY: dict[str, set[str]] = {
 }  # fmt: skip
 
 ORDER = (
-    "protocol/errors", "protocol/output", "protocol/clock", "protocol/names", "protocol/mission",
-    "protocol/mission_checks", "protocol/geometry", "protocol/messages", "protocol/node", "protocol/topics",
-    "protocol/outbox",
-    "protocol/lease", "protocol/transport", "protocol/runtime",
+    "protocol/errors", "protocol/output", "protocol/config_file", "protocol/clock", "protocol/names",
+    "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages", "protocol/node",
+    "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/transport", "protocol/runtime",
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
@@ -35,9 +34,9 @@ ORDER = (
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
     "world/simulator", "world/cli",
 
-    "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/scenario_loading", "deploy/recording",
-    "deploy/process", "deploy/client", "deploy/faults", "deploy/analysis", "deploy/analysis/paper",
-    "deploy/analysis/verification", "deploy/operate", "deploy/ros",
+    "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/recording",
+    "deploy/process", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",
+    "deploy/analysis/paper", "deploy/analysis/verification", "deploy/operate", "deploy/ros",
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/run",
     "deploy/simulate", "deploy/fuzz", "deploy/fleet/plan", "deploy/config", "deploy/fleet/security",
     "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/robot", "deploy/bench/harness",

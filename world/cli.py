@@ -72,7 +72,7 @@ def main() -> None:
     try:
         sys.exit(app(standalone_mode=False, prog_name="lfa-world"))
     except Refused as refused:
-        _refuse(str(refused))
+        _refuse(*refused.lines)
     except ModuleNotFoundError as error:
         if error.name not in EXTRA:
             raise
@@ -81,8 +81,9 @@ def main() -> None:
         _refuse(error.format_message())
 
 
-def _refuse(line: str) -> NoReturn:
-    write_line(f"lfa-world: {line}", sys.stderr)
+def _refuse(*lines: str) -> NoReturn:
+    for line in lines:
+        write_line(f"lfa-world: {line}", sys.stderr)
     sys.exit(2)
 
 

@@ -1,4 +1,4 @@
-"""`lfa validate`: read, check and draw a scenario, or list every mistake of a fleet file. Starts nothing."""
+"""`lfa validate`: check a scenario or a fleet file, and list every mistake in it. Starts nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.faults.script import parse_all
 from lfa.deploy.fleet.plan.fleet_file import is_fleet_file, load
 from lfa.deploy.recording.run_folder import toml
 from lfa.deploy.scenario_loading import load_scenario
@@ -24,24 +23,32 @@ def command(
         list[str] | None, typer.Option("--set", help="Override a field: world.lidar.beams=90.")
     ] = None,
     robots: Annotated[int | None, typer.Option(help="Use a team of robots 1..N instead of the scenario's.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON instead of TOML.")] = False,
+    show: Annotated[bool, typer.Option("--show", help="Print all of it, with the course as drawn.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
 ) -> int:
     if is_fleet_file(Path(scenario)):
         if overrides or robots is not None:
             raise Refused(f"{scenario}: --set and --robots are for a scenario: a fleet file has the keys set and team")
-        return _fleet(Path(scenario), as_json=as_json)
-    chosen = load_scenario(scenario, overrides or (), robots)
-    parse_all(chosen.mission, chosen.faults, ())
-    drawn = draw(chosen, seed)
-    print(msgspec.json.encode(drawn).decode() if as_json else toml(drawn), end="\n" if as_json else "")
+        return _fleet(Path(scenario), show=show, as_json=as_json)
+    drawn = draw(load_scenario(scenario, overrides or (), robots), seed)
+    if as_json:
+        print(msgspec.json.encode(drawn).decode())
+    elif show:
+        print(toml(drawn), end="")
+    else:
+        print(f"{scenario}: ok, {len(drawn.mission.robots)} robots, at most {drawn.time_limit_s:g} s")
     return 0
 
 
-def _fleet(path: Path, *, as_json: bool) -> int:
-    """Print the hosts with their processes. Raises Refused with one line for each mistake."""
+def _fleet(path: Path, *, show: bool, as_json: bool) -> int:
+    """Print a fleet, or that it is right. Raises RefusedFile with all mistakes."""
     plan = load(path)
     if as_json:
         print(msgspec.json.encode(plan.file).decode())
+        return 0
+    if not show:
+        machines = f"{len(plan.hosts)} machine{'s' if len(plan.hosts) > 1 else ''}"
+        print(f"{path}: ok, fleet {plan.name} of {len(plan.places)} robots on {machines}")
         return 0
     print(f"fleet {plan.name}: {plan.file.scenario}, world on {plan.file.world}, witness on {plan.file.witness}")
     for name, machine in plan.hosts.items():

@@ -26,7 +26,7 @@ TABLE = (
     (("run", "straight", "--fault", "tickle leader at 3 s"),      "kill leader at 20 s"),
     (("run", "straight", "--fault", "kill leader"),               "kill leader at 20 s"),
     (("run", "straight", "--fault", "restart leader at 3 s"),     "restart"),
-    (("run", "straight", "--set", 'faults=["kill 9 at 3 s"]'),    "scenario.faults"),
+    (("run", "straight", "--set", 'faults=["kill 9 at 3 s"]'),    "faults[0]"),
     (("run", "straight", "--out", "/proc/no/such/place"),         "--out"),
     (("sim", "nowhere"),                                          "nowhere"),
     (("sim", "straight", "--robots", "0"),                        "--robots"),

@@ -1,29 +1,40 @@
 """Loading of scenarios from TOML files: shipped ones by name, others by path, fields overridden by `--set a.b=value`.
 
-An unknown key, a wrong type or an impossible value raises Refused with one line: the source (the file, `--set` or
-`--robots`), the key, the value and what would be valid.
+Unknown keys, wrong types and impossible values raise RefusedFile, all at once, each with a line: the source (file and
+line, `--set` or `--robots`), the key, the value and what would be valid.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from msgspec.structs import replace
 
+from lfa.protocol.config_file.conversion import convert
+from lfa.protocol.config_file.mistake import (
+    FileError,
+    Mistake,
+    RefusedFile,
+    RefusedValue,
+    Rule,
+    apply_rules,
+    overlap,
+    spoiled,
+)
+from lfa.protocol.config_file.toml_file import TomlFile, read_toml
 from lfa.protocol.errors import Refused
+from lfa.protocol.mission_checks import MISSION_RULES
 from lfa.protocol.names import whole_number
 from lfa.protocol.transport.link_model import Radio
-from lfa.world.description.checks import ROBOTS_MAX, check_scenario
-from lfa.world.description.fields import converted, structs_in, value_at
-from lfa.world.description.placement import check_course, draw, starts_of
+from lfa.world.description.checks import ROBOTS_MAX, SCENARIO_RULES
+from lfa.world.description.course_rules import COURSE_RULE, PLACES
+from lfa.world.description.placement import draw, starts_of
 from lfa.world.description.scenario import Body, Lidar, Noise, Obstacle, Outcome, Point, Scenario, Vary, WorldSpec
-from lfa.world.description.toml_file import read_toml
 
 __all__ = [
     "Body",
@@ -53,7 +64,6 @@ SHORT_FORMS = {
 INSTEAD_OF = {"world.start": "starts", "world.starts": "start"}
 """Keys that exclude each other: setting one removes the other."""
 QUOTES = "'\""
-NUMBER_MAX = 1e9
 
 
 def shipped() -> dict[str, Scenario]:
@@ -61,34 +71,53 @@ def shipped() -> dict[str, Scenario]:
     return {name: load(name) for name in _names()}
 
 
-def load(name_or_path: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
+def load(
+    name_or_path: str, overrides: Sequence[str] = (), robots: int | None = None, rules: Sequence[Rule[Scenario]] = ()
+) -> Scenario:
     """Load the shipped scenario of that name, or the one in that file, apply overrides and check it.
 
-    `overrides` are texts `a.b=value` with a TOML value (bare words are text); `robots` renumbers the team to 1..N.
-    Raises Refused with one line: file, key, value, what would be valid.
+    `overrides` are texts `a.b=value` with a TOML value (bare words are text); `robots` renumbers the team to 1..N;
+    `rules` are those of rooms that this one does not know. Raises RefusedFile with all mistakes: file, line, key,
+    value, what would be valid.
     """
     path = _path_of(name_or_path)
-    document = read_toml(path, "a scenario file")
-    keys = [_override(document, override) for override in overrides]
+    file = read_toml(path, "a scenario file")
+    keys = [_override(file.document, override) for override in overrides]
     if robots is not None:
-        _renumber(document, robots)
-        keys.append("mission.robots")
-    try:
-        _refuse_unknown(document)
-        _refuse_endless(document)
-        scenario = _on_map(replace(converted(document), name=path.stem), path.parent)
-        return check_course(check_scenario(scenario))
-    except Refused as refused:
-        raise Refused(f"{_source(str(refused), keys, robots, path)}: {refused}") from None
+        _renumber(file.document, robots)
+    scenario, mistakes = convert(file.document, Scenario)
+    scenario = replace(scenario, name=path.stem)
+    apply_rules(MISSION_RULES, scenario.mission, mistakes)
+    apply_rules((*SCENARIO_RULES, *rules), scenario, mistakes)
+    scenario = _on_map(scenario, path.parent, mistakes)
+    apply_rules((COURSE_RULE,), scenario, mistakes)
+    if mistakes:
+        raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
+    return scenario
 
 
-def _on_map(scenario: Scenario, folder: Path) -> Scenario:
+def _on_map(scenario: Scenario, folder: Path, mistakes: list[Mistake]) -> Scenario:
     """Resolve the map of a scenario; without a map the image readers are not imported."""
-    if scenario.world.map is None and scenario.world.keepout is None and scenario.world.start is None:
+    world = scenario.world
+    if overlap(PLACES, spoiled(mistakes)) or (world.map is None and world.keepout is None and world.start is None):
         return scenario
     from lfa.world.description.map_scenario import on_map
 
-    return on_map(scenario, folder)
+    try:
+        return on_map(scenario, folder)
+    except RefusedValue as refused:
+        mistakes.append(refused.mistake)
+        return scenario
+
+
+def _error(file: TomlFile, mistake: Mistake, overridden: list[str], robots: int | None) -> FileError:
+    """Return a mistake with its place: the command line if it set one of the keys involved, else the line."""
+    name = file.path.name if file.path.parent == SCENARIOS else str(file.path)
+    if robots is not None and mistake.key in ("mission.robots", "world.starts"):
+        return FileError(f"--robots {robots}", str(mistake), key=mistake.key)
+    if overlap((mistake.key, *mistake.compared), overridden):
+        return FileError(f"{file.path.name} with --set", str(mistake), key=mistake.key)
+    return file.error(mistake, name)
 
 
 def _names() -> list[str]:
@@ -164,46 +193,3 @@ def _renumber(document: dict[str, Any], robots: int) -> None:
     starts = world.get("starts") if isinstance(world, dict) else None
     if isinstance(starts, list):
         world["starts"] = starts[:robots]
-
-
-def _refuse_unknown(document: dict[str, Any]) -> None:
-    for where, known, given in _tables(document, Scenario, ""):
-        for key in given:
-            if key not in known:
-                close = get_close_matches(key, known, n=1)
-                hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-                raise Refused(f"{where}{key} = {value_at(given, key)}: no such key: {hint}")
-
-
-def _tables(value: Any, type_: Any, where: str) -> Iterator[tuple[str, tuple[str, ...], dict[str, Any]]]:
-    """Yield every TOML table in `value` that stands for a Struct: its path, its allowed keys, the table itself."""
-    if isinstance(value, list):
-        for index, item in enumerate(value):
-            yield from _tables(item, type_, f"{where.removesuffix('.')}[{index}].")
-        return
-    struct = next((t for t in structs_in(type_)), None)
-    if struct is None or not isinstance(value, dict):
-        return
-    fields = {field.encode_name: field.type for field in msgspec.structs.fields(struct)}
-    yield where, tuple(name for name in fields if where or name != "name"), value
-    for key, item in value.items():
-        if key in fields:
-            yield from _tables(item, fields[key], f"{where}{key}.")
-
-
-def _refuse_endless(value: Any, where: str = "") -> None:
-    """Raise Refused for nan, inf and numbers above `NUMBER_MAX`: TOML allows them, no field of a scenario does."""
-    if isinstance(value, int | float) and not abs(value) <= NUMBER_MAX:
-        raise Refused(f"{where} = {value}: must be a finite number, at most {NUMBER_MAX:g}")
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, item in items:
-        part = f"[{key}]" if isinstance(value, list) else f".{key}" if where else str(key)
-        _refuse_endless(item, f"{where}{part}")
-
-
-def _source(refusal: str, keys: list[str], robots: int | None, path: Path) -> str:
-    """Return the source of the refused value: the command line if it set that key, else the file."""
-    if robots is not None and refusal.startswith(("mission.robots", "world.starts")):
-        return f"--robots {robots}"
-    given = any(re.match(rf"{re.escape(key)}\b", refusal) for key in keys)
-    return f"{path.name} with --set" if given else str(path if path.parent != SCENARIOS else path.name)

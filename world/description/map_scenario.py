@@ -7,6 +7,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from lfa.protocol.config_file.mistake import Mistake, RefusedValue
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import TAU, Pose2D, wrap
 from lfa.protocol.mission import Mission
@@ -26,13 +27,14 @@ LAY_OUT_TRIES_MAX = 20_000
 def on_map(scenario: Scenario, folder: Path) -> Scenario:
     """Return `scenario` with walls, keepout boxes and starts computed from its maps; the result refers to no map.
 
-    Paths are relative to `folder`. Raises Refused for a map that cannot be read, and for a start or goal without room.
+    Paths are relative to `folder`. Raises RefusedValue for a map that cannot be read, or a start or goal without room.
     """
     world, mission = scenario.world, scenario.mission
     if world.start is not None and len(world.start) not in (2, 3):
-        raise Refused(f"world.start = {list(world.start)}: must be [x, y] or [x, y, theta]")
+        raise _refused("world.start", list(world.start), "must be [x, y] or [x, y, theta]")
     if world.start is not None and world.starts is not None:
-        raise Refused(f"world.start = {list(world.start)}: must be left out where world.starts says it of every robot")
+        right = "must be left out where world.starts says it of every robot"
+        raise _refused("world.start", list(world.start), right)
     if world.keepout is not None:
         leading = replace(mission.leading, keepout_m=_keepout(folder / world.keepout))
         mission = replace(mission, leading=leading)
@@ -48,10 +50,14 @@ def on_map(scenario: Scenario, folder: Path) -> Scenario:
     return replace(scenario, mission=mission, world=replace(world, map=None, keepout=None, start=None))
 
 
+def _refused(key: str, value: object, says: str) -> RefusedValue:
+    return RefusedValue(Mistake(key, f" = {value}: {says}"))
+
+
 def _keepout(path: Path) -> tuple[tuple[float, float, float, float], ...]:
     mask = _read("world.keepout", path)
     if mask.origin[2] != 0.0:
-        raise Refused(f"{path}: origin = {list(mask.origin)}: must have yaw 0 in a keepout mask")
+        raise _refused("world.keepout", path.name, f"origin = {list(mask.origin)}: must have yaw 0 in a keepout mask")
     return maps.boxes(mask)
 
 
@@ -59,26 +65,26 @@ def _read(key: str, path: Path) -> Map:
     try:
         return maps.read(path)
     except Refused as refused:
-        raise Refused(f"{key} = {path.name}: {refused}") from None
+        raise _refused(key, path.name, str(refused)) from None
 
 
 def _check_goal(scenario: Scenario, drawn: Map, room: Room) -> None:
     if not scenario.mission.leading.route_m:
         return
     (x, y), radius_m = scenario.mission.goal_m, scenario.mission.radius_m
-    where = f"mission.leading.route_m = ... [{x:g}, {y:g}]: the goal"
+    key, value = "mission.leading.route_m", f"... [{x:g}, {y:g}]"
     cell = drawn.cell_of(x, y)
     if cell is None:
-        raise Refused(f"{where} is outside of the map {scenario.world.map}: must be within it")
+        raise _refused(key, value, f"the goal is outside of the map {scenario.world.map}: must be within it")
     if drawn.occupied[cell]:
-        raise Refused(f"{where} is inside a wall of the map {scenario.world.map}: must be on free ground")
+        raise _refused(key, value, f"the goal is inside a wall of the map {scenario.world.map}: must be on free ground")
     if room.clearance_m(x, y) < radius_m:
-        right = f"must be {radius_m:g} m (the robots' radius) clear of them"
-        raise Refused(f"{where} is {room.clearance_m(x, y):.2f} m from the walls of {scenario.world.map}: {right}")
+        what = f"the goal is {room.clearance_m(x, y):.2f} m from the walls of {scenario.world.map}"
+        raise _refused(key, value, f"{what}: must be {radius_m:g} m (the robots' radius) clear of them")
 
 
 def _check_start(scenario: Scenario, drawn: Map) -> None:
-    """Raise Refused for a given start outside the map or inside a wall; distance to walls is checked elsewhere."""
+    """Raise RefusedValue for a given start outside the map or inside a wall; distance to walls is checked elsewhere."""
     world = scenario.world
     given = {"world.start": world.start or (0.0, 0.0)}
     if world.starts is not None:
@@ -86,15 +92,15 @@ def _check_start(scenario: Scenario, drawn: Map) -> None:
     for key, (x, y, *_) in given.items():
         cell = drawn.cell_of(x, y)
         if cell is None:
-            raise Refused(f"{key} = {[x, y]}: outside of the map {world.map}: must be within it")
+            raise _refused(key, [x, y], f"outside of the map {world.map}: must be within it")
         if drawn.occupied[cell]:
-            raise Refused(f"{key} = {[x, y]}: inside a wall of the map {world.map}: must have room for a robot")
+            raise _refused(key, [x, y], f"inside a wall of the map {world.map}: must have room for a robot")
 
 
 def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
     """Place the first robot at `start` and each other in its slot, bending the chain least where walls need it.
 
-    Return None without a map and a start. Raises Refused when there is no room.
+    Return None without a map and a start. Raises RefusedValue when there is no room.
     """
     start, mission = scenario.world.start, scenario.mission
     if start is None and room is None:
@@ -102,7 +108,7 @@ def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
     x, y = (start[0], start[1]) if start is not None else (0.0, 0.0)
     if room is not None and room.clearance_m(x, y) < mission.radius_m:
         what = f"{room.clearance_m(x, y):.2f} m from a wall"
-        raise Refused(f"world.start = {[x, y]}: {what} of the map {scenario.world.map}: must have room for a robot")
+        raise _refused("world.start", [x, y], f"{what} of the map {scenario.world.map}: must have room for a robot")
     if (start is not None and len(start) == 3) or not mission.leading.route_m:
         headings = [start[2] if start is not None and len(start) == 3 else 0.0]
     else:
@@ -111,7 +117,7 @@ def _starts(scenario: Scenario, room: Room | None) -> list[Pose2D] | None:
     found = [laid for laid in (_lay_out(mission, Pose2D(x, y, theta), room) for theta in headings) if laid is not None]
     if not found:
         right = f"must have room behind it for {len(mission.robots)} robots, {mission.formation.separation_m:g} m apart"
-        raise Refused(f"world.start = {[round(x, 2), round(y, 2)]}: {right}")
+        raise _refused("world.start", [round(x, 2), round(y, 2)], right)
     return min(found, key=lambda laid: (laid[0], abs(wrap(laid[1][0].theta - headings[0]))))[1]
 
 

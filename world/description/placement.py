@@ -12,7 +12,6 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import TAU, Pose2D, compose
 from lfa.protocol.mission import Mission
 from lfa.world.description.obstacle_motion import way_of
-from lfa.world.description.reachability import parted
 from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Obstacle, Point, Scenario
 from lfa.world.description.terrain import Ditch, Feature, features, patch_of, patches_of
 
@@ -48,59 +47,7 @@ def _slot(mission: Mission, hop: int) -> Pose2D:
     return Pose2D(k * cos(phi), k * sin(phi), 0.0)
 
 
-def check_course(scenario: Scenario) -> Scenario:
-    """Return `scenario` unchanged. Raises `Refused` if a start or the goal is not free or not reachable."""
-    mission, world = scenario.mission, scenario.world
-    if world.starts is not None and len(world.starts) != len(mission.robots):
-        right = f"one pose for each of the {len(mission.robots)} robots"
-        raise Refused(f"world.starts = {len(world.starts)} poses: must be {right}")
-    poses = starts_of(scenario)
-    for robot_id, pose in zip(mission.robots, poses, strict=True):
-        place = f"the start of robot {robot_id} at ({pose.x:.2f}, {pose.y:.2f})"
-        _check_place(scenario, (pose.x, pose.y), place)
-    for n, (robot_id, pose) in enumerate(zip(mission.robots, poses, strict=True)):
-        for other_id, other in zip(mission.robots[:n], poses[:n], strict=True):
-            if not world.starts_coincide and hypot(pose.x - other.x, pose.y - other.y) < 2.0 * mission.radius_m:
-                right = f"starts at least {2.0 * mission.radius_m:g} m apart (two radii)"
-                value = f"robots {other_id} and {robot_id} both near ({pose.x:.2f}, {pose.y:.2f})"
-                raise Refused(f"world.starts = {value}: must be {right}")
-    goal = mission.goal_m
-    _check_place(scenario, goal, f"the goal at ({goal[0]:.2f}, {goal[1]:.2f})")
-    first, route = (poses[0].x, poses[0].y), mission.leading.route_m
-    if parted((first, *route), world.walls_m):
-        value = f"... [{goal[0]:g}, {goal[1]:g}]"
-        right = f"walls part it from the start of robot {mission.robots[0]} at ({first[0]:.2f}, {first[1]:.2f})"
-        raise Refused(f"mission.leading.route_m = {value}: must be a goal that can be reached, {right}")
-    for box in mission.leading.keepout_m:
-        if _within(goal, box):
-            value = f"... [{goal[0]:g}, {goal[1]:g}]"
-            raise Refused(f"mission.leading.route_m = {value}: must be a goal outside of the keep-out box {list(box)}")
-        if _within(first, box):
-            right = f"clear of the start of robot {mission.robots[0]} at ({first[0]:.2f}, {first[1]:.2f})"
-            raise Refused(f"mission.leading.keepout_m = ... {list(box)}: must be {right}")
-    return scenario
-
-
-def _within(place: Point, box: tuple[float, float, float, float]) -> bool:
-    return box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3]
-
-
-def _check_place(scenario: Scenario, place: Point, whose: str) -> None:
-    radius_m = scenario.mission.radius_m
-    for index, obstacle in enumerate(scenario.world.obstacles):
-        begins = _as_it_begins(obstacle)
-        if gap_to(place, begins) < radius_m:
-            raise Refused(f"world.obstacles[{index}] = at {list(begins.center_m)}: must be clear of {whose}")
-    for key, feature in features(scenario.world):
-        patch = patch_of(feature)
-        if patch.gap_m(*place) < radius_m:
-            raise Refused(f"world.{key} = at {[patch.x, patch.y]}: must be clear of {whose}")
-    for index, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
-        if to_segment(place, (x1, y1), (x2, y2)) < radius_m:
-            raise Refused(f"world.walls_m[{index}] = {[x1, y1, x2, y2]}: must be clear of {whose}")
-
-
-def _as_it_begins(obstacle: Obstacle) -> Obstacle:
+def as_it_begins(obstacle: Obstacle) -> Obstacle:
     """Return the obstacle with its centre where it is at the world's time 0."""
     return replace(obstacle, center_m=way_of(obstacle).at(0.0)) if obstacle.moves else obstacle
 
@@ -160,7 +107,7 @@ def _draw_pace(obstacle: Obstacle, anchors: list[Point], radius_m: float, chance
     obstacle = replace(obstacle, speed_mps=max(SPEED_MPS_MIN, min(SPEED_MPS_MAX, speed_mps)))
     for _ in range(DRAWS_MAX):
         moved = replace(obstacle, phase=chance.random())
-        if all(gap_to(anchor, _as_it_begins(moved)) >= radius_m for anchor in anchors):
+        if all(gap_to(anchor, as_it_begins(moved)) >= radius_m for anchor in anchors):
             return moved
     return obstacle
 
@@ -202,7 +149,7 @@ def _draw_start(
     scenario: Scenario, pose: Pose2D, within_m: float, within_rad: float, placed: list[Pose2D], chance: Random
 ) -> Pose2D:
     radius_m, patches = scenario.mission.radius_m, patches_of(scenario.world)
-    obstacles = [_as_it_begins(obstacle) for obstacle in scenario.world.obstacles]
+    obstacles = [as_it_begins(obstacle) for obstacle in scenario.world.obstacles]
     for _ in range(DRAWS_MAX):
         dx, dy = _in_disc(within_m, chance)
         drawn = Pose2D(pose.x + dx, pose.y + dy, pose.theta + chance.uniform(-within_rad, within_rad))

@@ -13,7 +13,7 @@ from typing import Protocol
 
 from msgspec import Struct
 
-from lfa.protocol.errors import Refused
+from lfa.protocol.config_file.mistake import Mistake, wrong
 
 Point = tuple[float, float]
 PATCH_WIDTH_M_MIN = 0.02
@@ -158,20 +158,17 @@ def patch_of(feature: Feature) -> Patch:
     return Patch(x, y, -feature.depth_m, 0.0, half_x, 0.5 * feature.length_m, *turned)
 
 
-def check_feature(where: str, feature: Feature) -> None:
-    """Raise Refused with the key, the value and the valid range if `feature` is not a valid feature."""
+def feature_mistakes(where: str, feature: Feature) -> Iterator[Mistake]:
+    """Yield the numbers of `feature` that are out of range; `where` is its key."""
     right = f"a number from {PATCH_WIDTH_M_MIN:g} to 1000"
-    _require(PATCH_WIDTH_M_MIN <= feature.width_m <= 1e3, f"{where}.width_m", feature.width_m, right)
+    if not PATCH_WIDTH_M_MIN <= feature.width_m <= 1e3:
+        yield wrong(f"{where}.width_m", feature.width_m, right)
     if isinstance(feature, Ditch):
         a, b = feature.ends_m
-        apart = PATCH_WIDTH_M_MIN <= hypot(b[0] - a[0], b[1] - a[1]) <= 1e3
-        _require(apart, f"{where}.ends_m", [list(a), list(b)], "two different points, at most 1000 m apart")
-    elif feature.length_m is not None:
-        _require(PATCH_WIDTH_M_MIN <= feature.length_m <= 1e3, f"{where}.length_m", feature.length_m, right)
+        if not PATCH_WIDTH_M_MIN <= hypot(b[0] - a[0], b[1] - a[1]) <= 1e3:
+            yield wrong(f"{where}.ends_m", [list(a), list(b)], "two different points, at most 1000 m apart")
+    elif feature.length_m is not None and not PATCH_WIDTH_M_MIN <= feature.length_m <= 1e3:
+        yield wrong(f"{where}.length_m", feature.length_m, right)
     key, high = ("height_m", feature.height_m) if isinstance(feature, Bump) else ("depth_m", feature.depth_m)
-    _require(0.001 <= high <= 10.0, f"{where}.{key}", high, "a number from 0.001 to 10")
-
-
-def _require(fine: bool, where: str, value: object, right: str) -> None:
-    if not fine:
-        raise Refused(f"{where} = {value}: must be {right}")
+    if not 0.001 <= high <= 10.0:
+        yield wrong(f"{where}.{key}", high, "a number from 0.001 to 10")

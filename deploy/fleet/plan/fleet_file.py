@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from lfa.deploy.fleet.plan import tables
 from lfa.deploy.scenario_loading import load_scenario
+from lfa.protocol.config_file.conversion import convert
+from lfa.protocol.config_file.mistake import Mistake, Range, Rule, apply_rules, out_of_range, wrong
+from lfa.protocol.config_file.toml_file import read_toml
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Profile
 from lfa.world.description.load import Scenario, draw
-from lfa.world.description.toml_file import read_toml
+from lfa.world.description.placement import SEED_MAX
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,30}")
 LOCAL = ("localhost", "127.0.0.1", "::1")
@@ -139,135 +143,133 @@ class FleetPlan(Struct, frozen=True):
         return tuple(robot for robot, place in self.places.items() if place == host)
 
 
-class Mistaken(Refused):
-    """Refusal of a fleet file, with one line for each mistake."""
-
-    def __init__(self, path: Path, mistakes: list[str]) -> None:
-        self.lines = tuple(f"{path}: {mistake}" for mistake in mistakes)
-        super().__init__("; ".join(self.lines))
-
-
 def is_fleet_file(path: Path) -> bool:
     """Return True for a TOML file with a table `hosts`, which a scenario does not have."""
     try:
-        return "hosts" in read_toml(path, "a fleet file")
+        return "hosts" in read_toml(path, "a fleet file").document
     except Refused:
         return False
 
 
 def load(path: Path) -> FleetPlan:
-    """Return the plan of a fleet file. Raises Refused, and Mistaken with every mistake at once."""
-    document = read_toml(path, "a fleet file")
-    mistakes: list[str] = []
-    file = tables.read(document, FleetFile, mistakes)
-    if file is None or not file.hosts:
-        raise Mistaken(path, mistakes or ["hosts = {}: must have at least one machine, as [hosts.NAME]"])
-    first = next(iter(file.hosts))
-    file = replace(file, fleet=file.fleet or path.name.partition(".")[0], world=file.world or first)
-    file = replace(file, witness=file.witness or file.world)
-    mistakes += _wrong(file)
+    """Return the plan of a fleet file. Raises RefusedFile with all mistakes."""
+    toml = read_toml(path, "a fleet file")
+    file, mistakes = convert(toml.document, FleetFile, SEED_MAX)
+    if not file.hosts and not mistakes:
+        mistakes.append(Mistake("hosts", " = {}: must have at least one machine, as [hosts.NAME]"))
+    if file.hosts:
+        first = next(iter(file.hosts))
+        file = replace(file, fleet=file.fleet or path.name.partition(".")[0], world=file.world or first)
+        file = replace(file, witness=file.witness or file.world)
+        apply_rules(FLEET_RULES, file, mistakes)
     scenario = _scenario(file, path, mistakes)
-    places = {} if scenario is None else _places(file, scenario.mission.robots, mistakes)
+    if scenario is not None:
+        apply_rules((Rule(partial(_placed, robots=scenario.mission.robots), ("scenario", "set")),), file, mistakes)
     if mistakes or scenario is None:
-        raise Mistaken(path, mistakes)
-    return FleetPlan(path, file, scenario, places)
+        raise toml.refuse(mistakes)
+    return FleetPlan(path, file, scenario, _places(file, scenario.mission.robots))
 
 
-def _scenario(file: FleetFile, path: Path, mistakes: list[str]) -> Scenario | None:
+def _scenario(file: FleetFile, path: Path, mistakes: list[Mistake]) -> Scenario | None:
     beside = path.parent / file.scenario
     overrides = [*file.set, *([f"mission.profile='{file.profile}'"] if file.profile else [])]
     try:
         named = str(beside) if beside.suffix == ".toml" else file.scenario
         return draw(load_scenario(named, overrides, file.team), file.seed)
     except Refused as refused:
-        mistakes.append(f"scenario = {file.scenario}: {refused}")
+        mistakes += [Mistake("scenario", f" = {file.scenario}: {line}") for line in refused.lines]
         return None
 
 
-def _places(file: FleetFile, robots: tuple[int, ...], mistakes: list[str]) -> dict[int, str]:
+def _places(file: FleetFile, robots: tuple[int, ...]) -> dict[int, str]:
     """Return the machine of each robot: from `robots.on`, else in turn over `robots.spread`."""
-    right = f"one of {', '.join(map(str, robots))}"
-    for robot, host in file.robots.on.items():
-        if robot not in map(str, robots):
-            mistakes.append(f"robots.on.{robot} = {host}: no such robot in the scenario: must be {right}")
-    spread = [name for word in file.robots.spread for name in _called(file, word, mistakes)] or list(file.hosts)
+    spread = [name for word in file.robots.spread for name in _called(file, word)] or list(file.hosts)
     free = [robot for robot in robots if str(robot) not in file.robots.on]
     dealt = {robot: spread[n % len(spread)] for n, robot in enumerate(free)}
     return {robot: file.robots.on.get(str(robot), dealt.get(robot, "")) for robot in robots}
 
 
-def _called(file: FleetFile, word: str, mistakes: list[str]) -> list[str]:
-    named = [name for name, machine in file.hosts.items() if word == name or word in machine.labels]
-    if not named:
-        mistakes.append(f"robots.spread = {word}: must be {_one_of(file.hosts)}, or a label of some")
-    return named
+def _called(file: FleetFile, word: str) -> list[str]:
+    return [name for name, machine in file.hosts.items() if word == name or word in machine.labels]
 
 
-def _wrong(file: FleetFile) -> list[str]:
-    """Return the mistakes that the types of the single values do not reveal."""
-    wrong = [] if NAME.fullmatch(file.fleet) else [f"fleet = {file.fleet}: must be {_NAMES}"]
+def _placed(file: FleetFile, robots: tuple[int, ...]) -> Iterator[Mistake]:
+    right = f"one of {', '.join(map(str, robots))}"
+    for robot, host in file.robots.on.items():
+        if robot not in map(str, robots):
+            yield Mistake(f"robots.on.{robot}", f" = {host}: no such robot in the scenario: must be {right}")
+
+
+def _names(file: FleetFile) -> Iterator[Mistake]:
+    """Find names that are none, and names of machines that the fleet does not have."""
+    if not NAME.fullmatch(file.fleet):
+        yield wrong("fleet", file.fleet, _NAME)
     places = {"world": file.world, "witness": file.witness}
     if file.witness == file.world:
         del places["witness"]
     places |= {f"robots.on.{robot}": host for robot, host in file.robots.on.items()}
-    wrong += [
-        f"{key} = {host}: must be {_one_of(file.hosts)}" for key, host in places.items() if host not in file.hosts
-    ]
-    for name, machine in file.hosts.items():
-        wrong += _wrong_machine(name, machine)
-    wrong += _wrong_together(file)
-    for a, b in file.links.pairs:
-        wrong += [f"links.pairs = [{a}, {b}]: {x} must be {_one_of(file.hosts)}" for x in (a, b) if x not in file.hosts]
-        wrong += [f"links.pairs = [{a}, {b}]: must be two machines"] if a == b else []
+    hosts = f"one of the hosts: {', '.join(file.hosts)}"
+    for key, host in places.items():
+        if host not in file.hosts:
+            yield wrong(key, host, hosts)
+    for n, word in enumerate(file.robots.spread):
+        if not _called(file, word):
+            yield wrong(f"robots.spread[{n}]", word, f"{hosts}, or a label of some")
+    for n, (a, b) in enumerate(file.links.pairs):
+        key, value = f"links.pairs[{n}]", f"[{a}, {b}]"
+        for x in (a, b):
+            if x not in file.hosts:
+                yield Mistake(key, f" = {value}: {x} must be {hosts}")
+        if a == b:
+            yield wrong(key, value, "two machines")
+
+
+def _restart(file: FleetFile) -> Iterator[Mistake]:
     restart = file.restart
-    for key, value, low, high in (
-        ("delay_s", restart.delay_s, 0.0, 600.0),
-        ("delay_max_s", restart.delay_max_s, restart.delay_s, 3600.0),
-        ("window_s", restart.window_s, 1.0, 86400.0),
-        ("starts_max", restart.starts_max, 0, 1000),
-    ):
-        if not low <= value <= high:
-            wrong.append(f"restart.{key} = {value:g}: must be from {low:g} to {high:g}")
-    return wrong
+    return out_of_range(
+        (
+            Range("restart.delay_s", restart.delay_s, 0.0, 600.0),
+            Range("restart.delay_max_s", restart.delay_max_s, restart.delay_s, 3600.0, "restart.delay_s"),
+            Range("restart.window_s", restart.window_s, 1.0, 86400.0),
+            Range("restart.starts_max", restart.starts_max, 0, 1000),
+        )
+    )
 
 
-def _wrong_machine(name: str, machine: Machine) -> list[str]:
-    where, wrong = f"hosts.{name}", []
+def _machines(file: FleetFile) -> Iterator[Mistake]:
+    for name, machine in file.hosts.items():
+        yield from _machine(f"hosts.{name}", name, machine)
+
+
+def _machine(where: str, name: str, machine: Machine) -> Iterator[Mistake]:
     if not NAME.fullmatch(name):
-        wrong.append(f"{where}: must be called by {_NAMES}")
+        yield Mistake(where, f": must be called by {_NAME}")
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.:_-]*", machine.address):
-        wrong.append(f"{where}.address = {machine.address}: must be a host's name or an IP address")
+        yield wrong(f"{where}.address", machine.address, "a host's name or an IP address")
     if machine.python and machine.venv:
-        wrong.append(f"{where}.venv = {machine.venv}: must not be given beside python")
+        yield Mistake(f"{where}.venv", f" = {machine.venv}: must not be given beside python")
     if not 0 <= machine.port <= PORT_MAX:
-        wrong.append(f"{where}.port = {machine.port}: must be a port, 1 to {PORT_MAX}")
+        yield wrong(f"{where}.port", machine.port, f"a port, 1 to {PORT_MAX}")
     if not 1 <= machine.router_port <= PORT_MAX:
-        wrong.append(f"{where}.router_port = {machine.router_port}: must be a port, 1 to {PORT_MAX}")
+        yield wrong(f"{where}.router_port", machine.router_port, f"a port, 1 to {PORT_MAX}")
     if machine.state and not machine.state.startswith(("/", "~/")):
-        wrong.append(f"{where}.state = {machine.state}: must begin with / or ~/")
-    return wrong
+        yield Mistake(f"{where}.state", f" = {machine.state}: must begin with / or ~/")
 
 
-def _wrong_together(file: FleetFile) -> list[str]:
-    """Return the mistakes in machines that cannot be in one fleet."""
-    wrong = []
+def _together(file: FleetFile) -> Iterator[Mistake]:
+    """Find machines that cannot be in one fleet."""
     local = [name for name, machine in file.hosts.items() if machine.address in LOCAL]
     if local and len(local) < len(file.hosts):
-        wrong += [
-            f"hosts.{name}.address = {file.hosts[name].address}: must be an address that the other machines reach"
-            for name in local
-        ]
+        for name in local:
+            yield wrong(f"hosts.{name}.address", file.hosts[name].address, "an address that the other machines reach")
     seen: dict[tuple[str, int], str] = {}
     for name, machine in file.hosts.items():
         other = seen.setdefault((machine.address, machine.router_port), name)
         if other != name:
-            at = f"{machine.address}:{machine.router_port}"
-            wrong.append(f"hosts.{name}.router_port = {machine.router_port}: must not be {other}'s, both are at {at}")
-    return wrong
+            key, at = f"hosts.{name}.router_port", f"{machine.address}:{machine.router_port}"
+            says = f" = {machine.router_port}: must not be {other}'s, both are at {at}"
+            yield Mistake(key, says, (key, f"hosts.{name}.address"))
 
 
-def _one_of(hosts: dict[str, Machine]) -> str:
-    return f"one of the hosts: {', '.join(hosts)}"
-
-
-_NAMES = "small letters, digits and '-', at most 31"
+_NAME = "small letters, digits and '-', at most 31"
+FLEET_RULES: tuple[Rule[FleetFile], ...] = tuple(Rule(check) for check in (_names, _restart, _machines, _together))

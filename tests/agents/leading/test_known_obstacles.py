@@ -62,7 +62,7 @@ def test_a_leader_with_known_obstacles_drives_past_them() -> None:
 @pytest.mark.parametrize(
     ("known", "motion", "line"),
     [
-        (((1.0, 2.0, -0.1),), "path_following", "mission.leading.known_m = [1.0, 2.0, -0.1]: must be x, y, radius"),
+        (((1.0, 2.0, -0.1),), "path_following", "mission.leading.known_m[0] = [1.0, 2.0, -0.1]: must be x, y, radius"),
         (((1.0, float("nan"), 0.1),), "path_following", "must be x, y, radius"),
         (((1.0, 2.0, 0.1),), "explore", "left out without motion"),
         (((1.0, 2.0, 0.1),) * 65, "path_following", "65 circles: must be at most 64"),

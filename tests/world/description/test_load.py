@@ -56,7 +56,7 @@ BAD = [
     (["time_limit_s=inf"], ["time_limit_s = inf", "finite"]),
     (["world.physics_hz=20"], ["world.physics_hz = 20", "from 100 to 1000"]),
     (["world.physics_hz=1e9"], ["world.physics_hz", "from 100 to 1000"]),
-    (["world.lidar.beams='many'"], ["world.lidar.beams = many", "int, not str"]),
+    (["world.lidar.beams='many'"], ["world.lidar.beams = many", "a whole number, not text"]),
     (["world.lidar.range_min_m=9"], ["world.lidar.range_min_m = 9", "from 0 to 8"]),
     (["radio.loss=1.5"], ["radio.loss = 1.5"]),
     (["world.obstacles=[{center_m=[0.2,0], radius_m=0.3}]"], ["obstacles[0]", "clear of the start of robot 1"]),
@@ -65,8 +65,8 @@ BAD = [
     (["world.walls_m=[[3,3,3,3]]"], ["walls_m[0]", "two different ends"]),
     (["world.starts=[[0,0,0]]"], ["world.starts = 1 poses", "each of the 4 robots"]),
     (["world.starts=[[0,0,0],[0,0.1,0],[3,0,0],[4,0,0]]"], ["world.starts", "robots 1 and 2", "0.3 m apart"]),
-    (["mission=3"], ["mission = 3", "object"]),
-    (["mission.robots.x=3"], ["mission.robots", "array"]),
+    (["mission=3"], ["mission = 3", "a table, not a whole number"]),
+    (["mission.robots.x=3"], ["mission.robots", "a list, not a table"]),
     (["world.obstacles[3].radius_m=1"], ["--set world.obstacles[3].radius_m = 1", "is in none"]),
     (["title.x=1"], ["--set title.x = 1", "is in none"]),
     (["a b=1"], ["--set 'a b=1'", "key=value"]),
@@ -76,7 +76,7 @@ BAD = [
     (["mission.formation.side=up"], ["mission.formation.side = up", "one of left, right, column, zigzag"]),
     (["mission.leading.orientations=[{at_m=1, side='up'}]"], ["orientations[0].side = up", "one of left, right"]),
     (["restart.world=always"], ["restart.world = always", "one of never, on-failure"]),
-    (["mission.following.gains={b_m=1, k_per_s='x'}"], ["mission.following.gains.k_per_s = x", "float, not str"]),
+    (["mission.following.gains={b_m=1, k_per_s='x'}"], ["mission.following.gains.k_per_s = x", "a number, not text"]),
 ]
 
 

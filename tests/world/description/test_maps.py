@@ -208,7 +208,7 @@ def test_a_start_beside_starts_in_one_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "both.toml"
     both = "[world]\nstart = [1.0, 1.0]\nstarts = [[0.0, 0.0, 0.0]]\n"
     path.write_text(f"title = 'x'\ntime_limit_s = 9.0\n[mission]\nrobots = [1]\nleading.route_m = [[9.0, 0.0]]\n{both}")
-    with pytest.raises(Refused, match=r"both.toml: world.start = \[1.0, 1.0\]: must be left out where world.starts"):
+    with pytest.raises(Refused, match=r"both.toml:7: world.start = \[1.0, 1.0\]: must be left out where world.starts"):
         load(str(path))
 
 
@@ -223,8 +223,8 @@ def test_a_keepout_mask_becomes_boxes_that_the_mission_tells(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("box", "said"),
     [
-        ("[3.0, 0.5, 4.5, 1.5]", r"keepout_m = ... .*: must be clear of the start of robot 1 at \(4.00, 1.00\)"),
-        ("[2.0, 5.0, 1.0, 4.0]", r"keepout_m = \[2.0, 5.0, 1.0, 4.0\]: must be x1, y1, x2, y2"),
+        ("[3.0, 0.5, 4.5, 1.5]", r"keepout_m\[0\] = .*: must be clear of the start of robot 1 at \(4.00, 1.00\)"),
+        ("[2.0, 5.0, 1.0, 4.0]", r"keepout_m\[0\] = \[2.0, 5.0, 1.0, 4.0\]: must be x1, y1, x2, y2"),
     ],
 )
 def test_a_keepout_box_that_forbids_the_start_or_nothing_is_refused(tmp_path: Path, box: str, said: str) -> None:
