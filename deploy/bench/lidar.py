@@ -1,6 +1,6 @@
 """`lfa bench lidar`: rays per second of the batch lidar on one core, beside a plain loop over pymunk's ray query.
 
-The world is the one in which peer projects were measured (conventions.md section 2): 20 obstacles, half of them round,
+The world is the one in which peer projects were measured: 20 obstacles, half of them round,
 and outer walls; 10 m of range over 360 degrees, 360 beams.
 """
 

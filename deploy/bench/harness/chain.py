@@ -74,7 +74,7 @@ class Setup(Struct, frozen=True):
 
 
 class ChainErrors(Struct, frozen=True):
-    """Errors of one follower, from the true poses; architecture.md section 5 defines each."""
+    """Errors of one follower, from the true poses; control.md section 6 defines each."""
 
     slot_m: float
     distance_m: float

@@ -1,0 +1,74 @@
+"""All pages of the repository: their links lead somewhere, and the files and names that they quote exist."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.test_imports import ROOT
+from tests.test_paper_map import names_of
+
+NOT_OURS = {".venv", "runs", "build", "dist", "site", ".git", ".namespace", ".pytest_cache"}
+PAGES = sorted(p for p in ROOT.rglob("*.md") if not NOT_OURS & set(p.relative_to(ROOT).parts))
+LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)")
+FILES = [p for p in ROOT.rglob("*.py") if not NOT_OURS & set(p.relative_to(ROOT).parts)]
+YOURS = ("carrot.py", "my_robot.py")
+FILE = re.compile(r"`([\w/.-]+\.py)(?:::?(\w+))?`")
+
+
+def _prose(page: Path) -> str:
+    return re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as browsers and GitHub name them."""
+    heads = re.findall(r"^#+ (.+)$", _prose(page), re.MULTILINE)
+    return {re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", head.lower()).strip()) for head in heads}
+
+
+def dead_links(page: Path) -> list[str]:
+    found = []
+    for path, anchor in LINK.findall(_prose(page)):
+        if re.match(r"\w+:", path):
+            continue
+        target = (page.parent / path).resolve() if path else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            found.append(f"{page.name}: {path}#{anchor}")
+    return found
+
+
+def _places(page: Path, quoted: str) -> list[Path]:
+    """The quoted file: from the root, or beside the page, or else every file whose path ends so."""
+    near = [path for path in (ROOT / quoted, page.parent / quoted) if path.is_file()]
+    return near or [path for path in FILES if path.as_posix().endswith(f"/{quoted}")]
+
+
+def gone(page: Path) -> list[str]:
+    """Files and names that the page quotes and nothing has; NAME.py stands for the reader's own."""
+    quoted = [(path, name) for path, name in FILE.findall(_prose(page)) if path not in YOURS and "NAME" not in path]
+    places = {path: _places(page, path) for path, _ in quoted}
+    return [f"{path}:{name}" for path, name in quoted if not any(not name or name in names_of(p) for p in places[path])]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
+    assert dead_links(page) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_file_and_name_that_a_page_quotes_exists(page: Path) -> None:
+    assert gone(page) == []
+
+
+def test_a_planted_dead_link_and_a_dead_anchor_are_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("# One two\n\n[a](page.md#one-two) [b](none.md) [c](#three)\n")
+    assert dead_links(page) == ["page.md: none.md#", "page.md: #three"]
+
+
+def test_a_planted_name_that_no_file_has_is_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("`agents/agent.py:Agent`, `lease.py:Lease`, `agents/agent.py:Angel`, `leash.py`\n")
+    assert gone(page) == ["agents/agent.py:Angel", "leash.py:"]
