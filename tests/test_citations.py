@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,15 +21,19 @@ SECTIONS = re.compile(
 OWN = Path("tests/test_citations.py")
 
 
-def pages() -> dict[str, Path]:
-    """Paths of all pages by lower-case name; pages that share a name (README.md) are no citation's target by name."""
-    found: dict[str, Path] = {}
-    for path in sorted(ROOT.rglob("*.md")):
-        if not {".venv", "runs", "build", ".namespace", ".git"} & set(path.relative_to(ROOT).parts):
-            found.setdefault(path.name.lower(), path)
-    return found
+def files(*suffixes: str) -> list[Path]:
+    """All files of the repository with one of the suffixes; environment, runs and caches lie outside of `FOLDERS`."""
+    inside = (path for folder in FOLDERS for path in (ROOT / folder).rglob("*"))
+    return sorted(p for p in (*ROOT.glob("*"), *inside) if p.suffix in suffixes and p.is_file())
 
 
+PAGES: dict[str, Path] = {}
+"""All pages by lower-case name; of pages that share a name (README.md) the first."""
+for _page in files(".md"):
+    PAGES.setdefault(_page.name.lower(), _page)
+
+
+@cache
 def sections(page: Path) -> set[str]:
     """Numbers of the page's sections: those of its headings, and those that begin a bold paragraph."""
     return set(re.findall(rf"^(?:#+ |\*\*)({NUMBER})\.? ", page.read_text(), re.MULTILINE))
@@ -42,14 +47,10 @@ def cited(text: str) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield page[1], tuple(re.findall(NUMBER, numbers[1])) if numbers else ()
 
 
-def _sources() -> list[Path]:
-    return [p for f in FOLDERS for p in sorted((ROOT / f).rglob("*")) if p.suffix in SUFFIXES and p.is_file()]
-
-
 def _wrong(path: Path, text: str) -> list[str]:
-    known, found = pages(), []
+    found = []
     for name, numbers in cited(text):
-        page = known.get(name.rpartition("/")[2].lower())
+        page = PAGES.get(name.rpartition("/")[2].lower())
         if page is None:
             found.append(f"{path}: {name} is not in the repository")
         else:
@@ -58,14 +59,14 @@ def _wrong(path: Path, text: str) -> list[str]:
 
 
 def test_every_cited_page_and_section_exists() -> None:
-    texts = [(p.relative_to(ROOT), p.read_text()) for p in _sources() if p.relative_to(ROOT) != OWN]
+    texts = [(p.relative_to(ROOT), p.read_text()) for p in files(*SUFFIXES) if p.relative_to(ROOT) != OWN]
     wrong = [line for path, text in texts for line in _wrong(path, text)]
     wrong = [line for line in wrong if not line.startswith("tests/docs/")]  # they plant names of pages
     assert not wrong, "\n".join(wrong)
 
 
 def test_the_three_pages_are_cited_by_code() -> None:
-    names = [(name, numbers) for p in _sources() if p.suffix == ".py" for name, numbers in cited(p.read_text())]
+    names = [(name, numbers) for p in files(".py") for name, numbers in cited(p.read_text())]
     for page in ("control.md", "lease.md", "zenoh.md"):
         assert sum(name == page and bool(numbers) for name, numbers in names) > 3, page
 

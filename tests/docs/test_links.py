@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.test_citations import files
 from tests.test_imports import ROOT
 from tests.test_paper_map import names_of
 
-NOT_OURS = {".venv", "runs", "build", "dist", "site", ".git", ".namespace", ".pytest_cache"}
-PAGES = sorted(p for p in ROOT.rglob("*.md") if not NOT_OURS & set(p.relative_to(ROOT).parts))
+PAGES = files(".md")
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)")
-FILES = [p for p in ROOT.rglob("*.py") if not NOT_OURS & set(p.relative_to(ROOT).parts)]
+FILES = files(".py")
 YOURS = ("carrot.py", "my_robot.py")
 FILE = re.compile(r"`([\w/.-]+\.py)(?:::?(\w+))?`")
 
