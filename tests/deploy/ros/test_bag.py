@@ -6,7 +6,8 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from mcap_ros2.reader import read_ros2_messages
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from rosbags.rosbag2 import Reader
@@ -62,12 +63,11 @@ def test_rosbags_decodes_every_message_at_its_time(written: Path) -> None:
 
 def test_foxgloves_reader_decodes_every_message_by_the_definitions_in_the_file(written: Path) -> None:
     (file,) = written.glob("*.mcap")
-    count = 0
-    for read in read_ros2_messages(str(file)):
-        assert read.ros_msg is not None
-        count += 1
-    with AnyReader([written]) as reader:
-        assert count == reader.message_count
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        count = sum(message is not None for *_, message in reader.iter_decoded_messages())
+    with AnyReader([written]) as again:
+        assert count == again.message_count
 
 
 def test_the_odometry_of_the_bag_is_the_recorded_one(run: Path, written: Path) -> None:
