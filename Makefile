@@ -74,10 +74,11 @@ planted: $(STAMP)
 same: $(STAMP)
 	PATH="$(abspath $(BIN)):$$PATH" tests/same.sh runs/same
 
-# The table of a scenario's keys, from the types, to the end of its page.
+# Tables from the code: a scenario's keys to the end of its page, the states and transitions of a lease into its page.
 pages: $(STAMP)
 	sed -i '/^| key | type /,$$d' world/SCENARIO.md
 	$(BIN)/lfa schema --markdown >> world/SCENARIO.md
+	$(BIN)/python -m tests.protocol.lease.page
 
 clean:
 	rm -rf $(VENV) runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -18,7 +18,8 @@ from lfa.agents.team_state import SENSORS_S_MAX, TeamState
 from lfa.agents.telemetry import Reports, status
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Twist
-from lfa.protocol.lease.lease import AdoptChain, BecomeLeader, Effect, Lease, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import NO_TERM, Config, LeaseNote, Member, Role, Term
 from lfa.protocol.messages.robot import CmdVel, GroundProfile, LaserScan, Localization, Sensors
@@ -73,6 +74,8 @@ class Agent:
         """True while grants can wait for the next control step: the lease lasts well beyond it."""
         self._interests = self._wanted()
         self.refusal: str | None = None
+        self.lease_observer: Observer | None = None
+        """Told of every event of the lease; set before the mission is known."""
 
     # --- interface to the node runner -----------------------------------------------------------------------------
 
@@ -239,7 +242,7 @@ class Agent:
         self._reports = Reports(self._outbox, len(mission.robots))
         self._stuck_policy = StuckPolicy(self._id, mission, self._outbox, self._team)
         me = Member(self._id, self.incarnation)
-        self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor)
+        self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor, self.lease_observer)
         self._next_control = now
         self._interests = self._wanted()
         self._event("mission", now, {"version": mission.version, "robots": list(mission.robots)})

@@ -18,7 +18,6 @@ from lfa.agents.agent import Agent
 from lfa.protocol import clock
 from lfa.protocol.config_file.mistake import apply_rules
 from lfa.protocol.errors import Refused
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import MISSION_RULES, check_mission
 from lfa.protocol.names import whole_number
@@ -28,6 +27,7 @@ from lfa.protocol.runtime.node_runner import Options, run
 from lfa.protocol.topics import fleet_name
 from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
+from lfa.protocol.witness import Witness
 
 ROLES = ("leader", "follower", "witness")
 EXAMPLE = "example: lfa-agent --role follower --id 2"

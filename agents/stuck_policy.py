@@ -14,7 +14,7 @@ from lfa.agents.perception.obstacle_model import TRAP_M
 from lfa.agents.recovery.stuck_detector import POSE_LOST
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.team import ObstacleNote
 from lfa.protocol.mission import Mission

@@ -11,13 +11,13 @@ import typer
 
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime.node_runner import Options, run
 from lfa.protocol.topics import WORLD_NAME, fleet_name
 from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import draw, load
 
 EXTRA = ("numpy", "pymunk", "PIL")

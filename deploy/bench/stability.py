@@ -16,12 +16,12 @@ from lfa.agents.agent import Agent
 from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Broken, Team, endless
 from lfa.protocol import clock
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
 from lfa.protocol.node import Node
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.transport.link_model import WEATHER, Radio
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import Scenario
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.simulator import Simulator

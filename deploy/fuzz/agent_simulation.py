@@ -15,17 +15,17 @@ from msgspec import Struct
 
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.verification.checker import Checker, listeners
-from lfa.deploy.analysis.verification.lease_observer import effect_facts, message_facts, observe_lease
+from lfa.deploy.analysis.verification.lease_observer import effect_facts
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.fuzz import network
 from lfa.deploy.fuzz.network import LinkConditions, Trace
 from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
 from lfa.protocol.lease.effects import BecomeLeader, Effect
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease, Observed
+from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import Message, encode
-from lfa.protocol.messages.consensus import Fence, LeaseNote, Member, Promise
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Member
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
@@ -33,6 +33,7 @@ from lfa.protocol.node import Envelope, Node, PeerDown, PeerUp, Received
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME, address
 from lfa.protocol.transport.link_model import LinkModel, Radio
+from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
 from lfa.world.description.scenario import Lidar, Scenario, WorldSpec
 from lfa.world.physics.kinematics import Kinematic
@@ -165,8 +166,7 @@ class AgentSimulation:
         )
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         life = self.processes[robot_id] = Life(self.simulator, node, member, clock)
-        observe_lease(node, lambda effects: self._done(life, effects))
-        _before(node, lambda received: self._received(received))
+        node.lease_observer = lambda observed: self._observed(life, observed)
         self._say(robot_id, f"starts, life {member.incarnation}")
         self._tell("lives", self.now, member)
         self._add(node, clock)
@@ -288,20 +288,16 @@ class AgentSimulation:
         for listen in self._listeners[what]:
             listen(*facts)
 
-    def _done(self, life: Life, effects: Sequence[Effect]) -> None:
-        for effect in effects:
+    def _observed(self, life: Life, observed: Observed) -> None:
+        if observed.event is LeaseEvent.PROMISE:
+            self._tell("promises", self.now, *observed.given)
+        for effect in observed.effects:
             self._say(life.id, network.told(effect))
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, life.id, effect))
             for words in effect_facts(
                 effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true
             ):
-                self._tell(*words)
-
-    def _received(self, received: Received) -> None:
-        note = received.message
-        if isinstance(note, LeaseNote) and isinstance(note.body, Promise):
-            for words in message_facts(note, self.now):
                 self._tell(*words)
 
     def _at_gateways(
@@ -346,17 +342,6 @@ class AgentSimulation:
         lease = self.processes[robot_id].lease
         assert lease is not None, robot_id
         return lease
-
-
-def _before(node: Agent | Witness, hear: Callable[[Received], None]) -> None:
-    """Call `hear` with every message that the node receives, just before the node gets it."""
-    receive = node.receive
-
-    def heard(received: Received) -> list[Envelope]:
-        hear(received)
-        return receive(received)
-
-    node.receive = heard  # type: ignore[method-assign]
 
 
 def _refused(world: World, robot: int | None) -> int:

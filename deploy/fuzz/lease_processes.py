@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from lfa.deploy.fuzz.gateways import GatewaySimulation
 from lfa.deploy.fuzz.network import SimulatedClock, told
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease, Observed
+from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S
 from lfa.protocol.messages.consensus import (
     NO_TERM,
@@ -16,7 +18,6 @@ from lfa.protocol.messages.consensus import (
     Grant,
     LeaseBody,
     Member,
-    Promise,
     Propose,
     Release,
     Role,
@@ -35,6 +36,8 @@ INBOX_SIZE_MAX = 500
 """Maximum number of messages kept for a paused process."""
 NEVER = float("inf")
 
+Call = Callable[..., list[Effect]]
+
 
 class Process:
     """One incarnation of one robot's (or the witness's) lease, with its own clock."""
@@ -49,8 +52,8 @@ class Process:
         self.leaving = False
         """True after a request to exit, while the process sends its last messages."""
         self.commanding = False
-        self.inbox: list[tuple[str, Any]] = []
-        """Messages received during a pause: method of the lease and its arguments."""
+        self.inbox: list[tuple[Call, tuple[Any, ...]]] = []
+        """Calls of the lease kept during a pause: method and arguments without the time."""
         self.wakes_at = NEVER
         """True time of the earliest wake-up on the heap."""
         self.drawn: CmdVel | None = None
@@ -70,19 +73,22 @@ class Hosts(GatewaySimulation):
 
     # --- inputs ------------------------------------------------------------------------------------------------
 
-    def deliver(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
-        """Call the method of the lease, or keep the call until the end of a pause."""
+    def deliver(self, process: Process, method: Call, arguments: tuple[Any, ...]) -> None:
+        """Call a method of the lease, or keep the call until the end of a pause."""
         if not process.paused:
             self.take(process, method, arguments)
         elif len(process.inbox) < INBOX_SIZE_MAX:
             process.inbox.append((method, arguments))
 
-    def take(self, process: Process, method: str, arguments: tuple[Any, ...]) -> None:
-        """Call the method of the lease at its local time, and execute the effects."""
-        if method == "receive" and type(arguments[1]) is Promise:
+    def take(self, process: Process, method: Call, arguments: tuple[Any, ...]) -> None:
+        """Call a method of the lease at its local time, and execute the effects."""
+        self.carry_out(process, method(*arguments, process.clock.local(self.now)))
+
+    def observed(self, observed: Observed) -> None:
+        """Notify the checkers of a promise that a lease receives."""
+        if observed.event is LeaseEvent.PROMISE:
             for tell in self._tell["promises"]:
-                tell(self.now, arguments[0], arguments[1])
-        self.carry_out(process, getattr(process.lease, method)(*arguments, process.clock.local(self.now)))
+                tell(self.now, *observed.given)
 
     def wake_at(self, process: Process, true: float) -> None:
         """Schedule a wake-up of the process at a true time [s], unless an earlier one is scheduled."""
@@ -105,7 +111,7 @@ class Hosts(GatewaySimulation):
     def _arrive(self, src: Member, to: int, body: LeaseBody) -> None:
         process = self.processes.get(to)
         if process is not None and process.alive:
-            self.deliver(process, "receive", (src, body))
+            self.deliver(process, process.lease.receive, (src, body))
 
     def _at_gateway(self, src: Member, robot_id: int, body: LeaseBody) -> None:
         answered = self.fence(robot_id, body)
@@ -175,7 +181,7 @@ class Hosts(GatewaySimulation):
 
     def _hinted(self, process: Process, hint: tuple[int, int, bool]) -> None:
         if process.alive:
-            self.deliver(process, "hint", hint)
+            self.deliver(process, process.lease.hint, hint)
 
     def _send(self, process: Process, send: Send) -> None:
         body = send.body

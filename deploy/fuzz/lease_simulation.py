@@ -9,7 +9,7 @@ from __future__ import annotations
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
 from lfa.deploy.fuzz.network import LinkConditions, SimulatedClock
 from lfa.protocol.lease.gateway import Gateway
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Leading, Mission, Profile
@@ -62,7 +62,7 @@ class LeaseSimulation(Hosts):
         member = Member(robot_id, self._lives)
         clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
-        lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor)
+        lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor, self.observed)
         process = Process(member, lease, clock)
         self.processes[robot_id] = process
         if self.trace is not None:
@@ -107,7 +107,7 @@ class LeaseSimulation(Hosts):
         """Deliver the operator's `forget` command for `lost` to every running robot, now."""
         for process in self.processes.values():
             if process.alive and process.id != WITNESS_ID:
-                self.deliver(process, "request_forget", (lost,))
+                self.deliver(process, process.lease.request_forget, (lost,))
 
     def pause(self, robot_id: int) -> None:
         """Pause the process (SIGSTOP): incoming messages are kept, its clock goes on."""
@@ -135,7 +135,8 @@ class LeaseSimulation(Hosts):
         member = self.processes[about].member
         for observer in observers:
             if self.processes[observer].alive:
-                self.deliver(self.processes[observer], "hint", (member.id, member.incarnation, up))
+                process = self.processes[observer]
+                self.deliver(process, process.lease.hint, (member.id, member.incarnation, up))
 
     def step_wall(self, robot_id: int, by_s: float) -> None:
         """Set a host's wall clock wrong by `by_s` [s]; no other clock can be stepped."""

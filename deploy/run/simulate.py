@@ -20,13 +20,13 @@ from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from lfa.deploy.run.termination import Referee
 from lfa.protocol.errors import Refused
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Node
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import Scenario, draw
 from lfa.world.simulator import Simulator
 from lfa.world.world import World

@@ -28,6 +28,8 @@ class Candidate:
         """Holder state of the term while it is being granted; set when the first PROPOSE is sent."""
         self.transferred = False
         """True if the issuer handed the term over (E16): this process only counts the grants."""
+        self.fencing = False
+        """True while enough have promised, but a gateway has still to confirm its fence (E15)."""
         self._promised: dict[Member, Grantee | None] = {}
         self._absent: frozenset[Grantee] = frozenset()
         """Placeholders for the leases of robots that did not promise and may still command (E21)."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from lfa.agents.agent import EASE_S, Agent
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.transport.link_model import Radio
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import draw, shipped
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.simulator import Simulator

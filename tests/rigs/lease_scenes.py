@@ -7,7 +7,7 @@ from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.effects import BecomeLeader, Effect, Send
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import (
     Config,

@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.verification.checker import Violation, listeners
-from lfa.deploy.analysis.verification.lease_observer import Words, effect_facts, message_facts, observe_lease
+from lfa.deploy.analysis.verification.lease_observer import Words, effect_facts, message_facts
 from lfa.deploy.analysis.verification.reexecution import call, node_of
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.recording import event_log
@@ -26,7 +26,6 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import Timing, timing_of
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Member
 from lfa.protocol.messages.robot import CmdVel
@@ -37,6 +36,7 @@ from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import Heading, Journal, JournalEntry, digest
 from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, WORLD_NAME, address
+from lfa.protocol.witness import Witness
 
 _local_decoder = msgspec.msgpack.Decoder(Local)
 
@@ -118,7 +118,7 @@ def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], tim
         return
     me = Member(robot, heading.incarnation)
     effects: list[Effect] = []
-    observe_lease(node, effects.extend)
+    node.lease_observer = lambda observed: effects.extend(observed.effects)
     host = NodeHost(node, Journal(None, heading))
     at = 0.0
     for entry in entries:

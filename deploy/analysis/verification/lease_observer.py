@@ -1,33 +1,16 @@
-"""Conversion of lease effects and messages to facts for the checkers.
-
-The effects of an agent's or a witness's core are observed just before the core carries them out.
-"""
+"""Conversion of lease effects and messages to facts for the checkers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from lfa.agents.agent import Agent
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.consensus import Grant, LeaseNote, Member, Promise, Propose, Release
 from lfa.protocol.names import robot_id_of
 
 Words = tuple[Any, ...]
 """Fact for the checkers: the name of a method of `Checker`, and its arguments."""
-
-
-def observe_lease(node: Agent | Witness, hear: Callable[[list[Effect]], object]) -> None:
-    """Call `hear` with the effects of the node's lease, just before the node carries them out."""
-    name = "_apply" if isinstance(node, Agent) else "_carry_out"
-    carry_out = getattr(node, name)
-
-    def heard(done: list[Effect], now: float) -> Any:
-        hear(done)
-        return carry_out(done, now)
-
-    setattr(node, name, heard)
 
 
 def effect_facts(

@@ -14,7 +14,6 @@ from msgspec import Struct
 
 from lfa.agents.agent import Agent
 from lfa.protocol.errors import Refused
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.mission import Mission
 from lfa.protocol.node import Local, Node
@@ -22,6 +21,7 @@ from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, JournalEntry, digest
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import TOPIC, address
+from lfa.protocol.witness import Witness
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.physics.rigid_bodies import Physics

@@ -30,7 +30,6 @@ from lfa.deploy.bench.control_cases.string_stability import (
 from lfa.deploy.bench.control_cases.table import DEGREES
 from lfa.deploy.bench.harness.rows import Case, Quantity
 from lfa.protocol.geometry import Pose2D, Twist
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Slot
@@ -38,6 +37,7 @@ from lfa.protocol.mission import Following, FormationSpec, Leading, Mission
 from lfa.protocol.node import Node
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.transport.link_model import Radio
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import Lidar, Scenario, WorldSpec, load
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.simulator import LocalClock, Simulator

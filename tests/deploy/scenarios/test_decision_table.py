@@ -14,12 +14,12 @@ from msgspec import Struct
 from lfa.agents.agent import Agent
 from lfa.agents.avoidance.decision import TABLE
 from lfa.protocol.geometry import Pose2D
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Event
 from lfa.protocol.node import Node
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import load
 from lfa.world.simulator import Simulator
 from lfa.world.world import World

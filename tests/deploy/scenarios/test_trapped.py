@@ -14,7 +14,6 @@ from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.recording import event_log
 from lfa.deploy.run.simulate import run
 from lfa.protocol.geometry import Pose2D
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import Truth
@@ -22,6 +21,7 @@ from lfa.protocol.messages.team import ObstacleNote
 from lfa.protocol.node import Envelope, Node, Received
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import key
+from lfa.protocol.witness import Witness
 from lfa.world.description.load import load
 from lfa.world.simulator import Simulator
 from lfa.world.world import World

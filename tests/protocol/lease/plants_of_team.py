@@ -7,7 +7,9 @@ from typing import Any
 import pytest
 
 import lfa.protocol.lease.holder
-import lfa.protocol.lease.lease
+import lfa.protocol.lease.machine.candidacy
+import lfa.protocol.lease.machine.resigning
+import lfa.protocol.lease.machine.voting
 import lfa.protocol.lease.membership
 import lfa.protocol.lease.quorum
 import lfa.protocol.lease.reconfiguration
@@ -15,9 +17,9 @@ from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.candidate import Candidate
 from lfa.protocol.lease.election import Election
 from lfa.protocol.lease.failure_detector import FailureDetector
-from lfa.protocol.lease.holder import Holder
-from lfa.protocol.lease.lease import Lease
-from lfa.protocol.messages.consensus import Config, Member, Propose, Term
+from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.machine.memory import LeaseMemory
+from lfa.protocol.messages.consensus import Config, Member, Propose, Release, Term
 
 
 def hint_taken_as_proof(patch: pytest.MonkeyPatch) -> None:
@@ -25,7 +27,7 @@ def hint_taken_as_proof(patch: pytest.MonkeyPatch) -> None:
 
     def hint(self: Lease, id: int, incarnation: int, up: bool, now: float) -> Any:
         effects = honest(self, id, incarnation, up, now)
-        self._acceptor.bond = None
+        self._memory.acceptor.bond = None
         return effects
 
     patch.setattr(Lease, "hint", hint)
@@ -74,7 +76,7 @@ def chain_forgets_its_order(patch: pytest.MonkeyPatch) -> None:
         head, *rest = config.chain
         return Config(config.version, config.voters, config.tie, config.previous, (head, *reversed(rest)))
 
-    patch.setattr(lfa.protocol.lease.lease, "led_by", led_by)
+    patch.setattr(lfa.protocol.lease.machine.candidacy, "led_by", led_by)
 
 
 def restart_votes_at_once(patch: pytest.MonkeyPatch) -> None:
@@ -100,28 +102,22 @@ def new_term_with_every_asking(patch: pytest.MonkeyPatch) -> None:
 
 def equal_ranks(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Election, "rank", lambda self, config, robot_id, peers: 0)
-    patch.setattr(Lease, "_stands_before", lambda self, src, body: False)
+    patch.setattr(lfa.protocol.lease.machine.voting, "stands_before", lambda m, src, body: False)
 
 
 def hand_over_writes_a_config(patch: pytest.MonkeyPatch) -> None:
-    honest = Lease._hand_over
+    honest = lfa.protocol.lease.machine.resigning.transfer
 
-    def hand_over(self: Lease, holder: Holder, now: float, effects: list[Any]) -> None:
-        honest(self, holder, now, effects)
-        transfer_proposal = self._pending_release.transfer_proposal
-        if transfer_proposal is not None:
-            written = lfa.protocol.lease.membership.led_by(
-                self.config, transfer_proposal.holder, transfer_proposal.term, lambda m: False, keep_leader=True
-            )
-            self._pending_release.transfer_proposal = Propose(
-                transfer_proposal.term,
-                written,
-                transfer_proposal.round,
-                transfer_proposal.holder,
-                nonce=transfer_proposal.nonce,
-            )
+    def transfer(m: LeaseMemory, now: float) -> Propose | None:
+        proposal = honest(m, now)
+        if proposal is None:
+            return None
+        written = lfa.protocol.lease.membership.led_by(
+            m.config, proposal.holder, proposal.term, lambda m: False, keep_leader=True
+        )
+        return Propose(proposal.term, written, proposal.round, proposal.holder, nonce=proposal.nonce)
 
-    patch.setattr(Lease, "_hand_over", hand_over)
+    patch.setattr(lfa.protocol.lease.machine.resigning, "transfer", transfer)
 
 
 def full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
@@ -131,7 +127,7 @@ def full_house_that_is_not_joint(patch: pytest.MonkeyPatch) -> None:
         config = honest(*arguments)
         return Config(config.version, config.voters, config.tie, None, config.chain)
 
-    patch.setattr(lfa.protocol.lease.lease, "unanimous_config", of_full_house)
+    patch.setattr(lfa.protocol.lease.machine.candidacy, "unanimous_config", of_full_house)
 
 
 def replaced_lives_make_a_full_house(patch: pytest.MonkeyPatch) -> None:
@@ -139,21 +135,22 @@ def replaced_lives_make_a_full_house(patch: pytest.MonkeyPatch) -> None:
 
 
 def given_up_restamp_is_released(patch: pytest.MonkeyPatch) -> None:
-    def drop(self: Lease, now: float, effects: list[Any]) -> None:
-        candidate, self._candidate = self._candidate, None
+    def drop(m: LeaseMemory, now: float) -> None:
+        candidate, m.candidate = m.candidate, None
         if candidate is not None and candidate.holder is not None:
-            self._acceptor.release(candidate.term)
-            effects.append(lfa.protocol.lease.lease.Send("all", lfa.protocol.lease.lease.Release(candidate.term)))
+            m.acceptor.release(candidate.term)
+            m.send("all", Release(candidate.term))
 
-    patch.setattr(Lease, "_drop_candidate", drop)
+    patch.setattr(lfa.protocol.lease.machine.resigning, "drop_candidacy", drop)
 
 
 def acts_under_a_restamp_at_once(patch: pytest.MonkeyPatch) -> None:
     def term(self: Lease) -> Term:
-        if self._holder is None:
-            return self.config.version.term
-        asked = self._candidate is not None and self._candidate.holder is not None
-        return self._candidate.term if asked and self._candidate is not None else self._holder.term
+        m = self._memory
+        if m.holder is None:
+            return m.config.version.term
+        asked = m.candidate is not None and m.candidate.holder is not None
+        return m.candidate.term if asked and m.candidate is not None else m.holder.term
 
     patch.setattr(Lease, "term", property(term))
 
@@ -163,7 +160,7 @@ def forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
 
     def request_forget(self: Lease, lost: tuple[Member, ...], now: float) -> Any:
         effects = honest(self, lost, now)
-        self._election.forget_until = float("inf")
+        self._memory.election.forget_until = float("inf")
         return effects
 
     patch.setattr(Lease, "request_forget", request_forget)

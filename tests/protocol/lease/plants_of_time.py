@@ -16,7 +16,11 @@ from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.effects import StepDown
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.holder import Holder
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine import lease, resigning
+from lfa.protocol.lease.machine.deadlines import DEADLINES
+from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.machine.memory import LeaseMemory
+from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.step_down import PendingRelease
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
@@ -64,7 +68,7 @@ def released_term_granted_again(patch: pytest.MonkeyPatch) -> None:
 
 def expired_leader_goes_on(patch: pytest.MonkeyPatch) -> None:
     """It leads and asks on, and its gateway alone still refuses."""
-    patch.setattr(Lease, "may_command", lambda self, now: self._holder is not None)
+    patch.setattr(Lease, "may_command", lambda self, now: self._memory.holder is not None)
     deaf_leader_goes_on_asking(patch)
 
 
@@ -76,7 +80,9 @@ def silence_of_four_heartbeats(patch: pytest.MonkeyPatch) -> None:
 def terms_begin_again_at_a_restart(patch: pytest.MonkeyPatch) -> None:
     honest = Lease.__init__
     patch.setattr(
-        Lease, "__init__", lambda self, me, mission, timing, now, floor: honest(self, me, mission, timing, now, 0)
+        Lease,
+        "__init__",
+        lambda self, me, mission, timing, now, floor, *more: honest(self, me, mission, timing, now, 0, *more),
     )
 
 
@@ -111,14 +117,13 @@ def wall_clock_in_lease_arithmetic(patch: pytest.MonkeyPatch) -> None:
 
 
 def lease_end_not_told(patch: pytest.MonkeyPatch) -> None:
-    honest = Lease._expire
+    honest = resigning.step_down
 
-    def expire(self: Lease, now: float, effects: list[Any]) -> None:
-        mine: list[Any] = []
-        honest(self, now, mine)
-        effects += [effect for effect in mine if not isinstance(effect, StepDown)]
+    def step_down(m: LeaseMemory, now: float, cause: Any, below: Term | None = None) -> None:
+        honest(m, now, cause, below)
+        m.effects = [effect for effect in m.effects if not (isinstance(effect, StepDown) and cause == "expired")]
 
-    patch.setattr(Lease, "_expire", expire)
+    patch.setattr(resigning, "step_down", step_down)
 
 
 def refusal_raises_the_promise(patch: pytest.MonkeyPatch) -> None:
@@ -135,16 +140,9 @@ def refusal_raises_the_promise(patch: pytest.MonkeyPatch) -> None:
 
 def deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
     """It commands no more, but its PROPOSEs keep the voters bound."""
-    honest = Lease.next_deadline
-
-    def next_deadline(self: Lease, again_at: float = float("-inf")) -> float:
-        if self._holder is None:
-            return honest(self, again_at)
-        asking = self._holder.next_round_at if self._candidate is None else self._candidate.deadline
-        return min(self._hello_at, self._pending_release.release_at, asking)
-
-    patch.setattr(Lease, "next_deadline", next_deadline)
-    patch.setattr(Lease, "_expire", lambda self, now, effects: None)
+    others = tuple(deadline for deadline in DEADLINES if deadline.event is not LeaseEvent.LEASE_EXPIRED)
+    patch.setattr(lease, "DEADLINES", others)
+    patch.setattr(Lease, "_expire", lambda self, now: None)
 
 
 def clocks_a_quarter_wrong(patch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ import pytest
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.protocol.lease.effects import BecomeLeader
 from lfa.protocol.lease.election import COLD_START_S
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import Config, Hello, Member, Prepare, Propose, Release, Term, Version
 from lfa.protocol.mission import Leading, Mission
 from tests.rigs.lease_scenes import STD, Team, sent

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.holder import Holder
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
 from lfa.protocol.messages.consensus import (
     Grant,

@@ -1,11 +1,11 @@
 """The witness as a Node."""
 
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.consensus import Hello, LeaseNote, Prepare, Promise, Term, Version
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import Ask, MissionNote, Status
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.node import Received, Stop
+from lfa.protocol.witness import Witness
 
 MISSION = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
 

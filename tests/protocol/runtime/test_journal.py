@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from lfa.protocol.errors import Refused
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
 from lfa.protocol.runtime.node_runner import _NodeRunner
 from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.witness import Witness
 
 HEADING = Heading(JOURNAL_VERSION, "robot2", 17, 3, {"fleet": "f"})
 

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfa.protocol.geometry import STILL
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.consensus import NO_TERM, Hello, LeaseNote, Role
 from lfa.protocol.messages.header import Header
@@ -17,6 +16,7 @@ from lfa.protocol.node import Stop
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
 from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, TOPICS, key
+from lfa.protocol.witness import Witness
 
 MISSION = Mission(leading=Leading(route_m=((0.0, 0.0), (5.0, 0.0))))
 

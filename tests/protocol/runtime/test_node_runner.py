@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from lfa.protocol.lease.witness import Witness
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_runner import _NodeRunner
 from lfa.protocol.topics import address
 from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.witness import Witness
 
 
 class Order:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from lfa.protocol.lease.effects import Effect, Send
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import NO_TERM, LeaseNote, Member, Role
@@ -38,6 +38,8 @@ class Witness:
         self.finished = False
         self.refusal: str | None = None
         self.started_with = {"kind": "witness", "mission": msgspec.to_builtins(mission)}
+        self.lease_observer: Observer | None = None
+        """Told of every event of the lease; set before the mission is known."""
         self._fleet = fleet
         self._floor = floor
         self._mission = mission
@@ -90,7 +92,7 @@ class Witness:
 
     def _lease_at(self, now: float, mission: Mission) -> Lease:
         me = Member(WITNESS_ID, self.incarnation)
-        self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor)
+        self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor, self.lease_observer)
         return self._lease
 
     def _hint(self, name: str, incarnation: int, up: bool, now: float) -> list[Envelope]:

@@ -1,0 +1,236 @@
+"""The lease of one process: leader, lease duration and chain, by the rules E1.. in protocol/README.md.
+
+`table.py` says what is done in which state, and why; `memory.py` holds what is known. A `Lease` never reads a clock:
+`now` is the process's own monotonic time [s] in every call, and must not decrease between calls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from lfa.protocol.lease.effects import Effect
+from lfa.protocol.lease.machine import voting
+from lfa.protocol.lease.machine.deadlines import DEADLINES, expiry
+from lfa.protocol.lease.machine.memory import LeaseMemory
+from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState, refusal, state_of
+from lfa.protocol.lease.membership import ids, is_first
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import (
+    Config,
+    Fenced,
+    Grant,
+    Hello,
+    LeaseBody,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Release,
+    Role,
+    Term,
+)
+from lfa.protocol.mission import Mission
+
+SOONEST = float("-inf")
+EVENTS: dict[type[LeaseBody], LeaseEvent] = {
+    Prepare: LeaseEvent.PREPARE,
+    Promise: LeaseEvent.PROMISE,
+    Propose: LeaseEvent.PROPOSE,
+    Grant: LeaseEvent.GRANT,
+    Release: LeaseEvent.RELEASE,
+    Hello: LeaseEvent.HELLO,
+    Fenced: LeaseEvent.FENCED,
+}
+"""Events of messages, without NACK, whose event follows from what was asked, and FENCE, which is for gateways."""
+
+
+class Observed(NamedTuple):
+    """One event and what came of it, told to an observer before the effects are carried out."""
+
+    event: LeaseEvent
+    before: LeaseState
+    after: LeaseState
+    given: tuple[Any, ...]
+    """The sender and the message, for the event of a message."""
+    effects: list[Effect]
+
+
+Observer = Callable[[Observed], object]
+
+
+class Lease:
+    """Voter, candidate and leader of one process; the caller carries out effects in the given order."""
+
+    def __init__(
+        self, me: Member, mission: Mission, timing: Timing, now: float, floor: int, observer: Observer | None = None
+    ) -> None:
+        """Start the lease of `me` (id 0: the witness, which votes and never leads).
+
+        `floor` is the wall clock [ms] at boot (small integers in simulation): terms of this incarnation are above it.
+        It orders incarnations and is no part of any safety argument. `observer` is told of every event.
+        """
+        self._memory = LeaseMemory(me, mission, timing, now, floor)
+        self._observer = observer
+
+    # --- read by the agent --------------------------------------------------------------------------------------
+
+    @property
+    def me(self) -> Member:
+        return self._memory.me
+
+    @property
+    def config(self) -> Config:
+        """Newest config known."""
+        return self._memory.config
+
+    @property
+    def leader(self) -> int | None:
+        """Id of the holder of the newest term known; None once its lease has expired by this process's own clock."""
+        return self._memory.leader
+
+    @property
+    def left_out(self) -> frozenset[int]:
+        """Ids of live robots that a leader keeps out of its chain because they are stuck (E22)."""
+        return self._memory.left_out
+
+    @left_out.setter
+    def left_out(self, robot_ids: frozenset[int]) -> None:
+        self._memory.left_out = robot_ids
+
+    @property
+    def released(self) -> bool:
+        """True if a requested release is complete: the final messages are out and the process may end."""
+        return self._memory.released
+
+    @property
+    def chain(self) -> tuple[int, ...]:
+        """Ids of `config.chain`, leader first."""
+        return ids(self._memory.config.chain)
+
+    @property
+    def term(self) -> Term:
+        """Term of the lease that this process holds, else of the config that it follows."""
+        holder = self._memory.holder
+        return holder.term if holder is not None else self._memory.config.version.term
+
+    @property
+    def role(self) -> Role:
+        m = self._memory
+        if m.holder is not None:
+            return Role.LEADER
+        return Role.FOLLOWER if m.leader is not None and m.me.id in self.chain else Role.WAITING
+
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Ids that the first election of the fleet still waits for (E18); empty once a leader is known."""
+        m = self._memory
+        if not is_first(m.config):
+            return ()
+        return tuple(i for i in m.election.all_member_ids if not m.peers.knows(i))
+
+    def may_command(self, now: float) -> bool:
+        """Return True if leading and `now` is before the lease's expiry (I1, I2)."""
+        return self._memory.holder is not None and now < expiry(self._memory)
+
+    def commanded(self, now: float) -> None:
+        """Record that a command as leader was sent at `now` [s]."""
+        self._memory.pending_release.commanded_at = now
+
+    # --- input -------------------------------------------------------------------------------------------------
+
+    def receive(self, src: Member, body: LeaseBody, now: float) -> list[Effect]:
+        """Process a message of another process or of the own gateway (FENCED: `src.id` is the gateway's robot)."""
+        m = self._memory
+        self._expire(now)
+        if not isinstance(body, Fenced):  # a gateway's incarnations are not its robot's
+            if src.id == m.me.id:
+                return self._memory.drain()  # own message
+            m.peers.heard(src, now)
+        if isinstance(body, Nack):
+            voting.hear_refusal(m, body, now)
+            event = refusal(m, body)
+        else:
+            event = EVENTS.get(type(body))
+        if event is not None:
+            self._fire(event, now, src, body)
+        return self._memory.drain()
+
+    def tick(self, now: float, again_at: float = SOONEST) -> list[Effect]:
+        """Do what is due at `now` [s]; send a round now if it falls due before `again_at` [s], the next tick."""
+        for deadline in DEADLINES:
+            m = self._memory
+            if now >= deadline.due(m, again_at) and (deadline.event, state_of(m)) in ACTIONS:
+                self._fire(deadline.event, now)
+        return self._memory.drain()
+
+    def next_deadline(self, again_at: float = SOONEST) -> float:
+        """Return the time [s] of the next tick, for a process that ticks at `again_at` [s] anyway."""
+        m, at = self._memory, float("inf")
+        state = state_of(m)
+        for deadline in DEADLINES:
+            if (deadline.event, state) in ACTIONS:
+                at = min(at, deadline.wakes(m, again_at))
+        return at
+
+    def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:
+        """Process a liveliness event, which proves nothing; a leader closes the chain over a vanished follower (E8)."""
+        self._expire(now)
+        if up:
+            self._memory.peers.appeared(id, incarnation)
+        elif id != self._memory.me.id:
+            self._memory.peers.vanished(id, incarnation, now)
+            self._fire(LeaseEvent.TOKEN_VANISHED, now)
+        return self._memory.drain()
+
+    def gateway_term(self, term: Term, now: float, latched: bool = False) -> list[Effect]:
+        """Process the own gateway's state from `sensors`: its highest term, and whether it is latched in that term.
+
+        E10: a leader whose gateway has seen a higher term, or is latched in the present one, raises its own term.
+        """
+        m = self._memory
+        self._expire(now)
+        m.seen = max(m.seen, term)
+        if m.holder is not None and (term > m.holder.term or (latched and term == m.holder.term)):
+            self._fire(LeaseEvent.GATEWAY_BARS, now)
+        return self._memory.drain()
+
+    def request_release(self, now: float) -> list[Effect]:
+        """Exit cleanly: stop leading and release the voters; `released` turns True, at once if there is no lease."""
+        self._fire(LeaseEvent.LEAVE, now)
+        return self._memory.drain()
+
+    def request_handover(self, now: float) -> list[Effect]:
+        """Hand the lease of a stuck leader to the next in the chain that answers; release it if none does (E16)."""
+        self._expire(now)
+        self._fire(LeaseEvent.HAND_OVER, now)
+        return self._memory.drain()
+
+    def request_forget(self, lost: tuple[Member, ...], now: float) -> list[Effect]:
+        """Apply an operator's declaration that the incarnations `lost`, and all earlier ones of their ids, are dead.
+
+        E20: it is valid for one attempt of each present candidate, and is ignored while a leader is known or if a later
+        incarnation of one of them was heard.
+        """
+        self._expire(now)
+        self._fire(LeaseEvent.FORGET, now, lost)
+        return self._memory.drain()
+
+    # --- the machine -------------------------------------------------------------------------------------------
+
+    def _expire(self, now: float) -> None:
+        """Step down if the lease has expired; first action of every call, so that no leader outlasts its lease (E7)."""
+        if self._memory.holder is not None and now >= expiry(self._memory):
+            self._fire(LeaseEvent.LEASE_EXPIRED, now)
+
+    def _fire(self, event: LeaseEvent, now: float, *given: Any) -> None:
+        """Do what the table says for the event in the present state."""
+        before = state_of(self._memory)
+        action = ACTIONS.get((event, before))
+        first = len(self._memory.effects)
+        if action is not None:
+            action(self._memory, *given, now)
+        if self._observer is not None:
+            effects = self._memory.effects[first:]
+            self._observer(Observed(event, before, state_of(self._memory), given, effects))

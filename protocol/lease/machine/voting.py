@@ -1,0 +1,141 @@
+"""Actions of every process as voter and follower: answers to PREPARE, PROPOSE, RELEASE and HELLO (E1, E3-E5, E9)."""
+
+from __future__ import annotations
+
+from lfa.protocol.lease.machine import candidacy, resigning
+from lfa.protocol.lease.machine.memory import LeaseMemory
+from lfa.protocol.lease.membership import VOTERS_MAX, is_first
+from lfa.protocol.lease.quorum import electors
+from lfa.protocol.messages.consensus import (
+    NO_TERM,
+    Grant,
+    Hello,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Release,
+    Term,
+)
+from lfa.protocol.names import robot_name
+
+HELLO_HEARTBEATS = 3
+
+
+def on_prepare(m: LeaseMemory, src: Member, body: Prepare, now: float) -> None:
+    """Promise, refuse, or stay silent before a candidate further back in a first election (E5)."""
+    m.seen = max(m.seen, body.term)
+    if stands_before(m, src, body):
+        return
+    if body.forget and m.lives_on(body.forget):
+        m.refuse(src, body.term, now)
+        return
+    answer = m.acceptor.prepare(src, body, m.config, now, m.holder_gone())
+    if answer is not None:
+        m.send(robot_name(src.id), answer)
+    if isinstance(answer, Promise):
+        _yield_to(m, body.term, now)
+        if m.candidate is None:
+            m.elect_after(max(now + 2.0 * m.timing.heartbeat_s, m.election.base))
+    elif answer is not None and answer.remaining_s > 0.0:
+        m.refused_prepare = (src, body)  # answered again when the bond ends: it may have overtaken the RELEASE
+
+
+def stands_before(m: LeaseMemory, src: Member, body: Prepare) -> bool:
+    """Return True if this process precedes the candidate `src` in the first election of a fleet (E5)."""
+    first = is_first(m.config) and body.version == m.config.version and m.me.id in m.election.may_lead
+    if not first or m.pending_release.closing:
+        return False
+    mine, other = (m.election.rank(m.config, i, m.peers) for i in (m.me.id, src.id))
+    return mine < other
+
+
+def on_propose(m: LeaseMemory, src: Member, body: Propose, now: float) -> None:
+    """Grant or refuse as a voter that the config names; follow the holder, or be it (E16)."""
+    m.seen = max(m.seen, body.term)
+    named = m.me in electors(body.config)
+    answer = m.acceptor.propose(src, body, m.config, now) if named else None
+    if answer is None and body.config.version < m.config.version:
+        answer = m.acceptor.refusal(body.term, m.config, now)
+    if isinstance(answer, Nack):
+        m.send(robot_name(src.id), answer)
+        return
+    if answer is not None and body.holder != m.me:
+        m.send(robot_name(body.holder.id), answer)
+    _yield_to(m, body.term, now)
+    if answer is not None and body.holder != m.me:
+        resigning.step_down(m, now, "deposed")  # the own voter has granted another holder
+    resigning.adopt(m, body.config, now)
+    if answer is not None and body.holder == m.me:
+        candidacy.take_over(m, body, answer, now)
+    m.leader = body.holder.id
+    m.leader_until = now + m.timing.grant_s
+    m.election.held(now)
+    m.elect_after(m.leader_until)
+
+
+def hear_refusal(m: LeaseMemory, body: Nack, now: float) -> None:
+    """Note the terms that a refusal names, and that a lease is held (E21)."""
+    m.seen = max(m.seen, body.promised, body.config.version.term)
+    if body.remaining_s > 0.0 and body.holder != m.me:
+        m.election.held(now)
+
+
+def on_release(m: LeaseMemory, _src: Member, body: Release, now: float) -> None:
+    """End the bond of exactly this term, and start the election."""
+    freed = m.acceptor.release(body.term)
+    # A process without a vote has no bond, but waits for the known lease to expire.
+    known = m.holder is None and body.term == m.config.version.term and m.acceptor.bound(now) is None
+    if not (freed or known):
+        return
+    m.leader = None
+    m.elect_after(now)
+    _answer_refused(m, now)
+
+
+def holder_vanished(m: LeaseMemory, now: float) -> None:
+    """Start the election after the holder's token vanished; answer a PREPARE that came before that event (E15)."""
+    if m.acceptor.bound(now) is not None and m.holder_gone():
+        m.elect_after(now)
+        _answer_refused(m, now)
+
+
+def keep_grant(m: LeaseMemory, src: Member, body: Grant, _now: float) -> None:
+    """Keep a grant whose PROPOSE, a hand-over, is still to come."""
+    term = m.config.version.term if m.holder is None else m.holder.term
+    if body.term > term:
+        m.early_grants = [*m.early_grants[1 - VOTERS_MAX :], (src, body)]
+
+
+def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
+    """Answer with the newest config while no leader is known (E9)."""
+    if m.leader is None and (body.version is None or body.version < m.config.version):
+        m.refuse(src, NO_TERM, now)
+
+
+def say_hello(m: LeaseMemory, now: float) -> None:
+    """Send HELLO if no grant binds this process or no leader's chain names it (E9)."""
+    pause_s = HELLO_HEARTBEATS * m.timing.heartbeat_s
+    on_time = now < m.hello_at + pause_s  # so that late ticks do not accumulate
+    m.hello_at = (m.hello_at if on_time else now) + pause_s
+    if m.is_out(now) and not m.pending_release.closing:
+        m.send("all", Hello(None if is_first(m.config) else m.config.version))
+
+
+def lose_leader(m: LeaseMemory, _now: float) -> None:
+    """Know of no leader: the lease of the last one has expired by the own clock."""
+    m.leader = None
+
+
+def _answer_refused(m: LeaseMemory, now: float) -> None:
+    refused, m.refused_prepare = m.refused_prepare, None
+    if refused is not None:
+        on_prepare(m, *refused, now)
+
+
+def _yield_to(m: LeaseMemory, term: Term, now: float) -> None:
+    """Give up an own candidacy lower than `term`, which this process has promised or granted."""
+    if m.candidate is not None and term > m.candidate.term:
+        resigning.drop_candidacy(m, now)
+        m.elect_after(now + 2.0 * m.timing.heartbeat_s)
