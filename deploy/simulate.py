@@ -10,19 +10,22 @@ done.figure("fig07_distance_error")              # matplotlib; a notebook shows 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.faults.script import parse_all
+from lfa.deploy.robot.driver import Driver, MakeBase
 from lfa.deploy.run import simulate
 from lfa.world.description.load import Scenario, load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Result", "run"]
+__all__ = ["Result", "read", "run"]
 
 
 class Result(Run):
@@ -45,12 +48,27 @@ def run(
     robots: int | None = None,
     faults: Sequence[str] = (),
     out: Path | None = None,
+    drivers: Mapping[int, MakeBase] | None = None,
 ) -> Result:
     """Run `scenario` (shipped name, file, or loaded) in virtual time, as `lfa sim` does, and return its result.
 
     `set` (texts `a.b=value`) and `robots` (team size) override a scenario that is given by name. The run folder is
-    `out`, or a new one in `runs/`. Raises Refused for a scenario that no world can be built from.
+    `out`, or a new one in `runs/`. `drivers` has the hardware of robots that the world does not simulate, by id: each
+    is driven through a `Driver`. Raises Refused for a scenario that no world can be built from.
     """
     chosen = load(scenario, set, robots) if isinstance(scenario, str) else scenario
-    ended = simulate.run(chosen, seed, out, parse_all(chosen.mission, chosen.faults, faults))
+    hardware = drivers or {}
+    if hardware:
+        world = replace(chosen.world, real_robots=tuple(sorted(hardware)))
+        chosen = replace(chosen, world=world, mission=replace(chosen.mission, cold_start="full_house"))
+    nodes = [Driver(simulate.FLEET, robot, 1, make_base) for robot, make_base in hardware.items()]
+    ended = simulate.run(chosen, seed, out, parse_all(chosen.mission, chosen.faults, faults), nodes)
     return Result(ended.folder)
+
+
+def read(folder: Path) -> Result:
+    """Return the result of a run that was recorded earlier, by `run`, `lfa sim`, `lfa run` or `lfa record`.
+
+    Raises Refused for a folder that is none, or that another version wrote.
+    """
+    return Result(folder)

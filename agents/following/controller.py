@@ -1,7 +1,7 @@
 """Controller interface for followers, and the law of control.md section 2 (steps 4 to 7) as the default controller.
 
 `follower.py` holds what all controllers share: the moving slot (steps 2, 3), the drive's limits (8, 9), stale data, the
-stop. A controller is found by name among the entry points `lfa.controllers`.
+stop. A controller is found by name among the entry points `lfa.controllers`, or those added by `add_controller`.
 """
 
 from __future__ import annotations
@@ -71,10 +71,26 @@ class MakeController(Protocol):
     def __call__(self, gains: Gains, limits: Limits) -> Controller: ...
 
 
+_added: dict[str, MakeController] = {}
+"""Controllers that a script has added to this process, by name."""
+
+
+def add_controller(name: str, make: MakeController) -> None:
+    """Make `make` the controller called `name` in this process: for a script or a notebook that simulates.
+
+    Robots that are processes find controllers by entry point only. Raise `Refused` for the default's name.
+    """
+    if name == DEFAULT_CONTROLLER:
+        raise Refused(f"controller {name}: the default one cannot be replaced, give another name")
+    _added[name] = make
+
+
 def find_controller(name: str) -> MakeController:
-    """Return the installed controller called `name`. Raise `Refused`. Entry points are read once, at the start."""
+    """Return the installed or added controller called `name`. Raise `Refused`. Entry points are read at the start."""
     if name == DEFAULT_CONTROLLER:
         return Law
+    if name in _added:
+        return _added[name]
     # Imported here, for a controller other than the default: it costs 3 MB of memory.
     from importlib.metadata import entry_points
 

@@ -32,6 +32,10 @@ ASK_S = 1.0
 REFUSAL_EVERY_S = 0.2
 
 
+MakeBase = Callable[[Limits, float], Base]
+"""Function that opens a robot's hardware: its mission's limits and the time [s] in, the hardware out."""
+
+
 class Driver:
     """Driver of robot `robot_id`; `make_base(limits, now)` opens its hardware once the mission is known."""
 
@@ -40,7 +44,7 @@ class Driver:
         fleet: str,
         robot_id: int,
         incarnation: int,
-        make_base: Callable[[Limits, float], Base],
+        make_base: MakeBase,
         alive: Callable[[float], None] = lambda now: None,
     ) -> None:
         """Create a driver; `alive(now)` is called after each control period in which the hardware answered."""

@@ -58,8 +58,13 @@ def command(
     return report(ended, figures=figures, as_json=as_json, junit=junit)
 
 
-def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault] = ()) -> Ended:
-    """Run `scenario` drawn with `seed` and write the run folder. Raises Refused for a bad `out` or fault."""
+def run(
+    scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault] = (), drivers: Sequence[Node] = ()
+) -> Ended:
+    """Run `scenario` drawn with `seed` and write the run folder. Raises Refused for a bad `out` or fault.
+
+    `drivers` are the hardware of the scenario's real robots; nothing of them is journalled.
+    """
     common = next((fault for fault in faults if fault.target in COMMON), None)
     if common is not None:
         raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
@@ -67,7 +72,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     folder = make(out, drawn)
     about = About(scenario.name, "simulated", seed, FLEET)
     recorder = Recorder(folder, about.metadata())
-    run = _Run(drawn, seed, folder, recorder)
+    run = _Run(drawn, seed, folder, recorder, drivers)
     started = time.perf_counter()
     with Interrupts() as interrupts:
         verdict = run.play(FaultSchedule(faults), interrupts)
@@ -78,8 +83,9 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
 class _Run:
     """Team in the simulator; recorder and referee receive all published messages."""
 
-    def __init__(self, drawn: Scenario, seed: int, folder: Path, recorder: Recorder) -> None:
+    def __init__(self, drawn: Scenario, seed: int, folder: Path, recorder: Recorder, drivers: Sequence[Node]) -> None:
         self._scenario = drawn
+        self._drivers = drivers
         self._seed = seed
         self._journals: dict[str, Journal] = {}
         self._journal_folder = folder / JOURNALS
@@ -98,6 +104,9 @@ class _Run:
         self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
         if self._scenario.mission.witness:
             self._add(Witness(FLEET, 1, 1))
+        for driver in self._drivers:
+            heading = Heading(JOURNAL_VERSION, driver.name, driver.incarnation, driver.incarnation, {})
+            self._simulator.add(driver, Journal(None, heading))
         for robot_id in self._scenario.mission.robots:
             self._add(self._agent(robot_id))
         self._flush()

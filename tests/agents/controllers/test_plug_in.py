@@ -11,8 +11,10 @@ from types import ModuleType
 import pytest
 
 import lfa.agents.controllers
+from lfa.agents.following import controller
 from lfa.agents.following.controller import find_controller
 from lfa.deploy.bench.harness.chain import Chain, Setup
+from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Twist
 from lfa.protocol.messages.team import Slot
 
@@ -33,3 +35,13 @@ def test_the_readmes_controller_follows_a_bend(monkeypatch: pytest.MonkeyPatch) 
         chain.step(Twist(min(0.5, 0.01 * step), 0.05))
     assert chain.errors(0).slot_m < 0.05
     assert abs(chain.errors(0).heading_rad) < 0.1
+
+
+def test_a_scripts_own_controller_is_found_by_its_name_and_replaces_no_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(controller, "_added", {})
+    with pytest.raises(Refused, match="must be one of"):
+        find_controller("mine")
+    controller.add_controller("mine", controller.Law)
+    assert find_controller("mine") is controller.Law
+    with pytest.raises(Refused, match="cannot be replaced"):
+        controller.add_controller("law", controller.Law)

@@ -1,0 +1,50 @@
+"""The numbered examples: short, in virtual time, and each does what its first line says."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+from lfa.agents.following import controller
+from tests.test_imports import ROOT
+
+FOLDER = ROOT / "deploy" / "examples"
+EXAMPLES = sorted(FOLDER.glob("*.py"))
+LINES_MAX = 40
+
+#   example                what it prints, as patterns
+SHOWN: dict[str, tuple[str, ...]] = {
+    "01_first_run":        (r"goal_reached", r"robot 2 leads from 5\.\d+ s on \(kill\)", r"robot 2 holds the lease"),
+    "02_own_controller":   (r"law +goal_reached", r"carrot +goal_reached"),
+    "03_own_scenario":     (r"ok +contacts_max 0", r"robot1: (left|right) a side is free"),
+    "04_sweep":            (r"K = 0\.8", r"K = 1\.5", r"sweep\.png"),
+    "05_read_recording":   (r"robot 3: \d+ poses", r"events: \{'start': 1"),
+    "06_driver":           (r"goal_reached: robot 2 was driven from \(-0\.6, 1\.04\) to \(3\.\d+, 1\.\d+\)",),
+    "07_faults":           (r"injected: stop 1 at", r"led by robots 1, 2", r" 0 violations"),
+    "08_formation_change": (r"asks for a column", r"robot 3: its slot moves until", r"path\.png"),
+}  # fmt: skip
+
+
+def test_the_examples_are_numbered_and_each_is_known_here() -> None:
+    assert [path.stem for path in EXAMPLES] == list(SHOWN)
+    assert [int(path.stem[:2]) for path in EXAMPLES] == list(range(1, len(EXAMPLES) + 1))
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_is_read_at_a_glance(path: Path) -> None:
+    assert len(path.read_text().splitlines()) < LINES_MAX
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_does_what_it_says(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(path)])
+    monkeypatch.setattr(controller, "_added", {})
+    runpy.run_path(str(path), run_name="__main__")
+    shown = capsys.readouterr().out
+    assert [pattern for pattern in SHOWN[path.stem] if not re.search(pattern, shown)] == [], shown
