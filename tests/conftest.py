@@ -36,6 +36,11 @@ TEAMS = os.path.join(tempfile.gettempdir(), f"lfa-teams-{os.getuid()}-{RUN}")
 """Lock file of this run of the tests: shared by teams that run, exclusive for a test that needs the machine alone."""
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that accepts today's traces (`tests/protocol/lease/traces`)."""
+    parser.addoption("--rewrite-traces", action="store_true", help="write the golden traces anew instead of comparing")
+
+
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the runtime folder, and the lock file when all workers are done."""
     shutil.rmtree(RUNTIME, ignore_errors=True)
