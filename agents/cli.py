@@ -12,12 +12,11 @@ import sys
 from pathlib import Path
 from typing import NoReturn
 
-import msgspec
-
 from lfa.agents.agent import Agent
 from lfa.protocol import clock
 from lfa.protocol.config_file.mistake import apply_rules
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import MISSION_RULES, check_mission
 from lfa.protocol.names import whole_number
@@ -103,13 +102,13 @@ def read_mission(path: Path) -> Mission:
     if path.suffix != ".json":
         return _read_toml_mission(path)
     try:
-        return check_mission(msgspec.json.decode(path.read_bytes(), type=Mission))
+        return check_mission(read_json(path, Mission))
+    except DamagedFile as error:
+        raise Refused(f"--mission {path}: {error}: {RIGHT_MISSION}") from None
     except OSError as error:
         raise Refused(f"--mission {path}: {error.strerror}: {RIGHT_MISSION}") from None
     except Refused as refused:
         raise Refused(f"--mission {path}: {refused}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise Refused(f"--mission {path}: {error}: {RIGHT_MISSION}") from None
 
 
 def _read_toml_mission(path: Path) -> Mission:

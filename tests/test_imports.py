@@ -23,9 +23,9 @@ MAY: dict[str, set[str]] = {
 }  # fmt: skip
 
 ORDER = (
-    "protocol/errors", "protocol/output", "protocol/config_file", "protocol/clock", "protocol/names",
-    "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages", "protocol/node",
-    "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/lease/machine", "protocol/witness",
+    "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/clock",
+    "protocol/names", "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages",
+    "protocol/node", "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/lease/machine", "protocol/witness",
     "protocol/transport", "protocol/runtime",
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",

@@ -15,6 +15,7 @@ import msgspec
 from msgspec.structs import replace
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.node import Envelope, Received
 from lfa.protocol.output import replace_file, write_line
@@ -30,10 +31,10 @@ def read(run: Path) -> Memory:
     """Return the state last written for the run in that folder. Raises Refused if there is none."""
     path = run / STATE if run.is_dir() else run
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Memory)
+        return read_json(path, Memory)
     except OSError as error:
         raise Refused(f"--resume {path}: cannot be read ({error.strerror}), must be a run folder with one") from None
-    except msgspec.DecodeError as error:
+    except DamagedFile as error:
         raise Refused(f"--resume {path}: no state of a world ({error})") from None
 
 

@@ -10,6 +10,7 @@ from msgspec import Struct
 from lfa.deploy.recording.event_log import Failover, FaultDone, LeaderTerm, TermViolation
 from lfa.deploy.recording.recorder import Recording
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.world.description.load import Outcome
 
 SUMMARY = "summary.json"
@@ -92,8 +93,8 @@ def write(folder: Path, summary: Summary) -> None:
 def read(folder: Path) -> Summary:
     """Return the summary of a run. Raises FileNotFoundError if there is none, Refused if it is of another version."""
     try:
-        return msgspec.json.decode((folder / SUMMARY).read_bytes(), type=Summary)
-    except msgspec.DecodeError as error:
+        return read_json(folder / SUMMARY, Summary)
+    except DamagedFile as error:
         raise Refused(
             f"{folder / SUMMARY}: of another version or damaged ({error}): read it with the lfa of its time"
         ) from None

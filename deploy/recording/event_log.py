@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
-from math import nan
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,11 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.recording.recorder import EVENTS
+from lfa.protocol.file_reading import DamagedFile, decode_json
 
 ENDING_FAULTS = ("kill", "terminate", "stop", "cut")
+LINE_BYTES_MAX = 1024 * 1024
+"""Longest line [bytes]: what a message of 64 KiB becomes at most; a longer one is damage."""
 Line = dict[str, Any]
 
 
@@ -63,9 +66,15 @@ class TermViolation(Struct):
 
 
 def lines(folder: Path) -> list[Line]:
-    """Return the events of a run ordered by time; a last line truncated by a kill is skipped."""
+    """Return the events of a run ordered by time; a last line truncated by a kill, and damaged lines, are skipped.
+
+    An event is skipped too if it lacks what its kind has in every run: a member can publish any event.
+    """
     path = folder / EVENTS
-    found = [_line(text) for text in path.read_bytes().splitlines()] if path.is_file() else []
+    if not path.is_file():
+        return []
+    with path.open("rb") as file:
+        found = [_line(text) for text in iter(lambda: file.readline(LINE_BYTES_MAX), b"")]
     return sorted((line for line in found if line is not None), key=lambda line: float(line["t"]))
 
 
@@ -169,10 +178,52 @@ def terms_that_went_back(events: Sequence[Line]) -> list[TermViolation]:
 
 def _line(text: bytes) -> Line | None:
     try:
-        line = msgspec.json.decode(text, type=dict[str, Any])
-    except msgspec.DecodeError:
+        line = decode_json(text, dict[str, Any])
+        shape = msgspec.convert(line, _SHAPES.get(str(line.get("kind")), _LoggedEvent))
+    except (DamagedFile, msgspec.ValidationError):
         return None
-    return line if "t" in line and "kind" in line else None
+    return line if isfinite(shape.t) else None
+
+
+class _LoggedEvent(Struct, kw_only=True):
+    """What a line of each kind has at least; kinds with more are in `_SHAPES`."""
+
+    t: float
+    kind: str
+    robot: Any
+    term: tuple[int, int, int] | None
+
+
+class _LoggedCommand(_LoggedEvent, kw_only=True):
+    robot: int
+    term: tuple[int, int, int]
+
+
+class _LoggedFault(_LoggedEvent, kw_only=True):
+    deed: str
+
+
+class _LoggedChain(_LoggedEvent, kw_only=True):
+    robot: int
+    chain: list[int] = []
+    seq: int = 0
+
+
+class _LoggedRole(_LoggedEvent, kw_only=True):
+    role: str
+
+
+class _LoggedDecision(_LoggedEvent, kw_only=True):
+    action: str
+
+
+_SHAPES: dict[str, type[_LoggedEvent]] = {
+    "leader_command": _LoggedCommand,
+    "fault": _LoggedFault,
+    "chain": _LoggedChain,
+    "role": _LoggedRole,
+    "decision": _LoggedDecision,
+}
 
 
 def _ended_by(fault: FaultDone, reign: LeaderTerm) -> bool:

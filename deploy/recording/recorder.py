@@ -164,8 +164,9 @@ def event_line(t: float, event: Event) -> bytes:
     data = mcap_channels.plain(event.data)
     sender = event.header.sender
     said = data if sender in ONLOOKERS else {}
+    at_s = said.get("t", t)
     head = {
-        "t": round(said.get("t", t), 6),
+        "t": round(at_s if isinstance(at_s, int | float) else t, 6),
         "robot": said.get("robot", robot_id_of(sender)),
         "term": None if event.term is None else msgspec.structs.astuple(event.term),
         "kind": event.kind,

@@ -57,7 +57,7 @@ def read_toml(path: Path, kind: str) -> TomlFile:
     try:
         text = data.decode().replace("\r\n", "\n")
         return TomlFile(path, tomllib.loads(text), lines_of(text))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
         said = " ".join(str(error).split())
         place = _PLACE.search(said)
         told = f"no TOML ({_PLACE.sub('', said)}): {right}"

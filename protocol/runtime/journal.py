@@ -18,9 +18,12 @@ import msgspec
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, decode_msgpack
 from lfa.protocol.output import AppendedFile, write_line
 
 JOURNAL_VERSION = 1
+ENTRY_BYTES_MAX = 16 * 1024 * 1024
+"""Maximum size [bytes] of an entry: a heading holds a mission, the others a message."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 """errno values of a disk that is full or failing: a robot that restarts goes on without a journal."""
 
@@ -117,10 +120,10 @@ def read(path: Path) -> tuple[Heading, Iterator[JournalEntry]]:
 
     The iterator of entries raises Refused at corrupted bytes.
     """
-    bodies = _bodies(path.read_bytes())
+    bodies = _bodies(path)
     try:
-        heading = _heading_decoder.decode(next(bodies))
-    except (StopIteration, msgspec.DecodeError) as error:
+        heading = decode_msgpack(next(bodies), _heading_decoder)
+    except (StopIteration, DamagedFile) as error:
         raise ValueError(f"{path}: not a journal") from error
     return heading, _entries(path, bodies)
 
@@ -129,16 +132,17 @@ def _entries(path: Path, bodies: Iterator[bytes]) -> Iterator[JournalEntry]:
     """Yield the entries. Raises Refused at an undecodable one: its bytes were corrupted, not cut off."""
     for n, body in enumerate(bodies, start=1):
         try:
-            yield _entry_decoder.decode(body)
-        except (msgspec.DecodeError, UnicodeDecodeError):
+            yield decode_msgpack(body, _entry_decoder)
+        except DamagedFile:
             raise Refused(f"{path}: entry {n} cannot be read: must be a journal as a process wrote it") from None
 
 
-def _bodies(data: bytes) -> Iterator[bytes]:
-    at = 0
-    while at + 4 <= len(data):
-        size = int.from_bytes(data[at : at + 4], "little")
-        if at + 4 + size > len(data):
-            return
-        yield data[at + 4 : at + 4 + size]
-        at += 4 + size
+def _bodies(path: Path) -> Iterator[bytes]:
+    """Yield the encoded entries, one in memory at a time, up to the end or to where the file is cut off."""
+    with path.open("rb") as file:
+        while len(head := file.read(4)) == 4:
+            size = int.from_bytes(head, "little")
+            body = file.read(size) if size <= ENTRY_BYTES_MAX else b""
+            if len(body) < size:
+                return
+            yield body

@@ -13,12 +13,14 @@ from pathlib import Path
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_bytes, read_text
 
 CA_FILE = "ca.pem"
 ACCESS_FILE = "access.json"
 USERS_FILE = "users"
 FOREIGN_BITS = 0o077
 CERTIFICATE_BYTES_MAX = 64 * 1024
+PASSWORD_BYTES_MAX = 4096
 _BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
 _UTC_TIME, _CONTEXT_0 = 0x17, 0xA0
 
@@ -38,7 +40,7 @@ class Credentials(Struct, frozen=True):
         """Read and return user and password; they are read at each use, so that no value stores them."""
         if self.password_file is None:
             return None
-        user, _, password = self.password_file.read_text().strip().partition(":")
+        user, _, password = read_text(self.password_file, PASSWORD_BYTES_MAX).strip().partition(":")
         return user, password
 
 
@@ -52,7 +54,12 @@ def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
         check_valid(path, wall_ms)
     for path in (key, password) if password.exists() else (key,):
         check_private(path)
-    return Credentials(name, folder / CA_FILE, certificate, key, password if password.exists() else None)
+    found = Credentials(name, folder / CA_FILE, certificate, key, password if password.exists() else None)
+    try:
+        found.user_and_password()
+    except (OSError, DamagedFile) as error:
+        raise Refused(f"{password}: {error}, must be a file that `lfa keys` made") from None
+    return found
 
 
 def check_private(path: Path) -> None:
@@ -78,8 +85,7 @@ def check_valid(path: Path, wall_ms: int) -> None:
 def validity(path: Path) -> tuple[datetime, datetime]:
     """Return start and end of the validity of the certificate at `path`. Raises Refused if it is no certificate."""
     try:
-        with path.open("rb") as file:
-            text = file.read(CERTIFICATE_BYTES_MAX)
+        text = read_bytes(path, CERTIFICATE_BYTES_MAX)
         return _validity(binascii.a2b_base64(text.partition(_BEGIN)[2].partition(_END)[0]))
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}, must be a certificate in PEM") from None

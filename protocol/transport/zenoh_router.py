@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import zenoh
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
 from lfa.protocol.transport.endpoints import check_endpoints
 from lfa.protocol.transport.zenoh_config import (
@@ -97,8 +97,8 @@ def _guard(credentials: Credentials) -> dict[str, Any]:
     users, access = folder / USERS_FILE, folder / ACCESS_FILE
     check_private(users)
     try:
-        rules = msgspec.json.decode(access.read_bytes(), type=dict[str, Any])
-    except (OSError, msgspec.DecodeError) as error:
+        rules = read_json(access, dict[str, Any])
+    except (OSError, DamagedFile) as error:
         raise Refused(f"{access}: {error}, must be the rules that `lfa keys` wrote") from None
     users_file = {"transport/auth/usrpwd/dictionary_file": str(users)}
     return login_settings(credentials) | users_file | {"transport/link/protocols": SECURE_PROTOCOLS} | rules

@@ -164,7 +164,7 @@ def _override(document: dict[str, Any], override: str) -> str:
 def _toml_value(key: str, text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+    except (ValueError, RecursionError):
         if re.fullmatch(r"[\w./ -]+", text):
             return text
         raise Refused(f"--set {key} = {text}: must be a TOML value (a number, text, true, [1, 2])") from None

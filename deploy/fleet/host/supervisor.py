@@ -29,6 +29,7 @@ from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
 from lfa.protocol.messages.header import Header
@@ -65,8 +66,8 @@ class Ledger(Struct, frozen=True):
 def ledger(folder: Path) -> Ledger | None:
     """Return what the supervisor of that folder wrote last, None without a readable file."""
     try:
-        return msgspec.json.decode((folder / LEDGER).read_bytes(), type=Ledger)
-    except (OSError, msgspec.DecodeError):
+        return read_json(folder / LEDGER, Ledger)
+    except (OSError, DamagedFile):
         return None
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
-import msgspec
 from msgspec import Struct
 
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine, Restart
@@ -14,6 +13,7 @@ from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, toml
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.mission import Profile
 from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import WORLD_NAME
@@ -201,8 +201,8 @@ def rows(part: HostPlan) -> list[ProcessSpec]:
 def read(path: Path) -> HostPlan:
     """Return the plan in a file that `lfa up` wrote. Raises Refused for any other file."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=HostPlan)
+        return read_json(path, HostPlan)
     except OSError as error:
         raise Refused(f"{path}: cannot be read ({error.strerror})") from None
-    except msgspec.DecodeError as error:
+    except DamagedFile as error:
         raise Refused(f"{path}: no part of a fleet ({error}): lfa up writes it") from None

@@ -6,13 +6,15 @@ Only routers have server certificates: a robot's certificate cannot impersonate 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
+from typing import Any
 
 from cryptography import x509
-from cryptography.exceptions import InvalidSignature
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePrivateKey, generate_private_key
 from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat, load_pem_private_key
@@ -20,10 +22,16 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import read_bytes
 
 CA_DAYS = 3650.0
+COMMON_NAME_MAX = 58
+"""Maximum length of a common name: 64 (RFC 5280), without the number that a name gets after a revocation."""
 BACKDATED = timedelta(hours=1)
 """Start of validity before the time of issue, so that a machine whose clock lags accepts a new certificate."""
+DAMAGED = (ValueError, TypeError, UnsupportedAlgorithm, x509.InvalidVersion)
+"""Exceptions of `cryptography` at bytes that are no key or certificate."""
+PEM_BYTES_MAX = 64 * 1024
 RENEW_BEFORE = timedelta(days=30)
 
 
@@ -37,7 +45,7 @@ class Authority(Struct, frozen=True):
 def found(certificate: Path, key: Path, fleet: str) -> None:
     """Create an authority and write its certificate and key."""
     private = generate_private_key(SECP256R1())
-    name = _name(f"lfa fleet {fleet}")
+    name = _name(authority_name(fleet))
     usage = x509.KeyUsage(False, False, False, False, False, True, True, False, False)
     signed = (
         _begun(name, name, private, CA_DAYS)
@@ -49,14 +57,30 @@ def found(certificate: Path, key: Path, fleet: str) -> None:
     _write_certificate(certificate, signed)
 
 
+def check_names(fleet: str, members: Mapping[str, tuple[str, ...]]) -> None:
+    """Raise Refused unless certificates can hold these names: the fleet's, and members' with their addresses."""
+    for name in (authority_name(fleet), *members):
+        if len(name) > COMMON_NAME_MAX or not name.isascii():
+            raise Refused(f"{name[:80]}: must be at most {COMMON_NAME_MAX} letters of ASCII, for a certificate")
+    for name, addresses in members.items():
+        try:
+            _names(addresses)
+        except ValueError as error:
+            raise Refused(f"{name}: an address among {', '.join(addresses)} is none ({error})") from None
+
+
+def authority_name(fleet: str) -> str:
+    """Return the common name of a fleet's authority."""
+    return f"lfa fleet {fleet}"
+
+
 def load(certificate: Path, key: Path) -> Authority:
     """Return the authority in these files. Raises Refused when they hold none, or do not belong together."""
     try:
-        private = load_pem_private_key(key.read_bytes(), None)
-        signed = x509.load_pem_x509_certificate(certificate.read_bytes())
-    except (OSError, ValueError, TypeError) as error:
+        private, public, signed = _pair(key, certificate)
+    except (OSError, *DAMAGED) as error:
         raise Refused(f"{certificate}, {key}: {error}, must be a fleet's authority (lfa keys init)") from None
-    if not isinstance(private, EllipticCurvePrivateKey) or private.public_key() != signed.public_key():
+    if not isinstance(private, EllipticCurvePrivateKey) or private.public_key() != public:
         raise Refused(f"{key}: does not belong to {certificate}")
     return Authority(signed, private)
 
@@ -83,16 +107,22 @@ def fits(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...]
     RENEW_BEFORE or half its validity, whichever is less.
     """
     try:
-        found = x509.load_pem_x509_certificate(stem.with_name(f"{stem.name}.pem").read_bytes())
-        private = load_pem_private_key(stem.with_name(f"{stem.name}.key").read_bytes(), None)
+        private, public, found = _pair(stem.with_name(f"{stem.name}.key"), stem.with_name(f"{stem.name}.pem"))
         found.verify_directly_issued_by(ca.certificate)
         said = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    except (OSError, ValueError, TypeError, InvalidSignature, x509.ExtensionNotFound):
+    except (OSError, *DAMAGED, InvalidSignature, x509.ExtensionNotFound, x509.DuplicateExtension):
         return False
     life = found.not_valid_after_utc - found.not_valid_before_utc
     left = found.not_valid_after_utc - datetime.now(UTC)
     same = list(said) == _names(addresses or (common_name,)) and found.subject == _name(common_name)
-    return same and private.public_key() == found.public_key() and left > min(RENEW_BEFORE, life / 2)
+    return same and private.public_key() == public and left > min(RENEW_BEFORE, life / 2)
+
+
+def _pair(key: Path, certificate: Path) -> tuple[Any, Any, x509.Certificate]:
+    """Return a private key, and a certificate after its public key. Raises OSError and one of DAMAGED."""
+    private = load_pem_private_key(read_bytes(key, PEM_BYTES_MAX), None)
+    signed = x509.load_pem_x509_certificate(read_bytes(certificate, PEM_BYTES_MAX))
+    return private, signed.public_key(), signed
 
 
 def write_key(path: Path, key: EllipticCurvePrivateKey) -> None:

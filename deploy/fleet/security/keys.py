@@ -33,9 +33,10 @@ from lfa.deploy.fleet.security import authority
 from lfa.deploy.fleet.security.access_rules import KeyPlan, driver_of, host_name, rules, sayable
 from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json, read_text
 from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
-from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, USERS_FILE, validity
+from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, PASSWORD_BYTES_MAX, USERS_FILE, validity
 
 REGISTRY, HOSTS, CA_KEY = "fleet.json", "hosts", "ca.key"
 DAYS = 365.0
@@ -108,6 +109,7 @@ def _turn(names: list[str], n: int) -> tuple[str, ...]:
 
 def make(folder: Path, plan: KeyPlan, days: float = DAYS) -> list[str]:
     """Create all files of `plan` in `folder`; return the members with a new certificate. Raises Refused."""
+    authority.check_names(plan.fleet, {name: _addresses(name, plan) for name in plan.places})
     try:
         private_folder(folder)
         known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
@@ -130,7 +132,7 @@ def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[
     registry = load(folder)
     chosen = list(names) or [name for name in registry.members() if name in registry.common_names]
     _check_names(registry, chosen)
-    back = {name: f"{name}.{registry.revoked[name] + 1}" for name in chosen if name not in registry.common_names}
+    back = {name: f"{name}.{registry.revoked.get(name, 0) + 1}" for name in chosen if name not in registry.common_names}
     registry = structs.replace(registry, common_names=registry.common_names | back)
     try:
         return _lay_out(folder, registry, days, renew=chosen)
@@ -176,10 +178,10 @@ def load(folder: Path) -> Registry:
     """Return the registry in `folder`. Raises Refused when it holds no fleet's keys."""
     path = folder / REGISTRY
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Registry)
+        return read_json(path, Registry)
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}, make it with: lfa keys init {folder}") from None
-    except msgspec.DecodeError as error:
+    except DamagedFile as error:
         raise Refused(f"{path}: {error}, must be what `lfa keys` wrote") from None
 
 
@@ -243,7 +245,11 @@ def _addresses(name: str, plan: KeyPlan) -> tuple[str, ...]:
 
 
 def _password(path: Path, common_name: str) -> None:
-    if not path.exists() or not path.read_text().startswith(f"{common_name}:"):
+    try:
+        fits = read_text(path, PASSWORD_BYTES_MAX).startswith(f"{common_name}:")
+    except (OSError, DamagedFile):
+        fits = False
+    if not fits:
         write_private(path, f"{common_name}:{secrets.token_urlsafe(24)}\n".encode())
 
 

@@ -172,7 +172,7 @@ def test_an_event_is_a_line_about_the_robot_that_it_is_about(tmp_path: Path) -> 
 
 
 def test_a_last_line_cut_off_by_a_kill_is_left_out(tmp_path: Path) -> None:
-    (tmp_path / EVENTS).write_bytes(b'{"t":1.0,"robot":1,"term":null,"kind":"role","from":"robot1"}\n{"t":2.0,"rob')
+    (tmp_path / EVENTS).write_bytes(b'{"t":1.0,"robot":1,"term":null,"kind":"contact","from":"robot1"}\n{"t":2.0,"rob')
     assert [line["t"] for line in event_log.lines(tmp_path)] == [1.0]
 
 
