@@ -266,8 +266,8 @@ class Agent:
                 case BecomeLeader(term, _):
                     self._event("lease", now, {"change": "acquired"}, term)
                     self._event("role", now, {"role": Role.LEADER.value, "leader": self._id}, term)
-                    assert self._orders is not None and self._driver is not None
-                    self._orders.begin(self._driver.lead.progress_m, now)
+                    assert self._orders is not None
+                    self._orders.begin(now)
                     self._control(now)
                 case StepDown(term, cause):
                     self.defer_grants = False

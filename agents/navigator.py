@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from lfa.agents.exploration.explorer import Explore
 
 CATCH_UP_PER_S = 0.8
-TRACK_EVERY = 5
-"""Number of control periods between two updates of a follower's progress on the route."""
 DT_MIN_S = 0.002
 OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
 """Maximum difference between command and measured twist while the wheels obey: several periods of full acceleration."""
@@ -74,7 +72,6 @@ class Navigator:
         self._role = Role.WAITING
         self._last = STILL
         self._driven_at: float | None = None
-        self._steps = 0
 
     @property
     def lead(self) -> PathFollower:
@@ -169,9 +166,6 @@ class Navigator:
         if role is Role.LEADER:
             wanted = self._lead(chain, still, pose, now)
         elif role is Role.FOLLOWER:
-            self._steps += 1
-            if self._steps % TRACK_EVERY == 0:
-                self.lead.track(pose)
             wanted = self._follow(still, pose, twist, dt, now)
             wanted = self._back_out(points, pose, wanted, now) if self._back_up_path.under_way else wanted
         else:
@@ -188,6 +182,8 @@ class Navigator:
         braked_for = points + self._obstacles.ground.doubtful(pose)
         self._last = safe(wanted, self._last, braked_for, self._mission.radius_m, limits, dt)
         self.follower.overridden(self._last)
+        if role is Role.LEADER:
+            self._team.progress = self.lead.progress(pose, self._last)
         return self._last
 
     def arrived(self, pose: Pose2D, twist: Twist) -> bool:
@@ -200,14 +196,14 @@ class Navigator:
         omega_max = self._mission.limits.omega_max_radps
         self._detour.omega_max_radps = min(LEADER_OMEGA_MAX_RADPS, omega_max) if role is Role.LEADER else omega_max
         if role is Role.LEADER:
-            self.leading.begin(pose, now)
+            self.leading.begin(pose, self.estimator.odometer_m, now)
         elif role is Role.FOLLOWER:
             self.follower.rejoin(pose, twist)
 
     def _watch(self, role: Role, pose: Pose2D, wanted: Twist, now: float) -> None:
         """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team."""
         waits = role is Role.LEADER and self.leading.waiting
-        if role is Role.WAITING or waits or self.lead.arrived(pose, self._last):
+        if role is Role.WAITING or waits or self.arrived(pose, self._last):
             self._stuck_monitor.rest(pose, now)
             return
         decision = self.decision

@@ -5,8 +5,9 @@ from __future__ import annotations
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import Sensors
-from lfa.protocol.messages.team import Delay, TableRow
+from lfa.protocol.messages.team import Delay, RouteProgress, TableRow
 from lfa.protocol.topics import TOPIC
 
 ROBOTS_MAX = 512
@@ -31,6 +32,8 @@ class TeamState:
         self._clocks: dict[int, ClockOffset] = {}
         self.obstacles = SharedObstacles(self.poses)
         """Moving obstacles that other robots reported."""
+        self.progress: RouteProgress | None = None
+        """Progress of the team on its route: the own one while this robot leads, else the leader's as last heard."""
 
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
         self.sensors, self.sensors_at = sensors, at
@@ -50,6 +53,8 @@ class TeamState:
             self._velocity[robot] = ((row.x - known[0].x) / dt, (row.y - known[0].y) / dt)
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
+        if row.progress is not None and (row.role is Role.LEADER or self.progress is None):
+            self.progress = row.progress
         self._table[robot] = (row, at)
         self._clocks[robot].heard(row.header.stamp, at)
 

@@ -37,14 +37,15 @@ class Reports:
         self._next_table = 0.0
         self._next_obstacle = 0.0
         self._steps = 0
+        self._arrived = False
         self._met: tuple[str, str] | None = None
 
     def place(
         self, driver: Navigator, team: TeamState, near: tuple[int, ...], role: Role, term: Term,
         pose: Pose2D, twist: Twist, now: float,
     ) -> None:  # fmt: skip
-        """Publish the pose after each control step; tracking and the table's row less often. `near` holds the ids of
-        the neighbours in the chain.
+        """Publish the pose after each control step; tracking and the table's row less often, but the row at once when
+        the team has arrived. `near` holds the ids of the neighbours in the chain.
         """
         outbox, odometer_m = self._outbox, driver.estimator.odometer_m
         header = outbox.header("pose", now)
@@ -52,10 +53,15 @@ class Reports:
         self._steps += 1
         if role is Role.FOLLOWER and driver.predecessor is not None and self._steps % TRACKING_EVERY == 0:
             self._tracking(driver, driver.predecessor.robot, now)
-        if now >= self._next_table:
+        arrived = driver.arrived(pose, driver.last)
+        if now >= self._next_table or arrived > self._arrived:
+            self._arrived = arrived
             self._next_table = now + self._table_s
             header, delays, stuck = outbox.header("table", now), team.delays(near, now), driver.stuck is not None
-            outbox.publish("table", TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck))
+            outbox.publish(
+                "table",
+                TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck, team.progress),
+            )
 
     def decision(self, decision: Decision | None, term: Term, now: float) -> None:
         """Publish each change of the decision about the surroundings, with the values that decided it."""

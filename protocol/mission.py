@@ -89,6 +89,12 @@ class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     cruise_mps: float = 0.5
     acceleration_mps2: float = 0.5
     goal_tolerance_m: float = 0.10
+    waypoint_tolerance_m: float = 0.15
+    """Distance [m] within which the leader passes each way-point on the way to the last: it rounds a corner so far, and
+    turns on the spot in a sharp one. With something on a way-point, it passes the nearest free place."""
+    corner_radius_m: float | None = None
+    """Radius [m] by which the route rounds its corners, whatever their distance to the way-points. None: by
+    `waypoint_tolerance_m`."""
     orientations: tuple[Orientation, ...] = ()
     """Changes of formation, in the order of the route."""
     keepout_m: tuple[tuple[float, float, float, float], ...] = ()

@@ -121,6 +121,8 @@ def _ranges(mission: Mission) -> Iterator[Mistake]:
         Range("mission.leading.cruise_mps", leading.cruise_mps, 0.01, limits.v_max_mps, "mission.limits.v_max_mps"),
         Range("mission.leading.acceleration_mps2", leading.acceleration_mps2, 0.01, a_max, "mission.limits.a_max_mps2"),
         Range("mission.leading.goal_tolerance_m", leading.goal_tolerance_m, 0.01, 10.0),
+        Range("mission.leading.waypoint_tolerance_m", leading.waypoint_tolerance_m, 0.02, 10.0),
+        Range("mission.leading.corner_radius_m", leading.corner_radius_m or 0.0, 0.0, 100.0),
     ))  # fmt: skip
 
 

@@ -33,6 +33,14 @@ class Explore:
         self.planner: Planner | None = None
         self._failures = 0
         self._tiles: Tiles | None = None
+        self._goal = mission.leading.route_m[0]
+
+    def aim(self, goal: Point) -> None:
+        """Plan to `goal` from now on: the next way-point of the mission."""
+        if goal != self._goal:
+            self._goal, self._failures = goal, 0
+            if self.mapping is not None:
+                self._plan(self.mapping)
 
     def shown(self, pose: Pose2D) -> Shown | None:
         """Return a tile of the map for views (agents/exploration/map_tiles.py); None if nothing is new."""
@@ -74,6 +82,9 @@ class Explore:
 
     def _begin(self, pose: Pose2D) -> None:
         leading = self._mission.leading
-        goal = leading.route_m[-1]
-        self.mapping = Mapping(*bounds([(pose.x, pose.y), goal], MARGIN_M))
-        self.planner = Planner(self.mapping.grid, goal, self._mission.radius_m, leading.keepout_m)
+        self.mapping = Mapping(*bounds([(pose.x, pose.y), *leading.route_m], MARGIN_M))
+        self._plan(self.mapping)
+
+    def _plan(self, mapping: Mapping) -> None:
+        keepout = self._mission.leading.keepout_m
+        self.planner = Planner(mapping.grid, self._goal, self._mission.radius_m, keepout)

@@ -34,20 +34,21 @@ class FormationCommands:
         self._mission = mission
         self._formation = formation
         self._number = 0
-        self._next = 0
+        self._next: int | None = None
         self._repeat_at = 0.0
         self._check_at = self._fold_at = 0.0
 
-    def begin(self, progress_m: float, now: float) -> None:
-        """Start a term: skip what the route has asked for so far; requests of this term count from 0."""
-        self._number, self._repeat_at = 0, now
-        self._next = sum(orientation.at_m <= progress_m for orientation in self._mission.leading.orientations)
+    def begin(self, now: float) -> None:
+        """Start a term: requests of this term count from 0."""
+        self._number, self._repeat_at, self._next = 0, now, None
 
     def lead(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
         """Run one control step of the leader: requests that are due on the route, and the present request once a
         second.
         """
         orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
+        if self._next is None:  # what the route has asked for so far was the former leader's to order
+            self._next = sum(orientation.at_m <= lead.progress_m for orientation in orientations)
         while self._next < len(orientations) and orientations[self._next].at_m <= lead.progress_m:
             self.order(orientations[self._next].side, "mission", followers, term, now)
             self._next += 1

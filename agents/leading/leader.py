@@ -74,16 +74,20 @@ class Leadership:
         """True while the leader stands until its team catches up."""
         return self._waiting_since is not None and not self.waited_out
 
-    def begin(self, pose: Pose2D, now: float) -> None:
-        """Start leading at `pose`."""
+    def begin(self, pose: Pose2D, driven_m: float, now: float) -> None:
+        """Start leading at `pose`, from the progress that the team has made; `driven_m` is the own odometer."""
         self._waiting_since, self.waited_out = None, False
-        self.lead.begin(pose)
-        if self._timetable is not None and self.lead.route is not None:
-            self._timetable.begin(self.lead.route, self.lead.progress_m, now)
+        self.lead.begin(pose, self._team.progress, driven_m)
+        if self._timetable is not None:
+            self._timetable.begin(self.lead.waypoints_m, self.lead.place_m, now)
 
     def work(self, leads: bool, pose: Pose2D, mates: Callable[[float], Sequence[Pose2D]], now: float) -> None:
         """Do one step's share of mapping and planning, where the ground is unknown."""
-        if self.explore is not None and self.explore.work(leads, pose, mates(now), now):
+        if self.explore is None:
+            return
+        if leads:
+            self.explore.aim(self.lead.waypoint)
+        if self.explore.work(leads, pose, mates(now), now):
             self.lead.take(self.explore.route, pose)
 
     def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
@@ -91,7 +95,7 @@ class Leadership:
         slots = [] if self._formation.trace else [self._formation.slot_of(robot) for robot in chain[1:]]
         speed = self._mission.leading.cruise_mps
         if self._timetable is not None:
-            speed = self._timetable.speed(self.lead.progress_m, now)
+            speed = self._timetable.speed(self.lead.place_m, now)
         speed *= self._patience(chain, pose, now) * self._swing(slots, now)
         self._speed_mps = speed
         return self.lead.step(pose, last, slots, speed), DETOUR_SHARE * speed

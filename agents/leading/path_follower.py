@@ -1,6 +1,7 @@
 """Path follower of a leader: along way-points, point to point or straight to the goal, and to rest there.
 
-Every robot knows the route and keeps its own progress on it, so that the next leader continues from where the team is.
+A route has been driven when all way-points have been passed in their order: a place that the route passes twice is
+passed twice. The team's progress is the leader's; every robot hears it, and the next leader goes on from there.
 """
 
 from __future__ import annotations
@@ -8,72 +9,47 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
-from math import atan2, ceil, cos, hypot, inf, pi, sin, tan
+from math import atan2, hypot, inf, pi
 
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.formation.formation import COLUMN_BELOW_MPS, PLANNED_MARGIN, leader_speed_cap
-from lfa.protocol.geometry import Point, Pose2D, Twist, in_base, wrap
-from lfa.protocol.messages.team import Slot
+from lfa.agents.leading.route import CORNER_RADIUS_M, Route
+from lfa.protocol.geometry import Point, Pose2D, Twist, in_base
+from lfa.protocol.messages.team import RouteProgress, Slot
 from lfa.protocol.mission import Leading, Limits
 
-CORNER_RADIUS_M = 2.5
-SPACING_M = 0.1
 LOOK_AHEAD_M = 0.6
 PLANNED_LOOK_AHEAD_M = 0.35
 PLANNED_CORNER_RADIUS_M = 0.8
 """Corner radius of a planned route: it is already smooth, and its clearance holds for the path itself."""
+ROUNDED_SHARE = 0.5
+"""Share of the way-point tolerance that a rounded corner uses; the rest is for the tracking."""
 DETOUR_AHEAD_M = 2.0
 WINDOW_M = 0.5
+START_M = 0.5
+"""Distance [m] to the first way-point within which a robot begins the route there, and does not drive to it first."""
+BEHIND_M = 10.0
+"""Distance [m] along the route behind the former leader's place within which a new leader joins the route."""
+WAY_ROUND = 1.5
+"""Length of the way along the route, as a multiple of the straight one, above which a new leader goes straight to the
+former leader's place: the robots behind did not drive up to the end of a turn-back, nor need they."""
+JOIN_M = 1.0
+"""Distance [m] to the route within which a robot that knows of no progress may join it on its way."""
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
-IN_PLACE_RADPS = 0.4
+IN_PLACE_RADPS, TEAM_RADPS = 0.4, 0.2
+"""Turn rate on the spot, alone and with slots that swing around the robot."""
 SLOWEST_SHARE = 0.25
 """Minimum fraction of the cruise speed on a planned route's bends, so that the path is tracked and not cut."""
+REACHED_SHARE = 0.7
+"""Share of its tolerance within which a way-point counts as reached: the pose is uncertain."""
+CORNER_MPS = 0.1
+"""Minimum speed [m/s] up to a corner in which the robot turns."""
 ARRIVED_MPS = 0.02
-LATERAL_GAIN = 1.2
-
-
-class Route:
-    """Polyline in `map` with rounded corners, its arc length and curvature."""
-
-    def __init__(self, points: Sequence[Point], corner_radius_m: float = CORNER_RADIUS_M) -> None:
-        self.points = _resampled(_rounded(points, corner_radius_m), SPACING_M)
-        self.at_m = [0.0]
-        for a, b in pairwise(self.points):
-            self.at_m.append(self.at_m[-1] + hypot(b[0] - a[0], b[1] - a[1]))
-        self.length_m = self.at_m[-1]
-        self._legs = [_leg(a, b) for a, b in pairwise(self.points)]
-        self.curvature = _curvatures(self.points)
-
-    def point(self, s: float) -> Point:
-        """Return the point at arc length `s` [m], clamped to the ends."""
-        i = self.segment(s)
-        (ax, ay), (bx, by) = self.points[i], self.points[i + 1]
-        share = (min(max(s, 0.0), self.length_m) - self.at_m[i]) / max(self.at_m[i + 1] - self.at_m[i], 1e-9)
-        return ax + share * (bx - ax), ay + share * (by - ay)
-
-    def nearest(self, x: float, y: float, low_m: float = 0.0, high_m: float = inf) -> float:
-        """Return the arc length of the point nearest to (x, y) between `low_m` and `high_m`."""
-        first, last = self.segment(low_m), self.segment(min(high_m, self.length_m))
-        best, nearest, share_of_it = inf, -1, 0.0
-        for i, (ax, ay, dx, dy, square) in enumerate(self._legs[first : last + 1], first):
-            px, py = x - ax, y - ay
-            share = (px * dx + py * dy) / square
-            share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
-            apart = hypot(px - share * dx, py - share * dy)
-            if apart < best:
-                best, nearest, share_of_it = apart, i, share
-        if nearest < 0:
-            return low_m
-        return self.at_m[nearest] + share_of_it * (self.at_m[nearest + 1] - self.at_m[nearest])
-
-    def segment(self, s: float) -> int:
-        """Return the index of the point at or before arc length `s` [m]."""
-        return min(max(bisect_right(self.at_m, s) - 1, 0), len(self.points) - 2)
 
 
 class PathFollower:
-    """Progress of one robot along the route, and its twist when it leads."""
+    """Progress of one robot along the mission's way-points, and its twist when it leads."""
 
     def __init__(self, leading: Leading, limits: Limits, radius_m: float = 0.15) -> None:
         """Create a path follower; `radius_m` is the room that a robot needs beside known obstacles
@@ -83,32 +59,79 @@ class PathFollower:
         self._radius_m = radius_m
         self._limits = limits
         self._route: Route | None = None
+        self._marks: tuple[float, ...] = ()
+        """Arc length [m] of each way-point on the route; empty for a motion without a fixed route."""
+        self._stops: tuple[int, ...] = ()
+        """Way-points that the robot drives up to: sharp corners, and all way-points point to point."""
         self._planned = leading.motion == "explore"
         self._reactive = leading.motion == "reactive"
-        self._from_m: float | None = None
         self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
+        self._last = len(leading.route_m) - 1
+        self._next = 0
+        """Index of the next way-point."""
+        self._nearest_m = inf
+        """Least distance [m] to the next way-point so far."""
+        self._added = 0
+        """Number of points that the route has before the first of its way-points."""
+        self._from_m: float | None = None
+        self._place: Point | None = None
+        """Place that replaces the next way-point, where something stands on it."""
         self._s = 0.0
+        self.passed: list[tuple[int, float]] = []
+        """Way-points passed since the list was last emptied, with the least distance [m] to each."""
+
+    # --- progress ---------------------------------------------------------------------------------------------------
+
+    def begin(self, pose: Pose2D, team: RouteProgress | None = None, driven_m: float = 0.0) -> None:
+        """Start leading at `pose`, from the progress of the `team`.
+
+        A robot that knows of none begins the route. It joins it on its way where it stands on it, if its odometer says
+        that it has driven so far (`driven_m`).
+        """
+        if team is not None:
+            self._next, self._nearest_m, self._place = min(team.waypoint, self._last), inf, None
+        if not (self._planned or self._reactive):
+            self._lay(pose)
+            if team is not None:
+                self._continue(pose, team)
+            elif self._added == 0:
+                self._join(pose, driven_m)
+        self.track(pose)
 
     def track(self, pose: Pose2D) -> None:
-        """Update the progress; called for leaders and followers."""
-        if self._reactive:
-            straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
-            self._from_m = straight if self._from_m is None else self._from_m
-            self._s = max(self._s, self._from_m - straight)
-        if self._route is None and (self._planned or self._reactive):
-            return
-        if self._route is None:
-            self._route = self._first_route(pose)
-            self._s = self._route.nearest(pose.x, pose.y)
-        else:
-            self._s = self._route.nearest(pose.x, pose.y, self._s - WINDOW_M, self._s + 2.0 * WINDOW_M)
+        """Update the progress of the leader at `pose`: a way-point to drive up to is passed when it has been reached,
+        another one when the route has been driven beyond it.
+        """
+        if self._route is not None:
+            low_m, high_m = max(self._left_stop_m, self._s - WINDOW_M), min(self._s + 2.0 * WINDOW_M, self._stop_m)
+            self._s = self._route.nearest(pose.x, pose.y, low_m, high_m)
+        elif self._reactive:
+            left_m = self._left_m(pose)
+            self._from_m = left_m if self._from_m is None else self._from_m
+            self._s = max(self._s, self._from_m - left_m)
+        while True:
+            near_m = _apart(self.waypoint, pose)
+            self._nearest_m = min(self._nearest_m, near_m)
+            if self._next == self._last or not self._is_passed(near_m):
+                return
+            self._pass()
 
-    def begin(self, pose: Pose2D) -> None:
-        """Start leading; point to point drives straight from the present pose."""
-        self.track(pose)
-        if self._leading.motion == "point_to_point":
-            self._route = Route([(pose.x, pose.y), self.goal])
-            self._s = 0.0
+    def progress(self, pose: Pose2D, twist: Twist) -> RouteProgress:
+        """Return the progress of the leader at `pose`: the next way-point, and the distance to it."""
+        if self.arrived(pose, twist):
+            return RouteProgress(self._last + 1, 0.0)
+        if self._marks:
+            return RouteProgress(self._next, max(0.0, self._marks[self._next] - self._s))
+        return RouteProgress(self._next, _apart(self.waypoint, pose))
+
+    def end_at(self, place: Point | None) -> None:
+        """Drive to `place` instead of the next way-point, on which something stands; None: to the way-point again."""
+        self._place = place
+
+    def skip(self) -> None:
+        """Pass over the next way-point, which cannot be reached; never the last."""
+        if self._next < self._last:
+            self._pass()
 
     def take(self, points: Sequence[Point], pose: Pose2D) -> None:
         """Replace the route by an own one (`explore`), starting at its nearest point."""
@@ -116,18 +139,134 @@ class PathFollower:
         self._s = self._route.nearest(pose.x, pose.y, 0.0, 2.0 * WINDOW_M)
 
     @property
-    def goal(self) -> Point:
-        return self._leading.route_m[-1]
+    def waypoint(self) -> Point:
+        """Way-point that comes next, or the free place beside it."""
+        return self._place or self._leading.route_m[self._next]
+
+    @property
+    def waypoint_number(self) -> int:
+        """Index of the next way-point in the mission's route."""
+        return self._next
+
+    @property
+    def is_last(self) -> bool:
+        """True on the way to the last way-point, the goal."""
+        return self._next == self._last
 
     @property
     def route(self) -> Route | None:
-        """Present route; None before the own pose is known, and for a motion without a route."""
+        """Present route; None before the robot leads, and for a motion without a route."""
         return self._route
 
     @property
-    def progress_m(self) -> float:
-        """Arc length [m] driven on the route, or distance gained to the goal; 0 before the own pose is known."""
+    def waypoints_m(self) -> tuple[float, ...]:
+        """Arc length [m] of each way-point on the route; empty without a fixed route."""
+        return self._marks
+
+    @property
+    def place_m(self) -> float:
+        """Arc length [m] of the present place on the route."""
         return self._s
+
+    @property
+    def progress_m(self) -> float:
+        """Distance [m] driven along the mission's route from its first way-point, or gained towards the goal; a route
+        of one point begins where the robot began.
+        """
+        return max(0.0, self._s - self._marks[0]) if self._last > 0 and self._marks else self._s
+
+    def remaining_m(self, pose: Pose2D) -> float:
+        """Return the distance [m] to the goal: along the route, or straight at the route's end."""
+        straight = self._left_m(pose)
+        return max(self._route.length_m - self._s, straight) if self._route is not None and self.is_last else straight
+
+    def arrived(self, pose: Pose2D, twist: Twist) -> bool:
+        """Return whether the robot has passed all way-points, and is at rest at the last one within its tolerance."""
+        near = _apart(self.waypoint, pose) <= self._leading.goal_tolerance_m
+        return self.is_last and near and abs(twist.linear_x) < ARRIVED_MPS
+
+    def _is_passed(self, near_m: float) -> bool:
+        if not self._marks or self._next in self._stops:
+            return near_m <= REACHED_SHARE * self._leading.waypoint_tolerance_m
+        return self._s > self._marks[self._next]
+
+    def _pass(self) -> None:
+        if self._marks:
+            self._s = max(self._s, self._marks[self._next])
+        elif self._planned:
+            self._route = None
+        self.passed.append((self._next, self._nearest_m))
+        self._next, self._nearest_m, self._place = self._next + 1, inf, None
+
+    def _left_m(self, pose: Pose2D) -> float:
+        """Return the straight distance [m] to the goal by way of the way-points that are left."""
+        points = self._leading.route_m[self._next :]
+        return _apart(self.waypoint, pose) + sum(hypot(c - a, d - b) for (a, b), (c, d) in pairwise(points))
+
+    def _lay(self, pose: Pose2D) -> None:
+        """Lay the route through the way-points. At its beginning, and point to point, it leads there from `pose`."""
+        direct = self._leading.motion == "point_to_point"
+        first = self._next if direct else 0
+        points = list(self._leading.route_m[first:])
+        self._added = int(direct or self._last == 0 or (self._next == 0 and _apart(points[0], pose) > START_M))
+        if self._added:
+            same = _apart(points[0], pose) < 1e-6
+            points.insert(0, (pose.x - 0.01, pose.y) if same else (pose.x, pose.y))
+        self._route = route = self._route_through(points)
+        self._marks = (*[0.0] * first, *route.passes(points)[self._added :])
+        self._stops = tuple(
+            n
+            for n in range(first, self._last)
+            if direct or any(abs(self._marks[n] - at_m) < 1e-6 for at_m in route.sharp_m)
+        )
+        self._s = 0.0
+
+    def _route_through(self, points: list[Point]) -> Route:
+        leading = self._leading
+        if leading.known_m:
+            # Imported here: only runs with obstacles known from an earlier run need it.
+            from lfa.agents.leading.known_obstacles import past_known
+
+            return Route(past_known(points, leading.known_m, self._radius_m))
+        if leading.corner_radius_m is not None:
+            return Route(points, leading.corner_radius_m)
+        return Route(points, CORNER_RADIUS_M, ROUNDED_SHARE * leading.waypoint_tolerance_m)
+
+    def _continue(self, pose: Pose2D, team: RouteProgress) -> None:
+        """Join the route behind the former leader's place, but after the last way-point to be driven up to."""
+        assert self._route is not None
+        there_m = max(0.0, self._marks[self._next] - max(0.0, team.to_m))
+        low_m = max(self._left_stop_m, there_m - BEHIND_M)
+        here_m = self._route.nearest(pose.x, pose.y, min(low_m, there_m), there_m)
+        along_m = _apart(self._route.point(here_m), pose) + there_m - here_m
+        round_about = along_m > WAY_ROUND * _apart(self._route.point(there_m), pose)
+        self._s = there_m if round_about else here_m
+        self._next = min(bisect_right(self._marks, self._s), self._next)
+
+    def _join(self, pose: Pose2D, driven_m: float) -> None:
+        assert self._route is not None
+        high_m = min(driven_m, self._route.length_m - JOIN_M)
+        self._s = self._route.joined_m(pose.x, pose.y, pose.theta, JOIN_M, high_m)
+        self._next = min(bisect_right(self._marks, self._s), self._last)
+
+    @property
+    def _stop(self) -> int:
+        """Next way-point to drive up to."""
+        return next((n for n in self._stops if n >= self._next), self._last) if self._marks else self._next
+
+    @property
+    def _left_stop_m(self) -> float:
+        """Arc length [m] of the last way-point that was driven up to: the way back from it passes the same places."""
+        return max((self._marks[n] for n in self._stops if n < self._next), default=0.0)
+
+    @property
+    def _stop_m(self) -> float:
+        """Arc length [m] of the next way-point to drive up to, or of the route's end."""
+        if self._marks and self._stop < self._last:
+            return self._marks[self._stop]
+        return self._route.length_m if self._route is not None else 0.0
+
+    # --- motion -----------------------------------------------------------------------------------------------------
 
     def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
         """Return the distance [m] to the next bend in which `slots` would slow the leader below `COLUMN_BELOW_MPS`, or
@@ -142,52 +281,52 @@ class PathFollower:
                 return self._route.at_m[i] - self._s
         return None
 
-    def remaining_m(self, pose: Pose2D) -> float:
-        """Return the distance [m] to the goal: along the route, or straight at the route's end."""
-        straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
-        return max(self._route.length_m - self._s, straight) if self._route is not None else straight
-
-    def arrived(self, pose: Pose2D, twist: Twist) -> bool:
-        """Return whether the robot is at rest within the goal's tolerance."""
-        near = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y) <= self._leading.goal_tolerance_m
-        return near and abs(twist.linear_x) < ARRIVED_MPS
-
     def ahead(self, pose: Pose2D, by_m: float = DETOUR_AHEAD_M) -> Point:
-        """Return the route's point `by_m` ahead, in `base_link`: a detour leads back to it."""
+        """Return the route's point `by_m` ahead, in `base_link`, but not beyond a way-point to be driven up to; a
+        detour leads back to it.
+        """
         if self._route is not None:
-            return in_base(pose, self._route.point(self._s + by_m))
-        x, y = in_base(pose, self.goal)
+            at_m = self._s + by_m
+            return in_base(pose, self._route.point(at_m) if at_m < self._stop_m else self._stop_point)
+        x, y = in_base(pose, self.waypoint)
         share = min(1.0, by_m / max(hypot(x, y), 1e-9))
         return share * x, share * y
+
+    @property
+    def _stop_point(self) -> Point:
+        return self.waypoint if self._stop == self._next else self._leading.route_m[self._stop]
 
     def step(self, pose: Pose2D, twist: Twist, slots: Sequence[Slot], speed_max_mps: float) -> Twist:
         """Return the wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
         self.track(pose)
         if self._route is None and not self._reactive:
             return Twist(0.0, 0.0)
-        straight = hypot(self.goal[0] - pose.x, self.goal[1] - pose.y)
-        if straight <= 0.3 * self._leading.goal_tolerance_m:
+        stop_x, stop_y = self._stop_point
+        straight = hypot(stop_x - pose.x, stop_y - pose.y)
+        ends = self._stop == self._last
+        if ends and straight <= 0.3 * self._leading.goal_tolerance_m:
             return Twist(0.0, 0.0)
-        left_m = straight if self._route is None else self._route.length_m - self._s
+        left_m = straight if self._route is None else self._stop_m - self._s
         near_end = left_m < self._look_ahead_m
-        target = in_base(pose, self.goal) if near_end else self.ahead(pose, self._look_ahead_m)
-        braking = (2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5
+        target = in_base(pose, (stop_x, stop_y)) if near_end else self.ahead(pose, self._look_ahead_m)
         bearing = atan2(target[1], target[0])
-        v = min(self._cruise(slots), braking, speed_max_mps)
+        v = min(self._cruise(slots), self._braking(straight, ends), speed_max_mps)
         if self._planned:
             v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
         # This limit is last: a share of it would be taken again in each following step.
         v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S)
-        if near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
-            return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing)
+        if ends and near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
+            return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else _turn(bearing, slots)
         if abs(bearing) > IN_PLACE_RAD:
-            return self._turn(bearing)
+            return _turn(bearing, slots)
         reach = max(hypot(*target), 0.25)
         curvature = 2.0 * target[1] / (reach * reach)
         return Twist(v, v * curvature)
 
-    def _turn(self, bearing: float) -> Twist:
-        return Twist(0.0, IN_PLACE_RADPS if bearing > 0.0 else -IN_PLACE_RADPS)
+    def _braking(self, straight: float, ends: bool) -> float:
+        """Return the speed [m/s] from which the robot can stop at the next way-point that it drives up to."""
+        v = float((2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5)
+        return v if ends else max(v, CORNER_MPS)
 
     def _cruise(self, slots: Sequence[Slot]) -> float:
         """Return the maximum speed [m/s] from which the robot can brake to the outermost robot's speed limit of each
@@ -207,70 +346,11 @@ class PathFollower:
             speed = min(cruise, leader_speed_cap(slots, route.curvature[i], self._limits, PLANNED_MARGIN), brake)
         return speed
 
-    def _first_route(self, pose: Pose2D) -> Route:
-        points = list(self._leading.route_m)
-        if len(points) == 1 or self._leading.motion == "point_to_point":
-            points = [(pose.x, pose.y), points[-1]]
-        if hypot(points[0][0] - points[-1][0], points[0][1] - points[-1][1]) < 1e-6 and len(points) == 2:
-            points[0] = (points[0][0] - 0.01, points[0][1])
-        if self._leading.known_m:
-            # Imported here: only runs with obstacles known from an earlier run need it.
-            from lfa.agents.leading.known_obstacles import past_known
 
-            if hypot(points[0][0] - pose.x, points[0][1] - pose.y) > CORNER_RADIUS_M:
-                points = [(pose.x, pose.y), *points]
-            points = past_known(points, self._leading.known_m, self._radius_m)
-        return Route(points)
+def _turn(bearing: float, slots: Sequence[Slot]) -> Twist:
+    rate = TEAM_RADPS if slots else IN_PLACE_RADPS
+    return Twist(0.0, rate if bearing > 0.0 else -rate)
 
 
-def _leg(a: Point, b: Point) -> tuple[float, float, float, float, float]:
-    """Return a leg's start, its direction and length as (dx, dy), and its length squared."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    return *a, dx, dy, max(dx * dx + dy * dy, 1e-12)
-
-
-def _rounded(points: Sequence[Point], radius_m: float) -> list[Point]:
-    """Replace corners by arcs of `radius_m`, smaller where the legs are short."""
-    rounded = [points[0]]
-    for a, corner, b in zip(points, points[1:], points[2:], strict=False):
-        leg_in, leg_out = hypot(corner[0] - a[0], corner[1] - a[1]), hypot(b[0] - corner[0], b[1] - corner[1])
-        heading = atan2(corner[1] - a[1], corner[0] - a[0])
-        turn = wrap(atan2(b[1] - corner[1], b[0] - corner[0]) - heading)
-        cut = min(radius_m * tan(min(abs(turn), 3.0) / 2.0), 0.45 * leg_in, 0.45 * leg_out)
-        if abs(turn) < 0.02 or cut < 1e-3:
-            rounded.append(corner)
-            continue
-        r = cut / tan(min(abs(turn), 3.0) / 2.0)
-        side = 1.0 if turn > 0.0 else -1.0
-        start = (corner[0] - cut * cos(heading), corner[1] - cut * sin(heading))
-        center = (start[0] - side * r * sin(heading), start[1] + side * r * cos(heading))
-        steps = max(2, ceil(abs(turn) * r / SPACING_M))
-        for n in range(steps + 1):
-            angle = heading - side * pi / 2 + turn * n / steps
-            rounded.append((center[0] + r * cos(angle), center[1] + r * sin(angle)))
-    rounded.append(points[-1])
-    return rounded
-
-
-def _resampled(points: Sequence[Point], spacing_m: float) -> list[Point]:
-    """Return the polyline with segments of at most `spacing_m` and without repeated points."""
-    out = [points[0]]
-    for a, b in pairwise(points):
-        length = hypot(b[0] - a[0], b[1] - a[1])
-        if length < 1e-9:
-            continue
-        steps = ceil(length / spacing_m)
-        out += [(a[0] + (b[0] - a[0]) * n / steps, a[1] + (b[1] - a[1]) * n / steps) for n in range(1, steps + 1)]
-    return out if len(out) > 1 else [points[0], (points[0][0] + 1e-3, points[0][1])]
-
-
-def _curvatures(points: Sequence[Point]) -> list[float]:
-    """Return the signed curvature [1/m] at each point, from the points 0.3 m before and after it, left > 0."""
-    reach = max(1, round(0.3 / SPACING_M))
-    out = [0.0] * len(points)
-    for i in range(reach, len(points) - reach):
-        a, b, c = points[i - reach], points[i], points[i + reach]
-        turn = wrap(atan2(c[1] - b[1], c[0] - b[0]) - atan2(b[1] - a[1], b[0] - a[0]))
-        length = 0.5 * (hypot(b[0] - a[0], b[1] - a[1]) + hypot(c[0] - b[0], c[1] - b[1]))
-        out[i] = turn / max(length, 1e-6)
-    return out
+def _apart(point: Point, pose: Pose2D) -> float:
+    return hypot(point[0] - pose.x, point[1] - pose.y)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from lfa.agents.leading.path_follower import Route
 from lfa.protocol.mission import Leading
 
 GAIN_PER_S = 0.5
@@ -27,12 +26,9 @@ class Timetable:
         self._at_m: list[float] = []
         self._zero = 0.0
 
-    def begin(self, route: Route, progress_m: float, now: float) -> None:
-        """Start the trajectory at `progress_m` along `route`."""
-        self._at_m, low = [], 0.0
-        for x, y in self._leading.route_m:
-            low = route.nearest(x, y, low)
-            self._at_m.append(low)
+    def begin(self, waypoints_m: Sequence[float], progress_m: float, now: float) -> None:
+        """Start the trajectory at `progress_m` along a route that passes its way-points at `waypoints_m`."""
+        self._at_m = list(waypoints_m)
         self._zero = now - _between(progress_m, self._at_m, self._leading.times_s)
 
     def due_m(self, now: float) -> float:

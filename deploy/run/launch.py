@@ -174,8 +174,8 @@ class _Launch:
         self._await(router.name, lambda: answers(self._endpoint), interrupts)
         self._processes.start(recorder)
         self._bus = bus = ZenohBus(self._endpoint, self._inbox)
-        wanted = {key(self._about.fleet, "*", topic) for topic in ("event", "tracking", "status", "truth", "operator")}
-        bus.follow(frozenset(wanted))
+        topics = ("event", "tracking", "table", "status", "truth", "operator")
+        bus.follow(frozenset(key(self._about.fleet, "*", topic) for topic in topics))
         fleet = self._about.fleet
         self._await(recorder.name, lambda: bool(bus.living(fleet, RECORDER_NAME)), interrupts)
         self._say("start", scenario=self._about.scenario, seed=self._about.seed)

@@ -1,24 +1,29 @@
 """Termination of a run: the verdict, decided once from the messages. Pure: time comes with the messages.
 
-A run has reached its goal when the leader of the present chain is within the goal's tolerance and all robots of that
-chain have been at rest for `REST_S`. It has failed when an agent publishes a `failed` event, and has run out of time
-when the world's clock passes the scenario's limit.
+A run has reached its goal when the leader of the present chain says that it has driven the whole route and arrived, the
+ground truth shows it there, and all robots of that chain have been at rest in their slots for `REST_S`. It has failed
+when an agent publishes a `failed` event, and has run out of time when the world's clock passes the scenario's limit.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import hypot
 
 from lfa.deploy.recording.outcome import Verdict
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.simulation import TrueRobot, Truth
-from lfa.protocol.messages.team import Event
+from lfa.protocol.messages.team import Event, RouteProgress, TableRow, Tracking
 from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import TOPIC
 from lfa.world.description.load import Scenario
 
 REST_S = 0.5
 REST_SPEED = 1e-3  # [m/s] and [rad/s]
+SLOT_SHARE = 0.5
+"""Distance of a robot at rest from its slot up to which it is in it, as a share of its commanded distance k^d."""
+TRACKING_S_MAX = TOPIC["tracking"].timeout_s or 1.0
 
 
 class Referee:
@@ -34,6 +39,11 @@ class Referee:
         self.chain: tuple[int, ...] = scenario.mission.robots
         self.leader: int | None = None
         self._resting_since: float | None = None
+        self._now_s = 0.0
+        self._progress: dict[int, RouteProgress] = {}
+        """Progress on the route as last reported by each robot."""
+        self._tracking: dict[int, tuple[Tracking, float]] = {}
+        """Last report of each follower, and when [s] it came."""
         self.verdict: Verdict | None = None
 
     def see(self, message: Message) -> Verdict | None:
@@ -41,7 +51,12 @@ class Referee:
         if self.verdict is None:
             match message:
                 case Truth():
+                    self._now_s = message.time_s
                     self.verdict = self._judge(message)
+                case TableRow(progress=RouteProgress() as progress):
+                    self._progress[robot_id_of(message.header.sender) or 0] = progress
+                case Tracking():
+                    self._tracking[robot_id_of(message.header.sender) or 0] = message, self._now_s
                 case Event(kind="failed"):
                     who = robot_id_of(message.header.sender)
                     self.verdict = Verdict("failed", f"robot {who}: {message.data.get('reason', 'gives up')}")
@@ -54,25 +69,46 @@ class Referee:
         return self.verdict
 
     def _judge(self, truth: Truth) -> Verdict | None:
-        if not self._arrived(truth.robots):
+        missing = self._missing(truth.robots)
+        if missing is not None:
             self._resting_since = None
         elif self._resting_since is None:
             self._resting_since = truth.time_s
         elif truth.time_s >= self._resting_since + REST_S:
             return Verdict("goal_reached")
         if truth.time_s >= self._scenario.time_limit_s:
-            return Verdict("time_limit", f"not at the goal after {self._scenario.time_limit_s:g} s")
+            why = missing or "at rest too short a time"
+            return Verdict("time_limit", f"not at the goal after {self._scenario.time_limit_s:g} s: {why}")
         return None
 
-    def _arrived(self, robots: tuple[TrueRobot, ...]) -> bool:
-        mission = self._scenario.mission
-        present = {robot.id: robot for robot in robots if robot.id in self.chain}
-        leader = present.get(self.chain[0]) if self.chain else None
-        if leader is None:
+    def _missing(self, robots: tuple[TrueRobot, ...]) -> str | None:
+        """Return what is missing until the team has arrived; None when nothing is."""
+        leading = self._scenario.mission.leading
+        present = {robot.id: robot for robot in robots}
+        chain = [present[robot] for robot in self.chain if robot in present]
+        if not chain:
+            return "no robot is in the chain"
+        leader, points = chain[0], leading.route_m
+        progress = self._progress.get(leader.id)
+        if progress is None or progress.waypoint < len(points):
+            return f"robot {leader.id} is on its way to way-point {1 + (progress.waypoint if progress else 0)}"
+        goal_x, goal_y = points[-1]
+        if hypot(leader.x - goal_x, leader.y - goal_y) > leading.goal_tolerance_m:
+            return f"robot {leader.id} is off the goal"
+        moving = next((robot.id for robot in chain if not _at_rest(robot)), None)
+        if moving is not None:
+            return f"robot {moving} moves"
+        astray = next((robot.id for ahead, robot in pairwise(chain) if not self._in_slot(robot, ahead)), None)
+        return None if astray is None else f"robot {astray} is not in its slot"
+
+    def _in_slot(self, robot: TrueRobot, ahead: TrueRobot) -> bool:
+        """Return whether a follower at rest is in its slot, by its own report and by the ground truth."""
+        tracking, at_s = self._tracking.get(robot.id, (None, 0.0))
+        if tracking is None or tracking.predecessor != ahead.id or self._now_s > at_s + TRACKING_S_MAX:
             return False
-        goal_x, goal_y = mission.goal_m
-        near = hypot(leader.x - goal_x, leader.y - goal_y) <= mission.leading.goal_tolerance_m
-        return near and all(_at_rest(robot) for robot in present.values())
+        off_max_m = SLOT_SHARE * tracking.separation_m
+        gap_m = hypot(robot.x - ahead.x, robot.y - ahead.y)
+        return tracking.error_m <= off_max_m and gap_m <= tracking.separation_m + off_max_m
 
 
 def _ids(said: object) -> tuple[int, ...]:

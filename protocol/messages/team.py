@@ -34,6 +34,15 @@ class Delay(Struct, frozen=True, array_like=True, gc=False):
     least_s: Stamp
 
 
+class RouteProgress(Struct, frozen=True, array_like=True, gc=False):
+    """Progress of a team along its mission's way-points, which all of its robots know."""
+
+    waypoint: Count
+    """Index of the next way-point; the number of way-points once the team has arrived."""
+    to_m: Number
+    """Distance [m] to it, along the route where there is one."""
+
+
 class TableRow(Struct, frozen=True, array_like=True, tag="table"):
     """One robot's row of the paper's table (X, Y, Z, theta), which every robot keeps of all robots."""
 
@@ -46,6 +55,8 @@ class TableRow(Struct, frozen=True, array_like=True, tag="table"):
     role: Role
     delays: tuple[Delay, ...] = ()
     stuck: bool = False
+    progress: RouteProgress | None = None
+    """Progress of the team: of a leader its own, of another robot the leader's as last heard; None: never heard."""
 
 
 class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):

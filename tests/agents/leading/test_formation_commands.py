@@ -26,8 +26,9 @@ def asked(known: tuple[tuple[float, float, float], ...], until_s: float) -> list
     mission = Mission(robots=(1, *FOLLOWERS), leading=leading, formation=FormationSpec(1.2, pi / 3.0, "left"))
     outbox, lead = Outbox("fleet", 1, 1), PathFollower(leading, Limits())
     orders = FormationCommands(outbox, mission, Formation.of(mission))
-    orders.begin(0.0, 0.0)
-    lead.track(Pose2D())
+    orders.begin(0.0)
+    lead.begin(Pose2D())
+    orders.lead(lead, FOLLOWERS, Term(2, 1, 1), 0.0)
     lead.track(Pose2D(0.5))
     for n in range(round(until_s * 50)):
         orders.lead(lead, FOLLOWERS, Term(2, 1, 1), n / 50)

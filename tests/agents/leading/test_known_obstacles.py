@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lfa.agents.leading.known_obstacles import ROOM_M, past_known
-from lfa.agents.leading.path_follower import PathFollower, Route
+from lfa.agents.leading.path_follower import PathFollower
+from lfa.agents.leading.route import Route
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, wrap
 from lfa.protocol.mission import Leading, Limits, Mission

@@ -19,7 +19,7 @@ def share_of(gap_in_k: float, since_s: float | None = None) -> float:
     """Its share of the cruise speed with a follower so far behind: at once, or from `since_s` ago on."""
     mission: Mission = load("straight").mission
     leader = Leadership(mission, Formation.of(mission), team := TeamState())
-    leader.begin(HERE, 0.0)
+    leader.begin(HERE, 0.0, 0.0)
     behind = HERE.x - gap_in_k * mission.formation.separation_m
     for seq, now in enumerate([0.0] if since_s is None else [0.0, since_s]):
         team.hear_row(2, TableRow(Header("robot2", 1, seq, now), behind, 0.0, 0.0, 0.0, 0.0, Role.FOLLOWER), now)
@@ -41,7 +41,7 @@ def test_a_leader_waits_15_s_and_then_goes_on_slowly() -> None:
 def test_a_leader_is_under_way_but_where_its_team_has_it_wait() -> None:
     mission = load("trajectory").mission
     leader = Leadership(mission, Formation.of(mission), team := TeamState())
-    leader.begin(Pose2D(), 0.0)
+    leader.begin(Pose2D(), 0.0, 0.0)
     leader.step((1,), Pose2D(), STILL, 0.0)
     assert leader.under_way
     far = TableRow(Header("robot2", 1, 0, 0.0), -9.0, 0.0, 0.0, 0.0, 0.0, Role.FOLLOWER)

@@ -5,9 +5,11 @@ from math import atan2, hypot, pi
 import pytest
 
 from lfa.agents.formation.formation import slots_of
-from lfa.agents.leading.path_follower import CORNER_RADIUS_M, PathFollower, Route
+from lfa.agents.leading.path_follower import PathFollower
+from lfa.agents.leading.route import CORNER_RADIUS_M, Route
 from lfa.agents.leading.timed_route import Timetable
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.messages.team import RouteProgress
 from lfa.protocol.mission import FormationSpec, Leading, Limits
 
 LIMITS = Limits()
@@ -15,9 +17,11 @@ DT = 0.02
 CORNERED = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0))
 
 
-def driven(leading: Leading, start: Pose2D, slots: tuple = (), seconds: float = 80.0) -> list[tuple[Pose2D, Twist]]:
+def driven(
+    leading: Leading, start: Pose2D, slots: tuple = (), seconds: float = 80.0, team: RouteProgress | None = None
+) -> list[tuple[Pose2D, Twist]]:
     lead, pose, twist = PathFollower(leading, LIMITS), start, STILL
-    lead.begin(pose)
+    lead.begin(pose, team)
     course = []
     for _ in range(round(seconds / DT)):
         wanted = lead.step(pose, twist, slots, leading.cruise_mps)
@@ -37,20 +41,20 @@ def test_a_leader_comes_to_rest_at_the_goal(motion: str) -> None:
     assert abs(twist.angular_z) < 1e-3
 
 
-def test_path_following_keeps_to_the_rounded_route() -> None:
+def test_path_following_keeps_to_the_route_rounded_by_the_missions_radius() -> None:
     route = Route(CORNERED)
-    for pose, _ in driven(Leading(route_m=CORNERED), Pose2D()):
+    for pose, _ in driven(Leading(route_m=CORNERED, corner_radius_m=CORNER_RADIUS_M), Pose2D()):
         x, y = route.point(route.nearest(pose.x, pose.y))
         assert hypot(pose.x - x, pose.y - y) < 0.08
 
 
 def test_point_to_point_goes_straight() -> None:
-    course = driven(Leading(motion="point_to_point", route_m=CORNERED), Pose2D(0.0, 0.0, pi / 4))
+    course = driven(Leading(motion="point_to_point", route_m=((8.0, 8.0),)), Pose2D(0.0, 0.0, pi / 4))
     assert max(abs(pose.x - pose.y) for pose, _ in course) < 0.05
 
 
-def test_a_leader_that_starts_beside_the_route_joins_it_ahead_and_never_turns_back() -> None:
-    course = driven(Leading(route_m=((0.0, 0.0), (12.0, 0.0))), Pose2D(4.0, 1.0, 0.0))
+def test_a_new_leader_beside_the_route_joins_it_ahead_and_never_turns_back() -> None:
+    course = driven(Leading(route_m=((0.0, 0.0), (12.0, 0.0))), Pose2D(4.0, 1.0, 0.0), team=RouteProgress(1, 7.0))
     assert min(pose.x for pose, _ in course) >= 4.0 - 1e-6
     assert abs(course[-1][0].y) < 0.10
 
@@ -65,15 +69,16 @@ def test_in_a_bend_the_leader_slows_for_the_outermost_follower() -> None:
     """control.md 2.2: f v <= 0.8 v_max, here for three in left echelon in a right bend."""
     route = ((0.0, 0.0), (8.0, 0.0), (8.0, -8.0))
     slots = slots_of(FormationSpec(), (2, 3, 4))
-    alone = driven(Leading(route_m=route), Pose2D())
-    team = driven(Leading(route_m=route), Pose2D(), slots)
+    leading = Leading(route_m=route, corner_radius_m=CORNER_RADIUS_M)
+    alone = driven(leading, Pose2D())
+    team = driven(leading, Pose2D(), slots)
     fastest_in_bend = max(t.linear_x for p, t in team if p.x > 7.0 and -1.0 < p.y < -0.5)
     assert max(t.linear_x for p, t in alone if p.x > 7.0 and -1.0 < p.y < -0.5) == pytest.approx(0.5, abs=0.01)
     assert fastest_in_bend < 0.4
 
 
 def test_reactive_goes_for_the_goal_from_wherever_it_is() -> None:
-    lead, pose = PathFollower(Leading(motion="reactive", route_m=CORNERED), LIMITS), Pose2D(3.0, 2.0, 0.0)
+    lead, pose = PathFollower(Leading(motion="reactive", route_m=((8.0, 8.0),)), LIMITS), Pose2D(3.0, 2.0, 0.0)
     lead.begin(pose)
     assert lead.route is None
     x, y = lead.ahead(pose, 1.0)
@@ -91,13 +96,12 @@ def timed(pause: tuple[float, float] = (99.0, 99.0)) -> dict[float, tuple[float,
     """Of each half second: how far the leader has come, and how far it should be; it is held up during `pause`."""
     lead, table, pose, twist = PathFollower(TIMED, LIMITS), Timetable(TIMED), Pose2D(), STILL
     lead.begin(pose)
-    assert lead.route is not None
-    table.begin(lead.route, lead.progress_m, 0.0)
+    table.begin(lead.waypoints_m, lead.place_m, 0.0)
     course = {}
     for n in range(round(24.0 / DT)):
         now = n * DT
         course[now] = (pose.x, table.due_m(now))
-        wanted = lead.step(pose, twist, (), table.speed(lead.progress_m, now))
+        wanted = lead.step(pose, twist, (), table.speed(lead.place_m, now))
         v = 0.0 if pause[0] <= now < pause[1] else max(twist.linear_x - DT, min(twist.linear_x + DT, wanted.linear_x))
         twist = Twist(v, wanted.angular_z)
         pose = along_arc(pose, twist, DT)
@@ -119,9 +123,8 @@ def test_a_delay_on_a_trajectory_is_made_up_for() -> None:
 
 def test_a_new_leader_takes_the_trajectory_up_where_it_stands() -> None:
     lead, table = PathFollower(TIMED, LIMITS), Timetable(TIMED)
-    lead.begin(Pose2D(2.0, 0.3, 0.0))
-    assert lead.route is not None
-    table.begin(lead.route, lead.progress_m, 500.0)
+    lead.begin(Pose2D(2.0, 0.3, 0.0), RouteProgress(2, 5.5))
+    table.begin(lead.waypoints_m, lead.place_m, 500.0)
     assert table.due_m(500.0) == pytest.approx(2.0, abs=0.01)
     assert table.due_m(506.0) == pytest.approx(5.0, abs=0.01)
 

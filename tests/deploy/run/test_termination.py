@@ -5,11 +5,12 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from lfa.deploy.run.termination import REST_S, Referee
+from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.consensus import Role, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import TrueRobot, Truth
-from lfa.protocol.messages.team import Event
+from lfa.protocol.messages.team import Event, RouteProgress, TableRow, Tracking
 from lfa.world.description.load import Scenario, load
 
 
@@ -17,8 +18,10 @@ def _scenario() -> Scenario:
     return load("straight", ["mission.leading.route_m=[[3.0, 0.0]]", "time_limit_s=20.0"], robots=2)
 
 
-def _truth(time_s: float, leader_x: float, speed: float = 0.0, follower_turns: float = 0.0) -> Truth:
-    robots = (TrueRobot(1, leader_x, 0.0, 0.0, speed, 0.0), TrueRobot(2, 2.0, 1.0, 0.0, 0.0, follower_turns))
+def _truth(
+    time_s: float, leader_x: float, speed: float = 0.0, follower_turns: float = 0.0, follower_x: float = 2.3
+) -> Truth:
+    robots = (TrueRobot(1, leader_x, 0.0, 0.0, speed, 0.0), TrueRobot(2, follower_x, 1.0, 0.0, 0.0, follower_turns))
     return Truth(Header("world", 1, 1, time_s), time_s, robots)
 
 
@@ -26,15 +29,61 @@ def _event(kind: str, sender: str, term: Term | None, **data: object) -> Event:
     return Event(Header(sender, 1, 1, 0.0), kind, term, data)
 
 
-def _outcome(*messages: Message) -> str | None:
+def _row(waypoint: int, robot: int = 1) -> TableRow:
+    header = Header(f"robot{robot}", 1, 1, 0.0)
+    return TableRow(header, 0.0, 0.0, 0.0, 0.0, 0.0, Role.LEADER, progress=RouteProgress(waypoint, 0.0))
+
+
+def _tracking(error_m: float = 0.0, predecessor: int = 1) -> Tracking:
+    return Tracking(
+        Header("robot2", 1, 1, 0.0), predecessor, 1.2, 0.0, 0.0, 0.0, Pose2D(), error_m, avoiding=False, state="stand"
+    )
+
+
+IN_SLOT = _tracking()
+
+
+def _outcome(*messages: Message, waypoint: int = 1, tracking: Tracking | None = IN_SLOT) -> str | None:
+    """The outcome after `messages`, where leader and follower report before each ground truth."""
     referee = Referee(_scenario())
+    referee.see(_truth(8.5, 2.0, speed=0.5))
     for message in messages:
+        for said in (_row(waypoint), _row(waypoint, 2), tracking) if isinstance(message, Truth) else ():
+            if said is not None:
+                referee.see(said)
         referee.see(message)
     return None if referee.verdict is None else referee.verdict.outcome
 
 
 def test_all_at_rest_at_the_goal_for_half_a_second_is_the_goal() -> None:
     assert _outcome(_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95)) == "goal_reached"
+
+
+def test_a_leader_that_has_not_driven_the_whole_route_has_not_arrived_wherever_it_stands() -> None:
+    assert _outcome(_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95), waypoint=0) is None
+
+
+def test_a_robot_at_rest_off_its_slot_keeps_the_run_going() -> None:
+    at_rest = (_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95))
+    assert _outcome(*at_rest, tracking=_tracking(error_m=0.7)) is None
+    assert _outcome(*at_rest, tracking=_tracking(predecessor=3)) is None
+
+
+def test_a_robot_that_reports_to_be_in_its_slot_and_is_far_from_it_keeps_the_run_going() -> None:
+    far = [_truth(t, 2.95, follower_x=-3.0) for t in (9.0, 9.0 + REST_S)]
+    assert _outcome(*far) is None
+
+
+def test_a_robot_that_reports_no_tracking_is_in_no_slot() -> None:
+    assert _outcome(_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95), tracking=None) is None
+
+
+def test_the_time_limits_reason_says_who_was_missing() -> None:
+    referee = Referee(_scenario())
+    referee.see(_row(1))
+    verdict = referee.see(_truth(20.0, 2.95))
+    assert verdict is not None
+    assert verdict.reason == "not at the goal after 20 s: robot 2 is not in its slot"
 
 
 def test_a_short_rest_is_not_yet_the_goal() -> None:
