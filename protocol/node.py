@@ -86,6 +86,14 @@ class Node(Protocol):
         """Key expressions that the node subscribes to at the moment; the runner follows changes."""
 
     @property
+    def defer_hellos(self) -> bool:
+        """True if HELLO, which processes without a vote repeat, can wait for the node's next deadline."""
+
+    @property
+    def defer_grants(self) -> bool:
+        """True while answers on `lease` to this node alone, GRANT above all, can wait for its next deadline."""
+
+    @property
     def finished(self) -> bool:
         """True when the final messages are out; the runner then ends the process."""
 
@@ -101,3 +109,13 @@ class Node(Protocol):
 
     def next_deadline(self) -> float:
         """Return the time [s] of the next tick, in the node's own monotonic time."""
+
+
+class NodeObserver(Protocol):
+    """Observer of one node, for checkers and tools: its host calls it around each input. It changes nothing."""
+
+    def before(self, received: Received) -> None:
+        """Process an input that the node gets next."""
+
+    def after(self, received: Received) -> None:
+        """Process an input that the node has processed; what it answered is not published yet."""

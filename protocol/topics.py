@@ -32,6 +32,8 @@ from lfa.protocol.messages.team import (
 Priority = Literal["real_time", "prompt", "data", "background"]
 
 TO_ALL = "all"
+TO_HELLO = "hello"
+"""Receiver in the key of a HELLO, which goes to all as well: an inbox knows by the key alone that it can wait."""
 WORLD_NAME = "world"
 OPERATOR_NAME = "operator"
 RECORDER_NAME = "recorder"

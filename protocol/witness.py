@@ -14,7 +14,7 @@ from lfa.protocol.messages.team import Ask, Level, MissionNote, Status
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID, WITNESS_NAME, robot_id_of, robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop
-from lfa.protocol.topics import TO_ALL, alive_key, key
+from lfa.protocol.topics import TO_ALL, TO_HELLO, alive_key, key
 
 ASK_S = 0.5
 STATUS_S = 1.0
@@ -24,12 +24,14 @@ class Witness:
     """Node around a `Lease` with id 0. Without a mission it asks for one."""
 
     name = WITNESS_NAME
+    defer_hellos = defer_grants = False
 
     def __init__(self, fleet: str, incarnation: int, floor: int, mission: Mission | None = None) -> None:
         self.incarnation = incarnation
         self.interests = frozenset(
             {
                 key(fleet, "*", "lease", TO_ALL),
+                key(fleet, "*", "lease", TO_HELLO),
                 key(fleet, "*", "lease", WITNESS_NAME),
                 key(fleet, "*", "mission"),
                 alive_key(fleet, "*", "*"),
@@ -107,7 +109,7 @@ class Witness:
 
     def _carry_out(self, effects: list[Effect], now: float) -> list[Envelope]:
         return [
-            self._envelope("lease", LeaseNote(self._header("lease", now), effect.body), effect.to)
+            self._envelope("lease", LeaseNote(self._header("lease", now), effect.body), effect.receiver)
             for effect in effects
             if isinstance(effect, Send)
         ]

@@ -108,6 +108,14 @@ class Remembering:
         return self._world.interests
 
     @property
+    def defer_hellos(self) -> bool:
+        return self._world.defer_hellos
+
+    @property
+    def defer_grants(self) -> bool:
+        return self._world.defer_grants
+
+    @property
     def finished(self) -> bool:
         return self._world.finished
 

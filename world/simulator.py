@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
-from lfa.protocol.node import Local, Node, PeerDown, PeerUp, Stop, Vitals
+from lfa.protocol.node import Local, Node, NodeObserver, PeerDown, PeerUp, Stop, Vitals
 from lfa.protocol.runtime.journal import Journal
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
@@ -77,9 +77,14 @@ class Simulator:
     def names(self) -> list[str]:
         return list(self._seats)
 
-    def add(self, node: Node, journal: Journal, clock: LocalClock | None = None) -> None:
-        """Start a process now. The others get a liveliness event for its token, and it gets theirs."""
-        seat = _SimulatedNode(NodeHost(node, journal), clock or LocalClock())
+    def add(
+        self, node: Node, journal: Journal, clock: LocalClock | None = None, observers: Sequence[NodeObserver] = ()
+    ) -> None:
+        """Start a process now. The others get a liveliness event for its token, and it gets theirs.
+
+        `observers` hear each input of the node.
+        """
+        seat = _SimulatedNode(NodeHost(node, journal, observers), clock or LocalClock())
         self._seats[node.name] = seat
         self._refresh(seat)
         self._announce(PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)

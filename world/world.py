@@ -75,6 +75,7 @@ class World:
         self.incarnation = incarnation
         self.finished = False
         self.refusal: str | None = None
+        self.defer_hellos = self.defer_grants = False
         self.slowed_s = 0.0
         """Total time [s] for which the world's time has stood still because ticks came too late."""
         self.started_with = {

@@ -19,19 +19,20 @@ from lfa.deploy.analysis.verification.lease_observer import effect_facts
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.fuzz import network
 from lfa.deploy.fuzz.network import LinkConditions, Trace
+from lfa.deploy.fuzz.observers import GatewayObserver
 from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
 from lfa.protocol.lease.effects import BecomeLeader, Effect
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
 from lfa.protocol.messages.codec import Message, encode
-from lfa.protocol.messages.consensus import Fence, LeaseNote, Member
+from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
-from lfa.protocol.node import Envelope, Node, PeerDown, PeerUp, Received
+from lfa.protocol.node import Node, NodeObserver, PeerDown, PeerUp
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
-from lfa.protocol.topics import WORLD_NAME, address
+from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import LinkModel, Radio
 from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
@@ -268,15 +269,14 @@ class AgentSimulation:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
         hardware = Hardware(world, clock)
         self.gateways = dict.fromkeys(self.mission.robots, hardware)
-        receive = world.receive
-        world.receive = lambda received: self._at_gateways(hardware, receive, received)  # type: ignore[method-assign]
         self._say(WITNESS_ID, "world starts")
         for robot_id in self.mission.robots:
             self._tell("gateway_starts", self.now, robot_id, self.now + self.timing.grant_s / clock.rate)
-        self._add(world, clock)
+        self._add(world, clock, GatewayObserver(self.simulator, world, self._tell, self.accepted))
 
-    def _add(self, node: Node, clock: LocalClock) -> None:
-        self.simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {})), clock)
+    def _add(self, node: Node, clock: LocalClock, *observers: NodeObserver) -> None:
+        journal = Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {}))
+        self.simulator.add(node, journal, clock, observers)
 
     def _next_life(self) -> int:
         self._lives += 1
@@ -300,26 +300,6 @@ class AgentSimulation:
             ):
                 self._tell(*words)
 
-    def _at_gateways(
-        self, hardware: Hardware, receive: Callable[[Received], list[Envelope]], received: Received
-    ) -> list[Envelope]:
-        """Pass a message to the world, and notify the checkers of commands and fences that its gateways accepted."""
-        where, message = address(received.key) if received.key else None, received.message
-        if where is None or not isinstance(message, CmdVel | LeaseNote):
-            return receive(received)
-        name = where.owner if isinstance(message, CmdVel) else (where.to or "").replace("gateway", "robot")
-        robot = robot_id_of(name)
-        refused = _refused(hardware.world, robot)
-        sent = receive(received)
-        if isinstance(message, CmdVel) and _refused(hardware.world, robot) == refused:
-            if message.as_leader:
-                self.accepted.append((self.now, message))
-            self._tell("obeys", self.now, robot, message, received.at - message.gateway.time)
-            self._tell("bars", self.now, robot, message.term)
-        elif isinstance(message, LeaseNote) and isinstance(message.body, Fence):
-            self._tell("bars", self.now, robot, message.body.term)
-        return sent
-
     def _hear(self, _now: float, key: str, payload: bytes, message: Message) -> None:
         if isinstance(message, CmdVel) and message.as_leader:
             life = self.processes.get(robot_id_of(message.header.sender) or WITNESS_ID)
@@ -342,12 +322,6 @@ class AgentSimulation:
         lease = self.processes[robot_id].lease
         assert lease is not None, robot_id
         return lease
-
-
-def _refused(world: World, robot: int | None) -> int:
-    """Return the number of commands that the robot's gateway has refused so far."""
-    gateway = world.gateways.get(robot) if robot is not None else None
-    return 0 if gateway is None else sum(gateway.refused.values())
 
 
 def _place(name: str) -> int:

@@ -52,6 +52,7 @@ class Driver:
         self.incarnation = incarnation
         self.finished = False
         self.refusal: str | None = None
+        self.defer_hellos = self.defer_grants = False
         self.started_with: dict[str, Any] = {"kind": "driver", "robot_id": robot_id}
         self.interests = frozenset(
             {

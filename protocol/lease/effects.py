@@ -6,7 +6,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-from lfa.protocol.messages.consensus import Config, LeaseBody, Term
+from lfa.protocol.messages.consensus import Config, Hello, LeaseBody, Term
+from lfa.protocol.topics import TO_HELLO
 
 Cause = Literal["expired", "released", "deposed", "handed_over"]
 
@@ -16,6 +17,11 @@ class Send(Struct, frozen=True):
 
     to: str
     body: LeaseBody
+
+    @property
+    def receiver(self) -> str:
+        """Receiver's part of the key of the topic `lease`."""
+        return TO_HELLO if isinstance(self.body, Hello) else self.to
 
 
 class BecomeLeader(Struct, frozen=True):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-import msgspec
 from msgspec import Struct
 
 from lfa.protocol.geometry import Number
@@ -119,10 +118,6 @@ class Hello(Struct, frozen=True, array_like=True, tag="hello"):
     """Request of a process that holds no live grant or is out of the chain (E9); `version` is None if it is blank."""
 
     version: Version | None
-
-
-HELLO_MARK, GRANT_MARK = (msgspec.msgpack.encode(kind.__struct_config__.tag) for kind in (Hello, Grant))
-"""Byte sequences contained in every encoded LeaseNote with a Hello or a Grant."""
 
 
 class Fence(Struct, frozen=True, array_like=True, tag="fence"):

@@ -5,10 +5,12 @@ Input and output are bytes. Undecodable input is counted and dropped here: a cor
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import msgspec
 
 from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
-from lfa.protocol.node import Envelope, Local, Node, Received
+from lfa.protocol.node import Envelope, Local, Node, NodeObserver, Received
 from lfa.protocol.runtime.journal import Journal
 from lfa.protocol.topics import TOPIC, address, may_sign
 
@@ -20,9 +22,11 @@ _local_encoder = msgspec.msgpack.Encoder()
 class NodeHost:
     """Adapter that calls one Node and keeps its journal. Each call returns the encoded messages to publish."""
 
-    def __init__(self, node: Node, journal: Journal) -> None:
+    def __init__(self, node: Node, journal: Journal, observers: Sequence[NodeObserver] = ()) -> None:
+        """Host `node`; `observers` hear each of its inputs."""
         self.node = node
         self.journal = journal
+        self._observers = observers
         self.undecodable = 0
 
     def decoded(self, key: str, payload: bytes) -> Message | None:
@@ -46,7 +50,13 @@ class NodeHost:
 
     def deliver(self, at: float, key: str, message: Message | Local, payload: bytes) -> Sent:
         """Deliver a decoded message with its bytes, or a local event (`key`, `payload` empty), and journal the call."""
-        sent = _encoded(self.node.receive(Received(at, key, message)))
+        received = Received(at, key, message)
+        for observer in self._observers:
+            observer.before(received)
+        envelopes = self.node.receive(received)
+        for observer in self._observers:
+            observer.after(received)
+        sent = _encoded(envelopes)
         if key:
             self.journal.add("message", at, key, payload, sent)
         else:

@@ -20,7 +20,6 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import OperatorNote
-from lfa.protocol.names import WITNESS_NAME
 from lfa.protocol.node import Local, Node, Stop
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime import log_capture
@@ -97,7 +96,7 @@ class _NodeRunner:
         if not self._follow() and self._links.due(now):
             self.bus.resubscribe()
         host.journal.flush()
-        self.inbox.defer_grants = getattr(node, "defer_grants", False)  # only a robot ever leads
+        self.inbox.defer_grants = node.defer_grants
         return late
 
     def tick_p99_s(self) -> float:
@@ -167,7 +166,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     try:
         for node in nodes:
-            inbox = Inbox(wake, defer_hellos=node.name != WITNESS_NAME)
+            inbox = Inbox(wake, defer_hellos=node.defer_hellos)
             bus = connect(options, inbox, stop)
             if bus is None:
                 return 0

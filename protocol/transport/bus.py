@@ -11,9 +11,8 @@ from typing import Protocol
 
 from msgspec import Struct, structs
 
-from lfa.protocol.messages.consensus import GRANT_MARK, HELLO_MARK
 from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
-from lfa.protocol.topics import TOPIC, Address, Topic, address
+from lfa.protocol.topics import TO_ALL, TO_HELLO, TOPIC, Address, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all messages of a fleet of 16 to one process
 ANEW_S = (1.5, 6.5)
@@ -97,7 +96,7 @@ class Inbox:
         self._every = every
         self._defer_hellos = defer_hellos
         self.defer_grants = False
-        """Do not wake for GRANT either: set by a leader whose lease lasts well beyond its next deadline."""
+        """Do not wake for answers to this process alone: set while its lease lasts well beyond its next deadline."""
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
         """Remaining number of events that an owner may queue, and the time [s] of that number."""
@@ -116,13 +115,13 @@ class Inbox:
                 return
             else:
                 self._queue.append(arrival)
-        if topic is None or (topic.wakes and not self._can_wait(topic, arrival.payload)):
+        if where is None or topic is None or (topic.wakes and not self._can_wait(where)):
             self._wake.set()
 
-    def _can_wait(self, topic: Topic, payload: object) -> bool:
-        if topic.name != "lease" or not isinstance(payload, bytes):
+    def _can_wait(self, where: Address) -> bool:
+        if where.topic != "lease":
             return False
-        return (self._defer_hellos and HELLO_MARK in payload) or (self.defer_grants and GRANT_MARK in payload)
+        return self._defer_hellos if where.to == TO_HELLO else self.defer_grants and where.to != TO_ALL
 
     def _allows(self, where: Address | None, now: float) -> bool:
         """Apply one token bucket per owner, so that a flooding owner takes neither time nor space from the others."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from lfa.agents.agent import EASE_S, Agent
+from lfa.agents.agent import Agent
+from lfa.agents.robot_core import EASE_S
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.transport.link_model import Radio

@@ -169,8 +169,8 @@ def clock_errors() -> tuple[float]:
 
 def _let_wave(agent: Agent, lead: PathFollower) -> None:
     """Replace the path follower of an agent that has one, since no mission can specify a speed wave."""
-    assert agent._driver is not None
-    agent._driver.leading.lead = lead
+    assert agent.core is not None
+    agent.core.navigator.leading.lead = lead
 
 
 def _deviation(values: list[float]) -> float:

@@ -20,6 +20,7 @@ from lfa.protocol.topics import (
     OPERATOR_NAME,
     RECORDER_NAME,
     TO_ALL,
+    TO_HELLO,
     TOPICS,
     TRUTH_OWNER,
     WORLD_NAME,
@@ -186,7 +187,7 @@ def _rule(id: str, flow: str, messages: Iterable[str], keys: list[str]) -> dict[
 def _floods(plan: KeyPlan, host: str) -> list[dict[str, Any]]:
     """Return the rate limits, for robots only: a world that catches up sends bursts, whose newest message counts."""
     robots = [name for name in plan.places if robot_id_of(name)]
-    receivers = [TO_ALL, WITNESS_NAME, *robots, *(name.replace("robot", "gateway", 1) for name in robots)]
+    receivers = [TO_ALL, TO_HELLO, WITNESS_NAME, *robots, *(name.replace("robot", "gateway", 1) for name in robots)]
     rates = [
         {"key_expr": f"lfa/{plan.fleet}/{name}/{topic.name}{to}", "freq": freq}
         for name in plan.at(host)

@@ -134,6 +134,11 @@ class Lease:
         """Return True if leading and `now` is before the lease's expiry (I1, I2)."""
         return self._memory.holder is not None and now < expiry(self._memory)
 
+    def is_settled(self, until: float) -> bool:
+        """Return True if leading beyond `until` [s] without a change under way: answers can wait until then."""
+        m = self._memory
+        return self.may_command(until) and m.candidate is None and m.config.previous is None
+
     def commanded(self, now: float) -> None:
         """Record that a command as leader was sent at `now` [s]."""
         self._memory.pending_release.commanded_at = now

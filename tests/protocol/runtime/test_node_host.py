@@ -12,7 +12,7 @@ from lfa.protocol.messages.consensus import NO_TERM, Hello, LeaseNote, Role
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import Ask, MissionNote, PoseStamped
 from lfa.protocol.mission import Leading, Mission
-from lfa.protocol.node import Stop
+from lfa.protocol.node import Received, Stop
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, digest, read
 from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.topics import TOPIC, TOPICS, key
@@ -49,6 +49,29 @@ def test_the_journal_holds_each_call_and_the_digest_of_its_answer(tmp_path: Path
     assert [entry.kind for entry in entries] == ["tick", "message", "local"]
     assert [entry.digest for entry in entries[:2]] == [digest(asked), digest(told)]
     assert entries[1].payload == note
+
+
+class Diary:
+    """Writes down each call."""
+
+    def __init__(self) -> None:
+        self.lines: list[tuple[str, object]] = []
+
+    def before(self, received: Received) -> None:
+        self.lines.append(("before", received.message))
+
+    def after(self, received: Received) -> None:
+        self.lines.append(("after", received.message))
+
+
+def test_an_observer_hears_each_input_around_the_call_and_no_tick() -> None:
+    diary = Diary()
+    host = NodeHost(Witness("f", 1, 1), Journal(None, Heading(JOURNAL_VERSION, "witness", 1, 1, {})), [diary])
+    host.tick(0.5)
+    note = MissionNote(Header("world", 1, 0, 0.6), MISSION)
+    host.message(0.7, key("f", "world", "mission"), encode(note))
+    host.deliver(0.8, "", Stop(), b"")
+    assert diary.lines == [("before", note), ("after", note), ("before", Stop()), ("after", Stop())]
 
 
 def test_a_witness_without_a_mission_asks_for_one() -> None:

@@ -6,9 +6,8 @@ from random import Random
 
 import pytest
 
-from lfa.protocol.messages.codec import encode
-from lfa.protocol.messages.consensus import Grant, Hello, LeaseNote, Release, Term, Version
-from lfa.protocol.messages.header import Header
+from lfa.protocol.lease.effects import Send
+from lfa.protocol.messages.consensus import Hello, Release, Term
 from lfa.protocol.node import PeerDown, PeerUp, RouterLost
 from lfa.protocol.transport.bus import (
     ANEW_S,
@@ -28,29 +27,30 @@ def arrival(at: float, topic: str) -> Arrival:
     return Arrival(at, f"lfa/f/robot1/{topic}", b"")
 
 
-def test_who_looks_in_often_is_not_woken_by_hello() -> None:
-    header = Header("robot1", 1, 1, 0.0)
-    for defers, body, wakes in (
-        (True, Hello(None), False),
-        (False, Hello(None), True),
-        (True, Release(Term(1, 1, 1)), True),
-    ):
-        wake = Wake()
-        inbox = Inbox(wake, defer_hellos=defers)
-        inbox.put(Arrival(0.0, "lfa/f/robot1/lease/all", encode(LeaseNote(header, body))))
-        assert wake.wait(0.0) == wakes
-        assert len(inbox.take()) == 1
+@pytest.mark.parametrize(
+    ("to", "defer_hellos", "defer_grants", "wakes"),
+    [
+        ("hello", True, False, False),
+        ("hello", False, True, True),
+        ("robot1", True, True, False),  # GRANT, and any other answer to this process alone
+        ("robot1", True, False, True),
+        ("all", True, True, True),  # PROPOSE, PREPARE, RELEASE, FENCED
+    ],
+)
+def test_the_key_alone_decides_which_lease_messages_can_wait(
+    to: str, defer_hellos: bool, defer_grants: bool, wakes: bool
+) -> None:
+    wake = Wake()
+    inbox = Inbox(wake, defer_hellos=defer_hellos)
+    inbox.defer_grants = defer_grants
+    inbox.put(Arrival(0.0, f"lfa/f/robot2/lease/{to}", b"no message at all"))
+    assert wake.wait(0.0) is wakes
+    assert len(inbox.take()) == 1
 
 
-def test_a_leader_at_ease_is_not_woken_by_grants() -> None:
-    note = encode(LeaseNote(Header("robot2", 1, 1, 0.0), Grant(Term(1, 1, 1), 7, Version(), 0.5)))
-    for defer_grants in (True, False):
-        wake = Wake()
-        inbox = Inbox(wake, defer_hellos=True)
-        inbox.defer_grants = defer_grants
-        inbox.put(Arrival(0.0, "lfa/f/robot2/lease/robot1", note))
-        assert wake.wait(0.0) != defer_grants
-        assert len(inbox.take()) == 1
+def test_hello_has_a_receiver_of_its_own_in_its_key() -> None:
+    assert Send("all", Hello(None)).receiver == "hello"
+    assert Send("all", Release(Term(1, 1, 1))).receiver == "all"
 
 
 def test_of_a_state_only_the_newest_value_is_kept() -> None:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Leading, Mission
 from tests.protocol.lease.traces.stage import Stage

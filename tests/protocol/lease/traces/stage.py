@@ -12,7 +12,7 @@ from typing import Any
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import Effect, Send
 from lfa.protocol.lease.gateway import Gateway
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
 from lfa.protocol.messages.consensus import Fence, Fenced, LeaseBody, Member, Role
 from lfa.protocol.messages.header import Header

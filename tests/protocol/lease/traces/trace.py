@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
-from lfa.protocol.lease.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import (
     NO_TERM,
     Config,

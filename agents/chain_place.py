@@ -1,0 +1,50 @@
+"""Place of one robot in the chain of its lease: its role, the robot that it follows, and its neighbours."""
+
+from __future__ import annotations
+
+from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.messages.consensus import Role
+
+
+class ChainPlace:
+    """The chain of `lease` as seen by robot `robot_id`."""
+
+    def __init__(self, robot_id: int, lease: Lease) -> None:
+        self._id = robot_id
+        self._lease = lease
+        self._config = lease.config
+        self._ids = lease.chain
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Ids of the chain, leader first; computed anew only when the config has changed (read many times a step)."""
+        if self._lease.config is not self._config:
+            self._config, self._ids = self._lease.config, self._lease.chain
+        return self._ids
+
+    @property
+    def first(self) -> int:
+        """Id of the robot that leads the chain; 0 before the first chain."""
+        return (self.ids or (0,))[0]
+
+    def role(self, follows: bool) -> Role:
+        """Return the present role; `follows`: a predecessor is set."""
+        if self._lease.role is Role.LEADER:
+            return Role.LEADER
+        return Role.FOLLOWER if follows and self._id != self.first else Role.WAITING
+
+    def ahead(self, stuck: bool) -> int | None:
+        """Return the robot to follow; None for none. A `stuck` robot left out of it tries to join the tail (E22)."""
+        chain = self.ids
+        if self._id not in chain:
+            return chain[-1] if chain and stuck else None
+        place = chain.index(self._id)
+        return chain[place - 1] if place > 0 else None
+
+    def neighbours(self) -> tuple[int, ...]:
+        """Return the robots directly before and behind; empty outside of the chain."""
+        chain = self.ids
+        if self._id not in chain:
+            return ()
+        place = chain.index(self._id)
+        return chain[max(0, place - 1) : place] + chain[place + 1 : place + 2]

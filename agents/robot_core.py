@@ -1,0 +1,270 @@
+"""One robot with its mission: it updates its state from an input, runs the lease, chooses a role, drives, publishes.
+
+Messages of the lease act on arrival; control runs at its own fixed rate, and computes from what is known at that
+moment. A robot that becomes leader commands at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from lfa.agents.chain_place import ChainPlace
+from lfa.agents.command_publisher import CommandPublisher
+from lfa.agents.config import CONTROL_PERIOD_S
+from lfa.agents.leading.formation_commands import FormationCommands
+from lfa.agents.navigator import Navigator
+from lfa.agents.stuck_policy import StuckPolicy
+from lfa.agents.subscriptions import with_mission
+from lfa.agents.team_state import SENSORS_S_MAX, TeamState
+from lfa.agents.telemetry import Reports
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import STILL
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.machine.lease import Lease, Observer
+from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
+from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.team import FormationNote, ObstacleNote, OperatorNote, PoseStamped, TableRow
+from lfa.protocol.mission import Mission
+from lfa.protocol.mission_checks import check_mission
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.node import PeerDown, PeerUp, Stop, Vitals
+from lfa.protocol.outbox import Outbox
+
+TeamMessage = PoseStamped | TableRow | ObstacleNote | FormationNote
+EASE_S = 2.0 * CONTROL_PERIOD_S
+"""Lease time [s] left beyond which a grant may wait for the next control step: each voter of a round would wake the
+leader."""
+
+
+class RobotCore:
+    """One robot from its mission on. Its messages go to the `outbox`, which its agent drains after each call."""
+
+    def __init__(
+        self,
+        robot_id: int,
+        mission: Mission,
+        outbox: Outbox,
+        floor: int,
+        now: float,
+        observer: Observer | None,
+    ) -> None:
+        """Start with the mission. Raise `Refused` when it is invalid or has no robot `robot_id`.
+
+        `observer` is told of every event of the lease.
+        """
+        check_mission(mission)
+        if robot_id not in mission.robots:
+            raise Refused(f"id {robot_id}: not in the mission, which has robots {list(mission.robots)}")
+        self.defer_grants = False
+        self._id = robot_id
+        self._outbox = outbox
+        self._team = TeamState()
+        self.navigator = Navigator(robot_id, mission, self._team)
+        me = Member(robot_id, outbox.incarnation)
+        self.lease = Lease(me, mission, timing_of(mission.profile), now, floor, observer)
+        self._place = ChainPlace(robot_id, self.lease)
+        self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place)
+        self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
+        self._reports = Reports(outbox, len(mission.robots))
+        self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
+        self._next_control = now
+        self._arrived = False
+        self._lost_input = ""
+        """Input of the robot's own hardware that was reported as lost; empty for none."""
+        self._pending_release = False
+        self.interests = with_mission(outbox.fleet, outbox.name, None)
+        self._event("mission", now, {"version": mission.version, "robots": list(mission.robots)})
+
+    @property
+    def finished(self) -> bool:
+        """True when a requested exit is complete: the final messages are out."""
+        return self._pending_release and self.lease.released
+
+    def next_deadline(self) -> float:
+        """Return the time [s] of the next control step, or of the lease's deadline before it."""
+        return min(self._next_control, self.lease.next_deadline(self._next_control))
+
+    def tick(self, now: float) -> None:
+        """Do what is due at `now` [s]: the lease's part, then a control step."""
+        step = now >= self._next_control
+        if step:
+            self._next_control = _next_on_grid(self._next_control, now, CONTROL_PERIOD_S)
+        if step or now >= self.lease.next_deadline():
+            self._apply(self.lease.tick(now, self._next_control), now)
+        if step:
+            self._control(now)
+
+    # --- inputs ---------------------------------------------------------------------------------------------------
+
+    def receive(self, message: object, now: float) -> None:
+        """Process a message or a local event."""
+        lease, navigator = self.lease, self.navigator
+        match message:
+            case Sensors():
+                self._team.hear_sensors(message, now)
+                navigator.estimator.sensors(message, now)
+                self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
+            case Localization():
+                navigator.estimator.localization(message, now)
+            case LaserScan():
+                navigator.see(message, now)
+            case GroundProfile():
+                navigator.update_ground(message, now)
+            case LeaseNote():
+                source = robot_id_of(message.header.sender)
+                if source is not None:
+                    self._apply(lease.receive(Member(source, message.header.incarnation), message.body, now), now)
+            case PoseStamped() | TableRow() | ObstacleNote() | FormationNote():
+                robot = robot_id_of(message.header.sender)
+                if robot is not None and robot != self._id:
+                    self._hear_robot(robot, message, now)
+            case PeerUp() | PeerDown():
+                peer = robot_id_of(message.name)
+                if peer is not None:
+                    self._apply(lease.hint(peer, message.incarnation, isinstance(message, PeerUp), now), now)
+            case OperatorNote():
+                self._obey(message, now)
+            case Vitals():
+                self._reports.status(message, navigator, self._team, lease, self._role(), now)
+            case Stop():
+                self._stop(now)
+
+    def _hear_robot(self, robot: int, message: TeamMessage, now: float) -> None:
+        """Update the state from a message of another robot."""
+        navigator = self.navigator
+        ahead = navigator.predecessor
+        if ahead is not None and ahead.robot != robot:
+            ahead = None
+        match message:
+            case PoseStamped():
+                if ahead is not None:
+                    ahead.heard(message, now)
+            case TableRow():
+                self._team.hear_row(robot, message, now)
+                least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
+                if ahead is not None and least_s is not None:
+                    ahead.clock.reported(least_s, now)
+            case ObstacleNote(kind="trap"):
+                navigator.avoid_trap(message, now)
+            case ObstacleNote():
+                self._team.obstacles.update(robot, message, now)
+            case FormationNote():
+                if navigator.formation.request(message):
+                    self._event("formation", now, {"number": message.number, "trace": message.trace})
+
+    def _obey(self, note: OperatorNote, now: float) -> None:
+        """Obey an operator's command. Only the leader changes the formation, or hands the lease to the next in the
+        chain.
+        """
+        lease = self.lease
+        if note.command == "forget":
+            self._forget(note, now)
+        if lease.role is not Role.LEADER:
+            return
+        if note.command == "formation":
+            self._formation_commands.order(
+                str(note.arguments.get("side")), "operator", lease.chain[1:], lease.term, now
+            )
+        elif note.command == "handover":
+            self._hand_over(now)
+
+    def _forget(self, note: OperatorNote, now: float) -> None:
+        """Exclude incarnations that are dead for good from the lease's next attempt (E20)."""
+        try:
+            lost = msgspec.convert(note.arguments.get("lives"), tuple[Member, ...])
+        except msgspec.ValidationError:
+            return
+        self._event("forget", now, {"robots": [member.id for member in lost]})
+        self._apply(self.lease.request_forget(lost, now), now)
+
+    def _stop(self, now: float) -> None:
+        """Brake and release the lease; finished when the last messages are sent."""
+        if not self._pending_release:
+            self._pending_release = True
+            self._commands.publish(STILL, now, as_leader=False)
+            self._apply(self.lease.request_release(now), now)
+
+    # --- the lease --------------------------------------------------------------------------------------------------
+
+    def _apply(self, effects: list[Effect], now: float) -> None:
+        """Carry out the effects of the lease in their order."""
+        for effect in effects:
+            match effect:
+                case Send():
+                    note = LeaseNote(self._outbox.header("lease", now), effect.body)
+                    self._outbox.publish("lease", note, effect.receiver)
+                case BecomeLeader(term, _):
+                    self._event("lease", now, {"change": "acquired"}, term)
+                    self._event("role", now, {"role": Role.LEADER.value, "leader": self._id}, term)
+                    self._formation_commands.begin(now)
+                    self._control(now)
+                case StepDown(term, cause):
+                    self.defer_grants = False
+                    self._event("lease", now, {"change": cause}, term)
+                case AdoptChain(config):
+                    self._adopt(now)
+                    chain = [member.id for member in config.chain]
+                    self._event("chain", now, {"chain": chain, "seq": config.version.seq}, config.version.term)
+                case LeaseExtended():
+                    pass
+
+    def _adopt(self, now: float) -> None:
+        """Follow the robot that the newest config puts ahead."""
+        navigator = self.navigator
+        ahead = self._place.ahead(stuck=navigator.stuck is not None)
+        before = None if navigator.predecessor is None else navigator.predecessor.robot
+        navigator.follow_robot(ahead, len(self._place.ids) - 1)
+        if ahead != before:
+            self.interests = with_mission(self._outbox.fleet, self._outbox.name, ahead)
+            role = Role.FOLLOWER if ahead is not None else Role.WAITING
+            self._event("role", now, {"role": role.value, "predecessor": ahead}, self.lease.config.version.term)
+
+    def _hand_over(self, now: float) -> None:
+        self._commands.publish(STILL, now, as_leader=False)
+        self._apply(self.lease.request_handover(now), now)
+
+    # --- control ----------------------------------------------------------------------------------------------------
+
+    def _control(self, now: float) -> None:
+        """Run one control step: pose, role, command, then the reports."""
+        lease, navigator = self.lease, self.navigator
+        self.defer_grants = lease.is_settled(now + EASE_S)
+        known = navigator.estimator.pose_at(now)
+        if known is None:
+            return
+        pose, twist = known
+        role = Role.WAITING if self._pending_release else self._role()
+        command = navigator.drive(role, self._place.ids, pose, twist, now)
+        self._commands.publish(command, now, as_leader=role is Role.LEADER)
+        self._watch_inputs(now)
+        told = STILL if navigator.estimator.age_s(now) > SENSORS_S_MAX else navigator.published(twist)
+        self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, told, now)
+        if self._stuck_policy.step(role, pose, lease, navigator, now):
+            self._hand_over(now)
+            return
+        if role is Role.LEADER:
+            self._formation_commands.lead(navigator.lead, self._place.ids[1:], lease.term, now)
+        if role is Role.LEADER and not self._arrived and navigator.arrived(pose, command):
+            self._arrived = True
+            self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
+
+    def _watch_inputs(self, now: float) -> None:
+        """Publish an event when an input of the robot's own hardware is lost, and when it is back."""
+        lost = self.navigator.lost_input(now) or ""
+        if lost != self._lost_input:
+            self._lost_input = lost
+            self._event("input", now, {"state": "lost", "input": lost} if lost else {"state": "back"})
+
+    def _role(self) -> Role:
+        return self._place.role(follows=self.navigator.predecessor is not None)
+
+    def _event(self, kind: str, now: float, data: dict[str, Any], term: Term | None = None) -> None:
+        self._outbox.event(kind, now, self.lease.term if term is None else term, data)
+
+
+def _next_on_grid(deadline: float, now: float, period: float) -> float:
+    """Return the first point after `now` of the grid with step `period` through `deadline`."""
+    return deadline + period * (int((now - deadline) / period) + 1)
