@@ -25,8 +25,8 @@ MAY: dict[str, set[str]] = {
 ORDER = (
     "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/clock",
     "protocol/names", "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages",
-    "protocol/node", "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/lease/machine", "protocol/witness",
-    "protocol/transport", "protocol/runtime",
+    "protocol/node", "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/lease/machine",
+    "protocol/witness", "protocol/transport", "protocol/runtime",
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
