@@ -183,7 +183,7 @@ class _Bench:
         def follows() -> bool:
             nonlocal follows_at
             follows_at = min((
-                t.header.stamp for t in team.tracking
+                t.header.stamp for t in team.heard.tracking
                 if t.header.sender == f"robot{chain[place + 1]}" and t.predecessor == chain[place - 1]
                 and t.header.stamp >= at
             ), default=inf)  # fmt: skip
@@ -222,10 +222,10 @@ def _got_over(team: Team, at: float, leader: int, survivors: Sequence[int]) -> T
     """Wait until another robot leads and all survivors have closed the chain; return both times."""
 
     def command_at() -> float | None:
-        return team.first("leader_command", at, lambda e: e.data["robot"] != leader)
+        return team.heard.first("leader_command", at, lambda e: e.data["robot"] != leader)
 
     def chain_at() -> float | None:
-        return team.adopted(at, survivors, lambda chain: chain[0] != leader)
+        return team.heard.adopted(at, survivors, lambda chain: chain[0] != leader)
 
     _wait(team, lambda: command_at() is not None and chain_at() is not None)
     return Took(_ms(at, command_at()), _ms(at, chain_at()))

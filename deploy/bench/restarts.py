@@ -42,7 +42,7 @@ def _rows(kills: int) -> Iterator[list[BenchRow]]:
             try:
                 team.wait_until(lambda: len(team.chain()) == ROBOTS, f"robot {victim} is not back", REJOIN_S)
             except Broken as broken:
-                print(f"{broken}: {team.describe()}", file=sys.stderr, flush=True)
+                print(f"{broken}: {team.heard.describe(clock.now())}", file=sys.stderr, flush=True)
                 continue
             rejoined += 1
             slowest_s = max(slowest_s, clock.now() - began)

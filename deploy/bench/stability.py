@@ -92,15 +92,15 @@ def _live(scenario: Scenario, duration_s: float, loss: float) -> Watch:
         if loss > 0.0:
             team.order(WEATHER, radio={"loss": loss})
         _look_on(team, WARM_UP_S)
-        team.events.clear()
+        team.heard.events.clear()
         until = clock.now() + duration_s
         while clock.now() < until:
             _look_on(team, LOOK_S)
-            for event in team.events:
+            for event in team.heard.events:
                 watch.see(event)
-            team.events.clear()
+            team.heard.events.clear()
         if not team.chain() and loss == 0.0:
-            raise Broken(f"the chain is not whole at the end: {team.describe()}")
+            raise Broken(f"the chain is not whole at the end: {team.heard.describe(clock.now())}")
     return watch
 
 

@@ -1,79 +1,139 @@
-"""State of a running fleet from its messages: for progress on a terminal, and to know which robot leads."""
+"""State of a running fleet from its messages, the one source of every view of it. Pure: times come with the messages.
+
+Its readers: progress of a run (`deploy/run/progress_rows.py`), `lfa watch` and `lfa top` (`team_status.py`), health
+and hosts of a fleet on several machines (`deploy/fleet`), benches and tests of teams (`deploy/bench/harness`).
+"""
 
 from __future__ import annotations
 
-from math import hypot
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from msgspec import structs
 
 from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.fleet import HostStatus
 from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.messages.team import Event, Status, Tracking
+from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
 from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import HOST_PREFIX
+
+M = TypeVar("M")
+FRESH_S = 1.0
+"""Age [s] from which a pose is outdated: its robot counts as silent."""
+
+
+class Heard(NamedTuple, Generic[M]):
+    """A message with its time [s] on the observer's clock."""
+
+    at: float
+    message: M
+
+
+class AdoptedChain(NamedTuple):
+    """Chain that a robot has adopted, with the version of its config."""
+
+    version: tuple[int, ...]
+    """Number, issuer and incarnation of its term, and its sequence number in the term."""
+    chain: tuple[int, ...]
 
 
 class FleetState:
-    """State of each robot, updated from messages by `see`, as text in `rows` and `line`. Times are world time [s]."""
+    """Newest message of each kind from each robot and host, updated by `update`."""
 
-    def __init__(self, robots: tuple[int, ...]) -> None:
-        self._robots = robots
-        self._roles: dict[int, str] = {}
-        self._term = 0
-        self._tracking: dict[int, Tracking] = {}
-        self._notes: dict[int, str] = {}
-        self._truth: Truth | None = None
-        self.gone: set[int] = set()
+    def __init__(self) -> None:
+        self.poses: dict[int, Heard[PoseStamped]] = {}
+        self.tracking: dict[int, Heard[Tracking]] = {}
+        self.status: dict[str, Heard[Status]] = {}
+        """By name: the witness has one, too."""
+        self.hosts: dict[str, Heard[HostStatus]] = {}
+        self.chains: dict[int, AdoptedChain] = {}
+        self.roles: dict[int, str] = {}
+        """Role of each robot by its last status or change of role."""
+        self.term = 0
+        """Highest term number in a status or a change of role."""
+        self.truth: Truth | None = None
 
-    def see(self, message: Message) -> None:
-        """Update the state from one message."""
+    def update(self, at: float, message: Message) -> None:
+        """Update the state by a message of time `at` [s]."""
         robot = robot_id_of(message.header.sender)
         match message:
+            case PoseStamped() if robot:
+                self.poses[robot] = Heard(at, message)
+            case Tracking() if robot:
+                self.tracking[robot] = Heard(at, message)
             case Truth():
-                self._truth = message
-            case Tracking() if robot is not None:
-                self._tracking[robot] = message
-            case Status() if robot is not None:
-                self._notes[robot] = message.text
-                self._roles[robot] = message.role
-                self._term = max(self._term, message.term.n)
-            case Event(kind="role", data={"role": str() as role}) if robot is not None:
-                self._roles[robot] = role
-                if message.term is not None:
-                    self._term = max(self._term, message.term.n)
+                self.truth = message
+            case HostStatus() if message.header.sender == f"{HOST_PREFIX}{message.host}":
+                self.hosts[message.host] = Heard(at, message)
+            case Status():
+                self.status[message.header.sender] = Heard(at, message)
+                if robot:
+                    self._role(robot, message.role, message.term.n)
+                    self._catch_up(robot, message.counters)
+            case Event() if robot:
+                self._event(robot, message)
 
-    @property
-    def time_s(self) -> float:
-        return 0.0 if self._truth is None else self._truth.time_s
+    def forget(self, robot: int) -> None:
+        """Forget what an ended incarnation of a robot said."""
+        for known in (self.poses, self.tracking, self.chains, self.roles):
+            known.pop(robot, None)
 
-    def headline(self, leader: int | None) -> str:
-        who = "no leader yet" if leader is None else f"leader {leader}, term {self._term}"
-        return f"{self.time_s:7.1f} s  {who}"
+    def fresh(self, robot: int, now: float, within_s: float = FRESH_S) -> PoseStamped | None:
+        """Return a robot's pose if it is younger than `within_s` [s]."""
+        heard = self.poses.get(robot)
+        return heard.message if heard is not None and now - heard.at < within_s else None
 
-    def rows(self) -> list[tuple[str, str, str, str]]:
-        """Return name, role, distance error and state of each robot."""
-        return [(f"robot{robot}", self._role(robot), self._error(robot), self._state(robot)) for robot in self._robots]
+    def leaders(self, now: float, within_s: float = FRESH_S) -> list[int]:
+        """Return the robots whose recent pose claims leadership, that of the highest term last."""
+        recent = {robot: self.fresh(robot, now, within_s) for robot in self.poses}
+        claims = [(pose.term, robot) for robot, pose in recent.items() if pose and pose.role is Role.LEADER]
+        return [robot for _, robot in sorted(claims)]
 
-    def line(self, leader: int | None) -> str:
-        """Return the headline and all rows on one line."""
-        cells = (" ".join(cell for cell in row if cell) for row in self.rows())
-        return "  |  ".join([self.headline(leader), *cells])
+    def leader(self, now: float) -> int | None:
+        """Return the leader by the robots' poses: the one of the highest term; None if none claims to lead."""
+        return next(reversed(self.leaders(now)), None)
 
-    def _role(self, robot: int) -> str:
-        return "gone" if robot in self.gone else self._roles.get(robot, "starting")
+    def chain(self, now: float) -> tuple[int, ...]:
+        """Return the chain from the leader on, as far as each robot follows a member of it."""
+        leader = self.leader(now)
+        if leader is None:
+            return ()
+        links = {
+            heard.message.predecessor: robot
+            for robot, heard in self.tracking.items()
+            if now - heard.at < FRESH_S and self._follows(robot)
+        }
+        chain = [leader]
+        while (following := links.get(chain[-1])) is not None and following not in chain:
+            chain.append(following)
+        return tuple(chain)
 
-    def _error(self, robot: int) -> str:
-        """Return D - k^d [m] from the last ground truth, as text; empty unless the robot follows."""
-        tracking, truth = self._tracking.get(robot), self._truth
-        if tracking is None or truth is None or self._role(robot) != "follower":
-            return ""
-        places = {r.id: (r.x, r.y) for r in truth.robots}
-        if robot not in places or tracking.predecessor not in places:
-            return ""
-        (x, y), (px, py) = places[robot], places[tracking.predecessor]
-        return f"{hypot(x - px, y - py) - tracking.separation_m:+.3f} m"
+    def _follows(self, robot: int) -> bool:
+        return robot in self.poses and self.poses[robot].message.role is Role.FOLLOWER
 
-    def _state(self, robot: int) -> str:
-        """Return a follower's tracking state, or else the text of the robot's last status."""
-        tracking, role = self._tracking.get(robot), self._role(robot)
-        if role == "follower" and tracking is not None:
-            return tracking.state
-        note = self._notes.get(robot, "")
-        return "" if role in ("gone", note) else note
+    def _role(self, robot: int, role: str, term: int) -> None:
+        self.roles[robot] = role
+        self.term = max(self.term, term)
+
+    def _event(self, robot: int, event: Event) -> None:
+        match event:
+            case Event(kind="role", data={"role": str() as role}):
+                self._role(robot, role, 0 if event.term is None else event.term.n)
+            case Event(kind="chain", data={"chain": chain, "seq": int() as seq}) if event.term is not None:
+                self.chains[robot] = AdoptedChain((*structs.astuple(event.term), seq), _ids(chain))
+
+    def _catch_up(self, robot: int, counters: dict[str, Any]) -> None:
+        """Update a robot's chain from the config version in its status, in case its chain event was lost.
+
+        The chain is that of a robot that reported the same version.
+        """
+        known = max(self.chains.values(), default=None)
+        said = (counters.get("config_n"), counters.get("config_seq"))
+        if known is not None and said == (known.version[0], known.version[-1]):
+            self.chains[robot] = known
+
+
+def _ids(chain: object) -> tuple[int, ...]:
+    """Return the robot ids in an event's data, which any sender may have written."""
+    return tuple(robot for robot in chain if isinstance(robot, int)) if isinstance(chain, list | tuple) else ()

@@ -12,11 +12,12 @@ from lfa.deploy.client.discovery import Running, agents, one_fleet, option
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import BadMessage, Message, decode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.node import Local, PeerDown, PeerUp
-from lfa.protocol.topics import OPERATOR_NAME, TOPIC, address, alive_key, fleet_name
+from lfa.protocol.topics import OPERATOR_NAME, alive_key, fleet_name
 from lfa.protocol.transport.bus import Arrival, Inbox, Links, Wake
 from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent, default_endpoint
 from lfa.world.description.load import Scenario, draw, load
@@ -57,6 +58,7 @@ class Subscriber:
         self._inbox = inbox
         self._wake = wake
         self._links = Links()
+        self._decoder = Decoder()
         self._tokens: set[tuple[str, int]] = set()
 
     @property
@@ -75,8 +77,7 @@ class Subscriber:
                 self._see_token(arrival.payload)
         if self._links.due(now):
             self.bus.resubscribe()
-        found = ((arrival, _message(arrival)) for arrival in arrivals)
-        return [(arrival, message) for arrival, message in found if message is not None]
+        return list(self._decoder.messages(arrivals))
 
     @property
     def living(self) -> set[str]:
@@ -117,17 +118,6 @@ def listen(fleet: FleetAddress, topics: frozenset[str], *, every: bool = False) 
         yield Subscriber(fleet, bus, inbox, wake)
     finally:
         bus.close()
-
-
-def _message(arrival: Arrival) -> Message | None:
-    where = address(arrival.key)
-    topic = TOPIC.get(where.topic) if where is not None else None
-    if topic is None or not isinstance(arrival.payload, bytes):
-        return None
-    try:
-        return decode(arrival.payload, topic.type)
-    except BadMessage:
-        return None
 
 
 def scenario_of_fleet(fleet: FleetAddress) -> Scenario | None:

@@ -10,13 +10,12 @@ from typing import Any
 
 from msgspec import Struct
 
+from lfa.deploy.client.fleet_state import FRESH_S, FleetState
 from lfa.protocol.geometry import wrap
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.consensus import Role
-from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
-from lfa.protocol.names import robot_id_of
+from lfa.protocol.messages.team import Event, Status, Tracking
+from lfa.protocol.names import robot_id_of, robot_name
 
-STALE_S = 1.0  # age [s] above which a pose counts as outdated
 LEADER_STEP_S = 1.0
 LEADERS_KEPT = 300
 EVENTS_KEPT = 50
@@ -55,9 +54,7 @@ class Board:
     """Status of a fleet, updated from messages by `see` and `sample`, read from `rows`, `leaders` and `events`."""
 
     def __init__(self, robots: tuple[int, ...] = ()) -> None:
-        self._poses: dict[int, tuple[float, PoseStamped]] = {}
-        self._tracking: dict[int, tuple[float, Tracking]] = {}
-        self._status: dict[int, Status] = {}
+        self._state = FleetState()
         self._robots = set(robots)
         self._sampled_at: float | None = None
         self.leaders: deque[int | None] = deque(maxlen=LEADERS_KEPT)
@@ -69,16 +66,9 @@ class Board:
         robot = robot_id_of(message.header.sender)
         if isinstance(message, Event):
             self._happened(at, message)
-        if not robot:
-            return
-        self._robots.add(robot)
-        match message:
-            case PoseStamped():
-                self._poses[robot] = (at, message)
-            case Tracking():
-                self._tracking[robot] = (at, message)
-            case Status():
-                self._status[robot] = message
+        if robot:
+            self._robots.add(robot)
+            self._state.update(at, message)
 
     def sample(self, now: float) -> None:
         """Append the present leader to `leaders`, once each `LEADER_STEP_S`."""
@@ -87,28 +77,22 @@ class Board:
             self.leaders.append(self.leader(now))
 
     def leader(self, now: float) -> int | None:
-        """Return the robot with the highest term among those whose recent pose claims leadership; None if none does."""
-        claims = [
-            (pose.term, robot)
-            for robot, (at, pose) in self._poses.items()
-            if pose.role is Role.LEADER and now - at < STALE_S
-        ]
-        return max(claims)[1] if claims else None
+        """Return the robot that leads by the poses; None if none claims to."""
+        return self._state.leader(now)
 
     def rows(self, now: float) -> list[RobotStatus]:
         return [self._row(robot, now) for robot in sorted(self._robots)]
 
     def _row(self, robot: int, now: float) -> RobotStatus:
-        at, pose = self._poses.get(robot, (None, None))
-        heard_at, tracking = self._tracking.get(robot, (0.0, None))
-        status = self._status.get(robot)
-        age_s = None if at is None else max(0.0, now - at)
-        if age_s is None or age_s > STALE_S or pose is None:
-            role, tracking = ("silent" if pose is not None else "unheard"), None
-        else:
-            role = pose.role.value
-        if tracking is not None and (role != "follower" or now - heard_at > STALE_S):
-            tracking = None
+        heard = self._state.poses.get(robot)
+        pose = None if heard is None else heard.message
+        said = self._state.status.get(robot_name(robot))
+        status = None if said is None else said.message
+        fresh = self._state.fresh(robot, now)
+        role = ("silent" if pose is not None else "unheard") if fresh is None else fresh.role.value
+        tracked = self._state.tracking.get(robot)
+        recent = tracked is not None and role == "follower" and now - tracked.at < FRESH_S
+        tracking = tracked.message if tracked is not None and recent else None
         counters = {} if status is None else status.counters
         return RobotStatus(
             robot=robot,
@@ -118,7 +102,7 @@ class Board:
             error_m=None if tracking is None else float(tracking.error_m),
             heading_error_rad=None if tracking is None or pose is None else wrap(tracking.heading - pose.theta),
             speed_mps=None if pose is None else pose.twist.linear_x,
-            pose_age_s=age_s,
+            pose_age_s=None if heard is None else max(0.0, now - heard.at),
             state=_state(role, tracking, status),
             loop_lag_ms=counters.get("loop_lag_ms"),
             cpu_percent=counters.get("cpu_percent"),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
+from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen
 from lfa.deploy.fleet.plan import host_plan as parts
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
@@ -19,7 +20,6 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.header import Header
-from lfa.protocol.messages.team import Status
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, key
 
 TOPICS = frozenset({"*/host", "*/log", "*/pose", "*/tracking", "*/status", "*/event"})
@@ -90,10 +90,17 @@ class FleetView:
         self.seen = seen
         self._life = clock.wall_ms()
         self._seq = 0
-        self.hosts: dict[str, HostStatus] = {}
-        self.heard_at: dict[str, float] = {}
-        self.texts: dict[str, str] = {}
+        self._state = FleetState()
+
+    @property
+    def hosts(self) -> dict[str, HostStatus]:
+        """Last status of each machine, by name."""
+        return {name: heard.message for name, heard in self._state.hosts.items()}
+
+    @property
+    def texts(self) -> dict[str, str]:
         """Status text of each robot, by name."""
+        return {name: heard.message.text for name, heard in self._state.status.items()}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -106,16 +113,13 @@ class FleetView:
         heard = []
         for arrival, message in self._ear.take():
             heard.append((arrival.at, message))
-            if isinstance(message, HostStatus) and message.header.sender == f"{HOST_PREFIX}{message.host}":
-                self.hosts[message.host] = message
-                self.heard_at[message.host] = arrival.at
-            elif isinstance(message, Status):
-                self.texts[message.header.sender] = message.text
+            self._state.update(arrival.at, message)
         return heard
 
     def silent(self, now: float) -> list[str]:
         """Return the machines without a status in the last SILENT_S."""
-        return [name for name in self.names if now - self.heard_at.get(name, -SILENT_S) >= SILENT_S]
+        heard = self._state.hosts
+        return [name for name in self.names if name not in heard or now - heard[name].at >= SILENT_S]
 
     def host_of(self, process: str) -> str | None:
         for name, status in self.hosts.items():

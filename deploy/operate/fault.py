@@ -14,6 +14,7 @@ import msgspec
 import typer
 
 from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agents, one_fleet, option, programs
+from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
@@ -21,13 +22,13 @@ from lfa.deploy.process import identity as processes
 from lfa.deploy.process.identity import Identity
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import BadMessage, decode, encode
-from lfa.protocol.messages.consensus import Role
-from lfa.protocol.messages.team import Event, PoseStamped
+from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of, whole_number
 from lfa.protocol.topics import OPERATOR_NAME, key
-from lfa.protocol.transport.bus import Arrival, Inbox
+from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent
 
@@ -102,7 +103,7 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
             raise Refused(f"restart {target!r}: must be a robot's id, such as 3")
         bus.follow(frozenset({operator.key}))
         until, again = clock.now() + RESTART_S_MAX, 0.0
-        while not any(_is_done(arrival, robot) for arrival in inbox.take()):
+        while not any(_is_done(message, robot) for _, message in Decoder().messages(inbox.take())):
             now = clock.now()
             if now >= again:  # the launcher may not have noticed yet that the robot's last process is gone
                 bus.publish(operator.orders_key, encode(operator.orders(RESTART, now, robot=robot)))
@@ -118,12 +119,8 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
     return 0
 
 
-def _is_done(arrival: Arrival, robot: int) -> bool:
-    try:
-        event = decode(arrival.payload, Event) if isinstance(arrival.payload, bytes) else None
-    except BadMessage:
-        return False
-    return isinstance(event, Event) and event.data == event.data | {"deed": RESTART, "robot": robot}
+def _is_done(message: Message, robot: int) -> bool:
+    return isinstance(message, Event) and message.data == message.data | {"deed": RESTART, "robot": robot}
 
 
 def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> tuple[int | str, Identity]:
@@ -162,17 +159,10 @@ def _leader(fleet: str, bus: ZenohBus, inbox: Inbox) -> int | None:
     """Listen for a second and return the robot that claims leadership in the highest term, or None."""
     bus.follow(frozenset({key(fleet, "*", "pose")}))
     clock.sleep(LISTEN_S)
-    leaders = []
-    for arrival in inbox.take():
-        if not isinstance(arrival.payload, bytes):
-            continue
-        try:
-            pose = decode(arrival.payload, PoseStamped)
-        except BadMessage:
-            continue
-        if isinstance(pose, PoseStamped) and pose.role is Role.LEADER:
-            leaders.append((pose.term, robot_id_of(pose.header.sender)))
-    return max(leaders)[1] if leaders else None
+    state = FleetState()
+    for arrival, message in Decoder().messages(inbox.take()):
+        state.update(arrival.at, message)
+    return state.leader(clock.now())
 
 
 def _bus(agent: Running, inbox: Inbox) -> ZenohBus:

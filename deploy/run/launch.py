@@ -30,15 +30,17 @@ from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from lfa.deploy.run.process_table import rows
 from lfa.deploy.run.progress import Progress, progress
+from lfa.deploy.run.progress_rows import ProgressRows
 from lfa.deploy.run.recorder_process import RecorderTask, RunResult
 from lfa.deploy.run.termination import Referee
 from lfa.protocol import clock
-from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Event, OperatorNote
 from lfa.protocol.names import robot_id_of, robot_name
-from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TOPIC, WORLD_NAME, address, key
+from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME, key
 from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.link_model import CLEAR, WEATHER, LinkModel
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
@@ -120,12 +122,14 @@ class _Launch:
         self._undone: list[str] = []
         self._doomed: set[str] = set()
         self._referee = Referee(drawn)
-        self._standing = FleetState(drawn.mission.robots)
+        self._state = FleetState()
+        self._rows_shown = ProgressRows(drawn.mission.robots, self._state)
         self._time = WorldTime()
         self._heard_at = clock.now()
         self._began_at: float | None = None
         self._operator = Operator(about.fleet, clock.wall_ms())
         self._inbox = Inbox()
+        self._decoder = Decoder()
         self._bus: ZenohBus | None = None
         self._air = LinkModel(CLEAR, Random(0))
         """Link conditions as last ordered, by the script or by hand; they are repeated to a process that restarts."""
@@ -161,7 +165,7 @@ class _Launch:
                 self._do_faults(view)
                 if clock.now() >= show_at:
                     show_at += SHOW_EVERY_S
-                    view.show(self._standing, self._referee.leader)
+                    view.show(self._rows_shown, self._referee.leader)
                 clock.sleep(STEP_S)
         except _Aborted as aborted:
             return verdict_of(interrupts) or Verdict("aborted", str(aborted))
@@ -196,14 +200,7 @@ class _Launch:
     # --- received messages ------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        for arrival in self._inbox.take():
-            where = address(arrival.key)
-            if not isinstance(arrival.payload, bytes) or where is None or where.topic not in TOPIC:
-                continue
-            try:
-                message = decode(arrival.payload, TOPIC[where.topic].type)
-            except BadMessage:
-                continue
+        for arrival, message in self._decoder.messages(self._inbox.take()):
             self._hear(arrival.at, message)
 
     def _hear(self, at: float, message: Message) -> None:
@@ -223,7 +220,7 @@ class _Launch:
             if robot in self._mission.robots and self._time.known:
                 self._do(RESTART, robot)
         self._referee.see(message)
-        self._standing.see(message)
+        self._state.update(at, message)
 
     def _expect(self, event: Event) -> None:
         """Register a fault by hand (`lfa fault`), so that the end of its process is not reported as a failure."""
@@ -242,13 +239,13 @@ class _Launch:
             name = robot_name(robot_id)
             if self._revives(name, view):
                 continue
-            if robot_id not in self._standing.gone and not self._processes.runs(name):
-                self._standing.gone.add(robot_id)
+            if robot_id not in self._rows_shown.gone and not self._processes.runs(name):
+                self._rows_shown.gone.add(robot_id)
                 how = self._processes.exit_of(name)
-                view.note(self._standing, str(how))
+                view.note(self._rows_shown, str(how))
                 if name not in self._doomed:
                     self._say("died", robot=robot_id, how=how)
-        if len(self._standing.gone) == len(self._mission.robots) and not self._schedule.pending:
+        if len(self._rows_shown.gone) == len(self._mission.robots) and not self._schedule.pending:
             raise _Aborted("no agent is left")
         starts = not self._time.known or bool(self._restarted)
         if clock.now() > self._heard_at + (START_S_MAX if starts else SILENCE_S_MAX):
@@ -261,7 +258,7 @@ class _Launch:
             return False
         if clock.now() >= self._revive_at.get(name, 0.0):
             self._revive_at[name] = clock.now() + REVIVE_S_MIN
-            view.note(self._standing, f"{self._processes.exit_of(name)}: started again")
+            view.note(self._rows_shown, f"{self._processes.exit_of(name)}: started again")
             self._start_again(name)
             self._restarted.append(name)
         return True
@@ -280,7 +277,7 @@ class _Launch:
             return
         for deed, victim in self._schedule.due(self._time.of(clock.now()), self._referee.leader):
             if self._do(deed, victim):
-                view.note(self._standing, f"fault: {deed} {f'robot {victim}' if isinstance(victim, int) else victim}")
+                view.note(self._rows_shown, f"fault: {deed} {f'robot {victim}' if isinstance(victim, int) else victim}")
             else:
                 self._undone.append(f"{deed} {victim}")
         if self._repeat_weather_until > clock.now() and (self._air.cuts or self._air.radio != CLEAR):
@@ -301,7 +298,7 @@ class _Launch:
         self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
         if deed == RESTART:
             self._doomed.discard(name)
-            self._standing.gone.discard(robot_id_of(name) or 0)
+            self._rows_shown.gone.discard(robot_id_of(name) or 0)
             self._start_again(name)
             return True
         if deed in ("kill", "terminate"):

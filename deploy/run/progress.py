@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
-from lfa.deploy.client.fleet_state import FleetState
+from lfa.deploy.run.progress_rows import ProgressRows
 from lfa.deploy.terminal_text import cell, visible
 from lfa.protocol.output import write_line
 
@@ -21,9 +21,9 @@ REDRAW_HZ = 5.0
 class Progress(Protocol):
     """Display of a run's progress on stderr; stdout is reserved for the result."""
 
-    def show(self, standing: FleetState, leader: int | None) -> None: ...
+    def show(self, rows: ProgressRows, leader: int | None) -> None: ...
 
-    def note(self, standing: FleetState, text: str) -> None:
+    def note(self, rows: ProgressRows, text: str) -> None:
         """Print a line about an occurrence, with the world's time [s]."""
 
     def close(self) -> None: ...
@@ -39,14 +39,14 @@ class _InLines:
         self._next_s = 0.0
         self._leader: int | None = None
 
-    def show(self, standing: FleetState, leader: int | None) -> None:
-        if standing.time_s >= self._next_s or leader != self._leader:
-            self._next_s = standing.time_s + LINE_EVERY_S
+    def show(self, rows: ProgressRows, leader: int | None) -> None:
+        if rows.time_s >= self._next_s or leader != self._leader:
+            self._next_s = rows.time_s + LINE_EVERY_S
             self._leader = leader
-            write_line(visible(standing.line(leader)), sys.stderr)
+            write_line(visible(rows.line(leader)), sys.stderr)
 
-    def note(self, standing: FleetState, text: str) -> None:
-        write_line(visible(f"{standing.time_s:7.1f} s  {text}"), sys.stderr)
+    def note(self, rows: ProgressRows, text: str) -> None:
+        write_line(visible(f"{rows.time_s:7.1f} s  {text}"), sys.stderr)
 
     def close(self) -> None:
         pass
@@ -62,25 +62,25 @@ class _OnTerminal:
         self._live: Live = Live(console=Console(stderr=True), refresh_per_second=REDRAW_HZ)
         self._live.start()
 
-    def show(self, standing: FleetState, leader: int | None) -> None:
+    def show(self, rows: ProgressRows, leader: int | None) -> None:
         with suppress(OSError):
-            self._live.update(_table(standing, leader))
+            self._live.update(_table(rows, leader))
 
-    def note(self, standing: FleetState, text: str) -> None:
+    def note(self, rows: ProgressRows, text: str) -> None:
         with suppress(OSError):
-            self._live.console.print(cell(f"{standing.time_s:7.1f} s  {text}"))
+            self._live.console.print(cell(f"{rows.time_s:7.1f} s  {text}"))
 
     def close(self) -> None:
         with suppress(OSError):
             self._live.stop()
 
 
-def _table(standing: FleetState, leader: int | None) -> Table:
+def _table(rows: ProgressRows, leader: int | None) -> Table:
     from rich.table import Table
 
-    table = Table(title=cell(standing.headline(leader)), title_justify="left", box=None, padding=(0, 2))
+    table = Table(title=cell(rows.headline(leader)), title_justify="left", box=None, padding=(0, 2))
     for heading in ("", "role", "distance error", "state"):
         table.add_column(heading, justify="right" if heading == "distance error" else "left")
-    for row in standing.rows():
+    for row in rows.rows():
         table.add_row(*map(cell, row))
     return table

@@ -23,15 +23,16 @@ from lfa.deploy.recording.run_folder import About
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.finish import finish
 from lfa.protocol import clock
-from lfa.protocol.messages.codec import BadMessage, Message, decode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import PeerDown, PeerUp
 from lfa.protocol.output import write_line
-from lfa.protocol.topics import RECORDER_NAME, TOPIC, address, alive_key, key
+from lfa.protocol.topics import RECORDER_NAME, alive_key, key
 from lfa.protocol.transport.bus import Arrival, Inbox, Wake
+from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 INBOX_SIZE_MAX = 65536  # one minute of a fleet of four, in case the disk is slow
@@ -99,7 +100,7 @@ class _Tape:
         self._incarnation = clock.wall_ms()
         self._key = key(fleet, RECORDER_NAME, "event")
         self._seq = 0
-        self._undecodable = 0
+        self._decoder = Decoder()
         self._missing = 0
         self._last_seq: dict[tuple[str, str, int], int] = {}
         self._time = WorldTime()
@@ -138,7 +139,7 @@ class _Tape:
         recording = self._recorder.close()
         self._bus.close()
         recording.missing, recording.dropped = self._missing, self._inbox.dropped
-        recording.undecodable = self._undecodable
+        recording.undecodable = self._decoder.undecodable
         lost = f"{recording.missing} missing, {recording.dropped} dropped, {recording.unwritten} refused by the disk"
         write_line(f"{recording.messages} recorded, {recording.undecodable} undecodable, {lost}", sys.stdout)
         return recording
@@ -150,14 +151,8 @@ class _Tape:
                 return self._key, self._says("peer_up", name, life)
             case PeerDown(name=name, incarnation=life):
                 return self._key, self._says("peer_down", name, life)
-            case bytes() as payload:
-                where = address(arrival.key)
-                topic = TOPIC.get(where.topic) if where is not None else None
-                try:
-                    return (arrival.key, decode(payload, topic.type)) if topic is not None else None
-                except BadMessage:
-                    self._undecodable += 1
-        return None
+        message = self._decoder.message(arrival)
+        return None if message is None else (arrival.key, message)
 
     def _says(self, kind: str, name: str, life: int) -> Event:
         self._seq += 1

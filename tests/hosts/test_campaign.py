@@ -111,7 +111,7 @@ def test_drawn_faults_round_after_round_break_no_invariant_and_all_come_together
         for number in range(ROUNDS):
             chain = team.await_chain(ROBOTS, WHOLE_S)
             check_terms(team)
-            team.events.clear()
+            team.heard.events.clear()
             kind = chance.choice(KINDS)
             faults.for_s = chance.choice((0.0, 0.05, 0.5, 2.0))
             print(f"{number:4} chain {chain}: {kind}", flush=True)

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from lfa.deploy.bench.harness.team import REST_MPS, Team
+from lfa.deploy.bench.harness.team import Team
+from lfa.deploy.bench.harness.team_history import REST_MPS
 from lfa.protocol import clock
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import WORLD_NAME
@@ -39,7 +40,7 @@ def hosts() -> Iterator[tuple[Team, Net]]:
 def whole(hosts: tuple[Team, Net]) -> Iterator[Whole]:
     team, net = hosts
     chain = team.await_chain(ROBOTS, WHOLE_S)
-    team.events.clear()
+    team.heard.events.clear()
     yield team, net, chain
     net.heal()
     team.heal()
@@ -56,7 +57,7 @@ def test_l7_of_two_halves_only_the_witness_side_drives_and_healing_makes_one_cha
     parted = clock.now()
     pass_time(team, PARTED_S)
     check_minority(team, chain[:2], chain[2:], led=True)
-    assert max(team.speeds_mps[robot] for robot in chain[2:]) > REST_MPS, "the witness's side does not drive"
+    assert max(team.heard.speeds_mps[robot] for robot in chain[2:]) > REST_MPS, "the witness's side does not drive"
     net.heal()
     healed = clock.now()
     team.wait_until(lambda: len(team.chain()) == ROBOTS, "no chain of all", WHOLE_S)

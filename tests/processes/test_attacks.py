@@ -292,8 +292,8 @@ def test_a_flood(fleet: Attacked) -> None:
     assert sent > 1000 * FLOOD_S
     expected = TOPIC["pose"].rate_hz * lasted_s  # type: ignore[operator]
     assert min(poses[f"{BASE}/robot{n}/pose"] for n in (1, 2)) > 0.6 * expected, poses
-    assert fleet.team.chain()[:2] in ((1, 2), ()), fleet.team.describe()
-    assert not [event for event in fleet.team.events if event.kind == "lease" and event.header.stamp > begun]
+    assert fleet.team.chain()[:2] in ((1, 2), ()), fleet.team.heard.describe(clock.now())
+    assert not [event for event in fleet.team.heard.events if event.kind == "lease" and event.header.stamp > begun]
 
 
 def _status(sample: zenoh.Sample) -> Status:

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from lfa.deploy.bench.harness.team import REST_MPS, Team
+from lfa.deploy.bench.harness.team import Team
+from lfa.deploy.bench.harness.team_history import REST_MPS
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER
@@ -26,7 +27,7 @@ def module_team() -> Iterator[Team]:
 @pytest.fixture
 def live(module_team: Team) -> Iterator[Team]:
     module_team.await_chain(ROBOTS, WHOLE_S)
-    module_team.events.clear()
+    module_team.heard.events.clear()
     yield module_team
     module_team.heal()
     check_terms(module_team)
@@ -43,7 +44,7 @@ def test_l7_of_two_halves_the_one_without_the_witness_comes_to_rest(live: Team, 
         live.wait_until(lambda: bool(set(leads(live, since)) & set(others)), "the other side does not lead", WHOLE_S)
     pass_time(live, PARTED_S)
     check_minority(live, side, others, led=place == 0)
-    assert max(live.speeds_mps[robot] for robot in others) > REST_MPS, "the witness's side does not drive"
+    assert max(live.heard.speeds_mps[robot] for robot in others) > REST_MPS, "the witness's side does not drive"
     live.heal()
     live.await_chain(ROBOTS, WHOLE_S)
     assert not set(leads(live, since)) & set(side)

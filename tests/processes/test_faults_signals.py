@@ -23,7 +23,7 @@ def module_team() -> Iterator[Team]:
 @pytest.fixture
 def live(module_team: Team) -> Iterator[Team]:
     module_team.await_chain(ROBOTS, WHOLE_S)
-    module_team.events.clear()
+    module_team.heard.events.clear()
     yield module_team
     check_terms(module_team)
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from lfa.deploy.analysis.verification.journals import obeyed
-from lfa.deploy.bench.harness.team import REST_MPS, Team, endless
+from lfa.deploy.bench.harness.team import Team, endless
+from lfa.deploy.bench.harness.team_history import REST_MPS
 from lfa.protocol import clock
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Term
@@ -44,7 +45,7 @@ def check_terms(live: Team) -> None:
 
 
 def _commands(live: Team) -> list[Event]:
-    return sorted((e for e in live.events if e.kind == "leader_command"), key=lambda e: e.header.stamp)
+    return sorted((e for e in live.heard.events if e.kind == "leader_command"), key=lambda e: e.header.stamp)
 
 
 def pass_time(live: Team, for_s: float) -> None:
@@ -82,7 +83,9 @@ def check_minority(live: Team, side: Sequence[int], others: Sequence[int], led: 
         assert max(commands) <= until, f"robot {first} was obeyed {max(commands) - until:.3f} s too long"
     else:
         until = last_heard(live, first, "pose", [robot_name(others[-1])]) + T_DR_S
-    slowed_s = sum(e.data["stood_still_s"] for e in live.events if e.kind == "slowed")
-    late_s = live.moved_at.get(first, until) - until - stop_s - slowed_s
+    slowed_s = sum(e.data["stood_still_s"] for e in live.heard.events if e.kind == "slowed")
+    late_s = live.heard.moved_at.get(first, until) - until - stop_s - slowed_s
     assert late_s <= LATE_S, f"robot {first} came to rest {late_s:.3f} s too late"
-    live.wait_until(lambda: all(live.speeds_mps[robot] <= REST_MPS for robot in side), "no rest behind it", WHOLE_S)
+    live.wait_until(
+        lambda: all(live.heard.speeds_mps[robot] <= REST_MPS for robot in side), "no rest behind it", WHOLE_S
+    )

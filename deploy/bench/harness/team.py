@@ -1,7 +1,6 @@
 """Team of real processes that a bench or a test keeps running, with fault injection and received messages.
 
-All processes of one machine read one clock (`lfa.protocol.clock`), and every header carries a stamp of the sender's
-clock. So only here may stamps of different processes be subtracted.
+What is heard of it lies in `team_history.py`.
 """
 
 from __future__ import annotations
@@ -15,9 +14,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from msgspec import structs
-
 from lfa.deploy.analysis.verification.journals import JournalVerdict, verify
+from lfa.deploy.bench.harness.team_history import TeamHistory
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import FleetAddress
 from lfa.deploy.process.identity import Identity
@@ -25,15 +23,13 @@ from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessS
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.run.process_table import rows
 from lfa.protocol import clock
-from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
-from lfa.protocol.messages.consensus import Role
-from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
+from lfa.protocol.messages.codec import encode
 from lfa.protocol.mission import FormationSpec, Leading, Mission, Profile
-from lfa.protocol.names import robot_id_of, robot_name
-from lfa.protocol.topics import RECORDER_NAME, TOPIC, WORLD_NAME, address, key
+from lfa.protocol.names import robot_name
+from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.credentials import Credentials
+from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.link_model import WEATHER
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
@@ -41,14 +37,9 @@ from lfa.world.description.load import Scenario
 
 POLL_S = 0.001
 START_S_MAX = 20.0
-SPEAKING_S = 0.15
-"""Time [s] without a pose after which a robot counts as absent."""
 SETTLED_S = 0.5
-REST_MPS = 1e-3
-"""Maximum speed [m/s] of a robot at rest."""
 ANEW_S = 3.0
 """Period [s] of renewing subscriptions; routers may lose them when their link was down (`ZenohBus.resubscribe`)."""
-EVENTS_MAX = 4096
 TOPICS = ("event", "tracking", "pose", "truth", "status")
 Table = Callable[[Sequence[ProcessSpec], Path], Sequence[ProcessSpec]]
 
@@ -97,16 +88,10 @@ class Team:
         self._rows = {row.name: row for row in (usual if table is None else table(usual, self.folder))}
         self._processes = ProcessGroup(run)
         self._inbox = Inbox(every=True)
+        self._decoder = Decoder()
         self._bus: ZenohBus | None = None
         self._operator = Operator(self._about.fleet, clock.wall_ms())
-        self.events: list[Event] = []
-        self.tracking: list[Tracking] = []
-        self.speeds_mps: dict[int, float] = {}
-        """True speed [m/s] of each robot in the world's last message."""
-        self.moved_at: dict[int, float] = {}
-        """Time [s] of the last motion of each robot, by the world's stamp."""
-        self._poses: dict[int, PoseStamped] = {}
-        self._chains: dict[int, tuple[tuple[Any, ...], tuple[int, ...]]] = {}
+        self.heard = TeamHistory(scenario.mission.robots)
 
     def __enter__(self) -> Team:
         try:
@@ -168,8 +153,7 @@ class Team:
             if not self._processes.wait([name], START_S_MAX):
                 raise Broken(f"{name} does not end")
             if isinstance(whom, int):
-                self._poses.pop(whom, None)  # messages of the earlier incarnation are obsolete
-                self._chains.pop(whom, None)
+                self.heard.state.forget(whom)
             self._processes.start(self._rows[name].restarted())
 
     def start(self, row: ProcessSpec) -> None:
@@ -200,44 +184,7 @@ class Team:
 
     def listen(self) -> None:
         """Receive all pending messages and update the state of the team."""
-        for arrival in self._inbox.take():
-            where = address(arrival.key)
-            if not isinstance(arrival.payload, bytes) or where is None:
-                continue
-            try:
-                self._hear(decode(arrival.payload, TOPIC[where.topic].type))
-            except BadMessage:
-                continue
-        del self.events[:-EVENTS_MAX], self.tracking[:-EVENTS_MAX]
-
-    def _hear(self, message: Message) -> None:
-        robot = robot_id_of(message.header.sender)
-        match message:
-            case PoseStamped() if robot is not None:
-                self._poses[robot] = message
-            case Truth():
-                self.speeds_mps = {robot.id: abs(robot.linear_x) for robot in message.robots}
-                moving = (robot for robot, speed_mps in self.speeds_mps.items() if speed_mps > REST_MPS)
-                self.moved_at |= dict.fromkeys(moving, message.header.stamp)
-            case Tracking():
-                self.tracking.append(message)
-            case Event():
-                self.events.append(message)
-                if message.kind == "chain" and robot is not None and message.term is not None:
-                    version = (structs.astuple(message.term), message.data.get("seq"))
-                    self._chains[robot] = (version, tuple(message.data["chain"]))
-
-            case Status(counters=counters) if robot is not None and "config_seq" in counters:
-                self._catch_up(robot, counters["config_n"], counters["config_seq"])
-
-    def _catch_up(self, robot: int, n: float, seq: float) -> None:
-        """Update a robot's chain from the config version in its status, in case its chain event was lost.
-
-        The chain is that of a robot that reported the same version.
-        """
-        known = max(self._chains.values(), default=None)
-        if known is not None and (known[0][0][0], known[0][1]) == (n, seq):
-            self._chains[robot] = known
+        self.heard.take(message for _, message in self._decoder.messages(self._inbox.take()))
 
     def wait_until(self, holds: Callable[[], bool], complaint: str, within_s: float = START_S_MAX) -> None:
         """Receive messages until `holds()` is true. Raises Broken with `complaint` after `within_s`."""
@@ -252,20 +199,7 @@ class Team:
 
     def chain(self) -> tuple[int, ...]:
         """Return the chain on which all present robots agree; empty if they disagree or a member is absent."""
-        speaking = [robot for robot in self.scenario.mission.robots if self._speaks(robot)]
-        said = {self._chains.get(robot) for robot in speaking}
-        if len(said) != 1 or (agreed := said.pop()) is None:
-            return ()
-        chain = agreed[1]
-        return chain if set(chain) <= set(speaking) and self._leads() == chain[0] else ()
-
-    def _speaks(self, robot: int) -> bool:
-        pose = self._poses.get(robot)
-        return pose is not None and clock.now() - pose.header.stamp < SPEAKING_S
-
-    def _leads(self) -> int | None:
-        leaders = [robot for robot, pose in self._poses.items() if pose.role is Role.LEADER and self._speaks(robot)]
-        return leaders[0] if len(leaders) == 1 else None
+        return self.heard.chain(clock.now())
 
     def await_chain(self, length: int, within_s: float = START_S_MAX) -> tuple[int, ...]:
         """Wait until one chain of `length` robots has been stable for `SETTLED_S`, and return it. Raises Broken."""
@@ -286,25 +220,5 @@ class Team:
         try:
             self.wait_until(settled, f"no settled chain of {length}", within_s)
         except Broken as broken:
-            raise Broken(f"{broken}: {self.describe()}") from None
+            raise Broken(f"{broken}: {self.heard.describe(clock.now())}") from None
         return last
-
-    def describe(self) -> str:
-        """Return the roles and chains of the robots as text, for error messages."""
-        roles = {r: str(p.role) for r, p in sorted(self._poses.items()) if self._speaks(r)}
-        chains = {robot: chain for robot, (_, chain) in sorted(self._chains.items())}
-        return f"roles {roles}, chains {chains}"
-
-    def first(self, kind: str, since: float, fits: Callable[[Event], bool]) -> float | None:
-        """Return the stamp [s] of the first `kind` event since `since` that `fits`, by its sender's clock, or None."""
-        stamps = [e.header.stamp for e in self.events if e.kind == kind and e.header.stamp >= since and fits(e)]
-        return min(stamps, default=None)
-
-    def adopted(self, since: float, robots: Sequence[int], fits: Callable[[Sequence[int]], bool]) -> float | None:
-        """Return the time [s] when the last of `robots` adopted a chain that `fits`; None until all have."""
-        first: dict[str, float] = {}
-        for event in self.events:
-            if event.kind == "chain" and event.header.stamp >= since and fits(event.data["chain"]):
-                first.setdefault(event.header.sender, event.header.stamp)
-        at = [first.get(robot_name(robot), float("inf")) for robot in robots]
-        return max(at) if at and max(at) < float("inf") else None

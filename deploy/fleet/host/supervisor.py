@@ -30,12 +30,13 @@ from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessS
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
-from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
 from lfa.protocol.messages.header import Header
 from lfa.protocol.output import replace_file, write_line
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
 from lfa.protocol.transport.bus import Inbox, Links
+from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
 from lfa.world.description.scenario import STATE
@@ -138,6 +139,7 @@ class Supervisor:
         self._wake = threading.Event()
         self._inbox = Inbox(self._wake)
         self._links = Links()
+        self._decoder = Decoder()
         self._bus: ZenohBus | None = None
         self._tails: dict[str, Tail] = {}
         self._ending = False
@@ -279,14 +281,11 @@ class Supervisor:
         told = False
         if self._bus is not None and self._links.due(now):
             self._bus.resubscribe()
-        for arrival in self._inbox.take():
+        arrivals = self._inbox.take()
+        for arrival in arrivals:
             if not isinstance(arrival.payload, bytes):
                 self._links.see(arrival.payload, now)
-                continue
-            try:
-                order = decode(arrival.payload, HostOrder)
-            except BadMessage:
-                continue
+        for _, order in self._decoder.messages(arrivals):
             if isinstance(order, HostOrder):
                 told = self._obey(order, now) or told
         return told

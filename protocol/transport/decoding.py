@@ -1,0 +1,35 @@
+"""Decoding of what arrives on a bus, for every reader that is no `Node`: bytes from the network never end it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from lfa.protocol.messages.codec import BadMessage, Message, decode
+from lfa.protocol.topics import TOPIC, address
+from lfa.protocol.transport.bus import Arrival
+
+
+class Decoder:
+    """Decoder of arrivals; what is no message of its key's topic is dropped, and counted in `undecodable`."""
+
+    def __init__(self) -> None:
+        self.undecodable = 0
+
+    def messages(self, arrivals: Iterable[Arrival]) -> Iterator[tuple[Arrival, Message]]:
+        """Yield the messages among `arrivals`, each with its arrival."""
+        for arrival in arrivals:
+            message = self.message(arrival)
+            if message is not None:
+                yield arrival, message
+
+    def message(self, arrival: Arrival) -> Message | None:
+        """Return the message; None for a local event, a foreign key, and bytes that do not decode."""
+        where = address(arrival.key)
+        topic = TOPIC.get(where.topic) if where is not None else None
+        if topic is None or not isinstance(arrival.payload, bytes):
+            return None
+        try:
+            return decode(arrival.payload, topic.type)
+        except BadMessage:
+            self.undecodable += 1
+            return None
