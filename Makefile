@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign lint bench fuzz model planted same pages clean setup
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted same pages clean setup
 
 setup: $(STAMP)
 
@@ -26,6 +26,15 @@ test: $(STAMP)
 	$(BIN)/pytest -n 2 --dist loadgroup -m 'processes and not hosts and not campaign and not wheel' \
 	|| { echo 'failed beside another team; once more, alone:'; $(BIN)/pytest --last-failed --last-failed-no-failures none \
 	-m 'processes and not hosts and not campaign and not wheel'; }
+
+# Programs of others that tests of the ROS side talk to, each in an environment of its own; their tests are skipped
+# without them. Fetches some 400 MB once.
+peers: .peers/genuine/.installed .peers/sdk/.installed
+
+.peers/%/.installed: tests/deploy/ros/peers/%.txt
+	$(PYTHON) -m venv .peers/$*
+	.peers/$*/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	touch $@
 
 # The tests that start no process.
 test-fast: $(STAMP)

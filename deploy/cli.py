@@ -83,6 +83,8 @@ COMMANDS = (
     Command("map", "lfa.deploy.analysis.verification.explored_map",
           "Export the map of an exploration run as a ROS map.yaml and pgm.",
           "lfa map runs/explore-20260101-120000 --out maps"),
+    Command("ros", "lfa.deploy.ros.bridge.command", "Show a running fleet as ROS 2 topics; take orders of ROS users.",
+          "lfa ros --serve"),
     Command("bag", "lfa.deploy.ros.bag", "Write a run as a rosbag2 folder, for ros2 bag play, Foxglove, PlotJuggler.",
           "lfa bag runs/paper_path1-20260101-120000"),
     Command("keys", "lfa.deploy.fleet.keys_command",

@@ -100,14 +100,22 @@ class Subscriber:
 
 
 @contextmanager
-def listen(fleet: FleetAddress, topics: frozenset[str], *, every: bool = False) -> Iterator[Subscriber]:
+def listen(
+    fleet: FleetAddress,
+    topics: frozenset[str],
+    *,
+    every: bool = False,
+    wake: Wake | None = None,
+    eager: frozenset[str] = frozenset(),
+) -> Iterator[Subscriber]:
     """Subscribe to the key expressions `topics` (as `*/pose`) of `fleet`. Raises Refused if no router answers.
 
-    `every`: receive all values of state topics, not only the newest.
+    `every`: receive all values of state topics, not only the newest. `wake`: shared with other sources of one loop.
+    `eager`: topics that wake although their receivers usually wait for their next deadline.
     """
     fleet_name(fleet.name)  # a fleet named `*` would address every fleet
-    wake = Wake()
-    inbox = Inbox(wake, INBOX_SIZE_MAX, every=every)
+    wake = wake or Wake()
+    inbox = Inbox(wake, INBOX_SIZE_MAX, every=every, eager=eager)
     known = None if fleet.keys is None else credentials(fleet.keys, OPERATOR_NAME, clock.wall_ms())
     try:
         bus = ZenohBus(fleet.endpoint, inbox, credentials=known)

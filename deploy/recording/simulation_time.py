@@ -21,6 +21,11 @@ class WorldTime:
     def known(self) -> bool:
         return bool(self._offsets)
 
+    @property
+    def offset(self) -> float:
+        """Least (arrival - world time) [s] of the last messages; 0 before the first."""
+        return self._offset
+
     def see(self, at: float, time_s: float) -> None:
         """Update the offset by a ground truth of world time `time_s` [s] that arrived at `at`."""
         self._offsets.append(at - time_s)

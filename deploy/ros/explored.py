@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from lfa.protocol.messages.team import PlanNote
 CELLS_MAX = 4_000_000
 """Largest grid: 100 m x 100 m of cells of 5 cm. Tiles that would make it larger are dropped."""
 TILES_MAX = 4096
+CELL_M_MIN, CELL_M_MAX = 0.001, 10.0
 _VALUES = np.array([-1, 0, 100], dtype=np.int8)
 """Occupancy by the tile's cells: unknown, free, occupied."""
 
@@ -33,7 +33,7 @@ class ExploredMap:
             self._planner, self._cell_m = note.header.sender, note.cell_m
         if not note.cells:
             return
-        if note.cell_m <= 0.0 or not isfinite(1.0 / note.cell_m):
+        if not CELL_M_MIN <= note.cell_m <= CELL_M_MAX:
             self.dropped += 1
             return
         corner = round(note.corner_map[0] / note.cell_m), round(note.corner_map[1] / note.cell_m)

@@ -61,6 +61,11 @@ class FleetMapping:
     def robots(self) -> tuple[int, ...]:
         return tuple(sorted(self._robots))
 
+    @property
+    def leader(self) -> int:
+        """Robot that leads by its own fresh claim; 0: none."""
+        return self._leader or 0
+
     def forget(self, robot: int) -> None:
         """Remove a robot that left the fleet."""
         self._robots.pop(robot, None)

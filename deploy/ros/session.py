@@ -14,9 +14,11 @@ from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
 
+from lfa.deploy.ros.graph import TOKENS_MAX, RosGraph
 from lfa.deploy.ros.types import BadRosMessage, from_cdr, request_type, response_type, to_cdr, type_hash
 from lfa.deploy.ros.wire import (
     DEFAULT,
+    TOKENS,
     Distro,
     Kind,
     Qos,
@@ -25,7 +27,7 @@ from lfa.deploy.ros.wire import (
     attachment,
     read_attachment,
 )
-from lfa.protocol.transport.bus import Settable
+from lfa.protocol.transport.bus import ANEW_S, Settable
 from lfa.protocol.transport.zenoh_ros import RosPublication, RosQuery, RosSession, Undeclarable
 
 T = TypeVar("T")
@@ -60,6 +62,8 @@ class RosSpace:
         self.wake = wake
         self.wall_ns = wall_ns
         self.counters = Counters()
+        self.open: set[NodeHandle] = set()
+        """Nodes that are not closed; Zenoh undeclares what nothing refers to."""
         self._next_id = 0
 
     def take_id(self) -> int:
@@ -78,6 +82,7 @@ class NodeHandle:
         self.space = space
         self.node = node
         self._declared: list[Undeclarable] = [space.session.token(node.token)]
+        space.open.add(self)
 
     def publisher(self, topic: str, of_type: str, qos: Qos = DEFAULT) -> RosPublisher:
         return RosPublisher(self, self._endpoint("MP", topic, of_type, qos))
@@ -99,6 +104,7 @@ class NodeHandle:
         """Undeclare all endpoints and the node, the last declared first."""
         while self._declared:
             self._declared.pop().undeclare()
+        self.space.open.discard(self)
 
     def _endpoint(self, kind: Kind, topic: str, of_type: str, qos: Qos) -> RosEndpoint:
         space = self.space
@@ -215,6 +221,49 @@ class RosClient:
         except BadRosMessage:
             space.counters.undecodable += 1
             return None
+
+
+class GraphFeed:
+    """The ROS graph of one domain, fed by liveliness tokens; `poll` brings it up to date.
+
+    When a link returns, the tokens are asked for again: a router that was restarted does not repeat them.
+    """
+
+    def __init__(self, space: RosSpace) -> None:
+        self._space = space
+        self._graph = RosGraph()
+        self._queue: deque[tuple[str, bool]] = deque(maxlen=TOKENS_MAX)
+        self._links_changed = False
+        self._again_at: list[float] = []
+        self._links = space.session.on_links(self._on_links)
+        self._tokens = self._subscribe()
+
+    def poll(self, now: float) -> RosGraph:
+        """Return the graph at `now` [s]."""
+        if self._links_changed:
+            self._links_changed, self._again_at = False, [now + after_s for after_s in ANEW_S]
+        if self._again_at and now >= self._again_at[0]:
+            self._again_at.pop(0)
+            self._tokens.undeclare()
+            self._tokens = self._subscribe()
+        while self._queue:
+            token, up = self._queue.popleft()
+            self._graph.update(token, up=up)
+        return self._graph
+
+    def close(self) -> None:
+        self._tokens.undeclare()
+        self._links.undeclare()
+
+    def _subscribe(self) -> Undeclarable:
+        return self._space.session.tokens(f"{TOKENS}/{self._space.domain}/**", self._on_token)
+
+    def _on_token(self, token: str, up: bool) -> None:
+        self._queue.append((token, up))
+        self._space.wake.set()
+
+    def _on_links(self) -> None:
+        self._links_changed = True
 
 
 class _Queue(Generic[T]):

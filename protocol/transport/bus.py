@@ -84,17 +84,20 @@ class Inbox:
         *,
         every: bool = False,
         defer_hellos: bool = False,
+        eager: frozenset[str] = frozenset(),
     ) -> None:
         """`wake` is set on an urgent arrival; several inboxes of one loop share it.
 
         `every` queues state topics too, for a recorder that needs all values. `defer_hellos` keeps a process that reads
-        its inbox fifty times a second anyway from being woken by HELLO, which processes without a vote repeat.
+        its inbox fifty times a second anyway from being woken by HELLO, which processes without a vote repeat. `eager`
+        names further topics that wake: a bridge passes sensors on without delay.
         """
         self._queue: deque[Arrival] = deque()
         self._newest: dict[str, Arrival] = {}
         self._size_max = size_max
         self._every = every
         self._defer_hellos = defer_hellos
+        self._eager = eager
         self.defer_grants = False
         """Do not wake for answers to this process alone: set while its lease lasts well beyond its next deadline."""
         self._lock = threading.Lock()
@@ -115,7 +118,7 @@ class Inbox:
                 return
             else:
                 self._queue.append(arrival)
-        if where is None or topic is None or (topic.wakes and not self._can_wait(where)):
+        if where is None or topic is None or topic.name in self._eager or (topic.wakes and not self._can_wait(where)):
             self._wake.set()
 
     def _can_wait(self, where: Address) -> bool:

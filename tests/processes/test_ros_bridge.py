@@ -1,0 +1,69 @@
+"""`lfa run` in one terminal and `lfa ros --serve` in another: a ROS user's SDK lists, echoes and orders."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from lfa.deploy.ros.topics import fleet_topics, robot_topics
+from lfa.deploy.ros.types import type_hash
+from tests.rigs.foreign_peers import answer, start
+from tests.rigs.lfa_runs import LFA, eventually, lfa, running
+from tests.rigs.ros_peers import free_endpoint
+
+pytestmark = pytest.mark.processes
+ECHOED = ("/robot1/odom", "/robot1/scan", "/tf", "/tf_static", "/lfa/leader", "/robot1/cmd_vel", "/diagnostics")
+
+
+@contextmanager
+def bridge(endpoint: str, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """Run `lfa ros` until the end of the block; it must say that it is ready."""
+    words = [*LFA, "ros", "--ros", endpoint, "--json", *options]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        assert "is on ROS domain 0" in line, line + process.stderr.read()
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def test_a_ros_users_sdk_lists_echoes_and_hands_over_and_the_robots_obey(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    table = {row.name: row for row in (*fleet_topics(tf_per_robot=False, sim_time=False), *robot_topics(1, tf_per_robot=False))}  # fmt: skip  # noqa: E501
+    wanted = [f"{topic}={table[topic].type}={type_hash(table[topic].type)}" for topic in ECHOED]
+    with running(tmp_path / "run", "paper_path1", "--robots", "3") as run:
+        run.wait_for("leader_command")
+        with bridge(endpoint, "--serve", "--fleet", f"paper_path1-{run.launcher.pid}") as bridged:
+            user = start("sdk", "sdk_user.py", endpoint.rpartition(":")[2], "6", *wanted, home=tmp_path)
+            told = json.loads(answer(user))
+            assert {topic: [row.type] for topic, row in table.items()}.items() <= told["topics"].items()
+            assert {"/robot2/odom", "/robot3/odom"} <= set(told["topics"])
+            live = set(ECHOED) - {"/tf_static", "/lfa/leader"}  # latched before this SDK came, which asks for none
+            assert live <= set(told["heard"]), told["heard"]
+            assert "robot1/odom" in told["last"]["/tf"]
+            assert told["called"] == [True, "robot 2 leads"]
+            eventually(lambda: any(e.get("by") == "operator" for e in run.events()), "the formation was not ordered")
+            eventually(lambda: any(e.get("change") == "handed_over" for e in run.events()), "nobody handed over")
+            bridged.send_signal(signal.SIGINT)
+            out, _ = bridged.communicate(timeout=30.0)
+            facts = json.loads(out)
+            assert (facts["undecodable"], facts["fleet_dropped"]) == (0, 0)
+            assert bridged.returncode == 0
+
+
+def test_without_a_ros_router_the_bridge_says_in_one_line_what_to_do(tmp_path: Path) -> None:
+    done = lfa("ros", "--ros", free_endpoint(), "--fleet", "nobody", "--connect", f"unixsock-stream/{tmp_path}/r.sock")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "no ROS router answers" in line
+    assert "--serve" in line
