@@ -45,11 +45,11 @@ def test_a_subscriber_hears_what_is_published_and_the_publisher_knows_it(pair: t
 def test_a_late_subscriber_gets_the_newest_message_of_a_latched_topic_in_both_directions(
     pair: tuple[RosSpace, RosSpace],
 ) -> None:
-    for one, other in (pair, pair[::-1]):
-        publisher = one.node("map").publisher("/map", STRING, LATCHED)
+    for n, (one, other) in enumerate((pair, pair[::-1])):
+        publisher = one.node("map").publisher(f"/map{n}", STRING, LATCHED)
         publisher.publish(text("old"))
         publisher.publish(text("new"))
-        subscription = other.node("late").subscription("/map", STRING, LATCHED)
+        subscription = other.node("late").subscription(f"/map{n}", STRING, LATCHED)
         assert [message.data for message in awaited(subscription.take, "the latched message")] == ["new"]
 
 
