@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 import msgspec
 import zenoh
 
+from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Profile
-from lfa.protocol.transport.credentials import Credentials
+from lfa.protocol.transport.credentials import FOREIGN_BITS, Credentials
 
 LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000}
 """Silence [ms] after which a link counts as dead; radio has gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
@@ -35,6 +37,26 @@ def default_endpoint() -> str:
     return f"unixsock-stream/{base / 'lfa-router.sock'}"
 
 
+def check_default(endpoint: str) -> None:
+    """Raise Refused if the default socket's folder is another user's, or if other users could put a socket there.
+
+    A router of another user in a shared temporary folder would take over every process that connects without
+    `--connect`. Folders of endpoints that the user names are the user's business.
+    """
+    usual = default_endpoint()
+    path = socket_path(usual)
+    if path is None or usual not in endpoint.split(","):
+        return
+    try:
+        found = path.parent.lstat()
+    except OSError:  # there is none: no router has started
+        return
+    mode = stat.S_IMODE(found.st_mode)
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or mode & FOREIGN_BITS:
+        what = "a link" if stat.S_ISLNK(found.st_mode) else f"of user {found.st_uid}, mode {mode:04o}"
+        raise Refused(f"{path.parent}: is {what}: must be your own folder with mode 0700, or give another endpoint")
+
+
 def socket_path(endpoint: str) -> Path | None:
     """Return the path of a unix-socket endpoint, None for other transports."""
     kind, _, rest = endpoint.partition("/")
@@ -55,6 +77,8 @@ def answers(endpoint: str, credentials: Credentials | None = None) -> bool:
 
 
 def client_session(endpoint: str, lease_ms: int, credentials: Credentials | None) -> zenoh.Session:
+    """Open a client session. Raises ZError, and Refused for the default endpoint in a folder of another user."""
+    check_default(endpoint)
     config = session_config("client", [], endpoint.split(","), lease_ms, credentials)
     login = {} if credentials is None else login_settings(credentials)
     if not login:

@@ -17,6 +17,7 @@ from lfa.protocol.transport.zenoh_config import (
     LINK_LEASE_MS,
     SECURE_PROTOCOLS,
     answers,
+    check_default,
     insert_settings,
     login_settings,
     reason_of,
@@ -87,6 +88,7 @@ def check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     except OSError as error:
         raise Refused(f"listen {endpoint}: {error.strerror}") from None
+    check_default(endpoint)
     if path.exists() and answers(endpoint):
         raise Refused(f"listen {endpoint}: another router answers there, stop it or give another --listen")
 
