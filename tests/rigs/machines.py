@@ -39,8 +39,10 @@ def why_not() -> str | None:
 class Machines:
     """Hosts `a`, `b`, ... and the operator's host, all on one switch."""
 
-    def __init__(self, net: Net, folder: Path, count: int) -> None:
+    def __init__(self, net: Net, folder: Path, count: int, *, six: bool, shells: Mapping[str, str]) -> None:
         self.net = net
+        self._six = six
+        self._shells = shells
         self.folder = folder
         self.names = NAMES[:count]
         self.home = folder / "home"
@@ -79,6 +81,8 @@ class Machines:
             "PermitRootLogin": "prohibit-password",
             "LogLevel": "ERROR",
         }
+        if name in self._shells:
+            settings["ForceCommand"] = self._shells[name]
         config = self.folder / f"sshd-{name}"
         config.write_text("".join(f"{key} {value}\n" for key, value in settings.items()))
         enter = self.net.enter(self._number(name))
@@ -101,7 +105,8 @@ class Machines:
     # --- properties ------------------------------------------------------------------------------------------------
 
     def address(self, name: str) -> str:
-        return self.net.address(self._number(name))
+        number = self._number(name)
+        return self.net.address6(number) if self._six else self.net.address(number)
 
     def state(self, name: str) -> Path:
         return self.folder / name
@@ -186,12 +191,15 @@ class Machines:
 
 
 @contextmanager
-def machines(count: int) -> Iterator[Machines]:
-    """Create `count` machines and an operator's; all their processes and files are removed at the end of the block."""
+def machines(count: int, *, six: bool = False, shells: Mapping[str, str] | None = None) -> Iterator[Machines]:
+    """Create `count` machines and an operator's; all their processes and files are removed at the end of the block.
+
+    With `six` their addresses are of IPv6. `shells` are commands that sshd runs in place of the one asked for.
+    """
     folder = Path(tempfile.mkdtemp(prefix="lfa-", dir="/tmp"))
     try:
         with Net(count + 1) as net:
-            made = Machines(net, folder, count)
+            made = Machines(net, folder, count, six=six, shells=shells or {})
             try:
                 made.open()
                 yield made

@@ -78,6 +78,7 @@ class Net:
         peer = ("peer", "name", port, "netns", self._switch)
         self._inside(name, "ip", "link", "add", "eth0", "type", "veth", *peer)
         self._inside(name, "ip", "addr", "add", f"{_ip(host)}/24", "dev", "eth0")
+        self._inside(name, "ip", "-6", "addr", "add", f"{self.address6(host)}/64", "dev", "eth0", "nodad")
         self._inside(name, "ip", "link", "set", "eth0", "up")
         self._inside(self._switch, "ip", "link", "set", port, "master", "br0", "up")
 
@@ -87,6 +88,9 @@ class Net:
 
     def address(self, host: int) -> str:
         return _ip(host)
+
+    def address6(self, host: int) -> str:
+        return f"fd00:77::{host + 1}"
 
     def unplug(self, host: int) -> None:
         """Take the host's link down: no packet passes, and no process is notified."""

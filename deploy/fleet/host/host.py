@@ -1,7 +1,7 @@
 """`python -m lfa.deploy.fleet.host.host check|start|stop|listen|rekey`: executed on each machine by `lfa` commands.
 
-Reads a HostPlan (JSON) from standard input and prints one JSON object. An error is one line on standard error, with
-exit code 2 if the request is refused.
+Reads a HostPlan (JSON) from standard input and prints one JSON object after ANSWER. An error is one line on standard
+error, with exit code 2 if the request is refused.
 """
 
 from __future__ import annotations
@@ -34,11 +34,14 @@ from lfa.protocol.transport.credentials import check_valid
 from lfa.protocol.transport.zenoh_config import answers, socket_path
 from lfa.protocol.transport.zenoh_router import UNIX_PATH_BYTES_MAX
 
+ANSWER = "lfa-answer:"
+"""Mark before an answer: a shell may print a greeting, to the same output, before it runs a command."""
 READY_S = 15.0
 STOP_S = 8.0
 POLL_S = 0.02
 LISTEN_S = 4.0
 FREE_MIB_MIN = 64
+OTHERS_WRITE = 0o022
 LOG = "supervisor.log"
 SYSTEMD = Path("/run/systemd/system")
 
@@ -100,7 +103,8 @@ def start(part: HostPlan) -> Found:
         return found
     orphans = end_orphans(part.folder)
     try:
-        part.run_folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        part.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        part.run_folder.mkdir(exist_ok=True, mode=0o700)
         (part.run_folder / SCENARIO).write_text(part.scenario, encoding="utf-8")
         path = part.folder / parts.PART
         if part.keyed:
@@ -147,6 +151,10 @@ def _check_place(part: HostPlan) -> None:
     place = part.folder
     while not place.exists():
         place = place.parent
+    found = place.lstat()
+    if place == part.folder and (found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE):
+        right = "must be your own folder that nobody else can write to, or a new one"
+        raise Refused(f"state = {part.state}: of user {found.st_uid}, mode {found.st_mode & 0o7777:04o}: {right}")
     if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
         raise Refused(f"state = {part.state}: {place} cannot be written to")
     free_mib = shutil.disk_usage(place).free >> 20
@@ -158,7 +166,7 @@ def _check_port(part: HostPlan) -> None:
     """Raise Refused unless the port is free: in TCP, and if routers link over UDP also in UDP."""
     kinds = {"tcp": socket.SOCK_STREAM, **({"udp": socket.SOCK_DGRAM} if part.over_udp else {})}
     for name, kind in kinds.items():
-        with socket.socket(socket.AF_INET, kind) as probe:
+        with socket.socket(_family(part), kind) as probe:
             if kind is socket.SOCK_STREAM:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
@@ -166,6 +174,11 @@ def _check_port(part: HostPlan) -> None:
             except OSError as error:
                 right = f"must be a free port ({name})"
                 raise Refused(f"router_port = {part.port}: {error.strerror}: {right}") from None
+
+
+def _family(part: HostPlan) -> socket.AddressFamily:
+    """Return the address family that this machine's router listens in."""
+    return socket.AF_INET6 if any("[" in endpoint for endpoint in part.listen) else socket.AF_INET
 
 
 def _check_world() -> None:
@@ -213,18 +226,18 @@ def _await_ready(part: HostPlan, child: subprocess.Popen[bytes], log: Path) -> N
 def listen(part: HostPlan) -> Found:
     """Listen at the router's port until a connection arrives or LISTEN_S is over, to test whether the port is open."""
     if part.over_udp:
-        _echo(part.port)
+        _echo(part)
         return Found(version("lfa"), clock.wall_ms())
-    with socket.create_server(("", part.port)) as server:
+    with socket.create_server(("", part.port), family=_family(part)) as server:
         server.settimeout(LISTEN_S)
         with contextlib.suppress(TimeoutError):
             server.accept()[0].close()
     return Found(version("lfa"), clock.wall_ms())
 
 
-def _echo(port: int) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
-        server.bind(("", port))
+def _echo(part: HostPlan) -> None:
+    with socket.socket(_family(part), socket.SOCK_DGRAM) as server:
+        server.bind(("", part.port))
         server.settimeout(LISTEN_S)
         with contextlib.suppress(TimeoutError):
             knock, who = server.recvfrom(64)
@@ -255,7 +268,7 @@ DEEDS = {"check": check, "start": start, "stop": stop, "listen": listen, "rekey"
 def main() -> None:
     try:
         part = msgspec.json.decode(sys.stdin.buffer.read(), type=HostPlan)
-        print(msgspec.json.encode(DEEDS[sys.argv[1]](part)).decode())
+        print(f"{ANSWER}{msgspec.json.encode(DEEDS[sys.argv[1]](part)).decode()}")
     except Refused as refused:
         print(refused, file=sys.stderr)
         sys.exit(2)

@@ -262,6 +262,10 @@ def _together(file: FleetFile) -> Iterator[Mistake]:
     if local and len(local) < len(file.hosts):
         for name in local:
             yield wrong(f"hosts.{name}.address", file.hosts[name].address, "an address that the other machines reach")
+    six = [name for name, machine in file.hosts.items() if ":" in machine.address]
+    for name in six if len(file.hosts) > 1 and file.links.transport != "tcp" else ():
+        right = 'an address of IPv4, or [links] transport = "tcp": Zenoh makes no certified link to an address of IPv6'
+        yield wrong(f"hosts.{name}.address", file.hosts[name].address, right)
     seen: dict[tuple[str, int], str] = {}
     for name, machine in file.hosts.items():
         other = seen.setdefault((machine.address, machine.router_port), name)

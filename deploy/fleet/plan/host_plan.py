@@ -157,7 +157,8 @@ def _at(machine: Machine) -> str:
 
 def _listen(plan: FleetPlan, machine: Machine) -> tuple[str, ...]:
     """Return the endpoints to listen at: the same port number in UDP for routers and in TCP for processes."""
-    where = f"{'127.0.0.1' if machine.local else '0.0.0.0'}:{machine.router_port}"
+    everywhere, here = ("[::]", "[::1]") if ":" in machine.address else ("0.0.0.0", "127.0.0.1")
+    where = f"{here if machine.local else everywhere}:{machine.router_port}"
     transport = plan.file.links.transport
     return tuple(f"{kind}/{where}" for kind in dict.fromkeys((transport, _DOORS[transport])))
 

@@ -16,6 +16,7 @@ from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, re
 from lfa.deploy.fleet.remote.wheel import install
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, decode_json
 
 CLOCK_S_MAX = 60.0
 """Maximum difference [s] of wall clocks; beyond it certificates start or end at the wrong time."""
@@ -79,7 +80,7 @@ class FleetHosts:
             except Unreachable as error:
                 self.unreached.add(name)
                 self.wrong[name] = str(error)
-            except (Refused, msgspec.DecodeError) as error:
+            except Refused as error:
                 self.wrong[name] = str(error)
 
         await asyncio.gather(*(guarded(name) for name in names if name not in self.wrong))
@@ -90,8 +91,8 @@ async def ask(shell: Shell, machine: Machine, deed: str, part: HostPlan) -> Foun
     python = python_of(machine)
     done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", deed), msgspec.json.encode(part))
     if done.code == 0:
-        with contextlib.suppress(msgspec.DecodeError):  # not our program: the probe finds the cause
-            return msgspec.json.decode(done.out, type=Found)
+        with contextlib.suppress(DamagedFile):  # not our program: the probe finds the cause
+            return decode_json(done.answer or b"", Found)
     if done.code != REFUSED_CODE or not done.err.strip():
         found = await probe(shell, python)
         if found.lfa != part.version:

@@ -9,6 +9,7 @@ import tarfile
 from pathlib import Path
 
 from lfa.deploy.client.discovery import option
+from lfa.deploy.fleet.host.host import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import HostPlan, parts
 from lfa.deploy.fleet.remote.ssh import Unreachable, python_of, reach
@@ -19,11 +20,13 @@ from lfa.protocol.errors import Refused
 PACK = (
     "import pathlib, sys, tarfile\n"
     "runs = sorted(pathlib.Path(sys.argv[1]).expanduser().glob('*/journal'), key=lambda run: run.stat().st_mtime)\n"
+    f"sys.stdout.write('{ANSWER}')\n"
+    "sys.stdout.flush()\n"
     "with tarfile.open(fileobj=sys.stdout.buffer, mode='w|') as packed:\n"
     "    for path in (path for run in runs[-1:] for path in sorted(run.glob('*.bin'))):\n"
     "        packed.add(path, path.name)\n"
 )
-"""Program for the remote Python: write the journals of the newest run as a tar file to standard output."""
+"""Program for the remote Python: write the journals of the newest run as a tar file to standard output, marked."""
 
 
 def of_processes(fleet: str) -> set[Path]:
@@ -61,12 +64,17 @@ async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> 
     try:
         shell = await reach(machine)
         try:
-            done = await shell.run((python_of(machine), "-c", PACK, part.state))
+            done = await shell.run((python_of(machine), "-P", "-c", PACK, part.state))
         finally:
             await shell.close()
     except (Unreachable, Refused) as error:
         return str(error)
-    return unpack(done.out, run) if done.code == 0 else f"gives no journals: {done.last_line}"
+    if done.code != 0 or done.answer is None:
+        return f"gives no journals: {done.last_line}"
+    try:
+        return unpack(done.answer, run)
+    except tarfile.TarError as error:
+        return f"gives no journals that can be read: {error}"
 
 
 def unpack(packed: bytes, run: Path) -> int:

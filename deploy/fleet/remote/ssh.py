@@ -9,23 +9,28 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-import msgspec
 from msgspec import Struct
 
+from lfa.deploy.fleet.host.host import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import Machine
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, decode_json
 
 CONNECT_S = 6.0
 COMMAND_S = 40.0
 PYTHON_MIN = (3, 11)
+GREETING_MAX = 80
 PROBE = (
-    "import json, sys, time\n"
+    "import sys\n"
+    "sys.path[:] = [folder for folder in sys.path if folder]\n"  # -P, which Python has from 3.11 on
+    "import json, time\n"
     "try:\n"
     "    from importlib.metadata import version\n"
     "    lfa = version('lfa')\n"
     "except Exception:\n"
     "    lfa = ''\n"
-    "print(json.dumps({'python': list(sys.version_info[:3]), 'lfa': lfa, 'wall_ms': int(time.time() * 1000)}))\n"
+    "told = {'python': list(sys.version_info[:3]), 'lfa': lfa, 'wall_ms': int(time.time() * 1000)}\n"
+    f"print('{ANSWER}' + json.dumps(told))\n"
 )
 """Program for any remote Python, with or without `lfa`: print the versions and the wall clock as JSON."""
 
@@ -41,6 +46,18 @@ class Done(Struct, frozen=True):
     def last_line(self) -> str:
         lines = self.err.decode(errors="replace").strip().splitlines()
         return lines[-1].strip() if lines else f"exit code {self.code}"
+
+    @property
+    def answer(self) -> bytes | None:
+        """What the program printed after its mark, whatever its shell printed before; None without the mark."""
+        _, mark, told = self.out.partition(ANSWER.encode())
+        return told if mark else None
+
+    @property
+    def greeting(self) -> str:
+        """First line of an output without an answer, for an error text; empty: no output."""
+        lines = self.out.decode(errors="replace").strip().splitlines()
+        return lines[0].strip()[:GREETING_MAX] if lines else ""
 
 
 class Probed(Struct, frozen=True):
@@ -142,8 +159,11 @@ async def probe(shell: Shell, python: str) -> Probed:
     """Return the versions and clock of a machine. Raises Refused when Python is missing or older than PYTHON_MIN."""
     done = await shell.run((python, "-c", PROBE))
     try:
-        found = msgspec.json.decode(done.out, type=Probed)
-    except msgspec.DecodeError:
+        found = decode_json(done.answer or b"", Probed)
+    except DamagedFile:
+        if done.code == 0 and done.greeting:
+            right = "make its shell silent for commands, and let it run them"
+            raise Refused(f"prints {done.greeting!r} and no answer: {right}") from None
         raise Refused(f"python = {python}: does not run there ({done.last_line}): must be Python 3.11+") from None
     if found.python < (*PYTHON_MIN, 0):
         is_ = ".".join(map(str, found.python))

@@ -11,12 +11,24 @@ from pathlib import Path
 
 import lfa.deploy
 from lfa.deploy.fleet.plan.fleet_file import Machine
-from lfa.deploy.fleet.remote.ssh import Shell, python_of
+from lfa.deploy.fleet.remote.ssh import Shell, probe, python_of
 from lfa.protocol.errors import Refused
 
 PACKAGES = ("agents", "world", "protocol", "deploy")
 WHEEL = "Wheel-Version: 1.0\nGenerator: lfa\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-WRITE = "import sys; open(sys.argv[1], 'wb').write(sys.stdin.buffer.read())"
+INSTALL = (
+    "import os, subprocess, sys, tempfile\n"
+    "name, extras, *options = sys.argv[1:]\n"
+    "with tempfile.TemporaryDirectory(prefix='lfa-') as folder:\n"
+    "    path = os.path.join(folder, name)\n"
+    "    with open(path, 'xb') as file:\n"
+    "        file.write(sys.stdin.buffer.read())\n"
+    "    pip = [sys.executable, '-P', '-m', 'pip', 'install', '--quiet', '--disable-pip-version-check']\n"
+    "    sys.exit(subprocess.run([*pip, *options, path + extras]).returncode)\n"
+)
+"""Program for the remote Python: install the wheel on its standard input, from a new folder that no other user enters.
+
+Arguments: name of the wheel, extras such as `[world]` or none, options of pip."""
 NEEDED = "import msgspec, typer, zenoh"
 
 
@@ -49,13 +61,12 @@ async def install(shell: Shell, machine: Machine, wanted: str) -> None:
     python = python_of(machine)
     if machine.venv and (await shell.run((python, "-c", ""))).code != 0:
         await _must(shell, ("python3", "-m", "venv", machine.venv), f"venv = {machine.venv}")
+    await probe(shell, python)
     name, data = pack()
-    place = f"/tmp/{name}"
-    await _must(shell, (python, "-c", WRITE, place), "copying lfa", data)
-    pip = (python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-    await _must(shell, (*pip, "--no-deps", "--force-reinstall", place), f"installing lfa {wanted}")
-    if (await shell.run((python, "-c", NEEDED))).code != 0:
-        await _must(shell, (*pip, f"{place}[world]"), f"installing what lfa {wanted} needs")
+    pip = (python, "-P", "-c", INSTALL, name)
+    await _must(shell, (*pip, "", "--no-deps", "--force-reinstall"), f"installing lfa {wanted}", data)
+    if (await shell.run((python, "-P", "-c", NEEDED))).code != 0:
+        await _must(shell, (*pip, "[world]"), f"installing what lfa {wanted} needs", data)
 
 
 async def _must(shell: Shell, words: tuple[str, ...], doing: str, stdin: bytes = b"") -> None:

@@ -8,6 +8,7 @@ import sys
 import tarfile
 from pathlib import Path
 
+from lfa.deploy.fleet.host.host import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.remote import journals
 
@@ -26,7 +27,7 @@ def test_the_newest_runs_journals_come(tmp_path: Path) -> None:
     packed = subprocess.run(
         [sys.executable, "-c", journals.PACK, str(_state(tmp_path))], capture_output=True, check=True
     ).stdout
-    assert journals.unpack(packed, tmp_path / "here") == 1
+    assert journals.unpack(packed.removeprefix(ANSWER.encode()), tmp_path / "here") == 1
     assert (tmp_path / "here" / "journal" / "robot2-7.bin").read_bytes() == b"new"
 
 
