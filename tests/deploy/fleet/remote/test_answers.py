@@ -97,7 +97,7 @@ def test_routers_of_machines_with_ipv6_addresses_listen_in_ipv6(tmp_path: Path) 
     assert made["b"].listen == ("tcp/0.0.0.0:7447",)
     assert made["b"].connect == ("tcp/[fd00:77::2]:7447",)
     file.write_text(text)
-    with pytest.raises(Refused, match="hosts.a.address = fd00:77::2: must be an address of IPv4, or"):
+    with pytest.raises(Refused, match=r"hosts.a.address = fd00:77::2: must be an address of IPv4, or"):
         load(file)
 
 
