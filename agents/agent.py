@@ -10,6 +10,7 @@ from lfa.agents.robot_core import RobotCore
 from lfa.agents.subscriptions import before_the_mission
 from lfa.agents.telemetry import waiting_status
 from lfa.protocol.errors import Refused
+from lfa.protocol.incarnations import after
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.messages.team import Ask, MissionNote
 from lfa.protocol.mission import Mission
@@ -80,6 +81,14 @@ class Agent:
     @property
     def finished(self) -> bool:
         return self._stopped if self._core is None else self._core.finished
+
+    @property
+    def reborn(self) -> Agent | None:
+        """Return this robot's agent under a later number, once it is told of a later incarnation of its name (E23)."""
+        newest = None if self._core is None else self._core.superseded_by
+        if newest is None:
+            return None
+        return Agent(self._id, after(newest, self.incarnation), self._outbox.fleet, self._floor, self._given)
 
     def next_deadline(self) -> float:
         return self._next_ask if self._core is None else self._core.next_deadline()

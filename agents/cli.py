@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from lfa.agents.agent import Agent
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.config_file.mistake import apply_rules
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
@@ -83,18 +83,19 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None) -> Node:
+    incarnation = incarnations.drawn()
     if role not in ROLES:
         raise Refused(f"--role {role}: must be one of {', '.join(ROLES)}")
     if role == "witness":
         if id not in ("w", "0"):
             raise Refused(f"--id {id}: the witness is w")
-        return Witness(fleet, wall_ms, wall_ms, mission)
+        return Witness(fleet, incarnation, wall_ms, mission)
     robot = whole_number(id) or 0
     if not 1 <= robot <= 2**31:
         raise Refused(f"--id {id}: must be a robot's number, 1 or higher")
     if mission is not None and robot not in mission.robots:
         raise Refused(f"--id {id}: not in the mission, which has robots {list(mission.robots)}")
-    return Agent(robot, wall_ms, fleet, wall_ms, mission)
+    return Agent(robot, incarnation, fleet, wall_ms, mission)
 
 
 def read_mission(path: Path) -> Mission:

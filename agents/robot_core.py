@@ -83,6 +83,11 @@ class RobotCore:
         """True when a requested exit is complete: the final messages are out."""
         return self._pending_release and self.lease.released
 
+    @property
+    def superseded_by(self) -> int | None:
+        """Number of a later incarnation that others know (E23); None if there is none, or if the robot is leaving."""
+        return None if self._pending_release else self.lease.superseded_by
+
     def next_deadline(self) -> float:
         """Return the time [s] of the next control step, or of the lease's deadline before it."""
         return min(self._next_control, self.lease.next_deadline(self._next_control))
@@ -107,6 +112,7 @@ class RobotCore:
                 self._team.hear_sensors(message, now)
                 navigator.estimator.sensors(message, now)
                 self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
+                lease.told_of(message.agent)
             case Localization():
                 navigator.estimator.localization(message, now)
             case LaserScan():

@@ -5,7 +5,9 @@ from __future__ import annotations
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D
+from lfa.protocol.incarnations import is_later
 from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import Sensors
 from lfa.protocol.messages.team import Delay, RouteProgress, TableRow
 from lfa.protocol.topics import TOPIC
@@ -39,9 +41,9 @@ class TeamState:
         self.sensors, self.sensors_at = sensors, at
 
     def hear_row(self, robot: int, row: TableRow, at: float) -> None:
-        """Update with a row of `robot`; one older than the last of the same incarnation is dropped."""
+        """Update with a row of `robot`; one that a later one has overtaken is dropped."""
         known = self._table.get(robot)
-        if known is not None and _order(row) <= _order(known[0]):
+        if known is not None and _overtaken(row.header, known[0].header, at - known[1]):
             return
         if known is None and len(self._table) >= ROBOTS_MAX:
             return
@@ -84,5 +86,11 @@ class TeamState:
         return tuple(Delay(robot, clock.least(now)) for robot, clock in clocks if clock is not None and clock.known)
 
 
-def _order(row: TableRow) -> tuple[int, int]:
-    return row.header.incarnation, row.header.seq
+def _overtaken(row: Header, known: Header, age_s: float) -> bool:
+    """Return True if the row is from before the known one, which arrived `age_s` ago.
+
+    Between incarnations that holds while the later one is fresh: a single stray number must not silence a robot (E23).
+    """
+    if row.incarnation == known.incarnation:
+        return row.seq <= known.seq
+    return is_later(known.incarnation, row.incarnation) and age_s <= ROW_S_MAX

@@ -16,7 +16,7 @@ def now() -> float:
 
 
 def wall_ms() -> int:
-    """Return the wall-clock time [ms], which only orders incarnations and term numbers; a lease never uses it."""
+    """Return the wall-clock time [ms], a first guess at the order of incarnations and terms (E23); no lease uses it."""
     return time.time_ns() // 1_000_000
 
 

@@ -119,3 +119,12 @@ class NodeObserver(Protocol):
 
     def after(self, received: Received) -> None:
         """Process an input that the node has processed; what it answered is not published yet."""
+
+
+def reborn(node: Node) -> Node | None:
+    """Return the node to run in the place of this one, under a later number, once others know a later one (E23).
+
+    None for most of the time, and always for a node whose number is not compared with earlier ones: world, driver.
+    """
+    later: Node | None = getattr(node, "reborn", None)
+    return later

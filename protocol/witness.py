@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from lfa.protocol.incarnations import after
 from lfa.protocol.lease.effects import Effect, Send
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
@@ -54,6 +55,14 @@ class Witness:
     def lease(self) -> Lease | None:
         """Lease of the witness; None before the mission."""
         return self._lease
+
+    @property
+    def reborn(self) -> Witness | None:
+        """Return the witness under a later number, once it is told of a later incarnation of its name (E23)."""
+        newest = None if self._lease is None else self._lease.superseded_by
+        if newest is None or self.finished:
+            return None
+        return Witness(self._fleet, after(newest, self.incarnation), self._floor, self._mission)
 
     def receive(self, received: Received) -> list[Envelope]:
         now = received.at

@@ -24,6 +24,7 @@ MAY: dict[str, set[str]] = {
 
 ORDER = (
     "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/clock",
+    "protocol/incarnations",
     "protocol/names", "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages",
     "protocol/node", "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/lease/machine",
     "protocol/witness", "protocol/transport", "protocol/runtime",

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NoReturn
 
 import typer
 
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
@@ -53,10 +53,11 @@ def start(
     options = Options(fleet_name(fleet), endpoint, journal, faults, LINK_LEASES_MS[link], known_as, notify)
     known = None if resume is None else checkpoint.read(resume)
     placed = drawn if known is None else checkpoint.resumed(drawn, known)
-    world = World(fleet, placed, seed, wall_ms, start_at=clock.now(), memory=known)
+    incarnation = incarnations.drawn()
+    world = World(fleet, placed, seed, incarnation, start_at=clock.now(), memory=known)
     nodes: list[Node] = [world if state is None else checkpoint.Remembering(world, state)]
     if witness and drawn.mission.witness:
-        nodes.append(Witness(fleet, wall_ms, wall_ms))
+        nodes.append(Witness(fleet, incarnation, wall_ms))
     return run(nodes, options, wall_ms)
 
 

@@ -69,6 +69,7 @@ class RobotHardware:
             gateway.term_max,
             gateway.latched,
             sum(gateway.refused.values()),
+            gateway.agent,
         )
         odometry.redraw()
         return self._envelope("sensors", message)

@@ -15,8 +15,8 @@ from msgspec import Struct
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
-from lfa.protocol.node import Local, Node, NodeObserver, PeerDown, PeerUp, Stop, Vitals
-from lfa.protocol.runtime.journal import Journal
+from lfa.protocol.node import Local, Node, NodeObserver, PeerDown, PeerUp, Stop, Vitals, reborn
+from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
 from lfa.protocol.transport.link_model import Link, LinkModel, Radio, link_of
@@ -64,6 +64,8 @@ class Simulator:
     def __init__(self, radio: Radio, seed: int) -> None:
         self.now = 0.0
         self.taps: list[Tap] = []
+        self.reborn: Callable[[Node], Journal] = _unjournalled
+        """Called with a node that goes on under a later number (E23), before it starts; returns its journal."""
         self._random = Random(f"air-{seed}")
         self.air = LinkModel(radio, self._random)
         self._seats: dict[str, _SimulatedNode] = {}
@@ -187,7 +189,11 @@ class Simulator:
             self._refresh(seat)
         if node.refusal is not None:
             raise Refused(node.refusal)
-        if node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
+        later = reborn(node)
+        if later is not None and seat.stop_by is None:
+            self._leave(seat)
+            self.add(later, self.reborn(later), seat.clock)
+        elif node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
             self._leave(seat)
         else:
             self._plan(seat)
@@ -267,6 +273,10 @@ class Simulator:
 
     def _hint_later(self, seat: _SimulatedNode, event: PeerUp | PeerDown, delay_s: float) -> None:
         self.at(self.now + delay_s, self._give, seat, "", event, b"")
+
+
+def _unjournalled(node: Node) -> Journal:
+    return Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, node.incarnation, {}))
 
 
 def _token(node: Node) -> str:

@@ -15,7 +15,9 @@ from lfa.agents.formation.pose_history import JitterBuffer, PoseHistory, Sample
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.localization.plausibility import plausible
 from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.incarnations import is_later
 from lfa.protocol.messages.team import PoseStamped
+from lfa.protocol.topics import TOPIC
 
 DEAD_RECKONING_FOLLOWERS_MAX = 3
 """Number of followers above which the buffer is used (control.md 5.1: dead reckoning amplifies along a chain)."""
@@ -27,6 +29,7 @@ DELAY_SPARE_S = 0.04
 DELAY_RATE = 0.05
 """Rate [s/s] at which the delay changes: a change alters the predecessor's apparent speed."""
 AGE_WINDOW_S = 10.0
+POSE_S_MAX = TOPIC["pose"].timeout_s or 0.0
 
 
 class Sighting(Struct, frozen=True):
@@ -75,7 +78,8 @@ class Predecessor:
         self._delay_s = DELAY_MIN_S if delay_s is None else delay_s
         self._oldest = _WindowedMaximum()
         self._asked_at: float | None = None
-        self._incarnation = -1
+        self._incarnation: int | None = None
+        self._heard_at = float("-inf")
         self._jumps = 0
         self.epoch = 0
         self.refused = 0
@@ -89,9 +93,10 @@ class Predecessor:
     def heard(self, message: PoseStamped, received_at: float) -> bool:
         """Update with a published pose; return False when it is refused."""
         header = message.header
-        if header.incarnation != self._incarnation and not self._restart(header.incarnation):
+        if header.incarnation != self._incarnation and not self._restart(header.incarnation, received_at):
             self.refused += 1
             return False
+        self._heard_at = received_at
         pose = Pose2D(message.x, message.y, message.theta)
         if not (isfinite(header.stamp) and plausible(pose, message.twist)):
             self.refused += 1
@@ -131,11 +136,15 @@ class Predecessor:
             self.robot, self.epoch, pose, twist, age_s if age_s > 0.0 else 0.0, self._delay_s, travelled_m, self.trace
         )
 
-    def _restart(self, incarnation: int) -> bool:
-        """Restart for another incarnation, which has another clock; return False for an older incarnation."""
-        if incarnation < self._incarnation:
-            return False
-        if self._incarnation >= 0:
+    def _restart(self, incarnation: int, now: float) -> bool:
+        """Restart for another incarnation, which has another clock.
+
+        Return False for an earlier incarnation, as long as the later one was heard within its freshness limit: a single
+        stray number must not silence the predecessor (E23).
+        """
+        if self._incarnation is not None:
+            if is_later(self._incarnation, incarnation) and now - self._heard_at <= POSE_S_MAX:
+                return False
             self.epoch += 1
             self._joining = True
         self._incarnation = incarnation

@@ -15,7 +15,7 @@ from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.deploy.process.identity import own_processes
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
@@ -88,7 +88,7 @@ class FleetView:
     def __init__(self, ear: Subscriber, seen: Seen) -> None:
         self._ear = ear
         self.seen = seen
-        self._life = clock.wall_ms()
+        self._life = incarnations.drawn()
         self._seq = 0
         self._state = FleetState()
 

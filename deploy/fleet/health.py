@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lfa.deploy.client.fleet_state import FRESH_S, FleetState
+from lfa.protocol.incarnations import drawn_at, is_later
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import PoseStamped
 from lfa.protocol.names import robot_id_of, robot_name
@@ -76,7 +77,9 @@ class Health:
         """Return False if a message comes from another process than the one that the robot's supervisor started."""
         hosts = (heard.message for heard in self._state.hosts.values())
         reports = [report for host in hosts for report in host.processes if report.name == robot_name(robot)]
-        return all(report.state == "running" and incarnation >= report.began_ms for report in reports)
+        return all(
+            report.state == "running" and not is_later(drawn_at(report.began_ms, 0), incarnation) for report in reports
+        )
 
     def _text(self, robot: int) -> str:
         if robot in self._namesakes:

@@ -21,6 +21,7 @@ from lfa.deploy.fuzz import network
 from lfa.deploy.fuzz.network import LinkConditions, Trace
 from lfa.deploy.fuzz.observers import GatewayObserver
 from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
+from lfa.protocol.incarnations import drawn_at
 from lfa.protocol.lease.effects import BecomeLeader, Effect
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
@@ -110,6 +111,7 @@ class AgentSimulation:
         self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max if schedule.faults else float("inf")
         """True time [s] of the latest arrival; messages that would arrive later are lost."""
         self.wall_ms: dict[int, int] = {}
+        """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
         self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots
         self.rates = schedule.rates
         self.processes: dict[int, Life] = {}
@@ -123,6 +125,7 @@ class AgentSimulation:
         self.simulator = Simulator(Radio(), schedule.seed)
         self.simulator.air = Gale(self)
         self.simulator.taps.append(self._hear)
+        self.simulator.reborn = self._reborn
         self.listen(())
 
     def listen(self, checkers: Sequence[Checker]) -> None:
@@ -158,19 +161,34 @@ class AgentSimulation:
         """Start a new incarnation with empty memory; a running one of the same id is killed first."""
         if robot_id in self.processes:
             self.kill(robot_id)
-        member = Member(robot_id, self._next_life())
-        floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
+        wall_ms = self.wall_ms.get(robot_id, 0)
+        number, floor = drawn_at(wall_ms, self._next_life()), max(round(self.now * 1000.0) + wall_ms, 0)
         node: Agent | Witness = (
-            Witness(FLEET, member.incarnation, floor, self.mission)
+            Witness(FLEET, number, floor, self.mission)
             if robot_id == WITNESS_ID
-            else Agent(robot_id, member.incarnation, FLEET, floor, self.mission)
+            else Agent(robot_id, number, FLEET, floor, self.mission)
         )
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
+        self._watch(node, robot_id, clock)
+        self._add(node, clock)
+
+    def _watch(self, node: Agent | Witness, robot_id: int, clock: LocalClock) -> None:
+        """Pass what a new incarnation does to the checkers and the trace."""
+        member = Member(robot_id, node.incarnation)
         life = self.processes[robot_id] = Life(self.simulator, node, member, clock)
         node.lease_observer = lambda observed: self._observed(life, observed)
         self._say(robot_id, f"starts, life {member.incarnation}")
         self._tell("lives", self.now, member)
-        self._add(node, clock)
+
+    def _reborn(self, node: Node) -> Journal:
+        """Watch the node that goes on under a later number (E23) in the place of one that the simulator has ended."""
+        robot_id = robot_id_of(node.name)
+        assert isinstance(node, Agent | Witness) and robot_id is not None
+        before = self.processes[robot_id]
+        self._tell("leads_no_more", self.now, before.member)
+        self._tell("ends", self.now, before.member)
+        self._watch(node, robot_id, before.clock)
+        return _unread(node)
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
         """Kill the process (SIGKILL); with `hinted`, connected processes see its token vanish."""
@@ -275,8 +293,7 @@ class AgentSimulation:
         self._add(world, clock, GatewayObserver(self.simulator, world, self._tell, self.accepted))
 
     def _add(self, node: Node, clock: LocalClock, *observers: NodeObserver) -> None:
-        journal = Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {}))
-        self.simulator.add(node, journal, clock, observers)
+        self.simulator.add(node, _unread(node), clock, observers)
 
     def _next_life(self) -> int:
         self._lives += 1
@@ -322,6 +339,10 @@ class AgentSimulation:
         lease = self.processes[robot_id].lease
         assert lease is not None, robot_id
         return lease
+
+
+def _unread(node: Node) -> Journal:
+    return Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {}))
 
 
 def _place(name: str) -> int:

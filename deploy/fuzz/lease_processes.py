@@ -253,12 +253,24 @@ class Hosts(GatewaySimulation):
             return
         self.at(self.now + FOLLOW_PERIOD_S, self.follow, process)
         lease = process.lease
+        self._hear_gateway(process)
         if process.paused or lease.role is not Role.FOLLOWER or lease.config.version.term == NO_TERM:
             return
         stamp = self.stamp(process.id)
         if stamp is not None:
             term, holder = lease.config.version.term, lease.chain[0]
             self.command(process.id, self._drawn(process, term, holder, False, stamp))
+
+    def _hear_gateway(self, process: Process) -> None:
+        """Tell the process the term and the agent that its robot's gateway knows, if connected (E23, E24)."""
+        host = self.gateways.get(process.id)
+        if host is None or not host.alive or process.paused or process.lease.role is Role.LEADER:
+            return
+        if (self.host_of_gateway(process.id), process.id) in self.cuts:
+            return
+        gateway, lease = host.gateway, process.lease
+        lease.told_of(gateway.agent)
+        self.carry_out(process, lease.gateway_term(gateway.term_max, process.clock.local(self.now), gateway.latched))
 
     def _drawn(self, process: Process, term: Term, holder: int, as_leader: bool, stamp: GatewayStamp) -> CmdVel:
         header = Header(robot_name(process.id), process.member.incarnation, 0, process.clock.local(self.now))

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
 from lfa.deploy.fuzz.network import LinkConditions, SimulatedClock
+from lfa.protocol.incarnations import after, drawn_at
+from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.timing import timing_of
@@ -42,7 +44,7 @@ class LeaseSimulation(Hosts):
         timing, gateways_at = timing_of(self.mission.profile), WITNESS_ID if gateways_at_world else None
         super().__init__(seed, ids, weather or LinkConditions(), gateways_at, timing, rates or {}, gateway_type)
         self.wall_ms: dict[int, int] = {}
-        """Error [s] of each host's wall clock: terms of incarnations that begin there start above that clock."""
+        """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
 
     # --- incarnations ------------------------------------------------------------------------------------------
 
@@ -54,19 +56,23 @@ class LeaseSimulation(Hosts):
             self.at(at, self.start, robot_id)
         return self
 
-    def start(self, robot_id: int) -> None:
-        """Start a new incarnation with empty memory; a running one of the same id is killed first."""
+    def start(self, robot_id: int, number: int | None = None) -> None:
+        """Start a new incarnation with empty memory; a running one of the same id is killed first.
+
+        `number`: that of the incarnation; None: drawn from its host's clock, which may be set back.
+        """
         if robot_id in self.processes and self.processes[robot_id].alive:
             self.kill(robot_id)
         self._lives += 1
-        member = Member(robot_id, self._lives)
+        drawn = drawn_at(self.wall_ms.get(robot_id, 0), self._lives)
+        member = Member(robot_id, drawn if number is None else number)
         clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor, self.observed)
         process = Process(member, lease, clock)
         self.processes[robot_id] = process
         if self.trace is not None:
-            self.trace(self.now, robot_id, f"starts, life {self._lives}")
+            self.trace(self.now, robot_id, f"starts, life {member.incarnation}")
         for tell in self._tell["lives"]:
             tell(self.now, member)
         self.tell_token(member, up=True)
@@ -76,6 +82,13 @@ class LeaseSimulation(Hosts):
             if host is not None and host.alive:
                 host.gateway.agent_up(member.incarnation, host.clock.local(self.now))
         self.wake_at(process, self.now)
+
+    def carry_out(self, process: Process, effects: list[Effect]) -> None:
+        """Execute the effects of a lease; start anew, under a later number, a process that was told of one (E23)."""
+        super().carry_out(process, effects)
+        newest = process.lease.superseded_by
+        if newest is not None and process.alive and not process.leaving:
+            self.start(process.id, after(newest, process.member.incarnation))
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
         """Kill the process (SIGKILL); with `hinted`, connected ones see its token vanish within `hint_delay_max`."""

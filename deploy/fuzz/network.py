@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from lfa.deploy.analysis.verification.checker import Checker, listeners
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StepDown
-from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Term
+from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
 
 REORDER_S = 0.15
 """Maximum delay [s] of a message held back; more than three heartbeats of the profile std."""
@@ -173,8 +173,8 @@ def told(effect: Effect) -> str:
 
 
 def body_term(body: LeaseBody) -> str:
-    """Return the term of a message as text; empty for HELLO, which has none."""
-    return "" if isinstance(body, Hello) else short(body.term)
+    """Return the term of a message as text; empty for HELLO and its answer, which have none."""
+    return "" if isinstance(body, Hello | Superseded) else short(body.term)
 
 
 def short(term: Term) -> str:

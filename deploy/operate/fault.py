@@ -20,7 +20,7 @@ from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
 from lfa.deploy.process import identity as processes
 from lfa.deploy.process.identity import Identity
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.team import Event
@@ -57,7 +57,7 @@ def command(
         return _restart(target, team[0].fleet, bus, inbox, as_json)
     try:
         whom, identity = _whom(target, team, bus, inbox)
-        operator = Operator(team[0].fleet, clock.wall_ms())
+        operator = Operator(team[0].fleet, incarnations.drawn())
         bus.publish(operator.key, encode(operator.says("fault", clock.now(), deed=deed, robot=whom)))
         clock.sleep(SENT_S)
         done = processes.send(identity, SIGNALS[deed])
@@ -79,7 +79,7 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
         if deed != "handover" and not all("--faults" in agent.identity.arguments for agent in team):
             raise Refused(f"fleet {fleet} does not obey weather: its processes were started without --faults")
         whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
-        operator = Operator(fleet, clock.wall_ms())
+        operator = Operator(fleet, incarnations.drawn())
         said = note(operator, clock.now(), deed, whom, robots)
         robot = whole_number(whom)
         event = operator.says("fault", clock.now(), deed=deed, robot=whom if robot is None else robot)
@@ -97,7 +97,7 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
 def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
     """Ask the fleet's launcher to restart a robot, and wait for its event. Raises Refused if none answers."""
     robot = robot_id_of(target if target.startswith("robot") else f"robot{target}")
-    operator = Operator(fleet, clock.wall_ms())
+    operator = Operator(fleet, incarnations.drawn())
     try:
         if robot is None:
             raise Refused(f"restart {target!r}: must be a robot's id, such as 3")

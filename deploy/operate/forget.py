@@ -10,7 +10,7 @@ import typer
 
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.consensus import Role
@@ -37,7 +37,7 @@ def command(
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
     with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status", "*/mission"})) as ear:
-        ask = Ask(Header(OPERATOR_NAME, clock.wall_ms(), 1, clock.now()), "mission")
+        ask = Ask(Header(OPERATOR_NAME, incarnations.drawn(), 1, clock.now()), "mission")
         ear.bus.publish(key(ear.fleet.name, OPERATOR_NAME, "ask"), encode(ask))
         leader, _, team = _listen(ear, LISTEN_S)
         for robot in robots:
@@ -63,9 +63,9 @@ def command(
 
 def _say(ear: Subscriber, robots: list[int]) -> None:
     """Publish the command; it covers every incarnation started before this moment, a later one may join."""
-    now_ms = clock.wall_ms()
-    operator = Operator(ear.fleet.name, now_ms)
-    lives = [[robot, now_ms] for robot in robots]
+    number = incarnations.drawn()
+    operator = Operator(ear.fleet.name, number)
+    lives = [[robot, number] for robot in robots]
     ear.bus.publish(operator.orders_key, encode(operator.orders("forget", clock.now(), lives=lives)))
 
 

@@ -11,7 +11,7 @@ import typer
 from lfa.agents.formation.formation import named
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.team import Event
 from lfa.protocol.mission import FormationSpec
@@ -55,5 +55,5 @@ def ask(ear: Subscriber, side: str) -> Event | None:
 
 
 def say(ear: Subscriber, side: str) -> None:
-    operator = Operator(ear.fleet.name, clock.wall_ms())
+    operator = Operator(ear.fleet.name, incarnations.drawn())
     ear.bus.publish(operator.orders_key, encode(operator.orders("formation", clock.now(), side=side)))

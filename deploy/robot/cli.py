@@ -17,7 +17,7 @@ from typing import NoReturn
 from lfa.deploy.robot.base import SimulatedBase
 from lfa.deploy.robot.driver import Driver
 from lfa.deploy.robot.watchdog import Watchdog
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.mission import Limits
@@ -50,7 +50,7 @@ def start(arguments: argparse.Namespace) -> int:
 
     fleet = fleet_name(arguments.fleet)
     watchdog = () if arguments.stop_command is None else (_watchdog(arguments.stop_command).alive,)
-    driver = Driver(fleet, arguments.id, wall_ms, make_base, *watchdog)
+    driver = Driver(fleet, arguments.id, incarnations.drawn(), make_base, *watchdog)
     known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
     endpoint = arguments.connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")

@@ -146,6 +146,7 @@ class Driver:
                 gateway.term_max,
                 gateway.latched,
                 sum(gateway.refused.values()),
+                gateway.agent,
             )
         ]
         topics = ["sensors"]

@@ -33,7 +33,7 @@ from lfa.deploy.run.progress import Progress, progress
 from lfa.deploy.run.progress_rows import ProgressRows
 from lfa.deploy.run.recorder_process import RecorderTask, RunResult
 from lfa.deploy.run.termination import Referee
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Event, OperatorNote
@@ -127,7 +127,7 @@ class _Launch:
         self._time = WorldTime()
         self._heard_at = clock.now()
         self._began_at: float | None = None
-        self._operator = Operator(about.fleet, clock.wall_ms())
+        self._operator = Operator(about.fleet, incarnations.drawn())
         self._inbox = Inbox()
         self._decoder = Decoder()
         self._bus: ZenohBus | None = None

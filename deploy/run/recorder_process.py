@@ -22,7 +22,7 @@ from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import About
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.finish import finish
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import Truth
@@ -97,7 +97,7 @@ class _Tape:
     def __init__(self, task: RecorderTask) -> None:
         fleet = task.about.fleet
         self._inbox = Inbox(size_max=INBOX_SIZE_MAX, every=True)
-        self._incarnation = clock.wall_ms()
+        self._incarnation = incarnations.drawn()
         self._key = key(fleet, RECORDER_NAME, "event")
         self._seq = 0
         self._decoder = Decoder()

@@ -95,6 +95,7 @@ class _Run:
         self._lives: dict[str, int] = {}
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
+        self._simulator.reborn = self._journal
         self.faults_left: list[str] = []
         self.recording: Recording | None = None
 
@@ -175,11 +176,14 @@ class _Run:
         self._recorder.record(now, self._operator.key, self._operator.says(kind, now, **data))
 
     def _add(self, node: Node) -> None:
+        self._simulator.add(node, self._journal(node))
+
+    def _journal(self, node: Node) -> Journal:
         started_with = {"fleet": FLEET, **node.started_with}
         heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, node.incarnation, started_with)
         journal = Journal(self._journal_folder, heading)
         self._journals[f"{node.name}-{node.incarnation}"] = journal
-        self._simulator.add(node, journal)
+        return journal
 
     def _agent(self, robot_id: int) -> Agent:
         life = self._next_life(robot_name(robot_id))

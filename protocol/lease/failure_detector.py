@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from lfa.protocol.incarnations import is_later
 from lfa.protocol.messages.consensus import Member
 
-NEVER_HEARD = -1
 LAST_WORDS_HEARTBEATS = 2.0
 """Time, in heartbeats, after its token vanished in which messages of a dead process may still arrive."""
 
@@ -13,6 +13,8 @@ class FailureDetector:
     def __init__(self, me: Member, heartbeat_s: float) -> None:
         self._newest: dict[int, int] = {me.id: me.incarnation}
         """Newest incarnation heard, by id."""
+        self._heard_at: dict[int, float] = {}
+        """Time [s] of the last message, by id."""
         self._gone: dict[int, tuple[int, float]] = {}
         """Incarnation and time [s] of a vanished token, by id."""
         self._last_words_s = LAST_WORDS_HEARTBEATS * heartbeat_s
@@ -22,24 +24,27 @@ class FailureDetector:
 
         An incarnation heard over two heartbeats after its token vanished is alive; earlier messages may be its last.
         """
-        if src.incarnation > self._newest.get(src.id, NEVER_HEARD):
+        self._heard_at[src.id] = now
+        if src.id not in self._newest or is_later(src.incarnation, self._newest[src.id]):
             self._newest[src.id] = src.incarnation
         if src.id in self._gone:
             incarnation, since = self._gone[src.id]
             late = now - since > self._last_words_s
-            if src.incarnation > incarnation or (src.incarnation == incarnation and late):
+            if is_later(src.incarnation, incarnation) or (src.incarnation == incarnation and late):
                 del self._gone[src.id]
 
     def appeared(self, id: int, incarnation: int) -> None:
-        if id in self._gone and incarnation >= self._gone[id][0]:
+        if id in self._gone and not is_later(self._gone[id][0], incarnation):
             del self._gone[id]
 
     def vanished(self, id: int, incarnation: int, now: float) -> None:
-        self._gone[id] = (max(incarnation, self._gone.get(id, (0, now))[0]), now)
+        if id in self._gone and is_later(self._gone[id][0], incarnation):
+            incarnation = self._gone[id][0]
+        self._gone[id] = (incarnation, now)
 
     def is_gone(self, member: Member) -> bool:
         """Return True if the token of this incarnation, or of a later one, vanished."""
-        return member.id in self._gone and self._gone[member.id][0] >= member.incarnation
+        return member.id in self._gone and not is_later(member.incarnation, self._gone[member.id][0])
 
     def knows(self, id: int) -> bool:
         """Return True if any incarnation of `id` was heard."""
@@ -47,7 +52,20 @@ class FailureDetector:
 
     def is_superseded(self, member: Member) -> bool:
         """Return True if a later incarnation of it was heard."""
-        return self._newest.get(member.id, NEVER_HEARD) > member.incarnation
+        return member.id in self._newest and is_later(self._newest[member.id], member.incarnation)
+
+    def later_than(self, member: Member) -> int | None:
+        """Return the number of a later incarnation that was heard or whose token vanished; None if there is none."""
+        gone, _ = self._gone.get(member.id, (member.incarnation, 0.0))
+        newest = self._newest.get(member.id, member.incarnation)
+        newest = gone if is_later(gone, newest) else newest
+        return newest if is_later(newest, member.incarnation) else None
+
+    def last_of(self, member: Member, now: float, silence_s: float) -> Member:
+        """Return the newest known incarnation of its id, `member` included; `member` itself if one was just heard."""
+        later = self.later_than(member)
+        just_heard = now - self._heard_at.get(member.id, float("-inf")) <= silence_s
+        return member if later is None or just_heard else Member(member.id, later)
 
     def has_ended(self, member: Member) -> bool:
         """Return True if no answer of this incarnation is expected: a later one was heard, or its token vanished."""

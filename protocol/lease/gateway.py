@@ -11,6 +11,7 @@ from __future__ import annotations
 from math import isfinite
 
 from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.incarnations import is_later
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
 from lfa.protocol.messages.robot import CmdVel
@@ -38,8 +39,8 @@ class Gateway:
         # E13: an earlier incarnation of this gateway may have confirmed a fence unknown to this one. Every lease below
         # that fence has expired after T_grant.
         self._shut_until = now + timing.grant_s
-        self._obeyed = 0
-        """Newest known incarnation of the robot's agent; commands of earlier ones are refused."""
+        self.agent: int | None = None
+        """Newest known incarnation of the robot's agent; commands of earlier ones are refused (E23)."""
         self._holder = 0
         """Holder of `term_max` named by the obeyed commands; 0: none yet."""
         self._latched: Term | None = None
@@ -55,7 +56,7 @@ class Gateway:
         if reason is not None:
             self.refused[reason] = self.refused.get(reason, 0) + 1
             return reason
-        self._obeyed, self._seq = cmd.header.incarnation, cmd.header.seq
+        self.agent, self._seq = cmd.header.incarnation, cmd.header.seq
         if cmd.term > self.term_max:
             self.term_max, self._holder = cmd.term, cmd.holder
         elif self._holder == 0:
@@ -68,7 +69,7 @@ class Gateway:
     def _objection(self, cmd: CmdVel, now: float) -> str | None:
         if now < self._shut_until:
             return SHUT
-        if cmd.header.incarnation < self._obeyed:
+        if self._knows_later(cmd.header.incarnation):
             return OLD_INCARNATION
         if cmd.term < self.term_max:
             return OLD_TERM
@@ -82,11 +83,7 @@ class Gateway:
             return FUTURE_STAMP
         if now - cmd.gateway.time > self._deadman_s or cmd.gateway.time < self._stamped_at:
             return OLD_STAMP
-        if (
-            cmd.gateway.time == self._stamped_at
-            and cmd.header.incarnation == self._obeyed
-            and cmd.header.seq < self._seq
-        ):
+        if cmd.gateway.time == self._stamped_at and cmd.header.incarnation == self.agent and cmd.header.seq < self._seq:
             return REORDERED
         if not (isfinite(cmd.twist.linear_x) and isfinite(cmd.twist.angular_z)):
             return BAD_TWIST
@@ -116,15 +113,18 @@ class Gateway:
         Follower commands are not barred: a vanished token proves nothing, and a follower does no harm. Not to be
         called when the gateway's own link to the router is lost too: that says nothing about the agent.
         """
-        if incarnation >= self._obeyed:
-            self._obeyed, self._latched = incarnation, self.term_max
+        if not self._knows_later(incarnation):
+            self.agent, self._latched = incarnation, self.term_max
             self._twist = STILL
 
     def agent_up(self, incarnation: int, now: float) -> None:
         """Record that an agent of this robot is connected; a newer incarnation replaces the obeyed one; stop then."""
-        if incarnation > self._obeyed:
-            self._obeyed = incarnation
+        if incarnation != self.agent and not self._knows_later(incarnation):
+            self.agent = incarnation
             self._twist = STILL
+
+    def _knows_later(self, incarnation: int) -> bool:
+        return self.agent is not None and is_later(self.agent, incarnation)
 
     @property
     def latched(self) -> bool:

@@ -120,6 +120,12 @@ class Hello(Struct, frozen=True, array_like=True, tag="hello"):
     version: Version | None
 
 
+class Superseded(Struct, frozen=True, array_like=True, tag="superseded"):
+    """Answer to the HELLO of an incarnation earlier than `newest`, of which the sender heard or saw the end (E23)."""
+
+    newest: Count
+
+
 class Fence(Struct, frozen=True, array_like=True, tag="fence"):
     """Order to the gateway of the robot whose term `old` is to end: refuse every term below `term`."""
 
@@ -134,7 +140,7 @@ class Fenced(Struct, frozen=True, array_like=True, tag="fenced"):
     term: Term
 
 
-LeaseBody = Prepare | Promise | Nack | Propose | Grant | Release | Hello | Fence | Fenced
+LeaseBody = Prepare | Promise | Nack | Propose | Grant | Release | Hello | Superseded | Fence | Fenced
 
 
 class LeaseNote(Struct, frozen=True, array_like=True, tag="lease"):

@@ -17,7 +17,7 @@ class ProcessReport(Struct, frozen=True, array_like=True, gc=False):
     """Process id; 0 while it does not run."""
     starts: int
     began_ms: int
-    """Wall clock [ms] of its machine at its last start; the incarnation in its messages is not older."""
+    """Wall clock [ms] of its machine at its last start; the incarnation in its messages is no earlier one (E23)."""
     up_s: float
     ended: str
     """Description of how its last incarnation ended; empty if none has."""

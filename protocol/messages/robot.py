@@ -20,6 +20,8 @@ class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
     term_max: Term
     latched: bool = False
     refused: int = 0
+    agent: Count | None = None
+    """Newest incarnation of the robot's agent that the gateway knows (E23); None before the first."""
 
 
 class Localization(Struct, frozen=True, array_like=True, tag="localization"):

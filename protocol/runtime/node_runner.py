@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
 from types import FrameType
@@ -20,7 +20,7 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import OperatorNote
-from lfa.protocol.node import Local, Node, Stop
+from lfa.protocol.node import Local, Node, Stop, reborn
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
@@ -162,22 +162,19 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     wake = Wake()
     stop = _on_signals(wake)
     seats: list[_NodeRunner] = []
-    lease_s = options.lease_ms / 1000.0
-    weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     try:
         for node in nodes:
             inbox = Inbox(wake, defer_hellos=node.defer_hellos)
             bus = connect(options, inbox, stop)
             if bus is None:
                 return 0
-            dead = refuse_double(bus, inbox, options.fleet, lease_s, node)
-            started_with = {"fleet": options.fleet, **node.started_with}
-            heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
-            seats.append(_NodeRunner(node, bus, inbox, Journal(options.journal, heading), weather_key))
-            bus.announce(options.fleet, node.name, node.incarnation)
-            refuse_twin(bus, options.fleet, lease_s, node, dead)
+            try:
+                seats.append(_joined(node, bus, inbox, options, floor))
+            except Refused:
+                bus.close()
+                raise
         settle()
-        return _loop(seats, wake, stop, Notify(options.notify))
+        return _loop(seats, wake, stop, Notify(options.notify), lambda seat, node: _reborn(seat, node, options, floor))
     finally:
         for seat in seats:
             seat.bus.close()
@@ -200,7 +197,40 @@ def connect(options: Options, inbox: Inbox, stop: _StopRequest) -> ZenohBus | No
     return None
 
 
-def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: Notify) -> int:
+def _joined(node: Node, bus: ZenohBus, inbox: Inbox, options: Options, floor: int) -> _NodeRunner:
+    """Announce `node`, whose name must not run in the fleet, and return its place in the loop. Raises Refused."""
+    lease_s = options.lease_ms / 1000.0
+    dead = refuse_double(bus, inbox, options.fleet, lease_s, node)
+    started_with = {"fleet": options.fleet, **node.started_with}
+    heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
+    weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
+    seat = _NodeRunner(node, bus, inbox, Journal(options.journal, heading), weather_key)
+    bus.announce(options.fleet, node.name, node.incarnation)
+    refuse_twin(bus, options.fleet, lease_s, node, dead)
+    return seat
+
+
+def _reborn(seat: _NodeRunner, node: Node, options: Options, floor: int) -> _NodeRunner:
+    """Replace the node in `seat` by `node`, which has the same name and a later number (E23); say so in one line.
+
+    Raises Refused if a process of this name speaks: then the later incarnation runs elsewhere, and this one is left.
+    """
+    why = f"the fleet knows a later incarnation than {seat.node.incarnation} (was the clock set back?)"
+    write_line(f"{node.name}: {why}: goes on as {node.incarnation}, at the tail", sys.stderr)
+    seat.host.journal.close()
+    seat.bus.withdraw()
+    seat.bus.follow(frozenset())
+    seat.inbox.take()
+    return _joined(node, seat.bus, seat.inbox, options, floor)
+
+
+def _loop(
+    seats: list[_NodeRunner],
+    wake: Wake,
+    stop: _StopRequest,
+    notify: Notify,
+    replaced: Callable[[_NodeRunner, Node], _NodeRunner],
+) -> int:
     began = now = clock.now()
     notify.ready()
     stop_by = None
@@ -209,8 +239,11 @@ def _loop(seats: Sequence[_NodeRunner], wake: Wake, stop: _StopRequest, notify: 
         deadline = min([seat.next_deadline() for seat in seats])
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
         now = clock.now()
-        for seat in seats:
+        for place, seat in enumerate(seats):
             vitals.lag(min(seat.step(now), now - began))  # a first deadline may lie far in the past
+            later = reborn(seat.node)
+            if later is not None and not stop.told:
+                seats[place] = replaced(seat, later)
         if vitals.due(now):
             notify.alive()
             for seat in seats:

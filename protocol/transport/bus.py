@@ -121,6 +121,11 @@ class Inbox:
         if where is None or topic is None or topic.name in self._eager or (topic.wakes and not self._can_wait(where)):
             self._wake.set()
 
+    def drop(self) -> None:
+        """Count an arrival that the transport could not read, on any thread."""
+        with self._lock:
+            self.dropped += 1
+
     def _can_wait(self, where: Address) -> bool:
         if where.topic != "lease":
             return False

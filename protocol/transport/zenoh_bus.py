@@ -14,6 +14,7 @@ from typing import Any
 import zenoh
 
 from lfa.protocol import clock
+from lfa.protocol.incarnations import NUMBERS
 from lfa.protocol.names import whole_number
 from lfa.protocol.node import PeerDown, PeerUp, RouterLost
 from lfa.protocol.topics import NO_ECHO, TOPIC, Topic, address, alive_key
@@ -57,6 +58,12 @@ class ZenohBus:
     def announce(self, fleet: str, owner: str, incarnation: int) -> None:
         """Declare the liveliness token of this incarnation."""
         self._token = self._session.liveliness().declare_token(alive_key(fleet, owner, incarnation))
+
+    def withdraw(self) -> None:
+        """Undeclare the token of this incarnation, whose end others see at once."""
+        if self._token is not None:
+            self._token.undeclare()  # type: ignore[no-untyped-call]
+            self._token = None
 
     def living(self, fleet: str, owner: str, timeout_s: float = 1.0) -> list[int]:
         """Return the incarnations of `owner` whose tokens exist at the moment."""
@@ -123,7 +130,9 @@ class ZenohBus:
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)
         peer = _peer(key, PeerUp if sample.kind == zenoh.SampleKind.PUT else PeerDown)
-        if peer is not None:
+        if peer is None:
+            self._inbox.drop()
+        else:
             self._inbox.put(Arrival(clock.now(), key, peer))
 
     def _on_transport(self, event: Any) -> None:
@@ -149,4 +158,4 @@ def _peer(key: str, kind: type[PeerUp] | type[PeerDown]) -> PeerUp | PeerDown | 
     if where is None or where.topic != "alive" or where.to is None:
         return None
     incarnation = whole_number(where.to)
-    return None if incarnation is None else kind(where.owner, incarnation)
+    return None if incarnation is None or incarnation >= NUMBERS else kind(where.owner, incarnation)

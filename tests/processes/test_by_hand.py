@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 from lfa.protocol.messages.codec import Message, decode
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.team import Status, Tracking
+from lfa.protocol.names import robot_name
 from lfa.protocol.topics import TOPIC, address, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.zenoh_bus import ZenohBus
@@ -25,6 +27,13 @@ from tests.rigs.lfa_runs import eventually
 pytestmark = pytest.mark.processes
 
 FLEET = "hand"
+BEHIND = """from lfa.protocol import clock
+right = clock.wall_ms
+clock.wall_ms = lambda: right() - 3_600_000
+from lfa.agents.cli import main
+main()
+"""
+"""`lfa-agent` on a machine whose wall clock is an hour behind."""
 RSS_MB_MAX = 35.0
 
 
@@ -56,6 +65,15 @@ class Terminals:
         arguments = ("lfa.agents.cli", "--role", role, "--id", str(robot_id), *self.team())
         return self.start(*arguments, environment=environment)
 
+    def agent_behind(self, robot_id: int) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", BEHIND, "--role", "follower", "--id", str(robot_id), *self.team()]
+        return self._run(command, os.environ)
+
+    def token(self, robot_id: int, number: int) -> None:
+        """Hold a liveliness token of this robot for an incarnation that does not exist."""
+        assert self._bus is not None
+        self._bus.announce(FLEET, robot_name(robot_id), number)
+
     def look_on(self) -> None:
         self._bus = ZenohBus(self.endpoint, self._inbox)
         self._bus.follow(frozenset(key(FLEET, "*", topic) for topic in ("tracking", "status", "pose")))
@@ -77,8 +95,10 @@ class Terminals:
         return ("--fleet", FLEET, "--connect", self.endpoint)
 
     def start(self, *arguments: str, environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
-        command, told = [sys.executable, "-m", *arguments], {**os.environ, **(environment or {})}
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=told)
+        return self._run([sys.executable, "-m", *arguments], {**os.environ, **(environment or {})})
+
+    def _run(self, command: list[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
         self._children.append(child)
         return child
 
@@ -126,6 +146,56 @@ def test_a_killed_follower_that_starts_again_follows_again(terminals: Terminals)
     follower.wait()
     terminals.agent(2)
     eventually(lambda: follows(terminals, "robot2", first_life[0]), "robot 2 does not follow in its second life")
+
+
+def test_a_robot_that_returns_with_a_clock_set_back_says_so_in_a_line_and_follows(terminals: Terminals) -> None:
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    terminals.agent(1, "leader")
+    follower = terminals.agent(2)
+    eventually(lambda: follows(terminals, "robot2"), "robot 2 follows nobody")
+    follower.kill()
+    follower.wait()
+    returned = terminals.agent_behind(2)
+    terminals.heard()
+    eventually(lambda: follows(terminals, "robot2"), "robot 2 does not follow with a clock that is an hour behind")
+    returned.terminate()
+    _, said = returned.communicate(timeout=20.0)
+    assert said.count("robot2: the fleet knows a later incarnation") == 1
+
+
+@pytest.mark.parametrize("number", [2**53 + 1, 2**53 - 1, 2**52])
+def test_a_stray_token_of_any_number_locks_no_robot_out(terminals: Terminals, number: int) -> None:
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    terminals.agent(1, "leader")
+    follower = terminals.agent(2)
+    eventually(lambda: follows(terminals, "robot2"), "robot 2 follows nobody")
+    terminals.token(2, number)
+    follower.kill()
+    follower.wait()
+    terminals.agent(2)
+    terminals.heard()
+    eventually(lambda: follows(terminals, "robot2"), f"robot 2 is locked out by a token with the number {number}")
+
+
+def test_a_process_that_slept_while_another_took_its_name_ends_in_one_line(terminals: Terminals) -> None:
+    terminals.router()
+    terminals.look_on()
+    terminals.world()
+    terminals.agent(1, "leader")
+    asleep = terminals.agent(2)
+    eventually(lambda: follows(terminals, "robot2"), "robot 2 follows nobody")
+    asleep.send_signal(signal.SIGSTOP)
+    terminals.agent(2)
+    terminals.heard()
+    eventually(lambda: follows(terminals, "robot2"), "robot 2 does not follow in its second incarnation")
+    asleep.send_signal(signal.SIGCONT)
+    _, said = asleep.communicate(timeout=30.0)
+    assert asleep.returncode == 2
+    assert said.endswith(f"robot2 already runs in fleet {FLEET!r}: end that one, or give another --id\n")
 
 
 def test_an_id_that_already_runs_is_refused_in_one_line(terminals: Terminals) -> None:

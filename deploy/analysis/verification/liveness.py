@@ -36,16 +36,20 @@ class _AfterFaults(Checker):
         super().__init__(timing)
         self.alive: dict[int, Member] = {}
         self.healed_at = NEVER
+        self._corrected_by = NEVER
         self._step_s = timing.rank_step_s
 
     def lives(self, at: float, who: Member) -> None:
         self.alive[who.id] = who
+        if self.healed_at <= at <= self._corrected_by:
+            self.healed_at = at  # the last fault's restart under a wrong clock is corrected only now (E23)
 
     def ends(self, at: float, who: Member) -> None:
         self.alive.pop(who.id, None)
 
     def heals(self, at: float, step_s: float) -> None:
         self.healed_at, self._step_s = at, max(step_s, self._step_s)
+        self._corrected_by = at + self.timing.grant_s
 
     @property
     def led_by(self) -> float:
@@ -172,7 +176,7 @@ class OneVersion(_AfterFaults):
 
 
 class Obeyed(_AfterFaults):
-    """Checker of L4: gateways accept leader commands without a long gap."""
+    """Checker of L4: gateways accept leader commands without a long gap, and at last a command of each robot."""
 
     name = "L4"
 
@@ -180,8 +184,11 @@ class Obeyed(_AfterFaults):
         super().__init__(timing)
         self._last = LONG_AGO
         self._silence: tuple[float, float] | None = None
+        self._obeyed_at: dict[int, float] = {}
+        """Time [s] of the last command that each robot's gateway accepted."""
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        self._obeyed_at[robot_id] = at
         if cmd.as_leader:
             self._hear(at)
 
@@ -190,6 +197,10 @@ class Obeyed(_AfterFaults):
         if self._silence is not None:
             last, then = self._silence
             self.broken(then, f"no leader command obeyed for {(then - last) * 1000.0:.0f} ms")
+        for robot_id in sorted(self.alive.keys() - {WITNESS_ID}):
+            last = self._obeyed_at.get(robot_id, LONG_AGO)
+            if at > self.settled_by + SETTLED_S and at - last > SETTLED_S:
+                self.broken(at, f"no command of robot {robot_id} obeyed for {at - last:.1f} s")
 
     def _hear(self, at: float) -> None:
         """Check the gap since the last leader command: at most the deadman time plus the latency of a command."""

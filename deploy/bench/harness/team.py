@@ -22,7 +22,7 @@ from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.run.process_table import rows
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.mission import FormationSpec, Leading, Mission, Profile
 from lfa.protocol.names import robot_name
@@ -90,7 +90,7 @@ class Team:
         self._inbox = Inbox(every=True)
         self._decoder = Decoder()
         self._bus: ZenohBus | None = None
-        self._operator = Operator(self._about.fleet, clock.wall_ms())
+        self._operator = Operator(self._about.fleet, incarnations.drawn())
         self.heard = TeamHistory(scenario.mission.robots)
 
     def __enter__(self) -> Team:

@@ -27,7 +27,7 @@ from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.messages.codec import Message, encode
@@ -124,7 +124,7 @@ class Supervisor:
             row.name: _ManagedProcess(row, RestartBackoff(ROUTER if row.name == ROUTER_NAME else part.restart))
             for row in parts.rows(part)
         }
-        self._life = clock.wall_ms()
+        self._life = incarnations.drawn()
         self._seqs: dict[str, int] = {}
         self._obeyed = (0, 0)
         self._orders: OrderedDict[int, int] = OrderedDict()

@@ -12,7 +12,7 @@ import typer
 from lfa.deploy.client.session import FleetAddress, find, listen, scenario_of_fleet
 from lfa.deploy.recording.recorder import parts
 from lfa.deploy.recording.simulation_time import WorldTime
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.header import Header
@@ -137,7 +137,7 @@ def _draw(fleet: FleetAddress, stream: rerun.RecordingStream, scenario: Scenario
         scene.ground(scenario.world)
         scene.mission(scenario.mission)
     with listen(fleet, frozenset(f"*/{topic}" for topic in TOPICS), every=True) as ear:
-        ask = Ask(Header(OPERATOR_NAME, clock.wall_ms(), 1, clock.now()), "mission")
+        ask = Ask(Header(OPERATOR_NAME, incarnations.drawn(), 1, clock.now()), "mission")
         ear.bus.publish(key(fleet.name, OPERATOR_NAME, "ask"), encode(ask))
         while until is None or clock.now() < until:
             clock.sleep(FLUSH_S)

@@ -190,7 +190,8 @@ def follow_refusal(m: LeaseMemory, _src: Member, body: Nack, now: float) -> None
 
 def forget(m: LeaseMemory, lost: tuple[Member, ...], now: float) -> None:
     """Apply an operator's declaration that the incarnations `lost` are dead, for one attempt of each robot (E20)."""
-    lost = tuple(member for member in lost if member.id in m.election.all_member_ids)
+    silence_s = m.timing.remove_silence_s
+    lost = tuple(m.peers.last_of(gone, now, silence_s) for gone in lost if gone.id in m.election.all_member_ids)
     if m.leader is None and lost and not m.lives_on(lost):
         resigning.drop_candidacy(m, now)
         m.election.forget(lost, now)

@@ -61,7 +61,7 @@ def on_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
 def note_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> bool:
     """Note the sender, to be taken in with the next change; return False for strangers and earlier incarnations."""
     voting.answer_hello(m, src, body, now)
-    if m.holder is None or src.id not in m.election.all_member_ids or m.peers.is_superseded(src):
+    if m.holder is None or src.id not in m.election.all_member_ids or m.peers.later_than(src) is not None:
         return False
     m.holder.heard_at[src] = now
     if src not in m.holder.said_hello:

@@ -29,6 +29,7 @@ from lfa.protocol.messages.consensus import (
     Propose,
     Release,
     Role,
+    Superseded,
     Term,
 )
 from lfa.protocol.mission import Mission
@@ -41,6 +42,7 @@ EVENTS: dict[type[LeaseBody], LeaseEvent] = {
     Grant: LeaseEvent.GRANT,
     Release: LeaseEvent.RELEASE,
     Hello: LeaseEvent.HELLO,
+    Superseded: LeaseEvent.SUPERSEDED,
     Fenced: LeaseEvent.FENCED,
 }
 """Events of messages, without NACK, whose event follows from what was asked, and FENCE, which is for gateways."""
@@ -103,6 +105,14 @@ class Lease:
     def released(self) -> bool:
         """True if a requested release is complete: the final messages are out and the process may end."""
         return self._memory.released
+
+    @property
+    def superseded_by(self) -> int | None:
+        """Number of an incarnation of this process that others take for a later one; None if there is none.
+
+        To all of them this process is out, and goes on only under a later number: its caller starts it anew (E23).
+        """
+        return self._memory.superseded_by
 
     @property
     def chain(self) -> tuple[int, ...]:
@@ -192,14 +202,20 @@ class Lease:
     def gateway_term(self, term: Term, now: float, latched: bool = False) -> list[Effect]:
         """Process the own gateway's state from `sensors`: its highest term, and whether it is latched in that term.
 
-        E10: a leader whose gateway has seen a higher term, or is latched in the present one, raises its own term.
+        E10: a leader whose gateway has seen a higher term, or is latched in the present one, raises its own term. Any
+        other process refuses lower terms from now on, so that its leader raises its own (E24).
         """
         m = self._memory
         self._expire(now)
-        m.seen = max(m.seen, term)
+        m.seen, m.gateway_term = max(m.seen, term), max(m.gateway_term, term)
         if m.holder is not None and (term > m.holder.term or (latched and term == m.holder.term)):
             self._fire(LeaseEvent.GATEWAY_BARS, now)
         return self._memory.drain()
+
+    def told_of(self, incarnation: int | None) -> None:
+        """Note the number of this process that its gateway knows (E23); None: it knows none."""
+        if incarnation is not None:
+            voting.note_later(self._memory, incarnation)
 
     def request_release(self, now: float) -> list[Effect]:
         """Exit cleanly: stop leading and release the voters; `released` turns True, at once if there is no lease."""
@@ -216,7 +232,7 @@ class Lease:
         """Apply an operator's declaration that the incarnations `lost`, and all earlier ones of their ids, are dead.
 
         E20: it is valid for one attempt of each present candidate, and is ignored while a leader is known or if a later
-        incarnation of one of them was heard.
+        incarnation of one of them was heard within t_remove: the operator's clock may be behind theirs.
         """
         self._expire(now)
         self._fire(LeaseEvent.FORGET, now, lost)

@@ -12,7 +12,7 @@ from lfa.protocol.lease.membership import first_config
 from lfa.protocol.lease.reconfiguration import Policy
 from lfa.protocol.lease.step_down import PendingRelease
 from lfa.protocol.lease.timing import Timing
-from lfa.protocol.messages.consensus import Config, Grant, LeaseBody, Member, Prepare, Term
+from lfa.protocol.messages.consensus import NO_TERM, Config, Grant, LeaseBody, Member, Prepare, Term
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID, robot_name
 
@@ -34,6 +34,10 @@ class LeaseMemory:
         """Ids of live robots that a leader keeps out of its chain because they are stuck (E22)."""
         self.seen = Term(floor)
         """Highest term known."""
+        self.gateway_term = NO_TERM
+        """Highest term that the own gateway has seen: it refuses commands under a lower one (E24)."""
+        self.superseded_by: int | None = None
+        """Number of an incarnation of this process that others take for a later one (E23); None if there is none."""
         self.acceptor = Acceptor(Term(floor), timing.grant_s, now)
         self.candidate: Candidate | None = None
         self.holder: Holder | None = None

@@ -83,6 +83,7 @@ class LeaseEvent(StrEnum):
     NACK_BOUND = "NACK: bound"
     RELEASE = "RELEASE"
     HELLO = "HELLO"
+    SUPERSEDED = "SUPERSEDED"
     FENCED = "FENCED"
     TOKEN_VANISHED = "token vanished"
     GATEWAY_BARS = "gateway bars the term"
@@ -178,7 +179,7 @@ TRANSITIONS = (
                "count it; PROPOSE when all have confirmed"),
     Transition(E.FENCED, (*RESTING, *PHASE_2, S.LEADER), resigning.on_fenced, (S.FOLLOWER,), "E4 E16",
                "if it is the own gateway's: RELEASE, or the transfer proposal"),
-    Transition(E.PROPOSE, ALL, voting.on_propose, (*DROPPED, S.TAKING_OVER), "E2 E3 E16",
+    Transition(E.PROPOSE, ALL, voting.on_propose, (*DROPPED, S.TAKING_OVER), "E2 E3 E16 E24",
                "grant or refuse; adopt its config and follow its holder, or be that holder"),
     Transition(E.GRANT, (*RESTING, S.CANDIDATE, S.FENCING), voting.keep_grant, (), "E16",
                "keep it if its term is unknown"),
@@ -206,12 +207,14 @@ TRANSITIONS = (
                "PREPARE again when the bond ends"),
     Transition(E.RELEASE, ALL, voting.on_release, DROPPED, "E4",
                "end a bond of this term and start the election; answer the PREPARE that the bond refused"),
-    Transition(E.HELLO, LEADS_NOT, voting.answer_hello, (), "E9",
-               "without a leader, answer with the newest config"),
-    Transition(E.HELLO, (S.LEADER,), leadership.on_hello, UP, "E9 E22",
+    Transition(E.HELLO, LEADS_NOT, voting.answer_hello, (), "E9 E23",
+               "without a leader, answer with the newest config; tell an earlier incarnation so"),
+    Transition(E.HELLO, (S.LEADER,), leadership.on_hello, UP, "E9 E22 E23",
                "take the sender into the chain"),
-    Transition(E.HELLO, UP, leadership.note_hello, (), "E9",
+    Transition(E.HELLO, UP, leadership.note_hello, (), "E9 E23",
                "note the sender"),
+    Transition(E.SUPERSEDED, ALL, voting.on_superseded, (), "E23",
+               "note it, to start anew under a later number"),
     Transition(E.TOKEN_VANISHED, (S.LEADER,), leadership.reshape, UP, "E8",
                "close the chain over it"),
     Transition(E.TOKEN_VANISHED, RESTING, voting.holder_vanished, (), "E15",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lfa.protocol.incarnations import is_later
 from lfa.protocol.lease.machine import candidacy, resigning
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.membership import VOTERS_MAX, is_first
@@ -16,6 +17,7 @@ from lfa.protocol.messages.consensus import (
     Promise,
     Propose,
     Release,
+    Superseded,
     Term,
 )
 from lfa.protocol.names import robot_name
@@ -54,6 +56,11 @@ def stands_before(m: LeaseMemory, src: Member, body: Prepare) -> bool:
 def on_propose(m: LeaseMemory, src: Member, body: Propose, now: float) -> None:
     """Grant or refuse as a voter that the config names; follow the holder, or be it (E16)."""
     m.seen = max(m.seen, body.term)
+    if body.term < m.gateway_term:
+        # E24: under this term the own gateway would let nothing through, for as long as its leader leads.
+        m.acceptor.promised = max(m.acceptor.promised, m.gateway_term)
+        m.refuse(src, body.term, now)
+        return
     named = m.me in electors(body.config)
     answer = m.acceptor.propose(src, body, m.config, now) if named else None
     if answer is None and body.config.version < m.config.version:
@@ -109,9 +116,23 @@ def keep_grant(m: LeaseMemory, src: Member, body: Grant, _now: float) -> None:
 
 
 def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
-    """Answer with the newest config while no leader is known (E9)."""
-    if m.leader is None and (body.version is None or body.version < m.config.version):
+    """Answer with the newest config while no leader is known (E9); tell an earlier incarnation so (E23)."""
+    later = m.peers.later_than(src)
+    if later is not None:
+        m.send(robot_name(src.id), Superseded(later))
+    elif m.leader is None and (body.version is None or body.version < m.config.version):
         m.refuse(src, NO_TERM, now)
+
+
+def on_superseded(m: LeaseMemory, _src: Member, body: Superseded, _now: float) -> None:
+    """Note that others know a later incarnation."""
+    note_later(m, body.newest)
+
+
+def note_later(m: LeaseMemory, incarnation: int) -> None:
+    """Note a number of this process that others know, if it is later than the own one and all noted (E23)."""
+    if is_later(incarnation, m.me.incarnation if m.superseded_by is None else m.superseded_by):
+        m.superseded_by = incarnation
 
 
 def say_hello(m: LeaseMemory, now: float) -> None:

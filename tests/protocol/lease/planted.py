@@ -116,5 +116,11 @@ PLANTED: tuple[Bug, ...] = (
         "lease::test_l5_a_pair_without_witness_keeps_its_leader_at_a_fifth_of_all_messages_lost"),
     Bug("rule E8", "the chain forgets its order", team.chain_forgets_its_order,
         "election::test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_within_its_bond", (0,)),
+    Bug("rule E23", "an earlier incarnation is dropped in silence", team.earlier_incarnation_not_told,
+        "incarnations::test_e23_a_robot_that_returns_with_another_clock_joins_at_the_tail", (-60.0,)),
+    Bug("rule E23", "the highest number is the latest", team.highest_number_is_the_latest,
+        "incarnations::test_e23_a_stray_token_locks_nobody_out", (2**53 - 1, 3)),
+    Bug("rule E24", "a follower keeps its gateway's term to itself", team.gateway_term_kept_back,
+        "incarnations::test_e24_a_follower_whose_gateway_saw_a_higher_term_makes_its_leader_raise_its_own", (2,)),
 )
 # fmt: on

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+import lfa.protocol.lease.failure_detector
 import lfa.protocol.lease.holder
 import lfa.protocol.lease.machine.candidacy
 import lfa.protocol.lease.machine.resigning
@@ -168,3 +169,23 @@ def forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
 
 def ended_lives_may_still_grant(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(FailureDetector, "has_ended", lambda self, member: False)
+
+
+def earlier_incarnation_not_told(patch: pytest.MonkeyPatch) -> None:
+    """Neither the others nor the gateway tell, and the leader takes no superseded incarnation in."""
+    patch.setattr(lfa.protocol.lease.machine.voting, "note_later", lambda m, incarnation: None)
+
+
+def highest_number_is_the_latest(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(lfa.protocol.lease.failure_detector, "is_later", lambda one, other: one > other)
+
+
+def gateway_term_kept_back(patch: pytest.MonkeyPatch) -> None:
+    honest = Lease.gateway_term
+
+    def gateway_term(self: Lease, term: Term, now: float, latched: bool = False) -> Any:
+        effects = honest(self, term, now, latched)
+        self._memory.gateway_term = Term()
+        return effects
+
+    patch.setattr(Lease, "gateway_term", gateway_term)
