@@ -67,13 +67,14 @@ def command(
             print(f"lfa: {line}", file=sys.stderr)
     recording.dropped = ear.dropped
     code = 0 if recording.messages and not recording.dropped and not recording.unwritten else 1
+    for line in recording.losses():
+        print(f"lfa: {line}", file=sys.stderr)
     if as_json:
         facts = {"folder": str(folder), "fleet": found.name, "journals": came}
         print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
         return code
     files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
-    lost = f"{ear.dropped} lost" + (f", {recording.unwritten} refused by the disk" if recording.unwritten else "")
-    print(f"{recording.messages} messages, {lost}, {files}, {came} journals: {folder}")
+    print(f"{recording.messages} messages, {ear.dropped} lost, {files}, {came} journals: {folder}")
     return code
 
 

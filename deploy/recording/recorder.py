@@ -16,6 +16,7 @@ from msgspec import Struct
 
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_writer import ChunkWriter
+from lfa.deploy.recording.sender_caps import SenderCaps
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of
@@ -46,6 +47,18 @@ class Recording(Struct, kw_only=True):
     undecodable: int = 0
     unwritten: int = 0
     """Number of messages that the disk refused."""
+    left_out: dict[str, int] = {}
+    """Number of messages of each member above what one may add to a recording (`sender_caps.py`)."""
+
+    def losses(self) -> list[str]:
+        """Return a line for each reason why messages are not in the recording."""
+        counts = {
+            "never arrived": self.missing,
+            "dropped, the recorder was too slow": self.dropped,
+            "refused by the disk": self.unwritten,
+            **{f"of {name}, above the cap on one member": count for name, count in self.left_out.items()},
+        }
+        return [f"not recorded: {count} messages {reason}" for reason, count in counts.items() if count]
 
 
 def parts(folder: Path) -> list[Path]:
@@ -71,6 +84,7 @@ class Recorder:
         self._bytes = 0
         self._messages = 0
         self._flushed_at = 0.0
+        self._caps = SenderCaps()
         self._unwritten = 0
         self._refused = ""
         """Why the disk took no message at the last attempt; empty: it took all."""
@@ -83,14 +97,19 @@ class Recorder:
     def record(self, t: float, key: str, message: Message) -> None:
         """Record `message`, sent on `key` at `t` [s] since the run's start; a negative `t` is recorded as 0."""
         t = t if t > 0.0 else 0.0
+        if not self._caps.admits(t, key):
+            return
         channel = self._channels.get(key)
         if channel is None:
             channel = self._channels[key] = self._open_channel(key, type(message))
         stamp_ns = round(t * 1e9)
-        self._writer.add_message(channel, stamp_ns, mcap_channels.encode(message), stamp_ns, message.header.seq)
+        body = mcap_channels.encode(message)
+        self._writer.add_message(channel, stamp_ns, body, stamp_ns, message.header.seq)
         self._messages += 1
-        if isinstance(message, Event):
-            self._events.append(event_line(t, message))
+        line = event_line(t, message) if isinstance(message, Event) else b""
+        if line:
+            self._events.append(line)
+        self._caps.spend(key, len(body) + len(line))
         if t >= self._flushed_at + FLUSH_S:
             self.flush_when_due(t)
 
@@ -109,7 +128,9 @@ class Recorder:
         self._finish_file()
         self._events.close()
         messages = self._messages - self._unwritten
-        return Recording(messages=messages, files=self._number, bytes=self._bytes, unwritten=self._unwritten)
+        recording = Recording(messages=messages, files=self._number, bytes=self._bytes, unwritten=self._unwritten)
+        recording.left_out = self._caps.left_out
+        return recording
 
     def _report(self, reason: str) -> None:
         """Print a line when the disk begins to refuse messages, and when it takes them again."""

@@ -37,6 +37,8 @@ from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 INBOX_SIZE_MAX = 65536  # one minute of a fleet of four, in case the disk is slow
 WAIT_S = 0.05
+STREAMS_MAX = 16384
+"""Maximum number of streams whose sequence numbers are followed."""
 LAST_WORDS_S = 0.2  # for messages in transit when the verdict arrives
 
 
@@ -127,6 +129,8 @@ class _Tape:
         """Count the gaps in a sender's sequence numbers, which are lost messages; the recorder should lose none."""
         owner_and_topic = "/".join(where.split("/")[2:4])
         stream = (owner_and_topic, header.sender, header.incarnation)
+        if len(self._last_seq) >= STREAMS_MAX:  # a member may invent incarnations
+            self._last_seq.clear()
         before = self._last_seq.get(stream, header.seq - 1)
         self._missing += max(0, header.seq - before - 1)
         self._last_seq[stream] = max(before, header.seq)
@@ -142,6 +146,8 @@ class _Tape:
         recording.undecodable = self._decoder.undecodable
         lost = f"{recording.missing} missing, {recording.dropped} dropped, {recording.unwritten} refused by the disk"
         write_line(f"{recording.messages} recorded, {recording.undecodable} undecodable, {lost}", sys.stdout)
+        for line in recording.losses():
+            write_line(line, sys.stderr)
         return recording
 
     def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
