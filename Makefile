@@ -3,8 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.installed-docs
+PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tests
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted same pages clean setup
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted same pages pictures docs clean setup
 
 setup: $(STAMP)
 
@@ -88,6 +90,25 @@ pages: $(STAMP)
 	sed -i '/^| key | type /,$$d' world/SCENARIO.md
 	$(BIN)/lfa schema --markdown >> world/SCENARIO.md
 	$(BIN)/python -m tests.protocol.lease.page
+
+# The pictures of the tutorial: figures of its own run.
+pictures: $(STAMP)
+	rm -rf build/pictures
+	$(BIN)/lfa sim leader_killed --seed 7 --out build/pictures
+	cp $(foreach name,fig07_distance_error fig09_path_flow lease_timeline,build/pictures/figures/$(name).png) deploy/docs/pictures
+
+# The documentation site in build/site, from the pages of the repository and its docstrings, and tests of what was built.
+docs: $(STAMP) $(DOCS_STAMP)
+	rm -rf build/pages build/site
+	mkdir -p build/pages
+	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.css' -o -path '*/examples/*.py' \
+	    | tar cf - -T - | tar xf - -C build/pages
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --config-file deploy/docs/mkdocs.yml
+	LFA_SITE=build/site $(BIN)/pytest tests/docs/test_site.py
+
+$(DOCS_STAMP): $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	touch $(DOCS_STAMP)
 
 clean:
 	rm -rf $(VENV) runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

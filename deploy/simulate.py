@@ -1,11 +1,13 @@
 """Run a scenario from a notebook or a script:
 
+```python
 from lfa.deploy.simulate import run
 
 done = run("paper_path1", seed=7, set=["mission.leading.cruise_mps=0.4"], faults=["kill leader at 9 s"])
 t, x, y, theta, v, omega = done.truth[2].T       # numpy: s, m, m, rad, m/s, rad/s in map
 error_m = done.errors[2].distance                # of follower 2, at done.errors[2].t
 done.figure("fig07_distance_error")              # matplotlib; a notebook shows it
+```
 """
 
 from __future__ import annotations

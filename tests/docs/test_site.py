@@ -1,0 +1,88 @@
+"""The built documentation site: complete, searchable, and loaded from nowhere else. `make docs` builds and tests it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from functools import cache
+from html import unescape
+from pathlib import Path
+
+import pytest
+
+from tests.test_citations import files
+from tests.test_imports import PACKAGES, ROOT
+
+SITE = ROOT / os.environ.get("LFA_SITE", "build/no-site")
+pytestmark = pytest.mark.skipif(not SITE.is_dir(), reason="make docs builds the site and runs this")
+
+#   question                                      words for the search       what the best results must say
+QUESTIONS = (
+    ("where is equation (29)",                    "equation (29)",           "kinematics.py:error_rates"),
+    ("which file decides left or right",          "left or right",           "avoidance/decision.py"),
+    ("what happens when the leader dies",         "leader dies",             "next in the chain"),
+    ("how do I add a sensor",                     "add a sensor",            "protocol/topics.py"),
+    ("what does E15 mean",                        "E15",                     "proves nothing"),
+)  # fmt: skip
+RESULTS = 5
+
+
+@cache
+def index() -> tuple[tuple[str, str, str], ...]:
+    """Address, title and text of each section that the search knows."""
+    found = json.loads((SITE / "search" / "search_index.json").read_text())["docs"]
+    return tuple((d["location"], unescape(d["title"]), unescape(re.sub(r"<[^>]+>", "", d["text"]))) for d in found)
+
+
+def results(words: str) -> list[tuple[str, str, str]]:
+    """The sections that a search for `words` lists first: all words, those in a title before those in a text."""
+    wanted = re.findall(r"[\w()]+", words.lower())
+
+    def rank(doc: tuple[str, str, str]) -> float:
+        title, text = doc[1].lower(), doc[2].lower()
+        if not all(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", f"{title} {text}") for word in wanted):
+            return 0.0
+        share = sum(text.count(word) for word in wanted) / (10.0 + len(text.split()))
+        return share + sum(word in title for word in wanted) + (words.lower() in text)
+
+    return sorted((doc for doc in index() if rank(doc) > 0.0), key=rank, reverse=True)[:RESULTS]
+
+
+@pytest.mark.parametrize(("question", "words", "answer"), QUESTIONS, ids=[question for question, *_ in QUESTIONS])
+def test_a_newcomers_question_is_answered_by_the_search(question: str, words: str, answer: str) -> None:
+    found = results(words)
+    assert any(answer in f"{title} {text}" for _, title, text in found), f"{question}: {[doc[:2] for doc in found]}"
+
+
+def test_every_page_of_the_repository_is_on_the_site() -> None:
+    pages = [page.relative_to(ROOT) for page in files(".md")]
+    built = [page.with_name("index.html") if page.name == "README.md" else page.with_suffix(".html") for page in pages]
+    assert [str(page) for page in built if not (SITE / page).is_file()] == []
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_reference_has_every_module_that_has_a_docstring(package: str) -> None:
+    page = (SITE / "deploy" / "docs" / "reference" / f"{package}.html").read_text()
+    modules = [path.relative_to(ROOT).with_suffix("") for path in (ROOT / package).rglob("*.py")]
+    names = ["lfa." + ".".join(module.parts).removesuffix(".__init__") for module in modules if _public(module)]
+    assert [name for name in names if f'id="{name}"' not in page] == []
+
+
+def _public(module: Path) -> bool:
+    return not {"examples", "docs"} & set(module.parts) and module.parts != (module.parts[0], "__init__")
+
+
+def test_the_site_loads_nothing_from_elsewhere() -> None:
+    loads = re.compile(r"""<(?:script|link|img|iframe)[^>]+(?:src|href)=["']?(https?:[^"'\s>]+)""")
+    found = {address for page in SITE.rglob("*.html") for address in loads.findall(page.read_text())}
+    styles = {
+        url for path in SITE.rglob("*.css") for url in re.findall(r"url\([\"']?(https?:[^)]*)\)", path.read_text())
+    }
+    assert found | styles == set()
+
+
+def test_every_picture_of_the_site_is_small() -> None:
+    pictures = [path for path in SITE.rglob("*.png") if "assets" not in path.parts]
+    assert pictures
+    assert [(path.name, path.stat().st_size) for path in pictures if path.stat().st_size > 150_000] == []
