@@ -17,7 +17,7 @@ MAKEFILE = (ROOT / "Makefile").read_text()
 
 ON_A_RUN = (
     "lfa verify RUN...", "lfa report RUN", "lfa report A B", "lfa replay RUN --robot 2", "lfa plot RUN", "lfa list",
-    "lfa validate FILE", "lfa schema", "lfa completion bash", "lfa sim SCENARIO --seed 7",
+    "lfa validate FILE", "lfa schema", "lfa completion bash", "lfa sim SCENARIO --seed 7", "lfa --version",
 )  # fmt: skip
 ON_A_FLEET = ("lfa watch", "lfa topic", "lfa formation column", "lfa fault kill leader")
 ELSEWHERE = {
