@@ -26,8 +26,8 @@ from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, without
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
 from lfa.agents.recovery.back_up import BackUp
-from lfa.agents.recovery.stuck_detector import POSE_LOST, POSE_LOST_S, SCAN_LOST, StuckMonitor
-from lfa.agents.team_state import SENSORS_S_MAX, TeamState
+from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, StuckMonitor
+from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
@@ -72,6 +72,9 @@ class Navigator:
         self._role = Role.WAITING
         self._last = STILL
         self._driven_at: float | None = None
+        self._placeless_since: float | None = None
+        self.was_placed = False
+        """True once the robot has had a pose."""
 
     @property
     def lead(self) -> PathFollower:
@@ -89,9 +92,17 @@ class Navigator:
 
     def lost_input(self, now: float) -> str | None:
         """Return the input of the robot's own hardware that is too old to drive by; None when all is well."""
-        if self.estimator.age_s(now) > SENSORS_S_MAX:
-            return "sensors"
+        missing = self.estimator.missing(now)
+        if missing is not None:
+            return missing
+        if self.estimator.unfixed:
+            return "localization"
         return "scan" if self.scan_age.lost(now) else None
+
+    @property
+    def pose_lost(self) -> bool:
+        """True while the robot is stuck because it has no pose (S6)."""
+        return self._stuck_monitor.pose_lost
 
     @property
     def decision(self) -> Decision | None:
@@ -152,11 +163,30 @@ class Navigator:
             before = self.predecessor
             self.predecessor = None if robot is None else predecessor_of(self._mission, robot, followers, before)
 
+    def hold(self, now: float) -> Twist:
+        """Return the command of a control step without a pose: brake along the path."""
+        if self._placeless_since is None:
+            self._placeless_since = now
+        missing = self.estimator.missing(now)
+        patience_s = POSE_LOST_S if self.was_placed else NEVER_PLACED_S
+        if missing is not None and now - self._placeless_since >= patience_s:
+            self._stuck_monitor.lose_pose(missing)
+        self._driven_at = now
+        self._detour.decision = self._crossing.decision = None
+        limits = self._mission.limits
+        self._last = safe(STILL, self._last, (), self._mission.radius_m, limits, CONTROL_PERIOD_S)
+        self.follower.overridden(self._last)
+        return self._last
+
     def drive(self, role: Role, chain: tuple[int, ...], pose: Pose2D, twist: Twist, now: float) -> Twist:
         """Return the command for the next control period."""
         dt = CONTROL_PERIOD_S if self._driven_at is None else now - self._driven_at
         dt = min(max(dt, DT_MIN_S), 2.0 * CONTROL_PERIOD_S)
         self._driven_at = now
+        self._stuck_monitor.find_pose()
+        if self._placeless_since is not None and self.was_placed:
+            self.follower.rejoin(pose, twist)
+        self._placeless_since, self.was_placed = None, True
         if role != self._role:
             self._change(role, pose, twist, now)
         points = self._obstacles.points(pose)
@@ -174,7 +204,7 @@ class Navigator:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
             wanted = self._ground_crossing.cross(wanted, now)
             wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
-            wanted = self.scan_age.limited(wanted, now)
+            wanted = self.estimator.limited(self.scan_age.limited(wanted, now))
         if not self._back_up_path.under_way:
             self._back_up_path.keep(pose)
         self._watch(role, pose, wanted, now)
@@ -210,7 +240,6 @@ class Navigator:
         action = None if decision is None else decision.action
         leads = role is Role.LEADER and self.leading.under_way
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
-        lost = POSE_LOST if self.estimator.age_s(now) > POSE_LOST_S else lost
         self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads)
 
     def _mates(self, now: float) -> list[Pose2D]:

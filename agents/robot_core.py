@@ -17,7 +17,7 @@ from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
-from lfa.agents.team_state import SENSORS_S_MAX, TeamState
+from lfa.agents.team_state import TeamState
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL
@@ -238,15 +238,16 @@ class RobotCore:
         """Run one control step: pose, role, command, then the reports."""
         lease, navigator = self.lease, self.navigator
         self.defer_grants = lease.is_settled(now + EASE_S)
+        self._watch_inputs(now)
+        role = Role.WAITING if self._pending_release else self._role()
         known = navigator.estimator.pose_at(now)
         if known is None:
+            self._control_without_pose(role, now)
             return
         pose, twist = known
-        role = Role.WAITING if self._pending_release else self._role()
         command = navigator.drive(role, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
-        self._watch_inputs(now)
-        told = STILL if navigator.estimator.age_s(now) > SENSORS_S_MAX else navigator.published(twist)
+        told = navigator.published(twist)
         self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, told, now)
         if self._stuck_policy.step(role, pose, lease, navigator, now):
             self._hand_over(now)
@@ -257,9 +258,17 @@ class RobotCore:
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
 
+    def _control_without_pose(self, role: Role, now: float) -> None:
+        """Run one control step of a robot that has no pose: it brakes, and tells its team that it has none."""
+        self._commands.publish(self.navigator.hold(now), now, as_leader=role is Role.LEADER)
+        self._reports.step_without_pose(self.navigator, self._team, self._place.neighbours(), role, now)
+        if self._stuck_policy.step(role, None, self.lease, self.navigator, now):
+            self._hand_over(now)
+
     def _watch_inputs(self, now: float) -> None:
         """Publish an event when an input of the robot's own hardware is lost, and when it is back."""
-        lost = self.navigator.lost_input(now) or ""
+        navigator = self.navigator
+        lost = (navigator.lost_input(now) or "") if navigator.was_placed or navigator.pose_lost else ""
         if lost != self._lost_input:
             self._lost_input = lost
             self._event("input", now, {"state": "lost", "input": lost} if lost else {"state": "back"})

@@ -3,6 +3,9 @@
 A stuck leader hands the lease over to the next in the chain, once for each place; the mission fails when it is stuck
 there again. A follower reports that it is stuck; when the leader has waited for it long enough, the chain closes over
 it. The follower keeps trying to come behind the last of the chain, and is taken in again there when it is free.
+
+A robot without a pose (S6) neither leads nor holds others up: as a leader it hands over as soon as another robot can
+lead; as a follower it is not waited for.
 """
 
 from __future__ import annotations
@@ -11,7 +14,6 @@ from math import floor, inf
 
 from lfa.agents.navigator import Navigator
 from lfa.agents.perception.obstacle_model import TRAP_M
-from lfa.agents.recovery.stuck_detector import POSE_LOST
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.lease.machine.lease import Lease
@@ -44,8 +46,10 @@ class StuckPolicy:
         """Robot that handed the lease over, until it is no longer stuck."""
         self._reign_from = 0.0
 
-    def step(self, role: Role, pose: Pose2D, lease: Lease, driver: Navigator, now: float) -> bool:
-        """Publish changes of the stuck state; return True when the lease is to be handed over now."""
+    def step(self, role: Role, pose: Pose2D | None, lease: Lease, driver: Navigator, now: float) -> bool:
+        """Publish changes of the stuck state; return True when the lease is to be handed over now. `pose` is None while
+        the robot has none.
+        """
         if driver.stuck != self._said:
             self._said = driver.stuck
             self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
@@ -53,7 +57,7 @@ class StuckPolicy:
             lease.left_out, chain = frozenset(), lease.chain
             self._led_before = chain[0] if chain else None
             self._reign_from = now
-            if self._id not in chain:
+            if self._id not in chain and pose is not None:
                 driver.back_out(pose)
             return False
         lease.left_out = self._left_out(lease, driver, now)
@@ -70,17 +74,20 @@ class StuckPolicy:
         if before is not None and now >= self._reign_from + NEWS_S and not self._team.stuck(before, now):
             self._led_before = None
         chain = lease.chain
-        waited_for = () if driver.leading.waited_out else [robot for robot in chain if robot != self._led_before]
+        waited_for = () if driver.leading.waited_out else [robot for robot in chain if self._waits_for(robot, now)]
         stuck = {robot for robot in self._robots if robot not in waited_for and self._team.stuck(robot, now)}
         for robot in stuck.intersection(chain) - lease.left_out:
             self._event("left_out", now, lease, {"robot_left": robot})
         return frozenset(stuck)
 
-    def _gives_up(self, pose: Pose2D, lease: Lease, driver: Navigator, now: float) -> bool:
+    def _waits_for(self, robot: int, now: float) -> bool:
+        return robot != self._led_before and not self._team.placeless(robot, now)
+
+    def _gives_up(self, pose: Pose2D | None, lease: Lease, driver: Navigator, now: float) -> bool:
         """Return whether to hand over; otherwise the mission has failed, or the lease has no other robot."""
         self._next_handover = now + HANDOVER_S
-        if driver.stuck == POSE_LOST:  # independent of the place: the pose returns when the hardware restarts
-            return len(lease.chain) > 1
+        if pose is None or driver.pose_lost:  # at no place: the pose returns when the hardware restarts
+            return any(self._team.can_lead(robot, now) for robot in lease.chain if robot != self._id)
         place = (floor(pose.x / PLACE_M), floor(pose.y / PLACE_M))
         if place in self._given_up or len(lease.chain) == 1:
             self._next_handover = inf

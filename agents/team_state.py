@@ -50,9 +50,12 @@ class TeamState:
         if known is None or known[0].header.incarnation != row.header.incarnation:
             self._clocks[robot] = ClockOffset()
             self._velocity[robot] = (0.0, 0.0)
+        elif not (known[0].placed and row.placed):
+            self._velocity[robot] = (0.0, 0.0)
         else:
             dt = max(row.header.stamp - known[0].header.stamp, ROW_S_MIN)
             self._velocity[robot] = ((row.x - known[0].x) / dt, (row.y - known[0].y) / dt)
+        if known is not None and known[0].header.incarnation == row.header.incarnation:
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
         if row.progress is not None and (row.role is Role.LEADER or self.progress is None):
@@ -64,9 +67,11 @@ class TeamState:
         return self.sensors if now - self.sensors_at <= SENSORS_S_MAX else None
 
     def pose_of(self, robot: int, now: float) -> Pose2D | None:
-        """Return the pose of `robot` in `map`, extrapolated for `GOES_ON_S` at most; None when its row is stale."""
+        """Return the pose of `robot` in `map`, extrapolated for `GOES_ON_S` at most; None when its row is stale, or
+        says that it has none.
+        """
         known = self._table.get(robot)
-        if known is None or now - known[1] > ROW_S_MAX:
+        if known is None or now - known[1] > ROW_S_MAX or not known[0].placed:
             return None
         row, (vx, vy), later = known[0], self._velocity[robot], min(now - known[1], GOES_ON_S)
         return Pose2D(row.x + vx * later, row.y + vy * later, row.theta)
@@ -79,6 +84,15 @@ class TeamState:
         """Return whether `robot` reports that it is stuck; a stale report does not count."""
         known = self._table.get(robot)
         return known is not None and known[0].stuck and now - known[1] <= ROW_S_MAX
+
+    def placeless(self, robot: int, now: float) -> bool:
+        """Return whether `robot` reports that it has no pose; a stale report does not count."""
+        known = self._table.get(robot)
+        return known is not None and not known[0].placed and now - known[1] <= ROW_S_MAX
+
+    def can_lead(self, robot: int, now: float) -> bool:
+        """Return whether `robot` reports a pose, and is not stuck."""
+        return self.pose_of(robot, now) is not None and not self.stuck(robot, now)
 
     def delays(self, robots: tuple[int, ...], now: float) -> tuple[Delay, ...]:
         """Return the least (receive - send) of these robots' rows, for their half of a round trip (control.md 3.3)."""

@@ -64,14 +64,29 @@ class Reports:
         if role is Role.FOLLOWER and navigator.predecessor is not None and self._steps % TRACKING_EVERY == 0:
             self._tracking(navigator, navigator.predecessor.robot, now)
         arrived = navigator.arrived(pose, navigator.last)
-        if now >= self._next_table or arrived > self._arrived:
-            self._arrived = arrived
-            self._next_table = now + self._table_s
-            header, delays, stuck = outbox.header("table", now), team.delays(near, now), navigator.stuck is not None
-            outbox.publish(
-                "table",
-                TableRow(header, pose.x, pose.y, 0.0, pose.theta, odometer_m, role, delays, stuck, team.progress),
-            )
+        if arrived > self._arrived:
+            self._next_table = now
+        self._arrived = arrived
+        self._row(pose, navigator, team, near, role, now)
+
+    def step_without_pose(
+        self, navigator: Navigator, team: TeamState, near: tuple[int, ...], role: Role, now: float
+    ) -> None:
+        """Publish what is due after a control step of a robot that has no pose: the table's row only."""
+        self._row(None, navigator, team, near, role, now)
+
+    def _row(
+        self, pose: Pose2D | None, navigator: Navigator, team: TeamState, near: tuple[int, ...], role: Role, now: float
+    ) -> None:
+        if now < self._next_table:
+            return
+        self._next_table = now + self._table_s
+        at, odometer_m, stuck = pose or Pose2D(), navigator.estimator.odometer_m, navigator.stuck is not None
+        header, delays = self._outbox.header("table", now), team.delays(near, now)
+        row = TableRow(
+            header, at.x, at.y, 0.0, at.theta, odometer_m, role, delays, stuck, team.progress, pose is not None
+        )
+        self._outbox.publish("table", row)
 
     def _decision(self, decision: Decision | None, term: Term, now: float) -> None:
         """Publish each change of the decision about the surroundings, with the values that decided it."""
@@ -163,7 +178,11 @@ def _health(navigator: Navigator, lease: Lease, role: Role, now: float) -> tuple
     """Return the text and level of the status: the robots that the first election waits for (E18) come first."""
     if lease.missing:
         return f"waiting for {', '.join(robot_name(i) for i in lease.missing)}", Level.WARN
-    if not navigator.estimator.ready:
-        return "waiting for sensors", Level.WARN
     lost = navigator.lost_input(now)
-    return (role.value, Level.OK) if lost is None else (f"{role.value}, no {lost} any more", Level.ERROR)
+    if lost is None:
+        return role.value, Level.OK
+    if navigator.pose_lost:
+        return f"{role.value}, own pose lost: no {lost}", Level.ERROR
+    if not navigator.was_placed:
+        return f"waiting for {lost}", Level.WARN
+    return f"{role.value}, no {lost} any more", Level.ERROR

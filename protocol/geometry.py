@@ -31,6 +31,12 @@ class Twist(Struct, frozen=True, array_like=True, gc=False):
 STILL = Twist(0.0, 0.0)
 
 
+def slowed(twist: Twist, speed_max_mps: float) -> Twist:
+    """Return `twist` scaled down to `speed_max_mps` [m/s], with v/omega kept."""
+    share = speed_max_mps / max(abs(twist.linear_x), 1e-9)
+    return twist if share >= 1.0 else Twist(share * twist.linear_x, share * twist.angular_z)
+
+
 def wrap(angle: float) -> float:
     """Return `angle` [rad] wrapped into (-pi, pi]."""
     wrapped = (angle + pi) % TAU - pi

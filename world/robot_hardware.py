@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import atan2
 
-from lfa.protocol.geometry import TAU, Pose2D, wrap
+from lfa.protocol.geometry import TAU, Pose2D, Twist, wrap
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.codec import Message
@@ -18,6 +18,8 @@ from lfa.world.description.scenario import Scenario
 from lfa.world.sensors.lidar import ANGLE_MIN, Floats
 from lfa.world.sensors.noise import HeightNoise, Localizer, RangeNoise, WheelOdometry
 
+PARTS = ("driver", "localization", "scanner")
+"""Parts of a robot that can hang."""
 REFUSAL_EVERY_S = 0.2
 """Minimum interval [s] between two refusal events of a gateway for the same reason, also across terms."""
 
@@ -38,7 +40,25 @@ class RobotHardware:
         self._fleet = fleet
         self._incarnation = incarnation
         self._seq: dict[str, int] = {}
+        self._hung: dict[str, Twist] = {}
+        """Parts that hang, and the twist at which the wheels were when each began to."""
         self._told: dict[str, tuple[Term, float]] = {}
+
+    def hang(self, part: str, now: float) -> None:
+        """Let the `driver`, the `localization` or the `scanner` hang, as a process does: silent, and without effect."""
+        self._hung.setdefault(part, self.gateway.twist(now))
+
+    def resume(self, part: str) -> None:
+        """End the hang of `part`."""
+        self._hung.pop(part, None)
+
+    def hangs(self, part: str) -> bool:
+        """Return whether `part` hangs; with the driver hang all parts, which it reads."""
+        return part in self._hung or "driver" in self._hung
+
+    def twist(self, now: float) -> Twist:
+        """Return the twist that the motors are commanded: the gateway's, or the last one of a driver that hangs."""
+        return self._hung.get("driver") or self.gateway.twist(now)
 
     def command(self, cmd: CmdVel, now: float) -> tuple[str, dict[str, object]] | None:
         """Pass `cmd` to the gateway; return kind and data of an event for an obeyed leader command or a new refusal."""

@@ -18,14 +18,14 @@ from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, TrueObstacle, TrueRobot, Truth
-from lfa.protocol.messages.team import Ask, Event, MissionNote
+from lfa.protocol.messages.team import Ask, Event, MissionNote, OperatorNote
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
-from lfa.world.robot_hardware import RobotHardware
+from lfa.world.robot_hardware import PARTS, RobotHardware
 from lfa.world.sensors.ground_sensor import Profiler
 from lfa.world.sensors.lidar import Scanner
 
@@ -115,7 +115,7 @@ class World:
         self._led: tuple[int, Term] | None = None
         """Robot and term of the leader command obeyed last, over all gateways; shows a return to an older term (I2)."""
         self.interests = frozenset(
-            {key(fleet, "*", "ask")}
+            {key(fleet, "*", "ask"), key(fleet, "*", "operator")}
             | {key(fleet, robot_name(robot_id), "cmd_vel") for robot_id in simulated}
             | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in simulated}
             | {alive_key(fleet, robot_name(robot_id), "*") for robot_id in simulated}
@@ -154,6 +154,8 @@ class World:
                 self._robots[self._place[name]].gateway.agent_up(incarnation, now)
             case PeerDown(name=name, incarnation=incarnation) if name in self._place and not self._cut_off:
                 self._robots[self._place[name]].gateway.agent_down(incarnation, now)
+            case OperatorNote(command="hang" | "resume" as command, arguments=arguments):
+                self._hang(command, arguments, now)
             case RouterLost():
                 self._cut_off = True
             case Stop():
@@ -211,6 +213,8 @@ class World:
         place = self._place.get(where.owner) if where is not None else None
         if place is None:
             return []
+        if self._robots[place].hangs("driver"):
+            return []
         news = self._robots[place].command(cmd, now)
         if news is None:
             return []
@@ -224,7 +228,15 @@ class World:
     def _fence(self, at_key: str, fence: Fence, now: float) -> list[Envelope]:
         where = address(at_key)
         to = where.to if where is not None else None
-        return [robot.fence(fence, now) for robot in self._robots if to == _gateway_name(robot.id)]
+        fenced = [robot for robot in self._robots if to == _gateway_name(robot.id) and not robot.hangs("driver")]
+        return [robot.fence(fence, now) for robot in fenced]
+
+    def _hang(self, command: str, arguments: dict[str, object], now: float) -> None:
+        """Let a part of a simulated robot hang, or end that."""
+        part, robot_id = arguments.get("part"), arguments.get("robot")
+        for _, robot in self._simulated:
+            if robot.id == robot_id and part in PARTS:
+                robot.hang(str(part), now) if command == "hang" else robot.resume(str(part))
 
     def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None, now: float) -> None:
         where = address(at_key)
@@ -237,7 +249,7 @@ class World:
             self._bodies.place(place, pose)
 
     def _move(self, now: float) -> list[Touch]:
-        wanted = [robot.gateway.twist(now) for robot in self._robots]
+        wanted = [robot.twist(now) for robot in self._robots]
         for place, (twist, at) in self._driven.items():  # a real robot keeps its last reported twist until the timeout
             wanted[place] = twist if now - at <= (TOPIC["sensors"].timeout_s or 0.0) else STILL
         touches = self._bodies.step(wanted)
@@ -254,20 +266,22 @@ class World:
             robot = self._robots[touch.robot]
             if robot.name in self._real:
                 continue
-            sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
+            if not robot.hangs("driver"):
+                sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
             sent.append(self._event("contact", None, data | {"t": self._step * self._dt_s}, stamp))
         if self._is_due(TOPIC["sensors"].rate_hz):
-            sent += [robot.sensors(stamp, now) for _, robot in simulated]
+            sent += [robot.sensors(stamp, now) for _, robot in simulated if not robot.hangs("driver")]
         if self._is_due(TOPIC["localization"].rate_hz):
-            fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated)
+            fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated if not robot.hangs("localization"))
             sent += [fix for fix in fixes if fix is not None]
         if self._is_due(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, self._bodies.moved())
-            sent += [robot.scan(stamp, ranges[n]) for n, robot in simulated]
+            sent += [robot.scan(stamp, ranges[n]) for n, robot in simulated if not robot.hangs("scanner")]
         if not self._profiler.flat and self._is_due(TOPIC["ground"].rate_hz):
             heights = self._profiler.profile(poses, self._bodies.standing_m())
-            sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in simulated]
+            seeing = [(n, robot) for n, robot in simulated if not robot.hangs("driver")]
+            sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in seeing]
         if self._is_due(TOPIC["truth"].rate_hz):
             sent.append(self._truth(stamp))
         if self._is_due(TOPIC["clock"].rate_hz):

@@ -31,6 +31,11 @@ class Covariance:
         p[1][1] += position
         p[2][2] += heading
 
+    @property
+    def position_m(self) -> float:
+        """Standard deviation [m] of the position, in its worse axis."""
+        return sqrt(max(self._rows[0][0], self._rows[1][1]))
+
     def admits(self, innovation: tuple[float, float, float], variances: tuple[float, float], sigma: float) -> bool:
         """Return whether each component of a measured pose error is within `sigma` standard deviations."""
         position, heading = variances

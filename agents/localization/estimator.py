@@ -16,14 +16,25 @@ from msgspec import Struct
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.localization.covariance import Covariance
 from lfa.agents.localization.plausibility import plausible
-from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, wrap
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, slowed, wrap
 from lfa.protocol.messages.robot import Localization, Sensors
+from lfa.protocol.topics import TOPIC
 
 ODOMETRY_KEPT = 64
 GATE_SIGMA = 5.0
 OUTLIERS_TO_RELOCATE = 5
 """Number of successive fixes that contradict the odometry after which the robot counts as carried or slipped."""
-EXTRAPOLATION_MAX_S = 0.2
+ODOMETRY_S_MAX = TOPIC["sensors"].timeout_s or 0.2
+"""Age [s] of the newest odometry beyond which there is no pose: nobody knows where the wheels went since."""
+UNFIXED_SLOW_M, UNFIXED_M_MAX = 0.75, 1.5
+"""Way [m] driven since the last accepted fix, from which a robot slows, and beyond which it has no pose: slip or a worn
+wheel leads it astray by some centimetres a metre, which no noise model knows of."""
+TURN_M_PER_RAD = 0.3
+"""Way [m] that a turn of one radian counts as."""
+UNFIXED_MPS = 0.2
+"""Speed [m/s] at which a robot drives the last part of the way that it may drive without a fix, at most."""
+SIGMA_M_MAX = 0.3
+"""Standard deviation [m] of the position beyond which there is no pose, and of a fix beyond which it is none."""
 
 
 class EstimatorNoise(Struct, frozen=True, forbid_unknown_fields=True):
@@ -68,6 +79,7 @@ class Estimator:
         self.outliers = 0
         self.relocations = 0
         self.last_fix_at: float | None = None
+        self._unfixed_m = 0.0
 
     def sensors(self, sensors: Sensors, received_at: float) -> bool:
         """Update with wheel odometry; return False when it is refused (not finite, implausible, out of order)."""
@@ -82,6 +94,10 @@ class Estimator:
         if not self._clock.heard(header.stamp, received_at):
             self.refused += 1
             return False
+        if self._history:
+            last = self._history[-1]
+            turn = abs(wrap(sensors.pose_odom.theta - last.pose_odom.theta))
+            self._unfixed_m += abs(sensors.odometer_m - last.odometer_m) + TURN_M_PER_RAD * turn
         self._history.append(_Odometry(header.stamp, sensors.pose_odom, sensors.twist, sensors.odometer_m))
         if self._pending is not None and header.stamp >= self._pending.header.stamp:
             fix, self._pending = self._pending, None
@@ -91,7 +107,7 @@ class Estimator:
     def localization(self, fix: Localization, received_at: float) -> bool:
         """Accept a fix, applied as soon as the odometry reaches its stamp; return False when it is refused."""
         stamp = fix.header.stamp
-        if not (isfinite(stamp) and plausible(fix.pose_map, Twist())):
+        if not (isfinite(stamp) and plausible(fix.pose_map, Twist()) and fix.sigma_m <= SIGMA_M_MAX):
             self.refused += 1
             return False
         if self._history and stamp < self._history[0].stamp:
@@ -104,22 +120,39 @@ class Estimator:
         self._correct(fix)
         return True
 
+    def missing(self, now: float) -> str | None:
+        """Return the input without which there is no pose, `odometry` or `localization`; None when there is one.
+
+        There is one from the first fix on that could be joined to the odometry, while the odometry is fresh and the
+        robot has not driven far since the last fix.
+        """
+        if self.age_s(now) > ODOMETRY_S_MAX:
+            return "odometry"
+        lost = self._unfixed_m > UNFIXED_M_MAX or self._covariance.position_m > SIGMA_M_MAX
+        return "localization" if self._map_odom is None or lost else None
+
     @property
-    def ready(self) -> bool:
-        """True from the first fix on that could be joined to the odometry."""
-        return self._map_odom is not None
+    def unfixed(self) -> bool:
+        """True when the robot has driven so far without a fix that it slows."""
+        return self._map_odom is not None and self._unfixed_m > UNFIXED_SLOW_M
+
+    def limited(self, wanted: Twist) -> Twist:
+        """Return `wanted`, slowed where the robot has driven far without a fix."""
+        return slowed(wanted, UNFIXED_MPS) if self.unfixed else wanted
 
     @property
     def odometer_m(self) -> float:
         return self._history[-1].odometer_m if self._history else 0.0
 
     def pose_at(self, now: float) -> tuple[Pose2D, Twist] | None:
-        """Return own pose in `map`, extrapolated along the arc to `now`, and own twist; None before it is `ready`."""
-        if self._map_odom is None:
+        """Return own pose in `map`, extrapolated along the arc to `now`, and own twist; None without a pose
+        (`missing`).
+        """
+        if self._map_odom is None or self.missing(now) is not None:
             return None
         newest = self._history[-1]
         age = now - newest.stamp - self._clock.offset(now)
-        age = min(EXTRAPOLATION_MAX_S, max(0.0, age))
+        age = min(ODOMETRY_S_MAX, max(0.0, age))
         here = compose(self._map_odom, newest.pose_odom)
         return along_arc(here, newest.twist, age), newest.twist
 
@@ -135,12 +168,13 @@ class Estimator:
         self._map_odom = None
         self._fix_at = None
         self._pending = None
+        self._unfixed_m = 0.0
         self._outliers_in_a_row = 0
 
     def _correct(self, fix: Localization) -> None:
         odometry = _at(self._history, fix.header.stamp)
         if self._map_odom is None or self._fix_at is None:
-            self._relocate(fix.pose_map, odometry)
+            self._relocate(fix, odometry)
             return
         predicted = compose(self._map_odom, odometry.pose_odom)
         self._grow(odometry, predicted)
@@ -149,11 +183,11 @@ class Estimator:
             fix.pose_map.y - predicted.y,
             wrap(fix.pose_map.theta - predicted.theta),
         )
-        variances = self._fix_variances()
+        variances = self._fix_variances(fix)
         if not self._covariance.admits(innovation, variances, GATE_SIGMA):
-            self._refuse_outlier(fix.pose_map, odometry)
+            self._refuse_outlier(fix, odometry)
             return
-        self._outliers_in_a_row = 0
+        self._outliers_in_a_row, self._unfixed_m = 0, 0.0
         dx, dy, dtheta = self._covariance.update(innovation, variances)
         corrected = Pose2D(predicted.x + dx, predicted.y + dy, wrap(predicted.theta + dtheta))
         self._map_odom = compose(corrected, inverse(odometry.pose_odom))
@@ -174,25 +208,25 @@ class Estimator:
         )
         self._fix_at = odometry
 
-    def _fix_variances(self) -> tuple[float, float]:
-        return self._noise.fix_m**2, self._noise.fix_rad**2
+    def _fix_variances(self, fix: Localization) -> tuple[float, float]:
+        return max(self._noise.fix_m, fix.sigma_m) ** 2, max(self._noise.fix_rad, fix.sigma_rad) ** 2
 
-    def _refuse_outlier(self, pose_map: Pose2D, odometry: _Odometry) -> None:
+    def _refuse_outlier(self, fix: Localization, odometry: _Odometry) -> None:
         """Count an outlier; relocate when several in a row agree with each other and not with the odometry."""
         self.outliers += 1
         self._outliers_in_a_row += 1
-        if self._outlier is not None and not _near(between(self._outlier, pose_map), self._noise):
+        if self._outlier is not None and not _near(between(self._outlier, fix.pose_map), self._noise):
             self._outliers_in_a_row = 1
-        self._outlier = pose_map
+        self._outlier = fix.pose_map
         if self._outliers_in_a_row >= OUTLIERS_TO_RELOCATE:
             self.relocations += 1
-            self._relocate(pose_map, odometry)
+            self._relocate(fix, odometry)
 
-    def _relocate(self, pose_map: Pose2D, odometry: _Odometry) -> None:
-        self._map_odom = compose(pose_map, inverse(odometry.pose_odom))
+    def _relocate(self, fix: Localization, odometry: _Odometry) -> None:
+        self._map_odom = compose(fix.pose_map, inverse(odometry.pose_odom))
         self._fix_at = odometry
-        self._covariance = Covariance(*self._fix_variances())
-        self._outliers_in_a_row = 0
+        self._covariance = Covariance(*self._fix_variances(fix))
+        self._outliers_in_a_row, self._unfixed_m = 0, 0.0
         self._outlier = None
 
 

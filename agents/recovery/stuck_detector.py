@@ -1,4 +1,4 @@
-"""Stuck detection: conditions S1 to S5 of control.md section 7, each with its reason as text, and the release."""
+"""Stuck detection: conditions S1 to S6 of control.md section 7, each with its reason as text, and the release."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ TURNS, TURNS_S = 3, 10.0
 BACK_S = 5.0
 CELL_M, CELL_ENTRIES, CELL_S = 0.5, 3, 30.0
 WAITING_S = 10.0
-POSE_LOST_S = 1.0
-POSE_LOST, SCAN_LOST = "S5: own pose lost", "S5: no scan comes any more"
+SCAN_LOST = "S5: no scan comes any more"
+POSE_LOST_S, NEVER_PLACED_S = 1.0, 3.0
+"""Time [s] without a pose from which a robot counts as stuck (S6), once it had one, and after its start."""
+POSE_LOST = "S6: own pose lost"
 TURN_S_MIN = 1.0
 """Minimum time [s] between two U-turns; nearer ones count as one, since the action flickers."""
 FREED_M = 0.5
@@ -67,6 +69,22 @@ class StuckMonitor:
             self._at = pose
         self.reason, self._held_at = held, now
 
+    def lose_pose(self, missing: str) -> None:
+        """Update in a control step without a pose, for want of the input `missing`."""
+        self._stuck.reset()
+        self._stands = None
+        self.reason, self._at = f"{POSE_LOST}, no {missing}", None
+
+    def find_pose(self) -> None:
+        """Update in the first control step with a pose."""
+        if self.pose_lost:
+            self.reason = None
+
+    @property
+    def pose_lost(self) -> bool:
+        """True while the robot is stuck because it has no pose."""
+        return self.reason is not None and self.reason.startswith(POSE_LOST)
+
     def rest(self, pose: Pose2D, now: float) -> None:
         """Update in a control step in which no motion is wanted."""
         self._stuck.reset()
@@ -88,13 +106,13 @@ class StuckMonitor:
         if self.reason is None or self._at is None or self.backing_out:
             return
         freed = hypot(pose.x - self._at.x, pose.y - self._at.y) >= FREED_M
-        if freed or now - self._held_at >= CALM_S or self.reason in (POSE_LOST, SCAN_LOST):
+        if freed or now - self._held_at >= CALM_S or self.reason == SCAN_LOST:
             self.out()
 
 
 class StuckConditions:
-    """Conditions S1 to S5 of one robot on its way; `reset` on arrival, while it waits for its team, and on a
-    restart.
+    """Conditions S1 to S5 of one robot that has a pose and is on its way; `reset` on arrival, while it waits for its
+    team, and on a restart.
     """
 
     def __init__(self, *, again: bool = True) -> None:

@@ -13,12 +13,14 @@ from msgspec import Struct
 from lfa.deploy.client.fleet_state import FRESH_S, FleetState
 from lfa.protocol.geometry import wrap
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.team import Event, Status, Tracking
+from lfa.protocol.messages.team import Event, Level, Status, Tracking
 from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.topics import TOPIC
 
 LEADER_STEP_S = 1.0
 LEADERS_KEPT = 300
 EVENTS_KEPT = 50
+STATUS_S_MAX = TOPIC["status"].timeout_s or 3.0
 LISTED_MAX = 12
 DULL = ("peer_up", "peer_down")
 
@@ -89,7 +91,12 @@ class Board:
         said = self._state.status.get(robot_name(robot))
         status = None if said is None else said.message
         fresh = self._state.fresh(robot, now)
-        role = ("silent" if pose is not None else "unheard") if fresh is None else fresh.role.value
+        if fresh is not None:
+            role = fresh.role.value
+        elif said is not None and said.message.level is Level.ERROR and now - said.at < STATUS_S_MAX:
+            role = said.message.role.value  # it lives, and publishes no pose because it has none
+        else:
+            role = "silent" if pose is not None else "unheard"
         tracked = self._state.tracking.get(robot)
         recent = tracked is not None and role == "follower" and now - tracked.at < FRESH_S
         tracking = tracked.message if tracked is not None and recent else None
@@ -101,7 +108,7 @@ class Board:
             predecessor=None if tracking is None else tracking.predecessor,
             error_m=None if tracking is None else float(tracking.error_m),
             heading_error_rad=None if tracking is None or pose is None else wrap(tracking.heading - pose.theta),
-            speed_mps=None if pose is None else pose.twist.linear_x,
+            speed_mps=None if fresh is None else fresh.twist.linear_x,
             pose_age_s=None if heard is None else max(0.0, now - heard.at),
             state=_state(role, tracking, status),
             loop_lag_ms=counters.get("loop_lag_ms"),

@@ -1,4 +1,5 @@
-"""Parsing of link faults: which links a cut disables, which share of messages is lost. Sides are comma-separated ids;
+"""Parsing of the faults that an operator's message orders: links that a cut disables, the share of messages that is
+lost, the part of a robot that hangs. Sides are comma-separated ids;
 `w` is the world with its witness, which runs on no robot.
 
     3       robot 3 from all others          1-2      1 and 2 from each other
@@ -19,6 +20,7 @@ from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER, Link
 
 WORLD_WORD = "w"
+PART = re.compile(r"(?P<part>driver|localization|scanner) *(?P<robot>\d+)", re.ASCII)
 SIDES = re.compile(r"(?P<one>[\dw,]+)(?:(?P<way>[->])(?P<other>[\dw,]+))?", re.ASCII)
 
 
@@ -46,7 +48,10 @@ def _side(text: str, robots: tuple[int, ...], right: str) -> list[str]:
 
 
 def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, dict[str, Any]]:
-    """Return the operator's command and its arguments for `cut`, `heal`, `loss` and `handover`. Raises Refused."""
+    """Return the operator's command and its arguments for `cut`, `heal`, `loss`, `handover`, `hang` and `resume`.
+
+    Raises Refused.
+    """
     text = str(target)
     match deed:
         case "cut":
@@ -55,6 +60,8 @@ def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, d
             return WEATHER, {"mend": links(text, robots)} if text else {"heal": True}
         case "loss":
             return WEATHER, {"radio": {"loss": _share(text)}} if text else {"fair": True}
+        case "hang" | "resume":
+            return deed, _part(deed, text, robots)
         case _:
             return deed, {}
 
@@ -63,6 +70,15 @@ def note(operator: Operator, now: float, deed: str, target: int | str, robots: t
     """Return the operator's message for a fault, stamped `now` [s]. Raises Refused."""
     command, arguments = order(deed, target, robots)
     return operator.orders(command, now, **arguments)
+
+
+def _part(deed: str, text: str, robots: tuple[int, ...]) -> dict[str, Any]:
+    match = PART.fullmatch(text)
+    robot = None if match is None else whole_number(match["robot"])
+    if match is None or robot not in robots:
+        ids = ", ".join(map(str, robots))
+        raise Refused(f"{deed} {text!r}: must be driver, localization or scanner of a robot of {ids}, such as driver 2")
+    return {"part": match["part"], "robot": robot}
 
 
 def _share(text: str) -> float:

@@ -18,7 +18,9 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import whole_number
 
-FaultAction = Literal["kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover"]
+FaultAction = Literal[
+    "kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover", "hang", "resume"
+]
 
 #            action        effect
 DEEDS: dict[str, str] = {
@@ -31,6 +33,8 @@ DEEDS: dict[str, str] = {
     "heal":      "ends a cut, or all cuts and all loss",
     "loss":      "every receiver loses this share of messages: 0.2; without a share: the initial value",
     "handover":  "the leader hands its lease to the next in the chain",
+    "hang":      "a part of a simulated robot hangs: driver 2 (its wheels go on), localization 2 or scanner 2",
+    "resume":    "ends a hang of the same part",
 }  # fmt: skip
 
 SIGNALS: dict[str, signal.Signals] = {
@@ -40,9 +44,9 @@ SIGNALS: dict[str, signal.Signals] = {
     "terminate": signal.SIGTERM,
 }
 
-ORDERS = ("cut", "heal", "loss", "handover")
+ORDERS = ("cut", "heal", "loss", "handover", "hang", "resume")
 """Fault actions sent as an operator's message to all, not as a signal to one process."""
-LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "loss"}
+LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "loss", "hang": "resume"}
 """Fault actions that may have a duration, and the action that ends each."""
 
 LEADER = "leader"
@@ -54,7 +58,7 @@ TIME_S_MAX = 1e6
 """Longest time limit [s] of a scenario."""
 RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"
 _SENTENCE = re.compile(
-    r"(?P<deed>\w+)(?: +(?!at )(?P<target>[\w.,>-]+))?"
+    r"(?P<deed>\w+)(?: +(?!at )(?P<target>(?:(?:driver|localization|scanner) +)?[\w.,>-]+))?"
     r"(?: +at +(?P<at>\d+(?:\.\d+)?) *s)?"
     r"(?: +for +(?P<duration>\d+(?:\.\d+)?) *s)?",
     re.ASCII,
@@ -85,7 +89,7 @@ def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
     if max(float(match["at"]), float(match["duration"] or 0.0)) > TIME_S_MAX:
         raise Refused(f"{where} {text!r}: times must be at most {TIME_S_MAX:g} s, what the longest run lasts")
     if match["deed"] in ORDERS:
-        target = _ordered(match["deed"], match["target"] or "", text, mission, where)
+        target = _ordered(match["deed"], " ".join((match["target"] or "").split()), text, mission, where)
     else:
         target = _target(match["target"] or "", text, mission, where)
     for_s = None if match["duration"] is None else float(match["duration"])

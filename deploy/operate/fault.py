@@ -76,7 +76,7 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
     """Send an operator's message to all of the fleet. Raises Refused if it is invalid, or the fleet ignores faults."""
     fleet, robots = team[0].fleet, tuple(sorted(agent.robot for agent in team))
     try:
-        if deed != "handover" and not all("--faults" in agent.identity.arguments for agent in team):
+        if deed in ("cut", "heal", "loss") and not all("--faults" in agent.identity.arguments for agent in team):
             raise Refused(f"fleet {fleet} does not obey weather: its processes were started without --faults")
         whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
         operator = Operator(fleet, incarnations.drawn())

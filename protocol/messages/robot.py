@@ -25,8 +25,13 @@ class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
 
 
 class Localization(Struct, frozen=True, array_like=True, tag="localization"):
+    """Fix of a localization in `map`."""
+
     header: Header
     pose_map: Pose2D
+    sigma_m: Number = 0.0
+    """Standard deviation [m] of the position, in its worse axis; 0: as good as the agent assumes."""
+    sigma_rad: Number = 0.0
 
 
 class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):

@@ -57,6 +57,8 @@ class TableRow(Struct, frozen=True, array_like=True, tag="table"):
     stuck: bool = False
     progress: RouteProgress | None = None
     """Progress of the team: of a leader its own, of another robot the leader's as last heard; None: never heard."""
+    placed: bool = True
+    """False: the robot has no pose; x, y and theta mean nothing then."""
 
 
 class Tracking(Struct, frozen=True, array_like=True, tag="tracking"):

@@ -255,7 +255,7 @@ class Knowing:
         header = Header("driver", 1, self._ticks, now)
         stamp = GatewayStamp(1, now)
         self._estimator.sensors(Sensors(header, self._odometry, twist, self._odometer_m, stamp, NO_TERM), now)
-        first = not self._estimator.ready
+        first = self._estimator.pose_at(now) is None
         if first or (self._ticks % FIX_EVERY == 0 and self._chance.random() >= blur.dropout):
             fix = Pose2D(
                 true.x + gauss(0.0, blur.fix_m),

@@ -7,7 +7,13 @@ from random import Random
 
 import pytest
 
-from lfa.agents.localization.estimator import OUTLIERS_TO_RELOCATE, Estimator
+from lfa.agents.localization.estimator import (
+    ODOMETRY_S_MAX,
+    OUTLIERS_TO_RELOCATE,
+    SIGMA_M_MAX,
+    UNFIXED_M_MAX,
+    Estimator,
+)
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp
 from lfa.protocol.messages.header import Header
@@ -119,8 +125,69 @@ def test_a_gap_in_localisation_is_bridged_by_the_wheels() -> None:
     drive = Drive(odometry=0.005)
     for n in range(500):
         drive.step(_wander(n))
-    errors = [drive.step(_wander(n), silent=True) for n in range(500, 750)]
+    errors = [drive.step(_wander(n), silent=True) for n in range(500, 590)]
+    assert drive.estimator.missing(drive.now) is None
     assert errors[-1][0] < 0.02
+
+
+def test_a_localization_that_ended_slows_the_robot_and_then_is_no_pose_until_the_next_fix() -> None:
+    drive = Drive()
+    for _ in range(100):
+        drive.step(Twist(0.5, 0.0))
+    go, way_m = Twist(0.5, 0.2), 0.0
+    assert drive.estimator.limited(go) == go
+    while way_m < UNFIXED_M_MAX - 0.1:
+        drive.step(Twist(0.5, 0.0), silent=True)
+        way_m += 0.5 * DT
+    assert drive.estimator.unfixed
+    assert drive.estimator.limited(go) == Twist(pytest.approx(0.2), pytest.approx(0.08))
+    for _ in range(12):
+        drive.step(Twist(0.5, 0.0), silent=True)
+    assert drive.estimator.missing(drive.now) == "localization"
+    assert drive.estimator.pose_at(drive.now) is None
+    for _ in range(6):
+        drive.step(STILL)
+    assert drive.estimator.pose_at(drive.now) is not None
+    assert drive.estimator.limited(go) == go
+
+
+def test_a_robot_that_stands_keeps_its_pose_without_fixes() -> None:
+    drive = Drive()
+    for _ in range(50):
+        drive.step(Twist(0.5, 0.0))
+    for _ in range(3000):
+        drive.step(STILL, silent=True)
+    assert drive.estimator.missing(drive.now) is None
+
+
+def test_fixes_that_are_all_refused_are_no_fixes() -> None:
+    drive = Drive()
+    for _ in range(50):
+        drive.step(Twist(0.5, 0.0))
+    for n in range(200):
+        wrong = Pose2D(drive.true.x + (5.0 if n % 2 else -5.0), drive.true.y, 0.0)
+        drive.step(Twist(0.5, 0.0), fix=wrong)
+    assert drive.estimator.missing(drive.now) == "localization"
+
+
+def test_a_fix_that_says_itself_how_wrong_it_may_be_is_none_beyond_the_bound() -> None:
+    drive = Drive()
+    header = Header("driver", 1, 0, 0.0)
+    sensors = Sensors(header, Pose2D(), STILL, 0.0, GatewayStamp(1, 0.0), NO_TERM)
+    drive.estimator.sensors(sensors, 0.0)
+    assert not drive.estimator.localization(Localization(header, Pose2D(), sigma_m=SIGMA_M_MAX + 0.01), 0.0)
+    assert drive.estimator.missing(0.0) == "localization"
+    assert drive.estimator.localization(Localization(header, Pose2D(), sigma_m=SIGMA_M_MAX), 0.0)
+    assert drive.estimator.missing(0.0) is None
+
+
+def test_odometry_that_stopped_is_no_pose() -> None:
+    drive = Drive()
+    for _ in range(50):
+        drive.step(Twist(0.5, 0.0))
+    assert drive.estimator.missing(drive.now + ODOMETRY_S_MAX - 0.05) is None
+    assert drive.estimator.missing(drive.now + ODOMETRY_S_MAX + 0.05) == "odometry"
+    assert drive.estimator.pose_at(drive.now + ODOMETRY_S_MAX + 0.05) is None
 
 
 def test_a_restarted_driver_with_a_new_clock_and_odometry_is_taken_up_at_its_first_fix() -> None:
@@ -129,7 +196,7 @@ def test_a_restarted_driver_with_a_new_clock_and_odometry_is_taken_up_at_its_fir
         drive.step(Twist(0.5, 0.0))
     header = Header("driver", 2, 0, 5.0)
     drive.estimator.sensors(Sensors(header, Pose2D(), STILL, 0.0, GatewayStamp(2, 0.0), NO_TERM), received_at=drive.now)
-    assert not drive.estimator.ready
+    assert drive.estimator.pose_at(drive.now) is None
     drive.estimator.localization(Localization(header, Pose2D(4.0, 5.0, 1.0)), received_at=drive.now)
     known = drive.estimator.pose_at(drive.now)
     assert known is not None

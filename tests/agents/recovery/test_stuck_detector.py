@@ -4,7 +4,7 @@ from lfa.agents.recovery.stuck_detector import (
     CALM_S,
     CELL_ENTRIES,
     FREED_M,
-    POSE_LOST,
+    SCAN_LOST,
     STANDS_S,
     STILL_S,
     TURNS,
@@ -87,8 +87,17 @@ def test_S4_waited_too_long_for_what_moves() -> None:
     assert str(watched(WAITING_S + 0.2, STILL, "wait")).startswith("S4")
 
 
-def test_S5_own_pose_lost() -> None:
-    assert str(StuckConditions().watch(Pose2D(), STILL, None, POSE_LOST, 0.0)).startswith("S5")
+def test_S5_scan_lost() -> None:
+    assert str(StuckConditions().watch(Pose2D(), STILL, None, SCAN_LOST, 0.0)).startswith("S5")
+
+
+def test_S6_own_pose_lost_until_it_is_found() -> None:
+    monitor = StuckMonitor()
+    monitor.lose_pose("odometry")
+    assert monitor.reason == "S6: own pose lost, no odometry"
+    assert monitor.pose_lost
+    monitor.find_pose()
+    assert monitor.reason is None
 
 
 def test_a_reset_forgets() -> None:

@@ -107,3 +107,10 @@ def test_the_table_keeps_every_number_whole_on_80_columns() -> None:
     _, line = console.export_text().splitlines()
     assert line.split()[:11] == ["10", "follower", "3586", "9", "-1716", "-178", "-0.25", "12345", "1200", "100", "135"]
     assert len(line) <= 80
+
+
+def test_a_robot_that_lost_its_pose_says_so_and_has_no_speed() -> None:
+    text = "follower, own pose lost: no odometry"
+    status = Status(Header("robot2", 1, 1, 0.0), Level.ERROR, text, Role.FOLLOWER, Term(), {})
+    row = _row(_board((10.0, _pose(2, Role.FOLLOWER, 3)), (14.0, status)), 2, 15.0)
+    assert (row.role, row.state, row.speed_mps) == ("follower", text, None)

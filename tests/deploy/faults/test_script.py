@@ -29,6 +29,9 @@ MISSION = Mission()
         ("loss 0.2 at 5 s for 3 s", Fault("loss", "0.2", 5.0, 3.0)),
         ("loss at 5 s", Fault("loss", "", 5.0)),
         ("handover at 5 s", Fault("handover", "leader", 5.0)),
+        ("hang driver 2 at 9 s", Fault("hang", "driver 2", 9.0)),
+        ("hang localization  3 at 9 s for 2 s", Fault("hang", "localization 3", 9.0, 2.0)),
+        ("resume scanner 1 at 9 s", Fault("resume", "scanner 1", 9.0)),
     ],
 )
 def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
