@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.installed-docs
 PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tests
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted same pages pictures docs clean setup
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted mutants same pages pictures docs clean setup
 
 setup: $(STAMP)
 
@@ -78,6 +78,10 @@ model: $(STAMP)
 # Planted bugs: which invariant falls after how many schedules of faults; minutes.
 planted: $(STAMP)
 	$(BIN)/python -m tests.protocol.lease.hunt
+
+# Small faults put into one file, one at a time: which do the tests of its room miss? make mutants FILE=agents/navigator.py
+mutants: $(STAMP)
+	$(BIN)/python -m tests.mutation $(FILE)
 
 # Does the code still behave as before? The first call records two runs of processes and writes a table of hashes of
 # events and journal calls (15 scenarios, 3 seeds, fuzz seeds, the two runs replayed); later calls compare with it.

@@ -1,12 +1,17 @@
 """S1 to S5: when a robot is stuck, and when it only waits."""
 
+import pytest
+
 from lfa.agents.recovery.stuck_detector import (
+    BACK_S,
+    BLOCKED_S,
     CALM_S,
     CELL_ENTRIES,
     FREED_M,
     SCAN_LOST,
     STANDS_S,
     STILL_S,
+    TURN_S_MIN,
     TURNS,
     WAITING_S,
     StuckConditions,
@@ -138,3 +143,88 @@ def test_a_stuck_leader_is_stuck_as_a_follower_and_a_new_leader_begins_anew() ->
     assert plight.reason is not None
     plight.begin(leading=True)
     assert plight.reason is None
+
+
+def test_a_robot_that_rests_is_watched_anew() -> None:
+    monitor = StuckMonitor()
+    for begin_s in (0.0, 3.0):  # twice almost long enough, with a rest between
+        for n in range(round((STILL_S - 0.2) / 0.02)):
+            monitor.watch(Pose2D(), AHEAD, None, None, begin_s + 0.02 * n, leads=False)
+        monitor.rest(Pose2D(), begin_s + STILL_S - 0.1)
+    assert monitor.reason is None
+
+
+def test_a_new_role_is_watched_anew() -> None:
+    monitor = StuckMonitor()
+    for n in range(round((STILL_S - 0.2) / 0.02)):
+        monitor.watch(Pose2D(), AHEAD, None, None, 0.02 * n, leads=False)
+    monitor.begin(leading=False)
+    monitor.watch(Pose2D(), AHEAD, None, None, STILL_S, leads=False)
+    assert monitor.reason is None
+
+
+def test_the_place_is_where_a_robot_got_stuck_first() -> None:
+    monitor = StuckMonitor()
+    for now, x in ((0.0, 0.0), (2.0, 0.0), (2.1, 0.8 * FREED_M)):
+        monitor.watch(Pose2D(x, 0.0, 0.0), STILL, "blocked", None, now, leads=False)
+    assert monitor.reason is not None
+    monitor.rest(Pose2D(FREED_M, 0.0, 0.0), 2.2)
+    assert monitor.reason is None
+
+
+def test_who_is_stuck_beside_the_axis_is_not_free_where_it_stands() -> None:
+    monitor = StuckMonitor()
+    for now in (0.0, 2.0):
+        monitor.watch(Pose2D(0.0, 3.0, 0.0), STILL, "blocked", None, now, leads=False)
+    monitor.rest(Pose2D(0.0, 3.0, 0.0), 2.1)
+    assert monitor.reason is not None
+    monitor.rest(Pose2D(0.0, 3.0 - FREED_M, 0.0), 2.2)
+    assert monitor.reason is None
+
+
+def test_S1_holds_beside_the_axis_too() -> None:
+    stuck, reason = StuckConditions(), None
+    for n in range(round((STILL_S + 0.2) / 0.02)):
+        reason = stuck.watch(Pose2D(0.0, 3.0, 0.0), AHEAD, None, None, 0.02 * n)
+    assert str(reason).startswith("S1")
+
+
+@pytest.mark.parametrize(("action", "longest_s"), [("wait", WAITING_S), ("blocked", BLOCKED_S), ("back", BACK_S)])
+def test_an_action_is_too_long_from_its_own_beginning(action: str, longest_s: float) -> None:
+    stuck, begin_s = StuckConditions(), 100.0
+    stuck.watch(Pose2D(), STILL, None, None, begin_s - 0.1)
+    stuck.watch(Pose2D(), STILL, action, None, begin_s)
+    assert stuck.watch(Pose2D(), STILL, action, None, begin_s + 0.99 * longest_s) is None
+    assert stuck.watch(Pose2D(), STILL, action, None, begin_s + 1.01 * longest_s) is not None
+
+
+def turned(*at_s: float, action: str = "u_turn") -> str | None:
+    """Return the reason after turns at these times [s], with another action between them."""
+    stuck, reason = StuckConditions(), None
+    for now in at_s:
+        stuck.watch(Pose2D(), STILL, "left", None, now - 0.01)
+        reason = stuck.watch(Pose2D(), STILL, action, None, now)
+    return reason
+
+
+def test_S3_counts_turns_from_the_first_of_three() -> None:
+    assert turned(1.0, 7.0, 10.9) is not None
+    assert turned(1.0, 7.0, 11.1) is None
+
+
+def test_S3_counts_u_turns_only_and_flickering_ones_once() -> None:
+    assert turned(1.0, 3.0, 5.0, action="right") is None
+    assert turned(1.0, 3.0, 3.0 + 0.9 * TURN_S_MIN) is None
+    assert turned(1.0, 3.0, 3.0 + 1.1 * TURN_S_MIN) is not None
+
+
+def test_S3_forgets_the_place_that_was_entered_first_when_it_remembers_256() -> None:
+    stuck, reason = StuckConditions(), None
+    there_and_back = [0, 1, 0]
+    for n, cell in enumerate([*there_and_back, *range(2, 257), 0]):
+        reason = stuck.watch(Pose2D(0.1 + 0.5 * cell, 0.1, 0.0), AHEAD, None, None, 0.1 * n)
+    assert reason is None
+    stuck = StuckConditions()
+    for n, cell in enumerate([*there_and_back, *range(2, 256), 0]):
+        reason = stuck.watch(Pose2D(0.1 + 0.5 * cell, 0.1, 0.0), AHEAD, None, None, 0.1 * n)
+    assert str(reason).startswith("S3")

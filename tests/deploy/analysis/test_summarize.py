@@ -1,0 +1,123 @@
+"""What a summary says of one robot, from recordings and events whose answers are known."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot
+from lfa.deploy.analysis.summary import RobotSummary
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
+
+T = np.arange(0.0, 10.0, 0.02)
+K, PHI = 1.2, 2.0 * pi / 3.0
+SETTLES_S = 4.0
+
+
+def _truth(x: Array, y: Array, theta: float = 0.0, speed: float = -0.5) -> Array:
+    return np.column_stack([T, x, y, theta + 0.0 * T, speed + 0.0 * T, 0.0 * T])
+
+
+def _run(off_m: Array, avoids_at_s: float = 6.0) -> RecordedRun:
+    """Robot 2 follows robot 1, `off_m` [m] too far out; it avoids something for a second."""
+    t = T[::2]
+    avoids = (t >= avoids_at_s) & (t < avoids_at_s + 1.0)
+    tracking = np.column_stack([t, 1.0 + 0.0 * t, K + 0.0 * t, PHI + 0.0 * t, 0.0 * t, 0.0 * t, 0.0 * t, avoids])
+    follower = _truth(0.5 * T + (K + off_m) * np.cos(PHI), (K + off_m) * np.sin(PHI))
+    return RecordedRun({1: _truth(0.5 * T, 0.0 * T), 2: follower}, {2: tracking}, {}, {})
+
+
+LATE = np.where(SETTLES_S > T, 0.3, 0.01)
+
+
+def line(kind: str, robot: int = 2, **facts: Any) -> dict[str, Any]:
+    return {"t": 1.0, "robot": robot, "kind": kind, **facts}
+
+
+def test_a_follower_has_errors_from_when_it_settled_on() -> None:
+    robot = _robot(2, _run(LATE), [])
+    assert robot.settled_after_s == pytest.approx(SETTLES_S)
+    assert robot.distance_error_rms_m == pytest.approx(0.01)
+    assert robot.distance_error_max_m == pytest.approx(0.01)
+    assert robot.final_distance_error_m == pytest.approx(0.01)
+    assert robot.avoidances == 1
+    assert robot.excused_s == pytest.approx(1.0, abs=0.05)
+    assert robot.bearing_error_rms_rad == pytest.approx(0.0, abs=1e-9)
+    assert robot.heading_error_rms_rad == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_follower_that_never_settles_has_a_last_error_and_no_rms() -> None:
+    robot = _robot(2, _run(0.3 + 0.0 * T, avoids_at_s=99.0), [])
+    assert robot.settled_after_s is None
+    assert robot.distance_error_rms_m is None and robot.distance_error_max_m is None
+    assert robot.final_distance_error_m == pytest.approx(0.3)
+
+
+def test_a_leader_has_a_place_and_a_speed_and_no_errors() -> None:
+    robot = _robot(1, _run(LATE), [])
+    assert robot.final_pose is not None
+    assert robot.final_pose[:2] == pytest.approx((0.5 * T[-1], 0.0))
+    assert robot.final_speed_mps == 0.5
+    assert robot.final_distance_error_m is None and robot.settled_after_s is None
+
+
+def test_a_robot_that_nobody_saw_has_no_place() -> None:
+    robot = _robot(3, _run(LATE), [])
+    assert robot.final_pose is None and robot.final_speed_mps is None
+    assert robot.alive and robot.role_at_end == "waiting"
+
+
+@pytest.mark.parametrize(
+    ("events", "alive"),
+    [
+        ([line("fault", deed="kill")], False),
+        ([line("fault", deed="terminate")], False),
+        ([line("died")], False),
+        ([line("fault", deed="stop")], True),
+        ([line("fault", deed="kill"), line("fault", deed="restart")], True),
+        ([line("fault", deed="restart"), line("died")], False),
+        ([line("fault", robot=1, deed="kill")], True),
+    ],
+)
+def test_a_robot_is_alive_unless_its_last_end_had_no_restart(events: list[dict[str, Any]], alive: bool) -> None:
+    assert _robot(2, _run(LATE), events).alive is alive
+
+
+def test_the_role_at_the_end_is_the_last_one() -> None:
+    events = [line("role", role="follower"), line("role", role="leader"), line("role", robot=1, role="waiting")]
+    assert _robot(2, _run(LATE), events).role_at_end == "leader"
+
+
+def test_an_obstacle_is_met_once_until_the_robot_resumes() -> None:
+    met = [("wall", "left"), ("wall", "left"), ("moving", "wait"), ("wall", "resume"), ("wall", "right")]
+    events = [line("decision", **{"class": kind, "action": action}) for kind, action in met]
+    events.append(line("contact"))
+    robot = _robot(2, _run(LATE), events)
+    assert {kind: n for kind, n in robot.obstacles_met.items() if n} == {"wall": 2, "moving": 1}
+    assert robot.contacts == 1
+
+
+def _at(distance_m: float | None) -> RobotSummary:
+    return RobotSummary(
+        id=2, alive=True, role_at_end="follower", final_pose=None, final_speed_mps=None, contacts=0, obstacles_met={},
+        orientation_requests=0, final_distance_error_m=distance_m,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "chain", "left"),
+    [
+        (0.9 * LEFT_BEHIND_M, (1, 2), False),
+        (-1.1 * LEFT_BEHIND_M, (1, 2), True),
+        (1.1 * LEFT_BEHIND_M, (2, 1), False),  # the leader follows nobody
+        (0.0, (1, 3), True),
+        (None, (1, 2), False),
+    ],
+)
+def test_left_behind_is_who_is_out_of_the_chain_or_far_from_its_slot(
+    distance_m: float | None, chain: tuple[int, ...], left: bool
+) -> None:
+    assert _left_behind(_at(distance_m), chain) is left
