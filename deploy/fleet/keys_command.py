@@ -29,6 +29,9 @@ def command(
     names: Annotated[
         list[str] | None, typer.Argument(help="rotate, revoke, show: members, such as robot3, world, host-a.")
     ] = None,
+    machine: Annotated[
+        str | None, typer.Option(help="revoke: all whose keys are on this machine, when it is lost.")
+    ] = None,
     robots: Annotated[int, typer.Option(help="init: number of robots N, with ids 1 to N.")] = 4,
     hosts: Annotated[str, typer.Option(help="init: machines with addresses: a=10.0.0.1+a.lan,b=10.0.0.2.")] = "local",
     place: Annotated[
@@ -52,12 +55,16 @@ def command(
         raise Refused(f"--days {days:g}: must be above 0 and at most {DAYS_MAX:g}")
     if action == "init" and chosen:
         raise Refused(f"init {' '.join(chosen)}: must be a folder alone, --robots and --hosts say who is in the fleet")
+    if machine is not None and action != "revoke":
+        raise Refused(f"--machine {machine}: must stand with revoke")
+    if machine is not None:
+        chosen = list(dict.fromkeys([*chosen, *keys.kept_on(folder, machine)]))
     if action == "revoke" and not chosen:
-        raise Refused("revoke: say whom, as in lfa keys revoke DIR robot3")
+        raise Refused("revoke: say whom, as in lfa keys revoke DIR robot3, or --machine b")
     if action == "init":
         return _init(folder, planned(fleet, hosts, robots, place or [], driver or []), days, as_json)
     if action != "show":
-        return _change(action, folder, chosen, days, plan, as_json)
+        return _change(action, folder, chosen, days, plan, machine, as_json)
     return _show(folder, chosen, as_json)
 
 
@@ -67,6 +74,7 @@ def _change(
     chosen: list[str],
     days: float,
     plan: FleetPlan | None,
+    lost: str | None,
     as_json: bool,
 ) -> int:
     """Rotate or revoke keys, then distribute them over ssh if there is a fleet file, else print what is to be done."""
@@ -75,8 +83,8 @@ def _change(
     else:
         keys.revoke(folder, chosen)
         changed, text = chosen, "revoked"
-    machines = list(keys.load(folder).plan.hosts)
-    wrong = [] if plan is None else asyncio.run(push(plan))
+    machines = [name for name in keys.load(folder).plan.hosts if name != lost]
+    wrong = [] if plan is None else asyncio.run(push(plan, lost))
     then = "routers opened anew" if plan is not None else "copy hosts/ again, then SIGHUP to the routers, one by one"
     facts: dict[str, object] = {"changed": changed, "hosts": machines, "pushed": plan is not None, "wrong": wrong}
     for line in wrong:

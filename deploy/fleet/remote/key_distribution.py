@@ -49,15 +49,17 @@ def _bundles(plan: FleetPlan) -> dict[str, Bundle]:
     return {name: {path.name: path.read_text() for path in sorted(at.iterdir())} for name, at in folders.items()}
 
 
-async def push(plan: FleetPlan) -> list[str]:
+async def push(plan: FleetPlan, lost: str | None = None) -> list[str]:
     """Send new keys to the machines of a running fleet and restart their routers one by one; return a line per failure.
 
-    A router reads its rules when it opens. During its restart its processes fail over to the next machine's router.
+    A machine that is `lost` is sent nothing. A router reads its rules when it opens. During its restart its processes
+    fail over to the next machine's router.
     """
     fleet = FleetHosts(plan, parts(plan, "", "", _bundles(plan)))
     try:
         await fleet.reach()
-        for name in plan.hosts:
+        fleet.wrong.pop(lost or "", None)
+        for name in (name for name in plan.hosts if name != lost):
             await fleet.do("rekey", [name])
     finally:
         await fleet.close()

@@ -40,6 +40,10 @@ SAY = ("put", "liveliness_token")
 HEAR = ("put", "reply", "liveliness_token")
 
 
+PERSONS = (OPERATOR_NAME, RECORDER_NAME)
+"""Members that are no process of one machine. Each machine has its own keys for them, beside those of the person."""
+
+
 class KeyPlan(Struct, frozen=True):
     """Machines of a fleet, and the routers that each process may join."""
 
@@ -54,14 +58,26 @@ class KeyPlan(Struct, frozen=True):
         return [name for name, hosts in self.places.items() if host in hosts]
 
     def kept_at(self, host: str) -> list[str]:
-        """Return the names whose keys are stored on `host`: its processes, the operator and the recorder."""
-        persons = (OPERATOR_NAME, RECORDER_NAME)
-        return [name for name in self.at(host) if name in persons or self.places[name][0] == host]
+        """Return the names whose keys are stored on `host`: its processes, and this machine's operator and recorder.
+
+        The keys of persons, who join from anywhere, are on no machine.
+        """
+        return [name for name in self.at(host) if name not in PERSONS and self.places[name][0] == host]
 
     def simulated(self) -> list[str]:
         """Return the robots whose hardware the world simulates: those without a driver."""
         robots = [name for name in self.places if robot_id_of(name)]
         return [name for name in robots if driver_of(name) not in self.places]
+
+
+def stationed(person: str, host: str) -> str:
+    """Return the name under which a person acts from machine `host`: `operator-a`, whose keys are on that machine."""
+    return f"{person}-{host}"
+
+
+def person_of(name: str) -> str | None:
+    """Return `operator` or `recorder` for such a person, stationed at a machine or not; None for any other member."""
+    return next((person for person in PERSONS if name == person or name.startswith(f"{person}-")), None)
 
 
 def driver_of(robot: str) -> str:
@@ -82,8 +98,8 @@ def voices(name: str, plan: KeyPlan) -> list[tuple[str, str]]:
         return [("world", WORLD_NAME), ("world", TRUTH_OWNER), *witness, *hardware]
     if name == WITNESS_NAME:
         return [("witness", WITNESS_NAME)]
-    if name == OPERATOR_NAME:
-        return [("operator", OPERATOR_NAME)]
+    if person_of(name) is not None:
+        return [("operator", OPERATOR_NAME)] if person_of(name) == OPERATOR_NAME else []
     if name.startswith(HOST_PREFIX):
         return [("host", name)]
     if name.startswith(DRIVER_PREFIX):

@@ -2,10 +2,11 @@
 
     DIR/ca.pem, ca.key       the fleet's authority; the key never leaves the operator's machine
     DIR/fleet.json           routers and common name of each member (no secrets)
-    DIR/issued/              certificate, key and password of every member: the operator's `--keys`
+    DIR/issued/              certificate, key and password of every member: the operator's `--keys`, on no machine
     DIR/hosts/a/             all files that machine `a` needs, and no others: `scp -r DIR/hosts/a a:/etc/lfa/keys`
         ca.pem, host-a.*     for its router and supervisor (the only server certificates)
-        robot1.pem .key .password   for its processes, for operator and recorder
+        robot1.pem .key .password   for its processes
+        operator.*, recorder.*      for persons who work at this machine: members `operator-a`, `recorder-a`
         access.json, users   access rules and passwords of its router with `--secure`
 
 Use, as in `lfa up`:
@@ -30,12 +31,21 @@ import msgspec
 from msgspec import Struct, structs
 
 from lfa.deploy.fleet.security import authority
-from lfa.deploy.fleet.security.access_rules import KeyPlan, driver_of, host_name, rules, sayable
+from lfa.deploy.fleet.security.access_rules import (
+    PERSONS,
+    KeyPlan,
+    driver_of,
+    host_name,
+    person_of,
+    rules,
+    sayable,
+    stationed,
+)
 from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json, read_text
 from lfa.protocol.names import WITNESS_NAME, robot_name
-from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME
+from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, PASSWORD_BYTES_MAX, USERS_FILE, validity
 
 REGISTRY, HOSTS, CA_KEY = "fleet.json", "hosts", "ca.key"
@@ -81,7 +91,7 @@ def spread(
 
     `places` overrides this for single members (`{"robot3": ["b"]}`); `drivers` are the robots whose hardware the world
     does not simulate. World and witness are on the first machine (`witness` in `places` is one with its own process);
-    operator and recorder may join anywhere. Raises Refused.
+    operator and recorder may join anywhere, as persons and as those stationed at each machine. Raises Refused.
     """
     names = list(hosts)
     if not names:
@@ -90,7 +100,9 @@ def spread(
     drawn |= {robot_name(robot): _turn(names, n) for n, robot in enumerate(robots)}
     drawn[WORLD_NAME] = _turn(names, 0)
     drawn |= {driver_of(robot_name(robot)): drawn.get(robot_name(robot), ()) for robot in drivers}
-    drawn |= {OPERATOR_NAME: tuple(names), RECORDER_NAME: tuple(names)}
+    for person in PERSONS:
+        drawn[person] = tuple(names)
+        drawn |= {stationed(person, host): (host, *(name for name in names if name != host)) for host in names}
     for name, where in (places or {}).items():
         strange = [host for host in where if host not in names]
         if name not in (*drawn, WITNESS_NAME) or strange or not where:
@@ -154,6 +166,14 @@ def revoke(folder: Path, names: Sequence[str]) -> list[str]:
     except OSError as error:
         raise _unwritable(folder, error) from None
     return list(registry.plan.hosts)
+
+
+def kept_on(folder: Path, machine: str) -> list[str]:
+    """Return the members whose keys are on `machine`: what is to be revoked when it is lost. Raises Refused."""
+    plan = load(folder).plan
+    if machine not in plan.hosts:
+        raise Refused(f"--machine {machine}: must be one of {', '.join(plan.hosts)}")
+    return plan.kept_at(machine)
 
 
 def show(folder: Path, now_ms: int) -> list[Shown]:
@@ -222,13 +242,14 @@ def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
     plan, here = registry.plan, folder_of(folder, host)
     private_folder(here)
     kept = [name for name in plan.kept_at(host) if name in registry.common_names]
-    wanted = {CA_FILE, ACCESS_FILE, USERS_FILE} | {f"{name}.{kind}" for name in kept for kind in KINDS}
+    files = {f"{person_of(name) or name}.{kind}": f"{name}.{kind}" for name in kept for kind in KINDS}
+    wanted = {CA_FILE, ACCESS_FILE, USERS_FILE, *files}
     for path in here.iterdir():
         if path.name not in wanted:
             path.unlink()
     write_private(here / CA_FILE, (folder / CA_FILE).read_bytes())
-    for file in (f"{name}.{kind}" for name in kept for kind in KINDS):
-        write_private(here / file, (folder / ISSUED / file).read_bytes())
+    for file, source in files.items():
+        write_private(here / file, (folder / ISSUED / source).read_bytes())
     joining = [name for name in (*plan.at(host), *map(host_name, plan.hosts)) if name in registry.common_names]
     write_private(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
     write_private(

@@ -14,9 +14,10 @@ import pytest
 from lfa.deploy.fleet.keys_command import command, planned
 from lfa.deploy.fleet.security import authority, keys
 from lfa.deploy.fleet.security.access_rules import KeyPlan, rules, sayable
+from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import TOPICS, Topic, matches
-from lfa.protocol.transport.credentials import check_valid, credentials, validity
+from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, check_valid, credentials, validity
 from lfa.protocol.transport.zenoh_router import check_listen
 from tests.rigs.lfa_runs import lfa
 
@@ -107,6 +108,35 @@ def test_a_machine_has_the_keys_of_those_who_run_there_and_no_others(tmp_path: P
     names = {path.stem for path in keys.folder_of(tmp_path / "k", "b").glob("*.key")}
     assert names == {"host-b", "robot2", "operator", "recorder"}
     assert not list((tmp_path / "k" / "hosts").rglob("ca.key"))
+
+
+def test_the_keys_of_persons_are_on_no_machine_and_each_machine_has_its_own(tmp_path: Path) -> None:
+    """A copy of a machine's disk must not be a copy of the operator's key."""
+    keys.make(tmp_path / "k", plan())
+    for person in ("operator", "recorder"):
+        held = {
+            place: (folder / f"{person}.key").read_bytes()
+            for place, folder in {
+                "issued": tmp_path / "k" / ISSUED,
+                **{host: keys.folder_of(tmp_path / "k", host) for host in "ab"},
+            }.items()
+        }
+        assert len(set(held.values())) == len(held), f"the same key of the {person} in two places"
+
+
+def test_what_lay_on_a_lost_machine_is_revoked_at_once_and_nothing_else(tmp_path: Path) -> None:
+    folder = tmp_path / "k"
+    keys.make(folder, plan())
+    lost = keys.kept_on(folder, "b")
+    assert set(lost) == {"host-b", "robot2", "operator-b", "recorder-b"}
+    keys.revoke(folder, lost)
+    for host in "ab":
+        rules, users = ((keys.folder_of(folder, host) / name).read_text() for name in (ACCESS_FILE, USERS_FILE))
+        assert not [name for name in lost if f'"{name}"' in rules or f"{name}:" in users]
+        assert '"operator"' in rules and '"operator-a"' in rules
+    assert {one.name for one in keys.show(folder, 0) if one.state == "revoked"} == set(lost)
+    with pytest.raises(Refused, match="--machine c: must be one of a, b"):
+        keys.kept_on(folder, "c")
 
 
 def test_everything_secret_is_for_the_owner_only(tmp_path: Path) -> None:

@@ -48,9 +48,11 @@ class Home:
     def state(self, host: str) -> Path:
         return self.folder / ".local/state/lfa" / FLEET / host
 
+    def socket(self, host: str) -> str:
+        return f"unixsock-stream/{self.state(host) / 'router.sock'}"
+
     def lets_in(self, name: str, host: str, folder: Path) -> bool:
-        socket = f"unixsock-stream/{self.state(host) / 'router.sock'}"
-        return answers(socket, credentials(folder, name, clock.wall_ms()))
+        return answers(self.socket(host), credentials(folder, name, clock.wall_ms()))
 
     def wrong(self) -> dict[str, str]:
         found: list[dict[str, Any]] = json.loads(self.lfa("doctor", str(self.file), "--json").stdout)["findings"]
@@ -105,6 +107,20 @@ def test_a_revoked_robot_is_let_in_by_no_router_and_the_rest_goes_on(home: Home)
         return {rate["channel"] for rate in heard} == {"robot1/pose"}
 
     eventually(rest, "robot 1 alone should be heard")
+
+
+def test_a_stolen_copy_of_a_lost_machines_keys_orders_nothing_once_the_machine_is_revoked(home: Home) -> None:
+    """The operator's key that lay there would otherwise restart robot 1."""
+    stolen = home.folder / "disk of b"
+    shutil.copytree(home.state("b") / "keys", stolen)
+    assert home.lets_in("operator", "a", stolen)
+    done = home.lfa("keys", "revoke", str(home.file), "--machine", "b", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["hosts"] == ["a"], "a lost machine is sent nothing"
+    for name in ("operator", "recorder", "host-b"):
+        assert not home.lets_in(name, "a", stolen), name
+    assert home.lets_in("operator", "a", home.keys / "issued"), "the person's own key is as good as before"
+    assert home.lets_in("operator", "a", home.state("a") / "keys"), "and so is that of machine a"
 
 
 def test_doctor_names_an_expired_certificate(home: Home) -> None:
