@@ -28,7 +28,7 @@ from lfa.agents.perception.scan_age import LOST_S, ScanAge
 from lfa.agents.recovery.back_up import BackUp
 from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, StuckMonitor
 from lfa.agents.team_state import TeamState
-from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
+from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base, slowed
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
 from lfa.protocol.messages.team import ObstacleNote
@@ -204,7 +204,9 @@ class Navigator:
             wanted = self._crossing.give_way(moving, pose, wanted, now)
             wanted = self._ground_crossing.cross(wanted, now)
             wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
-            wanted = self.estimator.limited(self.scan_age.limited(wanted, now))
+            usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else self._mission.limits.v_max_mps
+            wanted = slowed(self.scan_age.limited(wanted, now), self.scan_age.speed_max_mps(usual_mps))
+            wanted = self.estimator.limited(wanted)
         if not self._back_up_path.under_way:
             self._back_up_path.keep(pose)
         self._watch(role, pose, wanted, now)

@@ -180,7 +180,12 @@ def _health(navigator: Navigator, lease: Lease, role: Role, now: float) -> tuple
         return f"waiting for {', '.join(robot_name(i) for i in lease.missing)}", Level.WARN
     lost = navigator.lost_input(now)
     if lost is None:
-        return role.value, Level.OK
+        slow_hz = navigator.scan_age.slow_hz
+        return (
+            (role.value, Level.OK)
+            if slow_hz is None
+            else (f"{role.value}, slow: scans at {slow_hz:.1f} Hz", Level.WARN)
+        )
     if navigator.pose_lost:
         return f"{role.value}, own pose lost: no {lost}", Level.ERROR
     if not navigator.was_placed:

@@ -6,6 +6,7 @@ has moved far enough for its ranges to change.
 
 from __future__ import annotations
 
+from collections import deque
 from itertools import pairwise
 from math import cos, hypot, inf, sin
 
@@ -15,6 +16,12 @@ from lfa.protocol.topics import TOPIC
 
 SCAN_S_MAX = TOPIC["scan"].timeout_s or 0.35
 """Age [s] of the last scan up to which it is as good as new; at twice this age the robot stands."""
+PERIOD_S = 1.0 / (TOPIC["scan"].rate_hz or 10.0)
+"""Time [s] between two scans that the braking margin assumes (`avoidance/safety.py`)."""
+PERIOD_SLACK = 1.3
+"""Period of the scans, as a multiple of `PERIOD_S`, up to which the margin covers it."""
+PERIODS = 5
+"""Number of periods whose median is taken."""
 LOST_S = 5.0
 """Age [s] of the last scan from which a robot counts as stuck (S5), so that its chain goes on without it."""
 MOVED_M, MOVED_RAD = 0.05, 0.05
@@ -31,6 +38,7 @@ class ScanAge:
         self._ranges: tuple[float, ...] | None = None
         self._pose = Pose2D()
         self._at: float | None = None
+        self._periods: deque[float] = deque(maxlen=PERIODS)
 
     def update(self, scan: LaserScan, pose: Pose2D, now: float) -> bool:
         """Take a scan made at `pose` in `map`; return whether it counts."""
@@ -39,6 +47,8 @@ class ScanAge:
                 return False
         else:
             self._ranges, self._pose = scan.ranges_m, pose
+        if self._at is not None:
+            self._periods.append(now - self._at)
         self._at = now
         return True
 
@@ -49,6 +59,20 @@ class ScanAge:
     def lost(self, now: float) -> bool:
         """Return whether the robot stands for want of a scan."""
         return self.age_s(now) >= 2.0 * SCAN_S_MAX
+
+    @property
+    def slow_hz(self) -> float | None:
+        """Rate [Hz] of the scans, if it is lower than the braking margin assumes; None otherwise."""
+        if len(self._periods) < PERIODS:
+            return None
+        period_s = sorted(self._periods)[PERIODS // 2]
+        return 1.0 / period_s if period_s > PERIOD_SLACK * PERIOD_S else None
+
+    def speed_max_mps(self, usual_mps: float) -> float:
+        """Return the speed [m/s] at which a robot drives no farther from scan to scan than at `usual_mps` with scans
+        of the assumed rate.
+        """
+        return usual_mps if self.slow_hz is None else usual_mps * PERIOD_S * self.slow_hz
 
     def limited(self, wanted: Twist, now: float) -> Twist:
         """Return `wanted`, scaled down from `SCAN_S_MAX` on, to a stop at twice that age."""

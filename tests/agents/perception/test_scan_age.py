@@ -75,3 +75,23 @@ def test_a_scanner_that_stops_drives_nobody_into_an_obstacle(tmp_path: Path) -> 
     assert sum(robot.contacts for robot in done.summary.robots) == 0, REPRODUCE
     lost = [line for line in event_log.of_kind(event_log.lines(done.folder), "input") if line["state"] == "lost"]
     assert {line["robot"] for line in lost} == {1, 2, 3}, REPRODUCE
+
+
+@pytest.mark.parametrize(("rate_hz", "speed_mps"), [(10.0, 1.0), (8.0, 1.0), (5.0, 0.5), (2.0, 0.2)])
+def test_scans_at_a_lower_rate_than_the_braking_margin_assumes_lower_the_speed(
+    rate_hz: float, speed_mps: float
+) -> None:
+    age = ScanAge()
+    for n in range(10):
+        age.update(scan(1.0 + 0.01 * n), Pose2D(), n / rate_hz)
+    assert age.speed_max_mps(1.0) == pytest.approx(speed_mps)
+    assert (age.slow_hz is None) == (speed_mps == 1.0)
+
+
+def test_a_team_with_slow_scanners_drives_slowly_and_warns(tmp_path: Path) -> None:
+    settings = ["mission.leading.route_m=[[4.0, 0.0]]", "world.lidar.rate_hz=5", "faults=[]"]
+    ended = run(load("straight", settings, 2), 1, tmp_path / "run")
+    said = [line for line in event_log.lines(ended.folder) if line["kind"] == "input"]
+    assert {line["robot"] for line in said if line.get("state") == "slow"} == {1, 2}
+    assert ended.summary.outcome == "goal_reached"
+    assert ended.summary.sim_duration_s > 4.0 / 0.25, "lfa sim straight --robots 2 --set world.lidar.rate_hz=5"
