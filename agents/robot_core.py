@@ -73,6 +73,7 @@ class RobotCore:
         self._next_control = now
         self._arrived = False
         self._lost_input = ""
+        self._slow_scans = False
         """Input of the robot's own hardware that was reported as lost; empty for none."""
         self._pending_release = False
         self.interests = with_mission(outbox.fleet, outbox.name, None)
@@ -159,6 +160,7 @@ class RobotCore:
                 self._team.obstacles.update(robot, message, now)
             case FormationNote():
                 if navigator.formation.request(message):
+                    self._formation_commands.hear(message)
                     self._event("formation", now, {"number": message.number, "trace": message.trace})
 
     def _obey(self, note: OperatorNote, now: float) -> None:
@@ -168,12 +170,13 @@ class RobotCore:
         lease = self.lease
         if note.command == "forget":
             self._forget(note, now)
+        side = str(note.arguments.get("side"))
         if lease.role is not Role.LEADER:
+            if note.command == "formation":
+                self._formation_commands.remember(side, now)
             return
         if note.command == "formation":
-            self._formation_commands.order(
-                str(note.arguments.get("side")), "operator", lease.chain[1:], lease.term, now
-            )
+            self._formation_commands.order(side, "operator", lease.chain[1:], lease.term, now)
         elif note.command == "handover":
             self._hand_over(now)
 
@@ -272,6 +275,11 @@ class RobotCore:
         if lost != self._lost_input:
             self._lost_input = lost
             self._event("input", now, {"state": "lost", "input": lost} if lost else {"state": "back"})
+        slow_hz = navigator.scan_age.slow_hz
+        if (slow_hz is not None) != self._slow_scans:
+            self._slow_scans = slow_hz is not None
+            rate = {} if slow_hz is None else {"rate_hz": round(slow_hz, 1)}
+            self._event("input", now, {"state": "slow" if rate else "as fast as needed", "input": "scan", **rate})
 
     def _role(self) -> Role:
         return self._place.role(follows=self.navigator.predecessor is not None)

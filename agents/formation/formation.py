@@ -19,6 +19,7 @@ from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.team import FormationNote, Slot
 from lfa.protocol.mission import FormationSpec, Limits, Mission, Side
 
+SIDES: dict[str, Side] = {"left": "left", "right": "right", "column": "column", "zigzag": "zigzag"}
 SEPARATION_MAX_M = 100.0
 BLEND_SHARE_MIN = 0.1
 """Minimum rate of a blend, as a share of its rate limit, however fast the predecessor drives."""
@@ -69,10 +70,9 @@ def slots_of(spec: FormationSpec, followers: Sequence[int]) -> tuple[Slot, ...]:
 
 def named(name: str, spec: FormationSpec) -> FormationSpec:
     """Return `spec` with the side that an operator names (`lfa formation column`). Raise `Refused`."""
-    sides: dict[str, Side] = {"left": "left", "right": "right", "column": "column", "zigzag": "zigzag"}
-    if name not in sides:
-        raise Refused(f"formation = {name}: must be one of left, right, column, zigzag")
-    return FormationSpec(spec.separation_m, spec.angle_rad, sides[name], spec.heading_filter_m)
+    if name not in SIDES:
+        raise Refused(f"formation = {name}: must be one of {', '.join(SIDES)}")
+    return FormationSpec(spec.separation_m, spec.angle_rad, SIDES[name], spec.heading_filter_m)
 
 
 def check_slot(slot: Slot, separation_min_m: float) -> Slot:
@@ -104,6 +104,8 @@ class Formation:
         self._slots = {slot.robot: slot for slot in slots_of(spec, robots[1:])}
         self.trace = trace
         """True when followers drive on the path of their predecessor, k^d of it behind."""
+        self.side = ""
+        """Side of the newest order that was heard; empty: none."""
         self.version: tuple[Term, int] = (NO_TERM, -1)
         self.refused = 0
 
@@ -124,8 +126,12 @@ class Formation:
             return False
         self.version = (note.term, note.number)
         self._slots.update(slots)
-        self.trace = note.trace
+        self.trace, self.side = note.trace, note.side if note.side in SIDES else ""
         return True
+
+    def is_named(self, robot: int) -> bool:
+        """Return whether the mission or a request has named a slot for `robot`."""
+        return robot in self._slots
 
     def slot_of(self, robot: int) -> Slot:
         """Return the commanded slot of `robot`; straight behind if no request has named it."""

@@ -22,6 +22,8 @@ BEND_CHECK_S = 0.5
 FOLD_S = 6.0
 """Time [s] between the column orders of two hops: each swings for half of it, then comes to rest. If all changed at
 once, the last slot would swing with all before it and go a longer way."""
+ORDER_S_MAX = 5.0
+"""Age [s] up to which a new leader carries out an operator's order that no leader has carried out."""
 BEND_AHEAD_M = 5.0
 """Distance [m] ahead within which bends are checked: enough for a chain of four to form a column at cruise speed."""
 
@@ -35,8 +37,19 @@ class FormationCommands:
         self._formation = formation
         self._number = 0
         self._next: int | None = None
+        self._pending: tuple[str, float] | None = None
+        """Last order of an operator, and when it came, while another robot leads."""
         self._repeat_at = 0.0
         self._check_at = self._fold_at = 0.0
+
+    def remember(self, side: str, now: float) -> None:
+        """Keep an operator's order of another robot's term, which that robot may not live to carry out."""
+        self._pending = side, now
+
+    def hear(self, note: FormationNote) -> None:
+        """Update with a new request of another robot that leads: what was to be carried out has been, or is older."""
+        if note.number > 0:
+            self._pending = None
 
     def begin(self, now: float) -> None:
         """Start a term: requests of this term count from 0."""
@@ -48,7 +61,8 @@ class FormationCommands:
         """
         orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
         if self._next is None:  # what the route has asked for so far was the former leader's to order
-            self._next = sum(orientation.at_m <= lead.progress_m for orientation in orientations)
+            self._next = sum(orientation.at_m <= lead.reached_m for orientation in orientations)
+            self._carry_out(followers, term, now)
         while self._next < len(orientations) and orientations[self._next].at_m <= lead.progress_m:
             self.order(orientations[self._next].side, "mission", followers, term, now)
             self._next += 1
@@ -56,7 +70,7 @@ class FormationCommands:
             self._check_at = now + BEND_CHECK_S
             self._column_where_narrow(lead, followers, term, now)
         if now >= self._repeat_at:
-            self._say(tuple(self._formation.slot_of(robot) for robot in followers), term, now)
+            self._say(self._slots(followers), term, now)
 
     def order(self, side: str, reason: str, followers: Sequence[int], term: Term, now: float) -> None:
         """Publish a new request to all followers; an unknown side is ignored."""
@@ -65,8 +79,25 @@ class FormationCommands:
         except Refused:
             return
         self._number += 1
+        self._formation.side = side
         self._say(slots_of(spec, followers), term, now)
         self._outbox.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
+
+    def _carry_out(self, followers: Sequence[int], term: Term, now: float) -> None:
+        """Carry out an operator's order that came too late for the former leader."""
+        side, at = self._pending or ("", now)
+        if side and side != self._formation.side and now - at <= ORDER_S_MAX:
+            self.order(side, "operator", followers, term, now)
+        self._pending = None
+
+    def _slots(self, followers: Sequence[int]) -> tuple[Slot, ...]:
+        """Return the present slots; a robot that led when they were ordered gets the one of its place in the chain."""
+        if not self._formation.side:
+            return tuple(self._formation.slot_of(robot) for robot in followers)
+        ordered = slots_of(named(self._formation.side, self._mission.formation), followers)
+        return tuple(
+            self._formation.slot_of(slot.robot) if self._formation.is_named(slot.robot) else slot for slot in ordered
+        )
 
     def _column_where_narrow(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
         """Order column before a bend that the formation cannot follow, and where obstacles are known (the route passes
@@ -96,7 +127,7 @@ class FormationCommands:
 
     def _say(self, slots: tuple[Slot, ...], term: Term, now: float) -> None:
         header = self._outbox.header("formation", now)
-        note = FormationNote(header, term, self._number, slots, self._formation.trace)
+        note = FormationNote(header, term, self._number, slots, self._formation.trace, self._formation.side)
         self._formation.request(note)
         self._outbox.publish("formation", note)
         self._repeat_at = now + REPEAT_S

@@ -77,6 +77,8 @@ class PathFollower:
         self._place: Point | None = None
         """Place that replaces the next way-point, where something stands on it."""
         self._s = 0.0
+        self._reached_m = 0.0
+        """Arc length [m] that the former leader had reached."""
         self.passed: list[tuple[int, float]] = []
         """Way-points passed since the list was last emptied, with the least distance [m] to each."""
 
@@ -175,6 +177,12 @@ class PathFollower:
         """
         return max(0.0, self._s - self._marks[0]) if self._last > 0 and self._marks else self._s
 
+    @property
+    def reached_m(self) -> float:
+        """Distance [m] along the mission's route that the team has reached under any leader, as of `progress_m`."""
+        first_m = self._marks[0] if self._last > 0 and self._marks else 0.0
+        return max(self.progress_m, self._reached_m - first_m)
+
     def remaining_m(self, pose: Pose2D) -> float:
         """Return the distance [m] to the goal: along the route, or straight at the route's end."""
         straight = self._left_m(pose)
@@ -236,6 +244,7 @@ class PathFollower:
         """Join the route behind the former leader's place, but after the last way-point to be driven up to."""
         assert self._route is not None
         there_m = max(0.0, self._marks[self._next] - max(0.0, team.to_m))
+        self._reached_m = there_m
         low_m = max(self._left_stop_m, there_m - BEHIND_M)
         here_m = self._route.nearest(pose.x, pose.y, min(low_m, there_m), there_m)
         along_m = _apart(self._route.point(here_m), pose) + there_m - here_m

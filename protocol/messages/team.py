@@ -93,6 +93,8 @@ class FormationNote(Struct, frozen=True, array_like=True, tag="formation"):
     number: Count
     slots: tuple[Slot, ...]
     trace: bool = False
+    side: str = ""
+    """Side of the newest order, by the route or by hand, which the next leader keeps to; empty: none was given."""
 
 
 class ObstacleNote(Struct, frozen=True, array_like=True, tag="obstacles"):
