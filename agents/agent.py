@@ -14,6 +14,7 @@ from lfa.protocol.incarnations import after
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.messages.team import Ask, MissionNote
 from lfa.protocol.mission import Mission
+from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope, Received, Stop, Vitals
 from lfa.protocol.outbox import Outbox
 
@@ -33,7 +34,7 @@ class Agent:
         self.lease_observer: Observer | None = None
         """Told of every event of the lease; set before the mission is known."""
         self._id = robot_id
-        self._outbox = Outbox(fleet, robot_id, incarnation)
+        self._outbox = Outbox(fleet, robot_name(robot_id), incarnation)
         self._floor = floor
         self._given = mission
         self._core: RobotCore | None = None

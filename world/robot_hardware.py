@@ -7,13 +7,12 @@ from math import atan2
 from lfa.protocol.geometry import TAU, Pose2D, Twist, wrap
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_of
-from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
-from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope
-from lfa.protocol.topics import TO_ALL, WORLD_NAME, key
+from lfa.protocol.outbox import Outbox
+from lfa.protocol.topics import TO_ALL, WORLD_NAME
 from lfa.world.description.scenario import Scenario
 from lfa.world.sensors.lidar import ANGLE_MIN, Floats
 from lfa.world.sensors.noise import HeightNoise, Localizer, RangeNoise, WheelOdometry
@@ -37,9 +36,8 @@ class RobotHardware:
         self._range_noise = RangeNoise(noise, scenario.world.lidar, seed, robot_id)
         self._height_noise = HeightNoise(noise, seed, robot_id)
         self._lidar, self._ground = scenario.world.lidar, scenario.world.ground
-        self._fleet = fleet
-        self._incarnation = incarnation
-        self._seq: dict[str, int] = {}
+        self._outbox = Outbox(fleet, WORLD_NAME, incarnation, self.name, first=1)
+        self._gateway_outbox = Outbox(fleet, self.name, incarnation, first=1)
         self._hung: dict[str, Twist] = {}
         """Parts that hang, and the twist at which the wheels were when each began to."""
         self._told: dict[str, tuple[Term, float]] = {}
@@ -73,15 +71,14 @@ class RobotHardware:
 
     def fence(self, fence: Fence, now: float) -> Envelope:
         """Fence the gateway and return its FENCED, addressed to all (lease.md section 5)."""
-        header = self._header("lease", now, sender=self.name)
-        note = LeaseNote(header, self.gateway.fence(fence, now))
-        return Envelope(key(self._fleet, self.name, "lease", TO_ALL), note)
+        note = LeaseNote(self._gateway_outbox.header("lease", now), self.gateway.fence(fence, now))
+        return self._gateway_outbox.envelope("lease", note, TO_ALL)
 
     def sensors(self, stamp: float, now: float) -> Envelope:
         """Return the odometry as of `stamp`, with the gateway's stamp of `now`."""
         odometry, gateway = self.odometry, self.gateway
         message = Sensors(
-            self._header("sensors", stamp),
+            self._outbox.header("sensors", stamp),
             odometry.pose_odom,
             odometry.twist,
             odometry.odometer_m,
@@ -92,47 +89,40 @@ class RobotHardware:
             gateway.agent,
         )
         odometry.redraw()
-        return self._envelope("sensors", message)
+        return self._outbox.envelope("sensors", message)
 
     def localization(self, stamp: float, pose_map: Pose2D) -> Envelope | None:
         """Return a localisation fix of the true `pose_map`, or None if it drops out."""
         fix = self._localizer.fix(pose_map)
         if fix is None:
             return None
-        return self._envelope("localization", Localization(self._header("localization", stamp), fix))
+        return self._outbox.envelope("localization", Localization(self._outbox.header("localization", stamp), fix))
 
     def scan(self, stamp: float, ranges: Floats) -> Envelope:
         """Return the scan that this robot's scanner measures from the exact `ranges` [m], one per beam."""
         lidar = self._lidar
         message = LaserScan(
-            self._header("scan", stamp),
+            self._outbox.header("scan", stamp),
             ANGLE_MIN,
             TAU / lidar.beams,
             lidar.range_min_m,
             lidar.range_max_m,
             self._range_noise.apply(ranges),
         )
-        return self._envelope("scan", message)
+        return self._outbox.envelope("scan", message)
 
     def ground(self, stamp: float, offsets_m: tuple[float, ...], heights: Floats) -> Envelope:
         """Return the ground profile measured from the exact `heights` [m], one row per line at `offsets_m`."""
         message = GroundProfile(
-            self._header("ground", stamp),
+            self._outbox.header("ground", stamp),
             self._ground.first_m,
             self._ground.increment_m,
             offsets_m,
             self._height_noise.apply(heights),
         )
-        return self._envelope("ground", message)
+        return self._outbox.envelope("ground", message)
 
     def contact(self, stamp: float, pose_map: Pose2D, x: float, y: float) -> Envelope:
         """Return the message of a bumper contact at (x, y) in `map`, as a bearing in `base_link`."""
         bearing = wrap(atan2(y - pose_map.y, x - pose_map.x) - pose_map.theta)
-        return self._envelope("contact", Contact(self._header("contact", stamp), bearing))
-
-    def _envelope(self, topic: str, message: Message) -> Envelope:
-        return Envelope(key(self._fleet, self.name, topic), message)
-
-    def _header(self, topic: str, stamp: float, sender: str = WORLD_NAME) -> Header:
-        seq = self._seq[topic] = self._seq.get(topic, 0) + 1
-        return Header(sender, self._incarnation, seq, stamp)
+        return self._outbox.envelope("contact", Contact(self._outbox.header("contact", stamp), bearing))

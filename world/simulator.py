@@ -141,7 +141,7 @@ class Simulator:
         self._order += 1
         heapq.heappush(self._heap, (when, self._order, action, arguments))
 
-    def say(self, key: str, payload: bytes) -> None:
+    def publish(self, key: str, payload: bytes) -> None:
         """Publish a message from outside the simulation, such as an operator's, to subscribers of `key` and to taps."""
         message = decode(payload, TOPIC[key.split("/")[3]].type)
         for tap in self.taps:

@@ -15,12 +15,12 @@ from msgspec import Struct
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
-from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, TrueObstacle, TrueRobot, Truth
-from lfa.protocol.messages.team import Ask, Event, MissionNote, OperatorNote
+from lfa.protocol.messages.team import Ask, MissionNote, OperatorNote
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
@@ -111,7 +111,8 @@ class World:
         self._remembered = {} if memory is None else {robot.id: robot for robot in memory.robots}
         self._t0 = -inf if start_at is None else start_at - self._step * self._dt_s
         self._bodies.advance(self._step)
-        self._seq: dict[str, int] = {}
+        self._outbox = Outbox(fleet, WORLD_NAME, incarnation, first=1)
+        self._truths = Outbox(fleet, WORLD_NAME, incarnation, TRUTH_OWNER, first=1)
         self._led: tuple[int, Term] | None = None
         """Robot and term of the leader command obeyed last, over all gateways; shows a return to an older term (I2)."""
         self.interests = frozenset(
@@ -285,8 +286,8 @@ class World:
         if self._is_due(TOPIC["truth"].rate_hz):
             sent.append(self._truth(stamp))
         if self._is_due(TOPIC["clock"].rate_hz):
-            clock = Clock(self._header("clock", stamp), self._step * self._dt_s)
-            sent.append(Envelope(key(self._fleet, TRUTH_OWNER, "clock"), clock))
+            clock = Clock(self._truths.header("clock", stamp), self._step * self._dt_s)
+            sent.append(self._truths.envelope("clock", clock))
         return sent
 
     def _is_due(self, rate_hz: float | None) -> bool:
@@ -301,23 +302,18 @@ class World:
             for robot, pose, twist in zip(self._robots, self._bodies.poses, self._bodies.twists, strict=True)
         )
         obstacles = tuple(TrueObstacle(n, pose.x, pose.y) for n, pose in self._bodies.moved().items())
-        truth = Truth(self._header("truth", stamp), self._step * self._dt_s, robots, obstacles)
-        return Envelope(key(self._fleet, TRUTH_OWNER, "truth"), truth)
+        truth = Truth(self._truths.header("truth", stamp), self._step * self._dt_s, robots, obstacles)
+        return self._truths.envelope("truth", truth)
 
     def _mission(self, now: float) -> Envelope:
-        note = MissionNote(self._header("mission", now), self._scenario.mission)
-        return Envelope(key(self._fleet, WORLD_NAME, "mission"), note)
+        note = MissionNote(self._outbox.header("mission", now), self._scenario.mission)
+        return self._outbox.envelope("mission", note)
 
     def _event(self, kind: str, term: Term | None, data: dict[str, object], stamp: float) -> Envelope:
-        event = Event(self._header("event", stamp), kind, term, data)
-        return Envelope(key(self._fleet, WORLD_NAME, "event"), event)
+        return self._outbox.event_envelope(kind, stamp, term, data)
 
     def _time_of(self, now: float) -> float:
         return now - self._t0 if self._begun else self._step * self._dt_s
-
-    def _header(self, topic: str, stamp: float) -> Header:
-        seq = self._seq[topic] = self._seq.get(topic, 0) + 1
-        return Header(WORLD_NAME, self.incarnation, seq, stamp)
 
 
 def _gateway_name(robot_id: int) -> str:

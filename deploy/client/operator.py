@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from lfa.protocol.messages.header import Header
-from lfa.protocol.messages.team import Event, OperatorNote
-from lfa.protocol.topics import OPERATOR_NAME, key
+from lfa.protocol.messages.team import Ask, OperatorNote
+from lfa.protocol.node import Envelope
+from lfa.protocol.outbox import Outbox
+from lfa.protocol.topics import OPERATOR_NAME
 
 
 class Operator:
-    """Source of one operator's events and commands, with sequence numbers; `stamp` is its own clock [s]."""
+    """Source of one operator's events, commands and requests; `now` is its own clock [s]."""
 
     def __init__(self, fleet: str, incarnation: int) -> None:
-        self.key = key(fleet, OPERATOR_NAME, "event")
-        self.orders_key = key(fleet, OPERATOR_NAME, "operator")
-        self._incarnation = incarnation
-        self._seq = 0
+        self._outbox = Outbox(fleet, OPERATOR_NAME, incarnation, first=1)
+        self.event_key = self._outbox.key("event")
 
-    def says(self, kind: str, stamp: float, **data: Any) -> Event:
-        return Event(self._header(stamp), kind, None, data)
+    def event(self, kind: str, now: float, **data: Any) -> Envelope:
+        return self._outbox.event_envelope(kind, now, None, data)
 
-    def orders(self, command: str, stamp: float, **arguments: Any) -> OperatorNote:
-        return OperatorNote(self._header(stamp), command, arguments)
+    def command(self, command: str, now: float, **arguments: Any) -> Envelope:
+        return self._outbox.envelope("operator", OperatorNote(self._outbox.header("operator", now), command, arguments))
 
-    def _header(self, stamp: float) -> Header:
-        self._seq += 1
-        return Header(OPERATOR_NAME, self._incarnation, self._seq, stamp)
+    def ask(self, what: str, now: float) -> Envelope:
+        """Return a request to publish `what`, such as the mission."""
+        return self._outbox.envelope("ask", Ask(self._outbox.header("ask", now), what))

@@ -17,7 +17,7 @@ from lfa.protocol.node import Local, PeerDown, PeerUp
 from lfa.protocol.topics import OPERATOR_NAME, alive_key, fleet_name
 from lfa.protocol.transport.bus import Arrival, Inbox, Links, Wake
 from lfa.protocol.transport.credentials import credentials
-from lfa.protocol.transport.decoding import Decoder
+from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent, default_endpoint
 from lfa.world.description.load import Scenario, draw, load

@@ -14,8 +14,8 @@ from typing import Any
 
 from lfa.deploy.client.operator import Operator
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.team import OperatorNote
 from lfa.protocol.names import robot_name, whole_number
+from lfa.protocol.node import Envelope
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER, Link
 
@@ -66,10 +66,10 @@ def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, d
             return deed, {}
 
 
-def note(operator: Operator, now: float, deed: str, target: int | str, robots: tuple[int, ...]) -> OperatorNote:
+def note(operator: Operator, now: float, deed: str, target: int | str, robots: tuple[int, ...]) -> Envelope:
     """Return the operator's message for a fault, stamped `now` [s]. Raises Refused."""
     command, arguments = order(deed, target, robots)
-    return operator.orders(command, now, **arguments)
+    return operator.command(command, now, **arguments)
 
 
 def _part(deed: str, text: str, robots: tuple[int, ...]) -> dict[str, Any]:

@@ -17,10 +17,11 @@ from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
-from lfa.protocol.messages.header import Header
-from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, key
+from lfa.protocol.outbox import Outbox
+from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME
+from lfa.protocol.transport.message_bus import send
 
 TOPICS = frozenset({"*/host", "*/log", "*/pose", "*/tracking", "*/status", "*/event"})
 SAY_S = 0.4
@@ -88,8 +89,7 @@ class FleetView:
     def __init__(self, ear: Subscriber, seen: Seen) -> None:
         self._ear = ear
         self.seen = seen
-        self._life = incarnations.drawn()
-        self._seq = 0
+        self._outbox = Outbox(seen.name, OPERATOR_NAME, incarnations.drawn(), first=1)
         self._state = FleetState()
 
     @property
@@ -129,11 +129,10 @@ class FleetView:
 
     def order(self, deed: str, target: str = "", lines: int = 0) -> HostOrder:
         """Return a new order with its own sequence number; repeat it by `say` until it is obeyed."""
-        self._seq += 1
-        return HostOrder(Header(OPERATOR_NAME, self._life, self._seq, clock.now()), deed, target, lines)
+        return HostOrder(self._outbox.header("order", clock.now()), deed, target, lines)
 
     def say(self, order: HostOrder) -> None:
-        self._ear.bus.publish(key(self.seen.name, OPERATOR_NAME, "order"), encode(order))
+        send(self._ear.bus, self._outbox.envelope("order", order))
 
     def obeyed(self, order: HostOrder, host: str) -> bool:
         """Return True if the last status of `host` confirms the order."""

@@ -26,7 +26,7 @@ from lfa.protocol.lease.effects import BecomeLeader, Effect
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.mission import Leading, Mission
@@ -35,6 +35,7 @@ from lfa.protocol.node import Node, NodeObserver, PeerDown, PeerUp
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import LinkModel, Radio
+from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
 from lfa.world.description.scenario import Lidar, Scenario, WorldSpec
@@ -208,7 +209,7 @@ class AgentSimulation:
 
     def hand_over(self, robot_id: int) -> None:
         """Send an operator's request to all agents; the leader obeys."""
-        self.simulator.say(self._operator.orders_key, encode(self._operator.orders("handover", self.now)))
+        send(self.simulator, self._operator.command("handover", self.now))
 
     def pause(self, robot_id: int) -> None:
         """Pause the process (SIGSTOP)."""
@@ -222,7 +223,7 @@ class AgentSimulation:
         if life.paused and life.alive:
             life.paused = False
             if life.drawn is not None:
-                self.simulator.say(*life.drawn)
+                self.simulator.publish(*life.drawn)
             self.simulator.resume(robot_name(robot_id), shuffled=shuffled)
 
     def start_gateway(self, robot_id: int) -> None:

@@ -22,13 +22,13 @@ from lfa.deploy.process import identity as processes
 from lfa.deploy.process.identity import Identity
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of, whole_number
 from lfa.protocol.topics import OPERATOR_NAME, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.credentials import credentials
-from lfa.protocol.transport.decoding import Decoder
+from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent
 
@@ -58,7 +58,7 @@ def command(
     try:
         whom, identity = _whom(target, team, bus, inbox)
         operator = Operator(team[0].fleet, incarnations.drawn())
-        bus.publish(operator.key, encode(operator.says("fault", clock.now(), deed=deed, robot=whom)))
+        send(bus, operator.event("fault", clock.now(), deed=deed, robot=whom))
         clock.sleep(SENT_S)
         done = processes.send(identity, SIGNALS[deed])
     finally:
@@ -82,9 +82,8 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
         operator = Operator(fleet, incarnations.drawn())
         said = note(operator, clock.now(), deed, whom, robots)
         robot = whole_number(whom)
-        event = operator.says("fault", clock.now(), deed=deed, robot=whom if robot is None else robot)
-        bus.publish(operator.key, encode(event))
-        bus.publish(operator.orders_key, encode(said))
+        event = operator.event("fault", clock.now(), deed=deed, robot=whom if robot is None else robot)
+        send(bus, event, said)
         clock.sleep(SENT_S)
     finally:
         bus.close()
@@ -101,12 +100,12 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
     try:
         if robot is None:
             raise Refused(f"restart {target!r}: must be a robot's id, such as 3")
-        bus.follow(frozenset({operator.key}))
+        bus.follow(frozenset({operator.event_key}))
         until, again = clock.now() + RESTART_S_MAX, 0.0
         while not any(_is_done(message, robot) for _, message in Decoder().messages(inbox.take())):
             now = clock.now()
             if now >= again:  # the launcher may not have noticed yet that the robot's last process is gone
-                bus.publish(operator.orders_key, encode(operator.orders(RESTART, now, robot=robot)))
+                send(bus, operator.command(RESTART, now, robot=robot))
                 again = now + ORDER_EVERY_S
             if now > until:
                 raise Refused(f"robot {robot} of {fleet}: runs already, or no lfa run is there that starts it again")

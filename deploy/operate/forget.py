@@ -12,12 +12,10 @@ from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.consensus import Role
-from lfa.protocol.messages.header import Header
-from lfa.protocol.messages.team import Ask, Event, MissionNote, PoseStamped, Status
+from lfa.protocol.messages.team import Event, MissionNote, PoseStamped, Status
 from lfa.protocol.names import robot_id_of, robot_name
-from lfa.protocol.topics import OPERATOR_NAME, key
+from lfa.protocol.transport.message_bus import send
 
 LISTEN_S = 1.2
 """Time [s] to listen, long enough to receive a leader's pose and each robot's status."""
@@ -37,8 +35,7 @@ def command(
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
     with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status", "*/mission"})) as ear:
-        ask = Ask(Header(OPERATOR_NAME, incarnations.drawn(), 1, clock.now()), "mission")
-        ear.bus.publish(key(ear.fleet.name, OPERATOR_NAME, "ask"), encode(ask))
+        send(ear.bus, Operator(ear.fleet.name, incarnations.drawn()).ask("mission", clock.now()))
         leader, _, team = _listen(ear, LISTEN_S)
         for robot in robots:
             if team and robot not in team:
@@ -66,7 +63,7 @@ def _say(ear: Subscriber, robots: list[int]) -> None:
     number = incarnations.drawn()
     operator = Operator(ear.fleet.name, number)
     lives = [[robot, number] for robot in robots]
-    ear.bus.publish(operator.orders_key, encode(operator.orders("forget", clock.now(), lives=lives)))
+    send(ear.bus, operator.command("forget", clock.now(), lives=lives))
 
 
 def _listen(ear: Subscriber, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:

@@ -12,9 +12,9 @@ from lfa.agents.formation.formation import named
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.protocol import clock, incarnations
-from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.team import Event
 from lfa.protocol.mission import FormationSpec
+from lfa.protocol.transport.message_bus import send
 
 ANSWER_S_MAX = 2.0
 JOINED_S = 0.2  # time [s] until a newly declared subscription receives messages
@@ -56,4 +56,4 @@ def ask(ear: Subscriber, side: str) -> Event | None:
 
 def say(ear: Subscriber, side: str) -> None:
     operator = Operator(ear.fleet.name, incarnations.drawn())
-    ear.bus.publish(operator.orders_key, encode(operator.orders("formation", clock.now(), side=side)))
+    send(ear.bus, operator.command("formation", clock.now(), side=side))

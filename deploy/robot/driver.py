@@ -19,12 +19,12 @@ from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
-from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, Sensors
-from lfa.protocol.messages.team import Ask, Event, MissionNote
+from lfa.protocol.messages.team import Ask, MissionNote
 from lfa.protocol.mission import Limits
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import DRIVER_PREFIX, TO_ALL, TOPIC, alive_key, key
 
 PERIOD_S = 1.0 / (TOPIC["sensors"].rate_hz or 50.0)
@@ -62,16 +62,16 @@ class Driver:
                 alive_key(fleet, robot_name(robot_id), "*"),
             }
         )
-        self._fleet = fleet
         self._robot_id = robot_id
-        self._robot = robot_name(robot_id)
         self._make_base = make_base
         self._alive = alive
         self._base: Base | None = None
         self._gateway: Gateway | None = None
         self._cut_off = False
         self._next = -inf
-        self._seq: dict[str, int] = {}
+        self._outbox = Outbox(fleet, self.name, incarnation, first=1)
+        self._hardware = Outbox(fleet, self.name, incarnation, robot_name(robot_id), first=1)
+        self._gateway_outbox = Outbox(fleet, robot_name(robot_id), incarnation, first=1)
         self._led: Term | None = None
         self._told: dict[str, float] = {}
 
@@ -94,9 +94,8 @@ class Driver:
             case CmdVel() as cmd if gateway is not None:
                 return self._command(cmd, gateway, now)
             case LeaseNote(body=Fence() as fence) if gateway is not None:
-                header = Header(self._robot, self.incarnation, self._number("lease"), now)
-                note = LeaseNote(header, gateway.fence(fence, now))
-                return [Envelope(key(self._fleet, self._robot, "lease", TO_ALL), note)]
+                note = LeaseNote(self._gateway_outbox.header("lease", now), gateway.fence(fence, now))
+                return [self._gateway_outbox.envelope("lease", note, TO_ALL)]
             case PeerUp(incarnation=incarnation) if gateway is not None:
                 self._cut_off = False
                 gateway.agent_up(incarnation, now)
@@ -118,7 +117,7 @@ class Driver:
             return []
         if self._gateway is None or self._base is None:
             self._next = now + ASK_S
-            return [Envelope(key(self._fleet, self.name, "ask"), Ask(self._header("ask", now), "mission"))]
+            return [self._outbox.envelope("ask", Ask(self._outbox.header("ask", now), "mission"))]
         self._next = max(self._next + PERIOD_S, now)
         try:
             self._base.drive(self._gateway.twist(now), now)
@@ -138,7 +137,7 @@ class Driver:
     def _said(self, reading: Reading, gateway: Gateway, now: float) -> list[Envelope]:
         sent: list[Message] = [
             Sensors(
-                self._header("sensors", now),
+                self._hardware.header("sensors", now),
                 reading.pose_odom,
                 reading.twist,
                 reading.odometer_m,
@@ -151,16 +150,16 @@ class Driver:
         ]
         topics = ["sensors"]
         if reading.pose_map is not None:
-            sent.append(Localization(self._header("localization", now), reading.pose_map))
+            sent.append(Localization(self._hardware.header("localization", now), reading.pose_map))
             topics.append("localization")
         if (scan := reading.scan) is not None:
             turn = (scan.angle_min, scan.angle_increment, scan.range_min_m, scan.range_max_m, scan.ranges_m)
-            sent.append(LaserScan(self._header("scan", now), *turn))
+            sent.append(LaserScan(self._hardware.header("scan", now), *turn))
             topics.append("scan")
         if reading.contact is not None:
-            sent.append(Contact(self._header("contact", now), reading.contact))
+            sent.append(Contact(self._hardware.header("contact", now), reading.contact))
             topics.append("contact")
-        return [Envelope(key(self._fleet, self._robot, topic), m) for topic, m in zip(topics, sent, strict=True)]
+        return [self._hardware.envelope(topic, message) for topic, message in zip(topics, sent, strict=True)]
 
     def _command(self, cmd: CmdVel, gateway: Gateway, now: float) -> list[Envelope]:
         """Pass `cmd` to the gateway; return an event for each new term led and, rate-limited, for refusals."""
@@ -176,12 +175,4 @@ class Driver:
         return [self._event("refused", cmd.term, {"reason": reason, "count": gateway.refused[reason]}, now)]
 
     def _event(self, kind: str, term: Term, data: dict[str, Any], now: float) -> Envelope:
-        event = Event(self._header("event", now), kind, term, {"robot": self._robot_id, **data})
-        return Envelope(key(self._fleet, self.name, "event"), event)
-
-    def _header(self, topic: str, now: float) -> Header:
-        return Header(self.name, self.incarnation, self._number(topic), now)
-
-    def _number(self, topic: str) -> int:
-        seq = self._seq[topic] = self._seq.get(topic, 0) + 1
-        return seq
+        return self._outbox.event_envelope(kind, now, term, {"robot": self._robot_id, **data})

@@ -11,20 +11,19 @@ import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from random import Random
 
 import msgspec
 
 from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import ORDERS, RESTART, SIGNALS, Fault, FaultAction, FaultSchedule, parse_all
+from lfa.deploy.faults.script import Fault, parse_all
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.deploy.run.fault_execution import FaultExecution
 from lfa.deploy.run.finish import Ended, finish, report, reread, verdict_of
 from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
@@ -32,16 +31,16 @@ from lfa.deploy.run.process_table import rows
 from lfa.deploy.run.progress import Progress, progress
 from lfa.deploy.run.progress_rows import ProgressRows
 from lfa.deploy.run.recorder_process import RecorderTask, RunResult
+from lfa.deploy.run.restarted_processes import RestartedProcesses
 from lfa.deploy.run.termination import Referee
 from lfa.protocol import clock, incarnations
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.messages.team import Event, OperatorNote
-from lfa.protocol.names import robot_id_of, robot_name
-from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, WORLD_NAME, key
+from lfa.protocol.names import robot_name
+from lfa.protocol.node import Envelope
+from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, key
 from lfa.protocol.transport.bus import Inbox
-from lfa.protocol.transport.decoding import Decoder
-from lfa.protocol.transport.link_model import CLEAR, WEATHER, LinkModel
+from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
 from lfa.world.description.load import Scenario, draw
@@ -51,8 +50,6 @@ SHOW_EVERY_S = 0.2
 START_S_MAX = 20.0
 SILENCE_S_MAX = 5.0
 SOCKET_FOLDER_MAX = 60
-REVIVE_S_MIN = 1.0  # minimum time between two starts of a failing process
-NEWS_S = 2.0  # how long the link conditions are repeated after a restart
 RECORDER_S_MAX = 30.0  # to read the recording and write the summary
 
 
@@ -113,17 +110,10 @@ class _Launch:
         self._endpoint = f"unixsock-stream/{sockets / 'router.sock'}"
         task = msgspec.json.encode(RecorderTask(str(folder), about, self._endpoint, str(sockets))).decode()
         self._rows = rows(folder, about, self._endpoint, drawn.mission, task)
-        self._processes = ProcessGroup(folder)
-        self._restart = drawn.restart
-        self._revive_at: dict[str, float] = {}
-        self._restarted: list[str] = []
-        """Restarted processes whose `restarted` event is not yet published."""
-        self._schedule = FaultSchedule(faults)
-        self._undone: list[str] = []
-        self._doomed: set[str] = set()
+        self._group = ProcessGroup(folder)
         self._referee = Referee(drawn)
         self._state = FleetState()
-        self._rows_shown = ProgressRows(drawn.mission.robots, self._state)
+        self._progress = ProgressRows(drawn.mission.robots, self._state)
         self._time = WorldTime()
         self._heard_at = clock.now()
         self._began_at: float | None = None
@@ -131,9 +121,8 @@ class _Launch:
         self._inbox = Inbox()
         self._decoder = Decoder()
         self._bus: ZenohBus | None = None
-        self._air = LinkModel(CLEAR, Random(0))
-        """Link conditions as last ordered, by the script or by hand; they are repeated to a process that restarts."""
-        self._repeat_weather_until = 0.0
+        self._processes = RestartedProcesses(self._group, self._rows, drawn.restart, self._publish_event)
+        self._faults = FaultExecution(drawn.mission, faults, self._processes, self._time, self._operator, self._publish)
         self.summed_up = False
         """True once the recorder has written `summary.json`."""
 
@@ -145,7 +134,7 @@ class _Launch:
         try:
             verdict = self._watch(interrupts, view)
             now = clock.now()
-            left = (*self._undone, *(str(fault) for fault in self._schedule.pending))
+            left = self._faults.left
             word = RunResult(verdict, now - (self._began_at or now), left)
             self._end(word)
             return word
@@ -153,7 +142,7 @@ class _Launch:
             view.close()
             if self._bus is not None:
                 self._bus.close()
-            self._processes.kill_all()
+            self._group.kill_all()
 
     def _watch(self, interrupts: Interrupts, view: Progress) -> Verdict:
         try:
@@ -162,10 +151,10 @@ class _Launch:
             while verdict_of(interrupts) is None and self._referee.verdict is None:
                 self._listen()
                 self._check(view)
-                self._do_faults(view)
+                self._faults.do_due(self._referee.leader, lambda text: view.note(self._progress, text))
                 if clock.now() >= show_at:
                     show_at += SHOW_EVERY_S
-                    view.show(self._rows_shown, self._referee.leader)
+                    view.show(self._progress, self._referee.leader)
                 clock.sleep(STEP_S)
         except _Aborted as aborted:
             return verdict_of(interrupts) or Verdict("aborted", str(aborted))
@@ -174,17 +163,17 @@ class _Launch:
     def _start(self, interrupts: Interrupts) -> None:
         """Start the router, then the recorder, so that it misses no message; then world and agents in any order."""
         router, recorder, *others = self._rows
-        self._processes.start(router)
+        self._group.start(router)
         self._await(router.name, lambda: answers(self._endpoint), interrupts)
-        self._processes.start(recorder)
+        self._group.start(recorder)
         self._bus = bus = ZenohBus(self._endpoint, self._inbox)
         topics = ("event", "tracking", "table", "status", "truth", "operator")
         bus.follow(frozenset(key(self._about.fleet, "*", topic) for topic in topics))
         fleet = self._about.fleet
         self._await(recorder.name, lambda: bool(bus.living(fleet, RECORDER_NAME)), interrupts)
-        self._say("start", scenario=self._about.scenario, seed=self._about.seed)
+        self._publish_event("start", scenario=self._about.scenario, seed=self._about.seed)
         for row in others:
-            self._processes.start(row)
+            self._group.start(row)
         self._heard_at = clock.now()
 
     def _await(self, name: str, ready: Callable[[], bool], interrupts: Interrupts) -> None:
@@ -208,25 +197,10 @@ class _Launch:
             self._heard_at = at
             self._began_at = at if self._began_at is None else self._began_at
             self._time.see(at, message.time_s)
-            while self._restarted:  # only now: messages published while the router is down are lost
-                name = self._restarted.pop(0)
-                self._say("restarted", name=name, robot=robot_id_of(name), t=message.time_s)
-        elif isinstance(message, Event) and message.header.sender == OPERATOR_NAME:
-            self._expect(message)
-        elif isinstance(message, OperatorNote) and message.command == WEATHER:
-            self._air.obey(message.arguments)
-        elif isinstance(message, OperatorNote) and message.command == RESTART:
-            robot = message.arguments.get("robot")
-            if robot in self._mission.robots and self._time.known:
-                self._do(RESTART, robot)
+            self._processes.report_restarts(message.time_s)
+        self._faults.hear(message)
         self._referee.see(message)
         self._state.update(at, message)
-
-    def _expect(self, event: Event) -> None:
-        """Register a fault by hand (`lfa fault`), so that the end of its process is not reported as a failure."""
-        robot, deed = event.data.get("robot"), event.data.get("deed")
-        if event.kind == "fault" and deed in ("kill", "terminate") and robot in self._mission.robots:
-            self._doomed.add(robot_name(robot))
 
     # --- supervision -----------------------------------------------------------------------------------------------
 
@@ -239,78 +213,41 @@ class _Launch:
             name = robot_name(robot_id)
             if self._revives(name, view):
                 continue
-            if robot_id not in self._rows_shown.gone and not self._processes.runs(name):
-                self._rows_shown.gone.add(robot_id)
-                how = self._processes.exit_of(name)
-                view.note(self._rows_shown, str(how))
-                if name not in self._doomed:
-                    self._say("died", robot=robot_id, how=how)
-        if len(self._rows_shown.gone) == len(self._mission.robots) and not self._schedule.pending:
+            if self._group.runs(name):
+                self._progress.gone.discard(robot_id)
+            elif robot_id not in self._progress.gone:
+                self._progress.gone.add(robot_id)
+                how = self._group.exit_of(name)
+                view.note(self._progress, str(how))
+                if name not in self._faults.doomed:
+                    self._publish_event("died", robot=robot_id, how=how)
+        if len(self._progress.gone) == len(self._mission.robots) and not self._faults.pending:
             raise _Aborted("no agent is left")
-        starts = not self._time.known or bool(self._restarted)
+        starts = not self._time.known or self._processes.restarting
         if clock.now() > self._heard_at + (START_S_MAX if starts else SILENCE_S_MAX):
             raise _Aborted("nothing is heard of the world")
 
     def _revives(self, name: str, view: Progress) -> bool:
-        """Restart a failed process if the scenario's restart policy says so; return False if it does not apply."""
-        policy = self._restart.get(name, self._restart.get("robots") if name.startswith("robot") else None)
-        if policy != "on-failure" or not self._processes.failed(name):
+        """Return True while a failed process is restarted by the scenario's policy."""
+        how = self._group.exit_of(name)
+        if not self._processes.revives(name, clock.now()):
             return False
-        if clock.now() >= self._revive_at.get(name, 0.0):
-            self._revive_at[name] = clock.now() + REVIVE_S_MIN
-            view.note(self._rows_shown, f"{self._processes.exit_of(name)}: started again")
-            self._start_again(name)
-            self._restarted.append(name)
+        if self._group.runs(name):
+            view.note(self._progress, f"{how}: started again")
+            self._faults.repeat_links()
         return True
 
-    def _start_again(self, name: str) -> None:
-        self._processes.start(next(row for row in self._rows if row.name == name).restarted())
-        self._repeat_weather_until = clock.now() + NEWS_S
-
     def _needs(self, name: str) -> None:
-        how = self._processes.exit_of(name)
+        how = self._group.exit_of(name)
         if how is not None:
             raise _Aborted(how)
 
-    def _do_faults(self, view: Progress) -> None:
-        if not self._time.known:
-            return
-        for deed, victim in self._schedule.due(self._time.of(clock.now()), self._referee.leader):
-            if self._do(deed, victim):
-                view.note(self._rows_shown, f"fault: {deed} {f'robot {victim}' if isinstance(victim, int) else victim}")
-            else:
-                self._undone.append(f"{deed} {victim}")
-        if self._repeat_weather_until > clock.now() and (self._air.cuts or self._air.radio != CLEAR):
-            again = self._operator.orders(WEATHER, clock.now(), **self._air.orders)
-            self._publish(self._operator.orders_key, again)
+    def _publish_event(self, kind: str, **data: object) -> None:
+        self._publish(self._operator.event(kind, clock.now(), **data))
 
-    def _do(self, deed: FaultAction, victim: int | str) -> bool:
-        """Execute a fault action; return False if its process is not running, or for a restart already running."""
-        if deed in ORDERS:
-            self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
-            self._publish(
-                self._operator.orders_key, note(self._operator, clock.now(), deed, victim, self._mission.robots)
-            )
-            return True
-        name = robot_name(victim) if isinstance(victim, int) else victim
-        if self._processes.runs(name) == (deed == RESTART):
-            return False
-        self._say("fault", deed=deed, robot=victim, t=self._time.of(clock.now()))
-        if deed == RESTART:
-            self._doomed.discard(name)
-            self._rows_shown.gone.discard(robot_id_of(name) or 0)
-            self._start_again(name)
-            return True
-        if deed in ("kill", "terminate"):
-            self._doomed.add(name)
-        return self._processes.signal(name, SIGNALS[deed])
-
-    def _say(self, kind: str, **data: object) -> None:
-        self._publish(self._operator.key, self._operator.says(kind, clock.now(), **data))
-
-    def _publish(self, to: str, message: Message) -> None:
+    def _publish(self, envelope: Envelope) -> None:
         if self._bus is not None:
-            self._bus.publish(to, encode(message))
+            send(self._bus, envelope)
 
     # --- the end ---------------------------------------------------------------------------------------------------
 
@@ -318,10 +255,10 @@ class _Launch:
         """End agents and world, then the recorder, which writes the summary, then the router, each with a timeout."""
         team = [row.name for row in self._rows if row.name not in (ROUTER_NAME, RECORDER_NAME)]
         # Stamped when published: on a busy machine some agents have ended before the recorder receives it.
-        self._say("over", t=self._time.of(clock.now()))
-        self._processes.terminate(team)
-        if self._processes.runs(RECORDER_NAME):
-            self._processes.write_line(RECORDER_NAME, msgspec.json.encode(word))
-            self._processes.wait([RECORDER_NAME], RECORDER_S_MAX)
-            self.summed_up = self._processes.succeeded(RECORDER_NAME)
-        self._processes.terminate([RECORDER_NAME, ROUTER_NAME])
+        self._publish_event("over", t=self._time.of(clock.now()))
+        self._group.terminate(team)
+        if self._group.runs(RECORDER_NAME):
+            self._group.write_line(RECORDER_NAME, msgspec.json.encode(word))
+            self._group.wait([RECORDER_NAME], RECORDER_S_MAX)
+            self.summed_up = self._group.succeeded(RECORDER_NAME)
+        self._group.terminate([RECORDER_NAME, ROUTER_NAME])

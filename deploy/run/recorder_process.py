@@ -23,16 +23,15 @@ from lfa.deploy.recording.run_folder import About
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.finish import finish
 from lfa.protocol import clock, incarnations
-from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_id_of
-from lfa.protocol.node import PeerDown, PeerUp
+from lfa.protocol.node import Envelope, PeerDown, PeerUp
+from lfa.protocol.outbox import Outbox
 from lfa.protocol.output import write_line
-from lfa.protocol.topics import RECORDER_NAME, alive_key, key
+from lfa.protocol.topics import RECORDER_NAME, alive_key
 from lfa.protocol.transport.bus import Arrival, Inbox, Wake
-from lfa.protocol.transport.decoding import Decoder
+from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 INBOX_SIZE_MAX = 65536  # one minute of a fleet of four, in case the disk is slow
@@ -100,8 +99,7 @@ class _Tape:
         fleet = task.about.fleet
         self._inbox = Inbox(size_max=INBOX_SIZE_MAX, every=True)
         self._incarnation = incarnations.drawn()
-        self._key = key(fleet, RECORDER_NAME, "event")
-        self._seq = 0
+        self._outbox = Outbox(fleet, RECORDER_NAME, self._incarnation, first=1)
         self._decoder = Decoder()
         self._missing = 0
         self._last_seq: dict[tuple[str, str, int], int] = {}
@@ -118,7 +116,7 @@ class _Tape:
             heard = self._heard(arrival)
             if heard is None:
                 continue
-            where, message = heard
+            where, message = heard.key, heard.message
             if isinstance(message, Truth):
                 self._time.see(arrival.at, message.time_s)
             self._recorder.record(self._time.of(arrival.at), where, message)
@@ -138,8 +136,8 @@ class _Tape:
     def close(self, verdict: Verdict) -> Recording:
         """Record the end of the run, close recorder and bus, and return the counts."""
         now = clock.now()
-        end = self._operator.says("end", now, outcome=verdict.outcome, reason=verdict.reason)
-        self._recorder.record(self._time.of(now), self._operator.key, end)
+        end = self._operator.event("end", now, outcome=verdict.outcome, reason=verdict.reason)
+        self._recorder.record(self._time.of(now), end.key, end.message)
         recording = self._recorder.close()
         self._bus.close()
         recording.missing, recording.dropped = self._missing, self._inbox.dropped
@@ -150,20 +148,19 @@ class _Tape:
             write_line(line, sys.stderr)
         return recording
 
-    def _heard(self, arrival: Arrival) -> tuple[str, Message] | None:
+    def _heard(self, arrival: Arrival) -> Envelope | None:
         """Return key and message to record; a liveliness change becomes an event published by the recorder."""
         match arrival.payload:
             case PeerUp(name=name, incarnation=life):
-                return self._key, self._says("peer_up", name, life)
+                return self._token("peer_up", name, life)
             case PeerDown(name=name, incarnation=life):
-                return self._key, self._says("peer_down", name, life)
+                return self._token("peer_down", name, life)
         message = self._decoder.message(arrival)
-        return None if message is None else (arrival.key, message)
+        return None if message is None else Envelope(arrival.key, message)
 
-    def _says(self, kind: str, name: str, life: int) -> Event:
-        self._seq += 1
-        header = Header(RECORDER_NAME, self._incarnation, self._seq, clock.now())
-        return Event(header, kind, None, {"robot": robot_id_of(name), "name": name, "incarnation": life})
+    def _token(self, kind: str, name: str, incarnation: int) -> Envelope:
+        data = {"robot": robot_id_of(name), "name": name, "incarnation": incarnation}
+        return self._outbox.event_envelope(kind, clock.now(), None, data)
 
 
 if __name__ == "__main__":

@@ -20,12 +20,14 @@ from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
 from lfa.deploy.run.termination import Referee
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.team import OperatorNote
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Node
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.description.load import Scenario, draw
 from lfa.world.simulator import Simulator
@@ -161,11 +163,11 @@ class _Run:
         now = self._simulator.now
         self._say("fault", deed=deed, robot=target, t=now)
         said = note(self._operator, now, deed, target, self._scenario.mission.robots)
-        if said.command == WEATHER:
-            self._simulator.air.obey(said.arguments)
-            self._recorder.record(now, self._operator.orders_key, said)
+        if isinstance(said.message, OperatorNote) and said.message.command == WEATHER:
+            self._simulator.air.obey(said.message.arguments)
+            self._recorder.record(now, said.key, said.message)
         else:
-            self._simulator.say(self._operator.orders_key, encode(said))
+            send(self._simulator, said)
 
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
         self._recorder.record(now, key, message)
@@ -173,7 +175,8 @@ class _Run:
 
     def _say(self, kind: str, **data: object) -> None:
         now = self._simulator.now
-        self._recorder.record(now, self._operator.key, self._operator.says(kind, now, **data))
+        event = self._operator.event(kind, now, **data)
+        self._recorder.record(now, event.key, event.message)
 
     def _add(self, node: Node) -> None:
         self._simulator.add(node, self._journal(node))

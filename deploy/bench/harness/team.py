@@ -23,14 +23,13 @@ from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessS
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.run.process_table import rows
 from lfa.protocol import clock, incarnations
-from lfa.protocol.messages.codec import encode
 from lfa.protocol.mission import FormationSpec, Leading, Mission, Profile
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.credentials import Credentials
-from lfa.protocol.transport.decoding import Decoder
 from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
 from lfa.world.description.load import Scenario
@@ -166,7 +165,7 @@ class Team:
         """Publish an operator command to all; return the time [s] just before."""
         assert self._bus is not None
         at = clock.now()
-        self._bus.publish(self._operator.orders_key, encode(self._operator.orders(command, at, **arguments)))
+        send(self._bus, self._operator.command(command, at, **arguments))
         return at
 
     def cut_off(self, *robots: int) -> float:

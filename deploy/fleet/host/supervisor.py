@@ -21,22 +21,22 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.fleet.host.log_tail import Tail
-from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE, ROUTER, RestartBackoff
 from lfa.deploy.fleet.plan import host_plan as parts
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
+from lfa.deploy.process.restart_policy import REFUSED_CODE, ROUTER, RestartBackoff
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
-from lfa.protocol.messages.header import Header
+from lfa.protocol.outbox import Outbox
 from lfa.protocol.output import replace_file, write_line
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
 from lfa.protocol.transport.bus import Inbox, Links
-from lfa.protocol.transport.decoding import Decoder
+from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
 from lfa.world.description.scenario import STATE
@@ -124,8 +124,7 @@ class Supervisor:
             row.name: _ManagedProcess(row, RestartBackoff(ROUTER if row.name == ROUTER_NAME else part.restart))
             for row in parts.rows(part)
         }
-        self._life = incarnations.drawn()
-        self._seqs: dict[str, int] = {}
+        self._outbox = Outbox(part.fleet, self._me, incarnations.drawn(), first=1)
         self._obeyed = (0, 0)
         self._orders: OrderedDict[int, int] = OrderedDict()
         """Last sequence number of each operator, by incarnation."""
@@ -178,7 +177,7 @@ class Supervisor:
         for name, tail in list(self._tails.items()):
             lines = tail.take(now)
             if lines:
-                self._say("log", LogLines(self._header("log", now), name, lines))
+                self._publish("log", LogLines(self._outbox.header("log", now), name, lines))
             if tail.over(now):
                 del self._tails[name]
 
@@ -274,7 +273,7 @@ class Supervisor:
             return
         orders = key(self._part.fleet, OPERATOR_NAME, "order")
         bus.follow(frozenset({orders, alive_key(self._part.fleet, "*", "*")}))
-        bus.announce(self._part.fleet, self._me, self._life)
+        bus.announce(self._part.fleet, self._me, self._outbox.incarnation)
         self._bus = bus
 
     def _hear(self, now: float) -> bool:
@@ -330,16 +329,12 @@ class Supervisor:
         self._write_ledger()
         reports = tuple(ward.report(self._processes.pid(name), now) for name, ward in self._managed.items())
         part = self._part
-        header = self._header("host", now)
-        self._say("host", HostStatus(header, part.host, part.version, part.run, self._obeyed, reports))
+        header = self._outbox.header("host", now)
+        self._publish("host", HostStatus(header, part.host, part.version, part.run, self._obeyed, reports))
 
-    def _say(self, topic: str, message: Message) -> None:
+    def _publish(self, topic: str, message: Message) -> None:
         if self._bus is not None:
-            self._bus.publish(key(self._part.fleet, self._me, topic), encode(message))
-
-    def _header(self, topic: str, now: float) -> Header:
-        self._seqs[topic] = self._seqs.get(topic, 0) + 1
-        return Header(self._me, self._life, self._seqs[topic], now)
+            send(self._bus, self._outbox.envelope(topic, message))
 
 
 def main() -> None:

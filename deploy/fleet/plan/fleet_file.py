@@ -11,6 +11,7 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
+from lfa.deploy.process.restart_policy import Restart
 from lfa.deploy.scenario_loading import load_scenario
 from lfa.protocol.config_file.conversion import convert
 from lfa.protocol.config_file.mistake import Mistake, Range, Rule, apply_rules, out_of_range, wrong
@@ -24,8 +25,6 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,30}")
 LOCAL = ("localhost", "127.0.0.1", "::1")
 ROUTER_PORT = 7447
 PORT_MAX = 65535
-
-Policy = Literal["never", "on-failure", "always"]
 
 
 class Machine(Struct, frozen=True, forbid_unknown_fields=True):
@@ -71,18 +70,6 @@ class LinkPlan(Struct, frozen=True, forbid_unknown_fields=True):
     """Pairs of machines whose routers are linked. Default: all pairs."""
     failover: bool = True
     """True: a process whose router is lost connects to the next machine's router."""
-
-
-class Restart(Struct, frozen=True, forbid_unknown_fields=True):
-    """Restart policy for processes that end, except routers, which are always restarted."""
-
-    policy: Policy = "on-failure"
-    delay_s: float = 0.5
-    """Delay [s] before the first restart; doubled for each further restart within the window."""
-    delay_max_s: float = 10.0
-    window_s: float = 60.0
-    starts_max: int = 5
-    """Maximum number of restarts within the window; at the next end the process is not restarted."""
 
 
 class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine, Restart
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
+from lfa.deploy.process.restart_policy import Restart
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, toml
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused

@@ -9,11 +9,11 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 import msgspec
 
 from lfa.deploy.fleet.host.host import Found
-from lfa.deploy.fleet.host.restart_policy import REFUSED_CODE
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, reach
 from lfa.deploy.fleet.remote.wheel import install
+from lfa.deploy.process.restart_policy import REFUSED_CODE
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, decode_json

@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import FleetAddress, find, listen, scenario_of_fleet
 from lfa.deploy.recording.recorder import parts
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import encode
-from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.messages.team import Ask
-from lfa.protocol.topics import OPERATOR_NAME, address, key
+from lfa.protocol.topics import address
+from lfa.protocol.transport.message_bus import send
 
 if TYPE_CHECKING:
     import rerun
@@ -137,8 +136,7 @@ def _draw(fleet: FleetAddress, stream: rerun.RecordingStream, scenario: Scenario
         scene.ground(scenario.world)
         scene.mission(scenario.mission)
     with listen(fleet, frozenset(f"*/{topic}" for topic in TOPICS), every=True) as ear:
-        ask = Ask(Header(OPERATOR_NAME, incarnations.drawn(), 1, clock.now()), "mission")
-        ear.bus.publish(key(fleet.name, OPERATOR_NAME, "ask"), encode(ask))
+        send(ear.bus, Operator(fleet.name, incarnations.drawn()).ask("mission", clock.now()))
         while until is None or clock.now() < until:
             clock.sleep(FLUSH_S)
             for arrival, message in ear.take():

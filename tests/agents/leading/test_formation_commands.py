@@ -25,7 +25,7 @@ def asked(known: tuple[tuple[float, float, float], ...], until_s: float) -> list
     orientations = (Orientation(0.4, "right"),)
     leading = Leading(route_m=((20.0, 0.0),), known_m=known, orientations=orientations)
     mission = Mission(robots=(1, *FOLLOWERS), leading=leading, formation=FormationSpec(1.2, pi / 3.0, "left"))
-    outbox, lead = Outbox("fleet", 1, 1), PathFollower(leading, Limits())
+    outbox, lead = Outbox("fleet", "robot1", 1), PathFollower(leading, Limits())
     orders = FormationCommands(outbox, mission, Formation.of(mission))
     orders.begin(0.0)
     lead.begin(Pose2D())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lfa.deploy.fleet.host.restart_policy import ROUTER, RestartBackoff
-from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
+from lfa.deploy.process.restart_policy import ROUTER, Policy, Restart, RestartBackoff
 
 
 @pytest.mark.parametrize(

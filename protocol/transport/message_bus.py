@@ -1,12 +1,26 @@
-"""Decoding of what arrives on a bus, for every reader that is no `Node`: bytes from the network never end it."""
+"""Messages on a bus, for programs that are no `Node`: sending, and decoding of what arrives."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Protocol
 
-from lfa.protocol.messages.codec import BadMessage, Message, decode
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.node import Envelope
 from lfa.protocol.topics import TOPIC, address
 from lfa.protocol.transport.bus import Arrival
+
+
+class Publisher(Protocol):
+    """Sending side of a bus, or of a simulation in its place."""
+
+    def publish(self, key: str, payload: bytes) -> None: ...
+
+
+def send(bus: Publisher, *envelopes: Envelope) -> None:
+    """Publish messages, each on its key."""
+    for envelope in envelopes:
+        bus.publish(envelope.key, encode(envelope.message))
 
 
 class Decoder:

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Literal
 
 from msgspec import Struct
 
-from lfa.deploy.fleet.plan.fleet_file import Policy, Restart
-
+Policy = Literal["never", "on-failure", "always"]
 REFUSED_CODE = 2
+
+
+class Restart(Struct, frozen=True, forbid_unknown_fields=True):
+    """Restart policy for processes that end, except routers, which are always restarted."""
+
+    policy: Policy = "on-failure"
+    delay_s: float = 0.5
+    """Delay [s] before the first restart; doubled for each further restart within the window."""
+    delay_max_s: float = 10.0
+    window_s: float = 60.0
+    starts_max: int = 5
+    """Maximum number of restarts within the window; at the next end the process is not restarted."""
+
+
 ROUTER = Restart(policy="always", delay_s=0.05, delay_max_s=2.0, window_s=60.0, starts_max=1_000_000)
 """Restart policy of routers: unlimited, since a machine without its router is isolated."""
+RUN = Restart(policy="on-failure", delay_s=0.05, delay_max_s=2.0, window_s=60.0, starts_max=1_000_000)
+"""Restart policy of the processes of `lfa run` that its scenario restarts: as often as needed, it ends with the run."""
 
 
 class RestartDecision(Struct, frozen=True):
