@@ -14,19 +14,17 @@ from pathlib import Path
 
 import msgspec
 
-from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.script import Fault, parse_all
+from lfa.deploy.faults.script import Fault
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.fault_execution import FaultExecution
-from lfa.deploy.run.finish import Ended, finish, report, reread, verdict_of
-from lfa.deploy.run.load import rebuild_scenario
-from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
+from lfa.deploy.run.finish import Ended, finish, reread, verdict_of
 from lfa.deploy.run.process_table import rows
 from lfa.deploy.run.progress import Progress, progress
 from lfa.deploy.run.progress_rows import ProgressRows
@@ -53,27 +51,6 @@ SOCKET_FOLDER_MAX = 60
 RECORDER_S_MAX = 30.0  # to read the recording and write the summary
 
 
-def command(
-    scenario: ScenarioName,
-    seed: Seed = None,
-    overrides: Overrides = None,
-    robots: Robots = None,
-    fault: Faults = None,
-    out: Out = None,
-    map_from: MapFrom = None,
-    figures: Figures = True,
-    junit: JUnit = None,
-    as_json: AsJson = False,
-) -> int:
-    """Run a scenario as processes on this machine; exit with the code of its summary."""
-    chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
-    faults = parse_all(chosen.mission, chosen.faults, fault or ())
-    if junit is not None:
-        check_junit(junit)
-    ended = run(chosen, number, out, faults)
-    return report(ended, figures=figures and ended.signal is None, as_json=as_json, junit=junit)
-
-
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
     """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out`."""
     drawn = draw(scenario, seed)
@@ -89,6 +66,9 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
             return reread(folder, interrupts.signal)
     finally:
         shutil.rmtree(sockets, ignore_errors=True)
+
+
+command = scenario_command(run)
 
 
 def _socket_folder() -> Path:

@@ -7,17 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lfa.agents.agent import Agent
-from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import COMMON, ORDERS, Fault, FaultAction, FaultSchedule, parse_all
+from lfa.deploy.faults.script import COMMON, ORDERS, Fault, FaultAction, FaultSchedule
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import JOURNALS, About, make
-from lfa.deploy.run.finish import Ended, finish, report, verdict_of
-from lfa.deploy.run.load import rebuild_scenario
-from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
+from lfa.deploy.run.command import scenario_command
+from lfa.deploy.run.finish import Ended, finish, verdict_of
 from lfa.deploy.run.termination import Referee
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
@@ -37,27 +35,6 @@ FLEET = "sim"
 JOURNAL_FLUSH_S = 1.0
 SILENCE_S_MAX = 1.0
 LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
-
-
-def command(
-    scenario: ScenarioName,
-    seed: Seed = None,
-    overrides: Overrides = None,
-    robots: Robots = None,
-    fault: Faults = None,
-    out: Out = None,
-    map_from: MapFrom = None,
-    figures: Figures = True,
-    junit: JUnit = None,
-    as_json: AsJson = False,
-) -> int:
-    """Run a scenario in virtual time in this process; exit with the code of its summary."""
-    chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
-    faults = parse_all(chosen.mission, chosen.faults, fault or ())
-    if junit is not None:
-        check_junit(junit)
-    ended = run(chosen, number, out, faults)
-    return report(ended, figures=figures, as_json=as_json, junit=junit)
 
 
 def run(
@@ -80,6 +57,9 @@ def run(
         verdict = run.play(FaultSchedule(faults), interrupts)
     duration_s = time.perf_counter() - started
     return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, run.recording)
+
+
+command = scenario_command(run)
 
 
 class _Run:

@@ -27,10 +27,10 @@ from lfa.deploy.ros.types import typestore
 from lfa.deploy.ros.wire import Distro, check_domain
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.transport.bus import Wake
+from lfa.protocol.transport.message_bus import send
 from lfa.protocol.transport.zenoh_ros import ros_session
 
 ROUTER = "tcp/127.0.0.1:7447"
@@ -153,7 +153,7 @@ class Bridge:
             self._output.leave(robot)
 
     def _order(self, name: str, **arguments: object) -> None:
-        self._ear.bus.publish(self._operator.orders_key, encode(self._operator.orders(name, clock.now(), **arguments)))
+        send(self._ear.bus, self._operator.command(name, clock.now(), **arguments))
 
     def _warn(self, words: str) -> None:
         print(f"lfa ros: {words}", file=sys.stderr, flush=True)
