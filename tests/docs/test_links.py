@@ -72,3 +72,11 @@ def test_a_planted_name_that_no_file_has_is_seen(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("`agents/agent.py:Agent`, `lease.py:Lease`, `agents/agent.py:Angel`, `leash.py`\n")
     assert gone(page) == ["agents/agent.py:Angel", "leash.py:"]
+
+
+@pytest.mark.parametrize("package", ["agents", "world"])
+def test_a_packages_page_names_every_file_and_folder_at_its_top(package: str) -> None:
+    text = (ROOT / package / "README.md").read_text()
+    parts = [p for p in (ROOT / package).iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()]
+    names = [p.name for p in parts if p.name != "__init__.py"]
+    assert [name for name in names if f"`{name}" not in text] == []
