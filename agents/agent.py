@@ -30,7 +30,6 @@ class Agent:
     defer_hellos = True
 
     def __init__(self, robot_id: int, incarnation: int, fleet: str, floor: int, mission: Mission | None = None) -> None:
-        self.refusal: str | None = None
         self.lease_observer: Observer | None = None
         """Told of every event of the lease; set before the mission is known."""
         self._id = robot_id
@@ -41,6 +40,7 @@ class Agent:
         self._next_ask = 0.0
         self._interests = before_the_mission(fleet)
         self._stopped = False
+        self._refusal: str | None = None
 
     @property
     def name(self) -> str:
@@ -62,6 +62,11 @@ class Agent:
     def defer_grants(self) -> bool:
         """True while answers can wait for the next control step: the lease lasts well beyond it."""
         return self._core is not None and self._core.defer_grants
+
+    @property
+    def refusal(self) -> str | None:
+        """Reason, in one line, why this robot cannot take part with its mission; None if it can."""
+        return self._refusal if self._core is None else self._core.refusal
 
     @property
     def core(self) -> RobotCore | None:
@@ -123,4 +128,4 @@ class Agent:
         try:
             self._core = RobotCore(self._id, mission, self._outbox, self._floor, now, self.lease_observer)
         except Refused as refused:
-            self.refusal = str(refused)
+            self._refusal = str(refused)

@@ -21,7 +21,7 @@ from lfa.agents.team_state import TeamState
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL
-from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
@@ -59,6 +59,8 @@ class RobotCore:
         if robot_id not in mission.robots:
             raise Refused(f"id {robot_id}: not in the mission, which has robots {list(mission.robots)}")
         self.defer_grants = False
+        self.refusal: str | None = None
+        """What this robot's mission says otherwise than its team's (E25); None if nothing."""
         self._id = robot_id
         self._outbox = outbox
         self._team = TeamState()
@@ -217,6 +219,8 @@ class RobotCore:
                     self._adopt(now)
                     chain = [member.id for member in config.chain]
                     self._event("chain", now, {"chain": chain, "seq": config.version.seq}, config.version.term)
+                case StandAside(reason):
+                    self.refusal = reason
                 case LeaseExtended():
                     pass
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from lfa.protocol.incarnations import after
-from lfa.protocol.lease.effects import Effect, Send
+from lfa.protocol.lease.effects import Effect, Send, StandAside
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.codec import Message
@@ -117,11 +117,14 @@ class Witness:
         return [] if self._lease is None else self._carry_out(self._lease.request_release(now), now)
 
     def _carry_out(self, effects: list[Effect], now: float) -> list[Envelope]:
-        return [
-            self._envelope("lease", LeaseNote(self._header("lease", now), effect.body), effect.receiver)
-            for effect in effects
-            if isinstance(effect, Send)
-        ]
+        envelopes: list[Envelope] = []
+        for effect in effects:
+            if isinstance(effect, Send):
+                note = LeaseNote(self._header("lease", now), effect.body)
+                envelopes.append(self._envelope("lease", note, effect.receiver))
+            elif isinstance(effect, StandAside):
+                self.refusal = effect.reason
+        return envelopes
 
     def _status(self, now: float) -> Status:
         header = self._header("status", now)

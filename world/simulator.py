@@ -68,6 +68,8 @@ class Simulator:
         """Called with a node that goes on under a later number (E23), before it starts; returns its journal."""
         self._random = Random(f"air-{seed}")
         self.air = LinkModel(radio, self._random)
+        self.refused_leave = False
+        """True if a node that cannot take part leaves, as its process would, in place of ending the simulation."""
         self._seats: dict[str, _SimulatedNode] = {}
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = 0
@@ -187,13 +189,13 @@ class Simulator:
             self._publish(seat, key, payload)
         if node.interests is not seat.interests:
             self._refresh(seat)
-        if node.refusal is not None:
+        if node.refusal is not None and not self.refused_leave:
             raise Refused(node.refusal)
         later = reborn(node)
         if later is not None and seat.stop_by is None:
             self._leave(seat)
             self.add(later, self.reborn(later), seat.clock)
-        elif node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
+        elif node.refusal is not None or node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
             self._leave(seat)
         else:
             self._plan(seat)

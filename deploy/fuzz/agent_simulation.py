@@ -22,7 +22,8 @@ from lfa.deploy.fuzz.network import LinkConditions, Trace
 from lfa.deploy.fuzz.observers import GatewayObserver
 from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
 from lfa.protocol.incarnations import drawn_at
-from lfa.protocol.lease.effects import BecomeLeader, Effect
+from lfa.protocol.lease.agreement import agreement_of, digest
+from lfa.protocol.lease.effects import BecomeLeader, Effect, StandAside
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
@@ -123,7 +124,10 @@ class AgentSimulation:
         self._scenario = Scenario("A straight road", self.mission, 1e6, world=world, name=FLEET)
         self._operator = Operator(FLEET, 1)
         self._lives = 0
+        self._agreed: dict[int, int] = {}
+        """Digest of what the newest incarnation of each id holds to be agreed."""
         self.simulator = Simulator(Radio(), schedule.seed)
+        self.simulator.refused_leave = True
         self.simulator.air = Gale(self)
         self.simulator.taps.append(self._hear)
         self.simulator.reborn = self._reborn
@@ -158,16 +162,21 @@ class AgentSimulation:
             self.start(robot_id)
         return self
 
-    def start(self, robot_id: int) -> None:
-        """Start a new incarnation with empty memory; a running one of the same id is killed first."""
+    def start(self, robot_id: int, mission: Mission | None = None) -> None:
+        """Start a new incarnation with empty memory; a running one of the same id is killed first.
+
+        With `mission`, it holds that one in place of the team's.
+        """
+        mission = mission or self.mission
+        self._agreed[robot_id] = digest(agreement_of(mission, timing_of(mission.profile)))
         if robot_id in self.processes:
             self.kill(robot_id)
         wall_ms = self.wall_ms.get(robot_id, 0)
         number, floor = drawn_at(wall_ms, self._next_life()), max(round(self.now * 1000.0) + wall_ms, 0)
         node: Agent | Witness = (
-            Witness(FLEET, number, floor, self.mission)
+            Witness(FLEET, number, floor, mission)
             if robot_id == WITNESS_ID
-            else Agent(robot_id, number, FLEET, floor, self.mission)
+            else Agent(robot_id, number, FLEET, floor, mission)
         )
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         self._watch(node, robot_id, clock)
@@ -180,6 +189,7 @@ class AgentSimulation:
         node.lease_observer = lambda observed: self._observed(life, observed)
         self._say(robot_id, f"starts, life {member.incarnation}")
         self._tell("lives", self.now, member)
+        self._tell("holds", self.now, member, self._agreed[robot_id])
 
     def _reborn(self, node: Node) -> Journal:
         """Watch the node that goes on under a later number (E23) in the place of one that the simulator has ended."""
@@ -311,6 +321,9 @@ class AgentSimulation:
             self._tell("promises", self.now, *observed.given)
         for effect in observed.effects:
             self._say(life.id, network.told(effect))
+            if isinstance(effect, StandAside):
+                self._tell("leads_no_more", self.now, life.member)
+                self._tell("ends", self.now, life.member)
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, life.id, effect))
             for words in effect_facts(

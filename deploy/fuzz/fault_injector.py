@@ -16,6 +16,7 @@ from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.messages.consensus import Member
+from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID
 
 if TYPE_CHECKING:
@@ -69,6 +70,9 @@ class Faults:
             case "restart" | "witness" if target is not None:
                 arena.kill(target)
                 arena.at(lasts, self._start, target)
+            case "mixed" if target is not None:
+                arena.start(target, mission=self._other_mission(fault))
+                arena.at(lasts, self._start_right, target, arena.processes[target].member)
             case "exit" if target is not None:
                 arena.exit(target)
                 arena.at(min(lasts + EXIT_S, FAULTS_UNTIL_S), self._start, target)
@@ -89,20 +93,27 @@ class Faults:
             case "gateway" if target is not None and target != WITNESS_ID:
                 arena.kill_gateway(target)
                 arena.at(lasts, self._start_gateway, target)
+            case _:
+                done = self._disturb(fault, target, lasts)
+        self.counts[fault.kind] += done
+        if done and arena.trace is not None:
+            arena.trace(arena.now, WITNESS_ID if target is None else target, f"# {fault.kind}")
+
+    def _disturb(self, fault: ScheduledFault, target: int | None, lasts: float) -> bool:
+        """Inject a fault of the network; return True if it took effect."""
+        arena = self.arena
+        match fault.kind:
             case "cut" | "cut_one_way" | "cut_pair":
                 pairs = self._pairs(fault, target)
                 arena.part(pairs)
                 arena.at(lasts, arena.heal_partition, pairs)
-                done = bool(pairs)
+                return bool(pairs)
             case "loss" | "burst" | "duplicate" | "tail" | "reorder":
                 name = "loss" if fault.kind == "burst" else fault.kind
                 setattr(arena.weather, name, fault.value)
                 arena.at(lasts, self._calm, name)
-            case _:
-                done = False
-        self.counts[fault.kind] += done
-        if done and arena.trace is not None:
-            arena.trace(arena.now, WITNESS_ID if target is None else target, f"# {fault.kind}")
+                return True
+        return False
 
     def _pairs(self, fault: ScheduledFault, target: int | None) -> set[tuple[int, int]]:
         ids = set(self.arena.ids)
@@ -118,6 +129,17 @@ class Faults:
 
     def _start(self, target: int) -> None:
         if not self.arena.processes[target].alive:
+            self.arena.start(target)
+
+    def _other_mission(self, fault: ScheduledFault) -> Mission:
+        """Return the mission that a mixed-up process holds: of another version, or with another profile."""
+        mission = self.arena.mission
+        if fault.value > 0.0:
+            return structs.replace(mission, version=mission.version + 1)
+        return structs.replace(mission, profile="wifi" if mission.profile != "wifi" else "fast")
+
+    def _start_right(self, target: int, mixed: Member) -> None:
+        if self.arena.processes[target].member == mixed:
             self.arena.start(target)
 
     def _step_wall(self, fault: ScheduledFault, target: int, lasts: float) -> None:

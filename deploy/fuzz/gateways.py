@@ -97,7 +97,7 @@ class GatewaySimulation(Network):
         host = self.gateways.get(robot_id)
         if host is None or not host.alive or not isinstance(body, Fence):
             return None
-        for tell in self._tell["bars"]:
-            tell(self.now, robot_id, body.term)
         answer = host.gateway.fence(body, host.clock.local(self.now))
+        for tell in self._tell["bars"]:
+            tell(self.now, robot_id, answer.term)
         return Member(robot_id, host.gateway.incarnation), answer

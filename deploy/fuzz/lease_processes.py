@@ -8,7 +8,7 @@ from typing import Any
 from lfa.deploy.fuzz.gateways import GatewaySimulation
 from lfa.deploy.fuzz.network import SimulatedClock, told
 from lfa.protocol.geometry import Twist
-from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StepDown
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S
@@ -67,7 +67,7 @@ class Hosts(GatewaySimulation):
         super().__init__(*arguments)
         self.processes: dict[int, Process] = {}
         self.log: list[tuple[float, int, Effect]] = []
-        """`BecomeLeader` and `StepDown` effects, each with its true time [s] and the id."""
+        """`BecomeLeader`, `StepDown` and `StandAside` effects, each with its true time [s] and the id."""
         self._addresses = {name: to for i in self.ids for name, to in ((robot_name(i), i), (f"gateway{i}", -i))}
         self._others = {i: tuple(other for other in self.ids if other != i) for i in self.ids}
 
@@ -130,7 +130,7 @@ class Hosts(GatewaySimulation):
             else:
                 self._note(process, effect)
         lease = process.lease
-        if lease.released:
+        if lease.released or any(isinstance(effect, StandAside) for effect in effects):
             process.alive = False
             if self.trace is not None:
                 self.trace(self.now, process.id, "exits")
@@ -147,6 +147,8 @@ class Hosts(GatewaySimulation):
             case AdoptChain(config=config):
                 for tell in self._tell["adopts"]:
                     tell(self.now, process.member, config)
+            case StandAside():
+                self.log.append((self.now, process.id, effect))
             case StepDown():
                 self.log.append((self.now, process.id, effect))
                 for tell in self._tell["leads_no_more"]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
 from lfa.deploy.fuzz.network import LinkConditions, SimulatedClock
 from lfa.protocol.incarnations import after, drawn_at
+from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.machine.lease import Lease
@@ -56,10 +57,11 @@ class LeaseSimulation(Hosts):
             self.at(at, self.start, robot_id)
         return self
 
-    def start(self, robot_id: int, number: int | None = None) -> None:
+    def start(self, robot_id: int, number: int | None = None, mission: Mission | None = None) -> None:
         """Start a new incarnation with empty memory; a running one of the same id is killed first.
 
-        `number`: that of the incarnation; None: drawn from its host's clock, which may be set back.
+        `number`: that of the incarnation; None: drawn from its host's clock, which may be set back. `mission`: what it
+        holds in place of the team's.
         """
         if robot_id in self.processes and self.processes[robot_id].alive:
             self.kill(robot_id)
@@ -68,13 +70,16 @@ class LeaseSimulation(Hosts):
         member = Member(robot_id, drawn if number is None else number)
         clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
-        lease = Lease(member, self.mission, self.timing, clock.local(self.now), floor, self.observed)
+        mission = mission or self.mission
+        lease = Lease(member, mission, timing_of(mission.profile), clock.local(self.now), floor, self.observed)
         process = Process(member, lease, clock)
         self.processes[robot_id] = process
         if self.trace is not None:
             self.trace(self.now, robot_id, f"starts, life {member.incarnation}")
         for tell in self._tell["lives"]:
             tell(self.now, member)
+        for tell in self._tell["holds"]:
+            tell(self.now, member, digest(agreement_of(mission, timing_of(mission.profile))))
         self.tell_token(member, up=True)
         if robot_id != WITNESS_ID:
             self.at(self.now + self.random.uniform(0.0, FOLLOW_PERIOD_S), self.follow, process)

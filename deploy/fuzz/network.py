@@ -14,7 +14,7 @@ from typing import Any, Self
 from msgspec import Struct
 
 from lfa.deploy.analysis.verification.checker import Checker, listeners
-from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StepDown
+from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
 
 REORDER_S = 0.15
@@ -167,6 +167,8 @@ def told(effect: Effect) -> str:
             return f"LEADS {short(term)}"
         case StepDown(term=term, cause=cause):
             return f"STOPS {short(term)} {cause}"
+        case StandAside(reason=reason):
+            return f"ENDS {reason}"
         case AdoptChain(config=config):
             return f"chain {[m.id for m in config.chain]} v{short(config.version.term)}.{config.version.seq}"
     return "extends"

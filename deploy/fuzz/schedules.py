@@ -25,6 +25,9 @@ SINGLE_SHARE = 0.05
 LEADER_SHARE = 0.4
 """Share of the faults with one target that are aimed at the leader of that moment."""
 
+MIXED_AT_S = 0.05
+"""Time [s] of a fault before the first election."""
+
 LEADER = -1
 
 
@@ -78,11 +81,13 @@ KINDS: tuple[str, ...] = (
     "hand_over",
     "gateway",
     "witness",
+    "mixed",
 )
 """Kinds of fault that a schedule may draw.
 
 `burst` is a short total loss, `gateway` and `witness` are a crash with a restart. `clock_step` sets a wall clock wrong
-(no other clock can be stepped), and two times in three the process restarts.
+(no other clock can be stepped), and two times in three the process restarts. `mixed` restarts a process with another
+profile, or with another version of the mission.
 """
 
 
@@ -166,6 +171,12 @@ def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> ScheduledF
             return ScheduledFault(at, kind, (target,), random.uniform(0.05, 1.0), float(random.random() < 0.3))
         case "witness":
             return ScheduledFault(at, kind, (0,), lasts)
+        case "mixed":
+            early = random.random() < 0.5  # before the first election, which it may win
+            at, target = (MIXED_AT_S, random.choice(ids)) if early else (at, target)
+            return ScheduledFault(
+                at, kind, (target,), random.uniform(0.5, FAULTS_UNTIL_S), float(random.random() < 0.3)
+            )
         case _:
             return ScheduledFault(at, kind, (target,), lasts)
 

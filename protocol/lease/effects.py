@@ -52,4 +52,10 @@ class AdoptChain(Struct, frozen=True):
     config: Config
 
 
-Effect = Send | BecomeLeader | LeaseExtended | StepDown | AdoptChain
+class StandAside(Struct, frozen=True):
+    """Order to end for good: the team holds another agreement (E25); `reason` says in one line what differs."""
+
+    reason: str
+
+
+Effect = Send | BecomeLeader | LeaseExtended | StepDown | AdoptChain | StandAside

@@ -12,6 +12,7 @@ from math import isfinite
 
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.incarnations import is_later
+from lfa.protocol.lease.term_window import TermWindow
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
 from lfa.protocol.messages.robot import CmdVel
@@ -34,6 +35,7 @@ class Gateway:
         self.term_max: Term = NO_TERM
         self.refused: dict[str, int] = {}
         """Number of refused commands by reason."""
+        self._window = TermWindow()
         self._deadman_s = timing.deadman_s
         self._limits = limits
         # E13: an earlier incarnation of this gateway may have confirmed a fence unknown to this one. Every lease below
@@ -59,6 +61,7 @@ class Gateway:
         self.agent, self._seq = cmd.header.incarnation, cmd.header.seq
         if cmd.term > self.term_max:
             self.term_max, self._holder = cmd.term, cmd.holder
+            self._window.know(cmd.term.n)
         elif self._holder == 0:
             self._holder = cmd.holder
         if cmd.as_leader:
@@ -101,7 +104,12 @@ class Gateway:
         return twist if (v, omega) == (twist.linear_x, twist.angular_z) else Twist(v, omega)
 
     def fence(self, fence: Fence, now: float) -> Fenced:
-        """Refuse all terms below `fence.term` from now on, brake if it is new, and return the confirmation (E11)."""
+        """Refuse all terms below `fence.term` from now on, brake if it is new, and return the confirmation (E11).
+
+        A term that is too far ahead is not believed (E26): the answer then confirms the highest seen, and no old one.
+        """
+        if not self._window.believes(fence.term.n, now):
+            return Fenced(NO_TERM, self.term_max)
         if fence.term > self.term_max:
             self.term_max, self._holder = fence.term, 0
             self._twist = STILL

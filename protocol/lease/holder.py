@@ -17,7 +17,9 @@ within 8 s (L5)."""
 class Holder:
     """Renewal state of one term. `expiry` is None until a quorum has granted; it only grows."""
 
-    def __init__(self, me: Member, term: Term, timing: Timing, now: float, fenced: tuple[Term, ...] = ()) -> None:
+    def __init__(
+        self, me: Member, term: Term, timing: Timing, now: float, agreed: int, fenced: tuple[Term, ...] = ()
+    ) -> None:
         self.term = term
         self.expiry: float | None = None
         self.next_round_at = now
@@ -28,6 +30,7 @@ class Holder:
         self.began_at = now
         self.nonces: dict[Member, float] = {}
         """Time [s] of each voter's own clock carried by its last grant (E16)."""
+        self._agreed = agreed
         self._fenced = fenced
         self._me = me
         self._timing = timing
@@ -45,7 +48,7 @@ class Holder:
         self._sent_at.pop(number - ROUNDS_KEPT, None)
         self.next_round_at = now + RETRY_HEARTBEATS * self._timing.heartbeat_s
         fenced = self._fenced if now - self.began_at < self._timing.grant_s else ()
-        return Propose(self.term, config, number, self._me, fenced)
+        return Propose(self.term, config, number, self._me, fenced, agreed=self._agreed)
 
     def transferred(self, number: int, since: float) -> None:
         """Count round `number`, sent by the term's issuer, from `since` [s], a nonce of this process (E16)."""

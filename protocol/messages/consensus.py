@@ -8,6 +8,7 @@ from msgspec import Struct
 
 from lfa.protocol.geometry import Number
 from lfa.protocol.messages.header import Count, Header, Stamp
+from lfa.protocol.mission import ColdStart, Lonely, Profile, Shrink, TieBreak
 
 
 class Term(Struct, frozen=True, array_like=True, order=True, gc=False):
@@ -61,11 +62,34 @@ class GatewayStamp(Struct, frozen=True, array_like=True, gc=False):
     time: Stamp
 
 
+class Agreement(Struct, frozen=True, array_like=True):
+    """What safety rests on and all members must hold alike (E25); by its digest, others are refused."""
+
+    wire: Count
+    """Version of the messages."""
+    version: Count
+    """Version of the mission."""
+    robots: tuple[Count, ...]
+    witness: bool
+    profile: Profile
+    act_s: Number
+    deadman_s: Number
+    clock_rate_error: Number
+    can_lead: tuple[Count, ...] | None
+    tiebreak: TieBreak
+    shrink: Shrink
+    cold_start: ColdStart
+    lonely: Lonely
+    continue_after_s: Number
+
+
 class Prepare(Struct, frozen=True, array_like=True, tag="prepare"):
     term: Term
     version: Version
     forget: tuple[Member, ...] = ()
     """Incarnations that an operator declared dead for this attempt only, with all earlier ones of their ids (E20)."""
+    agreed: Count = 0
+    """Digest of the sender's agreement (E25)."""
 
 
 class Grantee(Struct, frozen=True, array_like=True):
@@ -88,6 +112,8 @@ class Nack(Struct, frozen=True, array_like=True, tag="nack"):
     holder: Member | None
     remaining_s: Number
     config: Config
+    agreement: Agreement | None = None
+    """What the refusing process holds, if that is the reason: it holds something else (E25)."""
 
 
 class Propose(Struct, frozen=True, array_like=True, tag="propose"):
@@ -99,6 +125,8 @@ class Propose(Struct, frozen=True, array_like=True, tag="propose"):
     holder: Member
     fenced: tuple[Term, ...] = ()
     nonce: Stamp | None = None
+    agreed: Count = 0
+    """Digest of the sender's agreement (E25)."""
 
 
 class Grant(Struct, frozen=True, array_like=True, tag="grant"):
@@ -118,6 +146,8 @@ class Hello(Struct, frozen=True, array_like=True, tag="hello"):
     """Request of a process that holds no live grant or is out of the chain (E9); `version` is None if it is blank."""
 
     version: Version | None
+    agreed: Count = 0
+    """Digest of the sender's agreement (E25)."""
 
 
 class Superseded(Struct, frozen=True, array_like=True, tag="superseded"):

@@ -213,7 +213,7 @@ def holder() -> int:
     timing, me, compared = timing_of("std"), Member(1, 7), 0
     config = Config(VERSIONS[0], MEMBERS, None, None, MEMBERS)
     for rounds in product((None, 0, 1, 2), repeat=3):
-        held = Holder(me, Term(9, 1, 7), timing, 0.0)
+        held = Holder(me, Term(9, 1, 7), timing, 0.0, 1)
         for n in range(3):
             held.next_propose(config, float(n))
         for member, number in zip(MEMBERS, rounds, strict=True):

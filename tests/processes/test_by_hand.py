@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -12,7 +13,9 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec import structs
 
 from lfa.protocol.messages.codec import Message, decode
 from lfa.protocol.messages.consensus import Role
@@ -22,6 +25,7 @@ from lfa.protocol.topics import TOPIC, address, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
+from lfa.world.description.load import load
 from tests.rigs.lfa_runs import eventually
 
 pytestmark = pytest.mark.processes
@@ -253,6 +257,37 @@ def test_a_fleet_goes_on_without_robots_that_the_operator_declares_lost(terminal
     assert (done.returncode, done.stdout) == (0, "forgotten: robot2, robot3, robot4; robot1 leads\n"), done.stderr
     again = terminals.lfa("forget", "3")
     assert again.stdout == "robot1 leads: who is silent leaves its voters without being forgotten\n"
+
+
+def test_who_holds_another_mission_than_its_team_ends_in_one_line(terminals: Terminals, tmp_path: Path) -> None:
+    """E25: another profile, other robots, another version; with the team's own mission it is taken in."""
+    team = msgspec.to_builtins(structs.replace(load("straight").mission, robots=(1, 2, 3)))
+
+    def start(**other: object) -> subprocess.Popen[str]:
+        file = tmp_path / f"{len(list(tmp_path.iterdir()))}.json"
+        file.write_text(json.dumps(team | other))
+        robot = ("lfa.agents.cli", "--role", "follower", "--id", "3", "--mission", str(file))
+        return terminals.start(*robot, *terminals.team())
+
+    terminals.router()
+    terminals.world(robots=3)
+    terminals.agent(1)
+    terminals.agent(2)
+    terminals.look_on()
+    waits = "waiting for robot3"
+    eventually(lambda: any(isinstance(m, Status) and m.text == waits for m in terminals.heard()), waits)
+    for other, line in (
+        ({"profile": "wifi"}, "mission.profile = wifi: must be std"),
+        ({"robots": [1, 2, 3, 4]}, "mission.robots = [1, 2, 3, 4]: must be [1, 2, 3]"),
+        ({"version": 2}, "mission.version = 2: must be 1"),
+    ):
+        odd = start(**other)
+        _, said = odd.communicate(timeout=30.0)
+        event, reason = said.splitlines()
+        assert " robot3 mission " in event
+        assert (odd.returncode, reason) == (2, f"lfa-agent: {line}, which witness, robot1, robot2 hold")
+    start()
+    eventually(lambda: follows(terminals, "robot3"), "robot 3 follows nobody with the team's mission")
 
 
 def test_systemd_hears_when_an_agent_is_ready_and_that_its_loop_turns(terminals: Terminals) -> None:

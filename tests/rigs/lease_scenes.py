@@ -80,7 +80,7 @@ def alone() -> Lease:
     mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
     lease = Lease(Member(1, 7), mission, STD, 0.0, floor=0)
     for other in OTHERS:
-        lease.receive(other, Hello(None), 0.0)
+        lease.receive(other, Hello(None, lease.agreed), 0.0)
     return lease
 
 

@@ -70,6 +70,9 @@ class Checker:
     def lives(self, at: float, who: Member) -> None:
         """Record that the process of incarnation `who` started."""
 
+    def holds(self, at: float, who: Member, agreed: int) -> None:
+        """Record the digest of what `who` holds to be agreed (E25)."""
+
     def ends(self, at: float, who: Member) -> None:
         """Record that the process of incarnation `who` ended."""
 

@@ -120,7 +120,7 @@ def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], tim
     effects: list[Effect] = []
     node.lease_observer = lambda observed: effects.extend(observed.effects)
     host = NodeHost(node, Journal(None, heading))
-    at = 0.0
+    at, agreed = 0.0, None
     for entry in entries:
         at = max(at, entry.at)
         note = _message(entry)
@@ -129,6 +129,9 @@ def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], tim
         effects.clear()
         if digest(call(host, entry)) != entry.digest:
             raise Refused(f"{path}: cannot be verified, it was written by another version of the cores (lfa replay)")
+        if agreed is None and node.lease is not None:
+            agreed = node.lease.agreed
+            yield Happening(at, ("holds", at, me, agreed))
         for effect in effects:
             for words in effect_facts(effect, me, at, timing.grant_s, float):
                 yield Happening(at, words)
@@ -157,8 +160,7 @@ class _Gateways:
             case LeaseNote(body=Fence() as fence) if where is not None and where.to is not None:
                 robot = int(where.to.removeprefix("gateway"))
                 if robot in self.gateways:
-                    self.gateways[robot].fence(fence, at)
-                    yield ("bars", at, robot, fence.term)
+                    yield ("bars", at, robot, self.gateways[robot].fence(fence, at).term)
             case PeerUp(name, incarnation) if (robot := robot_id_of(name)) in self.gateways:
                 self._cut_off = False
                 self.gateways[robot].agent_up(incarnation, at)

@@ -238,6 +238,35 @@ class Residual(WithFences):
         self._last = (at - age, cmd)
 
 
+class OneAgreement(Checker):
+    """Checker of I9: promises and grants join processes that hold the same agreement."""
+
+    name = "I9"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._agreed: dict[Member, int] = {}
+        self._holder: dict[Term, Member] = {}
+
+    def holds(self, at: float, who: Member, agreed: int) -> None:
+        self._agreed[who] = agreed
+
+    def proposes(self, at: float, who: Member, propose: Propose) -> None:
+        self._holder[propose.term] = propose.holder
+
+    def promises(self, at: float, who: Member, promise: Promise) -> None:
+        self._alike(at, who, Member(promise.term.issuer, promise.term.incarnation), "promised to")
+
+    def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
+        if grant.term in self._holder:
+            self._alike(at, voter, self._holder[grant.term], "granted to")
+
+    def _alike(self, at: float, voter: Member, asker: Member, deed: str) -> None:
+        mine = self._agreed.get(voter)
+        if self._agreed.get(asker, mine) != mine:
+            self.broken(at, f"{_m(voter)} {deed} {_m(asker)}, which holds another agreement")
+
+
 SAFETY: tuple[type[Checker], ...] = (
     LeaseExclusivity,
     Acting,
@@ -247,4 +276,5 @@ SAFETY: tuple[type[Checker], ...] = (
     JointChange,
     NoAmnesiacVote,
     Residual,
+    OneAgreement,
 )

@@ -23,6 +23,7 @@ def stand(m: LeaseMemory, now: float) -> None:
     term = Term(number, m.me.id, m.me.incarnation)
     m.candidate = Candidate(term, m.timing, now, m.election.forgotten(now))
     m.seen = term
+    m.window.know(number)
     ask_promises(m, now)
 
 
@@ -31,7 +32,7 @@ def ask_promises(m: LeaseMemory, now: float) -> None:
     candidate = m.candidate
     assert candidate is not None
     candidate.asked(now)
-    request = Prepare(candidate.term, m.config.version, candidate.forget)
+    request = Prepare(candidate.term, m.config.version, candidate.forget, m.agreed)
     m.send("all", request)
     own = m.acceptor.prepare(m.me, request, m.config, now, m.holder_gone())
     if isinstance(own, Promise):
@@ -69,7 +70,7 @@ def _fence_or_propose(m: LeaseMemory, candidate: Candidate, now: float) -> None:
     if candidate.unfenced(m.me):
         candidate.fencing = True
         return
-    candidate.holder = Holder(m.me, candidate.term, m.timing, now, candidate.fenced_terms)
+    candidate.holder = Holder(m.me, candidate.term, m.timing, now, m.agreed, candidate.fenced_terms)
     config = (
         unanimous_config(m.config, m.me, candidate.term, members)
         if members
@@ -121,7 +122,7 @@ def take_over(m: LeaseMemory, body: Propose, own: Grant, now: float) -> None:
         return
     candidate = Candidate(body.term, m.timing, now)
     candidate.transferred = True
-    candidate.holder = Holder(m.me, body.term, m.timing, now)
+    candidate.holder = Holder(m.me, body.term, m.timing, now, m.agreed)
     candidate.holder.transferred(body.round, body.nonce)
     m.candidate = candidate
     early, m.early_grants = m.early_grants, []

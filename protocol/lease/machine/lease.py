@@ -15,6 +15,7 @@ from lfa.protocol.lease.machine.deadlines import DEADLINES, expiry
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState, refusal, state_of
 from lfa.protocol.lease.membership import ids, is_first
+from lfa.protocol.lease.term_window import highest
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import (
     Config,
@@ -88,6 +89,11 @@ class Lease:
         return self._memory.config
 
     @property
+    def agreed(self) -> int:
+        """Digest of what this process and its team hold alike (E25)."""
+        return self._memory.agreed
+
+    @property
     def leader(self) -> int | None:
         """Id of the holder of the newest term known; None once its lease has expired by this process's own clock."""
         return self._memory.leader
@@ -159,18 +165,11 @@ class Lease:
         """Process a message of another process or of the own gateway (FENCED: `src.id` is the gateway's robot)."""
         m = self._memory
         self._expire(now)
-        if not isinstance(body, Fenced):  # a gateway's incarnations are not its robot's
-            if src.id == m.me.id:
-                return self._memory.drain()  # own message
-            m.peers.heard(src, now)
-        if isinstance(body, Nack):
-            voting.hear_refusal(m, body, now)
-            event = refusal(m, body)
-        else:
-            event = EVENTS.get(type(body))
-        if event is not None:
-            self._fire(event, now, src, body)
-        return self._memory.drain()
+        if src.id != m.me.id or isinstance(body, Fenced):
+            event = self._heard(src, body, now)
+            if event is not None:
+                self._fire(event, now, src, body)
+        return m.drain()
 
     def tick(self, now: float, again_at: float = SOONEST) -> list[Effect]:
         """Do what is due at `now` [s]; send a round now if it falls due before `again_at` [s], the next tick."""
@@ -207,6 +206,7 @@ class Lease:
         """
         m = self._memory
         self._expire(now)
+        m.window.know(term.n)
         m.seen, m.gateway_term = max(m.seen, term), max(m.gateway_term, term)
         if m.holder is not None and (term > m.holder.term or (latched and term == m.holder.term)):
             self._fire(LeaseEvent.GATEWAY_BARS, now)
@@ -244,6 +244,24 @@ class Lease:
         """Step down if the lease has expired; first action of every call, so that no leader outlasts its lease (E7)."""
         if self._memory.holder is not None and now >= expiry(self._memory):
             self._fire(LeaseEvent.LEASE_EXPIRED, now)
+
+    def _heard(self, src: Member, body: LeaseBody, now: float) -> LeaseEvent | None:
+        """Note what any message tells, and return its event; None if it says nothing to act upon."""
+        m = self._memory
+        if isinstance(body, Prepare | Propose | Hello):
+            if body.agreed != m.agreed:
+                return LeaseEvent.FOREIGN
+            m.census.alike(src.id)
+        if not m.window.believes(highest(body), now):
+            return None  # E26
+        if isinstance(body, Nack) and body.agreement is not None:
+            return LeaseEvent.NACK_FOREIGN
+        if not isinstance(body, Fenced):  # a gateway's incarnations are not its robot's
+            m.peers.heard(src, now)
+        if not isinstance(body, Nack):
+            return EVENTS.get(type(body))
+        voting.hear_refusal(m, body, now)
+        return refusal(m, body)
 
     def _fire(self, event: LeaseEvent, now: float, *given: Any) -> None:
         """Do what the table says for the event in the present state."""

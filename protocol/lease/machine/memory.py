@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lfa.protocol.lease.acceptor import Acceptor
+from lfa.protocol.lease.agreement import Census, agreement_of, digest
 from lfa.protocol.lease.candidate import Candidate
 from lfa.protocol.lease.effects import Effect, Send
 from lfa.protocol.lease.election import Election
@@ -11,6 +12,7 @@ from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.membership import first_config
 from lfa.protocol.lease.reconfiguration import Policy
 from lfa.protocol.lease.step_down import PendingRelease
+from lfa.protocol.lease.term_window import FREE, TermWindow
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Config, Grant, LeaseBody, Member, Prepare, Term
 from lfa.protocol.mission import Mission
@@ -27,13 +29,18 @@ class LeaseMemory:
         self.me = me
         self.timing = timing
         self.config: Config = first_config(mission)
+        agreement = agreement_of(mission, timing)
+        self.agreed = digest(agreement)
+        """Digest of what this process holds, said in PREPARE, PROPOSE and HELLO (E25)."""
         self.leader: int | None = None
         """Id of the holder of the newest term known; None once its lease has expired by this process's own clock."""
         self.leader_until = now
         self.left_out: frozenset[int] = frozenset()
         """Ids of live robots that a leader keeps out of its chain because they are stuck (E22)."""
+        floor = min(floor, FREE)
         self.seen = Term(floor)
         """Highest term known."""
+        self.window = TermWindow(floor)
         self.gateway_term = NO_TERM
         """Highest term that the own gateway has seen: it refuses commands under a lower one (E24)."""
         self.superseded_by: int | None = None
@@ -43,6 +50,7 @@ class LeaseMemory:
         self.holder: Holder | None = None
         self.pending_release = PendingRelease(timing.deadman_s)
         self.election = Election(me, mission, timing, now)
+        self.census = Census(agreement, me.id, self.election.all_member_ids, now)
         self.policy = Policy(mission.tiebreak, mission.shrink, len(self.election.all_member_ids))
         self.peers = FailureDetector(me, timing.heartbeat_s)
         self.hello_at = now

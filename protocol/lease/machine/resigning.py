@@ -102,7 +102,8 @@ def transfer(m: LeaseMemory, now: float) -> Propose | None:
         return None
     member, nonce = successor
     m.seen = Term(max(m.seen.n, m.holder.term.n) + 1, m.me.id, m.me.incarnation)
-    return Propose(m.seen, m.config, 0, member, nonce=nonce)
+    m.window.know(m.seen.n)
+    return Propose(m.seen, m.config, 0, member, nonce=nonce, agreed=m.agreed)
 
 
 def _successor(m: LeaseMemory, holder: Holder, now: float) -> tuple[Member, float] | None:

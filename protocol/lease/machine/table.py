@@ -19,6 +19,9 @@ voter that is still bound, but whose holder's token has vanished, promises too a
 the candidate has that holder's gateway fenced (E15). Phase 2: it writes the config that it leads and sends PROPOSE as a
 leader does; the quorum's grants make it the leader.
 
+One agreement. All this is safe only if all hold the same durations, the same members and the same policies. PREPARE,
+PROPOSE and HELLO carry a digest of them; a process that holds something else is refused, and ends if outvoted (E25).
+
 One end. A leader steps down first and tells later: it stops commanding, has its own gateway refuse its term, and only
 then sends RELEASE, which frees the voters at once (E4). To hand over, it sends instead of RELEASE a PROPOSE that names
 its successor, which only counts the grants (E16).
@@ -38,7 +41,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import NamedTuple
 
-from lfa.protocol.lease.machine import candidacy, leadership, resigning, voting
+from lfa.protocol.lease.machine import agreeing, candidacy, leadership, resigning, voting
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.messages.consensus import Nack
 
@@ -81,6 +84,8 @@ class LeaseEvent(StrEnum):
     NACK_NEWER = "NACK: newer config"
     NACK_BOTH = "NACK: higher promise, newer config"
     NACK_BOUND = "NACK: bound"
+    NACK_FOREIGN = "NACK: another agreement"
+    FOREIGN = "PREPARE, PROPOSE or HELLO of another agreement"
     RELEASE = "RELEASE"
     HELLO = "HELLO"
     SUPERSEDED = "SUPERSEDED"
@@ -205,6 +210,10 @@ TRANSITIONS = (
                "adopt the config, give its holder time"),
     Transition(E.NACK_BOUND, PHASE_1, candidacy.wait_for_bond, (), "E3",
                "PREPARE again when the bond ends"),
+    Transition(E.FOREIGN, ALL, agreeing.refuse_foreign, (), "E25",
+               "NACK with the own agreement; nothing else in it counts"),
+    Transition(E.NACK_FOREIGN, ALL, agreeing.refused_as_foreign, (), "E25",
+               "count it; without a leader, end if outvoted"),
     Transition(E.RELEASE, ALL, voting.on_release, DROPPED, "E4",
                "end a bond of this term and start the election; answer the PREPARE that the bond refused"),
     Transition(E.HELLO, LEADS_NOT, voting.answer_hello, (), "E9 E23",

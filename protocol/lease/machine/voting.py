@@ -141,7 +141,7 @@ def say_hello(m: LeaseMemory, now: float) -> None:
     on_time = now < m.hello_at + pause_s  # so that late ticks do not accumulate
     m.hello_at = (m.hello_at if on_time else now) + pause_s
     if m.is_out(now) and not m.pending_release.closing:
-        m.send("all", Hello(None if is_first(m.config) else m.config.version))
+        m.send("all", Hello(None if is_first(m.config) else m.config.version, m.agreed))
 
 
 def lose_leader(m: LeaseMemory, _now: float) -> None:

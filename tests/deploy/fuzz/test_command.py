@@ -74,7 +74,7 @@ def test_a_long_hunt_says_how_it_stands() -> None:
 
 
 def test_faults_can_be_left_out_one_by_one() -> None:
-    schedule = draw(3)
+    schedule = draw(4)
     assert len(without(schedule, 0, 2).faults) == len(schedule.faults) - 2
     assert all(isinstance(fault, ScheduledFault) for fault in schedule.faults)
 

@@ -9,6 +9,7 @@ import pytest
 import lfa.protocol.lease.failure_detector
 import lfa.protocol.lease.holder
 import lfa.protocol.lease.machine.candidacy
+import lfa.protocol.lease.machine.memory
 import lfa.protocol.lease.machine.resigning
 import lfa.protocol.lease.machine.voting
 import lfa.protocol.lease.membership
@@ -20,6 +21,7 @@ from lfa.protocol.lease.election import Election
 from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.machine.memory import LeaseMemory
+from lfa.protocol.lease.term_window import TermWindow
 from lfa.protocol.messages.consensus import Config, Member, Propose, Release, Term
 
 
@@ -116,7 +118,7 @@ def hand_over_writes_a_config(patch: pytest.MonkeyPatch) -> None:
         written = lfa.protocol.lease.membership.led_by(
             m.config, proposal.holder, proposal.term, lambda m: False, keep_leader=True
         )
-        return Propose(proposal.term, written, proposal.round, proposal.holder, nonce=proposal.nonce)
+        return Propose(proposal.term, written, proposal.round, proposal.holder, nonce=proposal.nonce, agreed=m.agreed)
 
     patch.setattr(lfa.protocol.lease.machine.resigning, "transfer", transfer)
 
@@ -165,6 +167,14 @@ def forget_as_a_standing_flag(patch: pytest.MonkeyPatch) -> None:
         return effects
 
     patch.setattr(Lease, "request_forget", request_forget)
+
+
+def any_term_is_believed(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(TermWindow, "believes", lambda self, number, now: True)
+
+
+def nothing_is_agreed(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(lfa.protocol.lease.machine.memory, "digest", lambda agreement: 1)
 
 
 def ended_lives_may_still_grant(patch: pytest.MonkeyPatch) -> None:

@@ -188,7 +188,7 @@ def one_highest_fenced_term(patch: pytest.MonkeyPatch) -> None:
         bond = self.bound(now)
         if bond is not None and body.fenced and bond.term <= max(body.fenced):
             fenced = (*body.fenced, bond.term)
-            body = Propose(body.term, body.config, body.round, body.holder, fenced, body.nonce)
+            body = Propose(body.term, body.config, body.round, body.holder, fenced, body.nonce, body.agreed)
         return honest(self, src, body, config, now)
 
     patch.setattr(Acceptor, "propose", propose)

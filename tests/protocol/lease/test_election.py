@@ -119,7 +119,7 @@ def test_e6_a_robot_without_a_vote_does_not_wait_for_a_lease_that_was_released()
     term, leader, witness = Term(5, 1, 7), Member(1, 7), Member(0, 3)
     config = Config(Version(term, 0), (leader, Member(2, 4), witness), witness, None, (leader,))
     newcomer = Lease(Member(2, 9), mission, STD, 0.0, floor=0)
-    newcomer.receive(leader, Propose(term, config, 3, leader), 10.0)
+    newcomer.receive(leader, Propose(term, config, 3, leader, agreed=newcomer.agreed), 10.0)
     newcomer.receive(leader, Release(term), 10.01)
     now, asked = 10.01, []
     while not asked and now < 11.0:
@@ -134,7 +134,7 @@ def _under_a_leader(*chain: Member) -> Lease:
     term, leader, witness = Term(5, 1, 7), Member(1, 7), Member(0, 3)
     config = Config(Version(term, 0), (leader, Member(2, 4), witness), witness, None, (leader, *chain))
     lease = Lease(Member(2, 4), mission, STD, 0.0, floor=0)
-    lease.receive(leader, Propose(term, config, 3, leader), 10.0)
+    lease.receive(leader, Propose(term, config, 3, leader, agreed=lease.agreed), 10.0)
     lease.tick(10.0)
     return lease
 

@@ -89,9 +89,9 @@ def test_e23_a_gateway_that_outlived_its_agent_is_enough_to_be_told() -> None:
 
 def test_e23_every_process_tells_an_earlier_incarnation_that_says_hello() -> None:
     lease = Lease(Member(2, 5), TEAM, STD, 0.0, floor=0)
-    lease.receive(Member(3, 8), Hello(None), 0.0)
-    assert sent(lease.receive(Member(3, 7), Hello(None), 0.1), Superseded) == [Superseded(8)]
-    assert sent(lease.receive(Member(3, 8), Hello(None), 0.1), Superseded) == []
+    lease.receive(Member(3, 8), Hello(None, lease.agreed), 0.0)
+    assert sent(lease.receive(Member(3, 7), Hello(None, lease.agreed), 0.1), Superseded) == [Superseded(8)]
+    assert sent(lease.receive(Member(3, 8), Hello(None, lease.agreed), 0.1), Superseded) == []
 
 
 def test_e23_who_is_told_of_an_earlier_number_goes_on_as_before() -> None:

@@ -79,7 +79,7 @@ def test_e2_a_grant_that_comes_after_the_lease_would_have_run_out_makes_no_leade
 
 def test_e7_bug_5_at_the_lease_end_it_stops_before_anything_else() -> None:
     lease, asked_at, _, _ = elected(slow_s=0.001)
-    effects = lease.receive(Member(2, 4), Hello(Version()), asked_at + STD.act_s)
+    effects = lease.receive(Member(2, 4), Hello(Version(), lease.agreed), asked_at + STD.act_s)
     assert isinstance(effects[0], StepDown)
     assert not lease.may_command(asked_at + STD.act_s)
     assert not sent(effects, Propose), "a leader whose lease has run out must fall silent"

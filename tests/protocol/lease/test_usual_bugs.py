@@ -187,7 +187,7 @@ def test_e3_a_fence_of_a_later_term_frees_nobody_bound_to_an_earlier_one() -> No
 
 def test_rounds_of_a_term_go_on_where_its_issuer_stopped() -> None:
     """A round that was used twice would count old grants for a new question."""
-    holder = Holder(A, Term(7, 2, 8), STD, 10.0)
+    holder = Holder(A, Term(7, 2, 8), STD, 10.0, 1)
     holder.transferred(0, 9.9)
     assert [holder.next_propose(config_of(LOW), 10.0).round, holder.next_propose(config_of(LOW), 10.1).round] == [1, 2]
 
@@ -219,7 +219,9 @@ def refused_by_the_witness(
 ) -> Lease:
     """Robot 2 of four, after robot 1 fell silent and `granted` have granted to it; three votes of five are needed."""
     lease = Lease(Member(2, 1), TEAM, STD, 0.0, floor=0)
-    lease.receive(Member(1, 1), Propose(Term(1, 1, 1), config_of(Term(1, 1, 1)), 0, Member(1, 1)), 0.4)
+    lease.receive(
+        Member(1, 1), Propose(Term(1, 1, 1), config_of(Term(1, 1, 1)), 0, Member(1, 1), agreed=lease.agreed), 0.4
+    )
     [prepare] = sent(lease.tick(REFUSED_AT), Prepare)
     assert isinstance(prepare, Prepare)
     promise = Promise(prepare.term, lease.config, None, False)
@@ -229,7 +231,7 @@ def refused_by_the_witness(
     for other in granted:
         lease.receive(Member(other, 1), Grant(propose.term, propose.round, propose.config.version, 0.0), REFUSED_AT)
     for other in restarted:
-        lease.receive(Member(other, 2), Hello(None), REFUSED_AT)
+        lease.receive(Member(other, 2), Hello(None, lease.agreed), REFUSED_AT)
     for other in vanished:
         lease.hint(other, 1, False, REFUSED_AT)
     lease.receive(Member(0, 1), Nack(propose.term, Term(50, 4, 1), None, 0.0, OLD), REFUSED_AT)

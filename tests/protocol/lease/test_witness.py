@@ -20,7 +20,8 @@ def test_with_a_mission_it_votes_once_its_earlier_lifes_bonds_have_run_out() -> 
     witness = Witness("f", 1, 0)
     witness.tick(0.0)
     witness.receive(Received(0.1, "lfa/f/operator/mission", MissionNote(Header("operator", 1, 0, 0.0), MISSION)))
-    ask = LeaseNote(Header("robot1", 7, 0, 0.0), Prepare(Term(5, 1, 7), Version()))
+    assert witness.lease is not None
+    ask = LeaseNote(Header("robot1", 7, 0, 0.0), Prepare(Term(5, 1, 7), Version(), agreed=witness.lease.agreed))
     assert witness.receive(Received(0.2, "lfa/f/robot1/lease/all", ask)) == []
     [answer] = witness.receive(Received(0.5, "lfa/f/robot1/lease/all", ask))
     assert answer.key == "lfa/f/witness/lease/robot1"
@@ -40,8 +41,9 @@ def test_it_tells_its_state_once_a_second_and_never_leads() -> None:
 
 def test_it_names_those_that_the_first_election_waits_for() -> None:
     witness = Witness("f", 1, 0, MISSION)
-    hello = LeaseNote(Header("robot1", 7, 0, 0.0), Hello(None))
     witness.tick(0.0)
+    assert witness.lease is not None
+    hello = LeaseNote(Header("robot1", 7, 0, 0.0), Hello(None, witness.lease.agreed))
     witness.receive(Received(0.1, "lfa/f/robot1/lease/all", hello))
     [status] = [e.message for e in witness.tick(1.0) if isinstance(e.message, Status)]
     assert status.text == "waiting for robot2"
