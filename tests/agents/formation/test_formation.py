@@ -194,3 +194,43 @@ def test_the_filtered_heading_does_not_move_while_the_predecessor_turns_in_place
             last = motion.x, motion.y
             pose = along_arc(pose, Twist(0.0, pi / 4), DT)
         assert way == pytest.approx(moved, abs=1e-3)
+
+
+def test_beside_begins_at_a_quarter_turn() -> None:
+    assert check_slot(Slot(2, 1.2, pi / 2), 0.4) == Slot(2, 1.2, pi / 2)
+    for phi in (0.99 * pi / 2, -0.99 * pi / 2, 1.2, 0.0):
+        with pytest.raises(Refused, match="beside or behind"):
+            check_slot(Slot(2, 1.2, phi), 0.4)
+
+
+@pytest.mark.parametrize("phi", [0.3, 1.2])
+def test_the_papers_input_means_the_first_follower(phi: float) -> None:
+    assert paper_phi("zigzag", phi) == paper_phi("left", phi) == phi_of("left", phi, 0)
+    assert paper_phi("zigzag", phi + pi / 2) == phi_of("left", phi, 0)
+
+
+def test_a_target_that_hangs_at_a_place_stays_there_and_a_reset_lets_it_go() -> None:
+    slot, predecessor = Slot(2, 1.2, pi), Pose2D(3.0, 2.0, 0.0)
+    motion = SlotMotion(DEFAULT, LIMITS, 0.0)
+    motion.reset(slot, predecessor)
+    motion.step(slot, predecessor, STILL, DT)
+    assert (motion.x, motion.y) == pytest.approx((1.8, 2.0))
+    motion.hang_at(1.0, 1.0)
+    motion.step(slot, predecessor, STILL, DT)
+    assert (motion.x, motion.y) == pytest.approx((1.0, 1.0))
+    motion.step(slot, predecessor, STILL, DT)
+    assert 1.0 < motion.x < 1.05 and 1.0 < motion.y < 1.05
+    motion.reset(slot, predecessor)
+    motion.step(slot, predecessor, STILL, DT)
+    assert (motion.x, motion.y) == pytest.approx((1.8, 2.0))
+
+
+def test_a_filtered_heading_turns_as_far_as_the_predecessor_has_driven() -> None:
+    slot, turned = Slot(2, 1.2, pi), Pose2D(0.0, 0.0, 0.5)
+    motion = SlotMotion(DEFAULT, LIMITS, 2.0)
+    motion.reset(slot, Pose2D())
+    motion.step(slot, turned, Twist(0.4, 0.0), DT)
+    assert motion.chi == 0.0
+    assert motion.chi_rate == pytest.approx(0.4 / 2.0 * 0.5)
+    motion.step(slot, turned, Twist(0.4, 0.0), DT)
+    assert motion.chi == pytest.approx(0.1 * DT)

@@ -5,7 +5,7 @@ from random import Random
 import pytest
 
 from lfa.protocol.transport.bus import Arrival
-from lfa.protocol.transport.link_model import LinkModel, Radio, Reception, link_of
+from lfa.protocol.transport.link_model import WAITING_MAX, LinkModel, Radio, Reception, link_of
 
 
 def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:
@@ -96,3 +96,40 @@ def test_what_comes_through_keeps_its_order_and_its_delay() -> None:
     assert reception.take(1.001) == [late]
     assert reception.next_due() == pytest.approx(1.1)
     assert [(a.key, a.payload) for a in reception.take(1.2)] == [(early.key, b"a")]
+
+
+def test_fair_and_heal_each_bring_the_first_weather_back_and_only_heal_ends_cuts() -> None:
+    air = LinkModel(Radio(delay_s=0.01), Random(1))
+    for word, cuts_left in (("fair", 1), ("heal", 0)):
+        assert air.obey({"radio": {"loss": 0.5}, "cut": [["robot1", "robot2"]]})
+        assert air.obey({word: True})
+        assert air.radio == Radio(delay_s=0.01)
+        assert len(air.cuts) == cuts_left
+
+
+def test_the_air_is_clear_without_weather_cuts_and_messages_on_their_way() -> None:
+    reception = Reception("robot2", Random(1))
+    assert reception.is_clear
+    reception.put(Arrival(1.0, "lfa/f/robot1/table", b""))
+    assert not reception.is_clear
+    reception.take(1.0)
+    assert reception.is_clear
+    assert reception.air.obey({"cut": [["robot1", "robot2"]]})
+    assert not reception.is_clear
+    assert reception.air.obey({"heal": True, "radio": {"loss": 0.1}})
+    assert not reception.is_clear
+
+
+def test_of_messages_due_at_one_time_the_first_comes_first() -> None:
+    reception = Reception("robot2", Random(1))
+    for n in range(5):
+        reception.put(Arrival(1.0, "lfa/f/robot1/table", bytes([n])))
+    assert [arrival.payload for arrival in reception.take(1.0)] == [bytes([n]) for n in range(5)]
+
+
+def test_so_many_messages_wait_and_no_more() -> None:
+    reception = Reception("robot2", Random(1))
+    reception.air.obey({"radio": {"delay_s": 1.0, "duplication": 1.0}})
+    for _ in range(WAITING_MAX):
+        reception.put(Arrival(1.0, "lfa/f/robot1/table", b""))
+    assert len(reception.take(3.0)) == WAITING_MAX
