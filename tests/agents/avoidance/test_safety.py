@@ -1,6 +1,6 @@
 """The last function before cmd_vel: finite, within the limits, and able to stop in time, whatever comes in."""
 
-from math import inf, isfinite, nan
+from math import cos, inf, isfinite, nan, sin
 
 import pytest
 from hypothesis import given
@@ -77,3 +77,37 @@ def test_a_team_mate_beside_or_behind_slows_nobody() -> None:
     for place in ((0.1, 0.5), (-0.5, 0.0)):
         assert sharing(Twist(0.5, 0.0), [place], 0.15, LIMITS) == Twist(0.5, 0.0)
     assert sharing(Twist(-0.3, 0.0), [(-0.4, 0.0)], 0.15, LIMITS).linear_x > -0.3
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("turn_radps", "slowed"), [(0.0, False), (1.5, True), (-1.5, False)])
+def test_a_team_mate_80_degrees_aside_counts_only_where_the_robot_turns(
+    side: float, turn_radps: float, slowed: bool
+) -> None:
+    mate = (0.5 * cos(1.4), side * 0.5 * sin(1.4))
+    out = sharing(Twist(0.6, side * turn_radps), [mate], 0.15, LIMITS)
+    assert (out.linear_x < 0.59) is slowed
+
+
+@pytest.mark.parametrize("turn_radps", [-2.0, 2.0])
+def test_a_team_mate_straight_ahead_counts_however_the_robot_turns(turn_radps: float) -> None:
+    assert sharing(Twist(0.6, turn_radps), [(0.5, 0.0)], 0.15, LIMITS).linear_x < 0.5
+
+
+def test_the_nearest_of_several_team_mates_decides() -> None:
+    near, far = (0.5, 0.0), (1.0, 0.1)
+    alone = sharing(Twist(0.9, 0.0), [near], 0.15, LIMITS)
+    assert sharing(Twist(0.9, 0.0), [near, far], 0.15, LIMITS) == alone
+    assert sharing(Twist(0.9, 0.0), [far, near], 0.15, LIMITS).linear_x == pytest.approx(alone.linear_x)
+
+
+@pytest.mark.parametrize(("wanted", "first"), [(1.0, 0.02), (-0.3, -0.02), (0.01, 0.01)])
+def test_a_command_changes_by_one_step_of_acceleration(wanted: float, first: float) -> None:
+    out = safe(Twist(wanted, 10.0 * wanted), STILL, [], 0.15, LIMITS, DT)
+    assert out.linear_x == pytest.approx(first)
+    assert abs(out.angular_z) <= LIMITS.alpha_max_radps2 * DT + 1e-12
+
+
+def test_backwards_has_a_limit_of_its_own() -> None:
+    assert within(Twist(-1.0, 0.5), LIMITS) == pytest.approx((-0.3, 0.15))
+    assert within(Twist(0.2, 4.0), LIMITS) == pytest.approx((0.1, 2.0))

@@ -23,6 +23,7 @@ from lfa.agents.formation.formation import (
     slots_of,
     speed_factors,
 )
+from lfa.agents.formation.pose_history import PoseHistory
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 from lfa.protocol.messages.consensus import Term
@@ -234,3 +235,31 @@ def test_a_filtered_heading_turns_as_far_as_the_predecessor_has_driven() -> None
     assert motion.chi_rate == pytest.approx(0.4 / 2.0 * 0.5)
     motion.step(slot, turned, Twist(0.4, 0.0), DT)
     assert motion.chi == pytest.approx(0.1 * DT)
+
+
+def test_on_a_bend_of_the_trace_the_slot_turns_with_it() -> None:
+    trace, radius_m, slot = PoseHistory(4.0), 2.0, Slot(2, 1.2, pi)
+    for n in range(201):
+        trace.add(along_arc(Pose2D(), Twist(0.01, 0.01 / radius_m), float(n)))
+    predecessor = along_arc(Pose2D(), Twist(2.0, 2.0 / radius_m), 1.0)
+    motion = SlotMotion(DEFAULT, LIMITS, 0.0)
+    motion.reset(slot, predecessor)
+    motion.step_on(trace, trace.travelled_m, slot, predecessor, 0.4, DT)
+    expected = along_arc(Pose2D(), Twist(0.8, 0.8 / radius_m), 1.0)
+    assert (motion.x, motion.y) == pytest.approx((expected.x, expected.y), abs=0.02)
+    assert hypot(motion.vx, motion.vy) == pytest.approx(0.4)
+    assert motion.chi_rate == pytest.approx(0.4 / radius_m, rel=0.1)
+
+
+def test_a_blend_never_makes_the_slot_faster_than_its_share_of_the_drive() -> None:
+    slot, wide = Slot(2, 1.2, pi), Slot(2, 2.4, pi / 2)
+    motion = SlotMotion(DEFAULT, LIMITS, 0.0)
+    motion.reset(slot, Pose2D())
+    limit = DEFAULT.slot_speed_share * LIMITS.v_max_mps
+    x, speeds = 0.0, []
+    for _ in range(400):
+        x += 0.6 * DT
+        motion.step(wide, Pose2D(x, 0.0, 0.0), Twist(0.6, 0.0), DT)
+        speeds.append(hypot(motion.vx, motion.vy))
+    assert 0.61 < max(speeds) <= limit + 0.05
+    assert (motion.separation_m, motion.phi) == pytest.approx((2.4, pi / 2))

@@ -19,7 +19,7 @@ def grant(number: int, seq: int = 0) -> Grant:
 
 def asked(rounds: int, every_s: float = 0.001) -> Holder:
     """Return a holder that has sent so many rounds, the first at 10 s, and has its own grant of the first."""
-    holder = Holder(ME, TERM, STD, 10.0)
+    holder = Holder(ME, TERM, STD, 10.0, agreed=1)
     for number in range(rounds):
         holder.next_propose(CONFIG, 10.0 + every_s * number)
     assert not holder.granted(ME, grant(0), CONFIG, 10.0)
@@ -51,7 +51,7 @@ def test_a_grant_of_a_round_that_was_never_sent_extends_nothing() -> None:
 
 def test_a_late_grant_counts_for_one_of_the_last_64_rounds() -> None:
     assert asked(ROUNDS_KEPT).granted(OTHER, grant(0), CONFIG, 10.1)
-    forgotten = Holder(ME, TERM, STD, 10.0)
+    forgotten = Holder(ME, TERM, STD, 10.0, agreed=1)
     for number in range(ROUNDS_KEPT + 1):
         forgotten.next_propose(CONFIG, 10.0 + 0.001 * number)
     assert not any(forgotten.granted(voter, grant(0), CONFIG, 10.1) for voter in CONFIG.voters)
