@@ -228,3 +228,14 @@ def test_S3_forgets_the_place_that_was_entered_first_when_it_remembers_256() -> 
     for n, cell in enumerate([*there_and_back, *range(2, 256), 0]):
         reason = stuck.watch(Pose2D(0.1 + 0.5 * cell, 0.1, 0.0), AHEAD, None, None, 0.1 * n)
     assert str(reason).startswith("S3")
+
+
+def test_a_robot_that_finds_its_pose_again_is_watched_anew() -> None:
+    monitor = StuckMonitor()
+    for n in range(round((STILL_S - 0.2) / 0.02)):
+        monitor.watch(Pose2D(), AHEAD, None, None, 0.02 * n, leads=False)
+    monitor.lose_pose("localization")
+    assert monitor.pose_lost
+    monitor.find_pose()
+    monitor.watch(Pose2D(), AHEAD, None, None, STILL_S, leads=False)
+    assert monitor.reason is None

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from math import pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot
+from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot, summarize
 from lfa.deploy.analysis.summary import RobotSummary
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.run_folder import About
+from lfa.deploy.run.simulate import run
+from lfa.world.description.load import load
 
 T = np.arange(0.0, 10.0, 0.02)
 K, PHI = 1.2, 2.0 * pi / 3.0
@@ -121,3 +126,22 @@ def test_left_behind_is_who_is_out_of_the_chain_or_far_from_its_slot(
     distance_m: float | None, chain: tuple[int, ...], left: bool
 ) -> None:
     assert _left_behind(_at(distance_m), chain) is left
+
+
+def test_a_run_is_summed_up_with_its_times_and_judged_by_its_assertions(tmp_path: Path) -> None:
+    """Two robots for two seconds; no number in it is a measurement of this machine's speed."""
+    folder = tmp_path / "run"
+    run(load("straight", ("time_limit_s=2.0", "mission.robots=[1,2]")), 1, folder)
+    verdict, about = Verdict("time_limit", "over"), About("straight", "simulated", 1, "fleet")
+    summary = summarize(folder, about, verdict, 0.1234567, ["kill 2 at 9 s"])
+    assert summary.duration_s == 0.123
+    assert summary.sim_duration_s == pytest.approx(2.0, abs=0.1)
+    assert summary.real_time_factor == pytest.approx(summary.sim_duration_s / 0.1234567, abs=0.1)
+    assert summarize(folder, about, verdict, 0.0, []).real_time_factor == 0.0
+    judged = {assertion.name: (assertion.ok, assertion.text) for assertion in summary.assertions}
+    assert judged["no_violations"] == (True, "")
+    assert judged["all_faults_done"] == (False, "kill 2 at 9 s")
+    assert judged["goal_reached"] == (False, "over")
+    assert summary.assertions[0].name == "goal_reached"
+    assert [robot.role_at_end for robot in summary.robots] == ["leader", "follower"]
+    assert summary.robots[0].final_distance_error_m is None and summary.robots[1].final_distance_error_m is not None
