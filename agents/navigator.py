@@ -268,10 +268,11 @@ class Navigator:
         return mates
 
     def _lead(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
+        around_these = self.leading.look(points, pose, now)
         wanted, speed = self.leading.step(chain, pose, self._last, now)
         if self.explore is not None:
             return self.leading.exploring(points, pose, wanted)
-        around = self._steer(points, self.leading.target(pose), wanted, speed, pose, now)
+        around = self._steer(around_these, self.leading.target(pose), wanted, speed, pose, now)
         return wanted if around is None else around
 
     def _steer(

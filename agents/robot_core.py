@@ -255,6 +255,8 @@ class RobotCore:
         command = navigator.drive(role, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
         told = navigator.published(twist)
+        for kind, data in navigator.leading.drain():
+            self._event(kind, now, data, lease.term)
         self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, told, now)
         if self._stuck_policy.step(role, pose, lease, navigator, now):
             self._hand_over(now)

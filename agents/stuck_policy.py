@@ -61,9 +61,8 @@ class StuckPolicy:
                 driver.back_out(pose)
             return False
         lease.left_out = self._left_out(lease, driver, now)
-        failure = None if driver.explore is None else driver.explore.failure
-        if failure is not None:
-            self._fail(failure, lease, now)
+        if driver.leading.failure is not None:
+            self._fail(driver.leading.failure, lease, now)
         return driver.stuck is not None and now >= self._next_handover and self._gives_up(pose, lease, driver, now)
 
     def _left_out(self, lease: Lease, driver: Navigator, now: float) -> frozenset[int]:

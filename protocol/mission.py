@@ -89,6 +89,8 @@ class Leading(Struct, frozen=True, forbid_unknown_fields=True):
     cruise_mps: float = 0.5
     acceleration_mps2: float = 0.5
     goal_tolerance_m: float = 0.10
+    """Distance [m] to the last way-point within which the leader comes to rest. With something on it, the leader ends
+    at the nearest free place within 1 m of it; the run fails if there is none."""
     waypoint_tolerance_m: float = 0.15
     """Distance [m] within which the leader passes each way-point on the way to the last: it rounds a corner so far, and
     turns on the spot in a sharp one. With something on a way-point, it passes the nearest free place."""

@@ -7,15 +7,16 @@ slowing that lets the team keep up is the same for all (control.md sections 2.2 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import atan2
-from typing import TYPE_CHECKING
+from math import atan2, hypot
+from typing import TYPE_CHECKING, Any
 
 from lfa.agents.avoidance.safety import SKIN_M
 from lfa.agents.formation.formation import Formation
+from lfa.agents.leading.free_place import FREE_WITHIN_M, FreePlace
 from lfa.agents.leading.path_follower import PathFollower
-from lfa.agents.perception.scan import Point, free_along
+from lfa.agents.perception.scan import Point, free_along, without
 from lfa.agents.team_state import TeamState
-from lfa.protocol.geometry import STILL, Pose2D, Twist, distance
+from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, in_base
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Mission
 
@@ -36,6 +37,8 @@ DETOUR_SHARE = 0.7
 NOSE_M, NOSE_RAD, NOSE_RADPS, NOSE_MPS = 0.05, 0.2, 0.5, 0.1
 """Free distance ahead, bearing of the route, turn rate and speed for an explorer that faces a wall."""
 LOOK_ROUND_M = 0.35
+LEFT_M, BACK_M = 0.5, 0.15
+"""Distances [m] from the route beyond which a leader has left it, and within which it is back on it."""
 
 
 class Leadership:
@@ -57,6 +60,13 @@ class Leadership:
             from lfa.agents.leading.timed_route import Timetable
 
             self._timetable = Timetable(mission.leading)
+        self._free_place = FreePlace(mission.radius_m)
+        self._looked_at = -1
+        self._told: list[tuple[str, dict[str, Any]]] = []
+        self._off_max_m: float | None = None
+        """Largest distance [m] from the route since the leader left it; None on the route."""
+        self.failure: str | None = None
+        """Reason why the goal cannot be reached; None: none is known."""
         self._waiting_since: float | None = None
         self._asked: dict[int, float] = {}
         self._swings_until = 0.0
@@ -89,6 +99,8 @@ class Leadership:
             self.explore.aim(self.lead.waypoint)
         if self.explore.work(leads, pose, mates(now), now):
             self.lead.take(self.explore.route, pose)
+        if self.explore.failure is not None:
+            self.failure = self.explore.failure
 
     def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
         """Return the wanted twist, and the maximum speed [m/s] of a detour."""
@@ -98,7 +110,57 @@ class Leadership:
             speed = self._timetable.speed(self.lead.place_m, now)
         speed *= self._patience(chain, pose, now) * self._swing(slots, now)
         self._speed_mps = speed
-        return self.lead.step(pose, last, slots, speed), DETOUR_SHARE * speed
+        wanted = self.lead.step(pose, last, slots, speed)
+        self._tell_detour(self.lead.off_m(pose))
+        return wanted, DETOUR_SHARE * speed
+
+    def look(self, points: list[Point], pose: Pose2D, now: float) -> list[Point]:
+        """Look whether something stands on the next way-point, and choose the free place beside it.
+
+        Return the points of the scan to make a detour for, which are all but those of that thing.
+        """
+        lead = self.lead
+        if lead.waypoint_number != self._looked_at:
+            self._looked_at = lead.waypoint_number
+            self._free_place.reset()
+        number, (x, y) = lead.waypoint_number, self._mission.leading.route_m[lead.waypoint_number]
+        if lead.drives_up:
+            place = self._free_place.look((x, y), points, pose, now)
+            if place is not None and lead.place is None:
+                lead.end_at(place)
+                self._told.append(("waypoint_taken", {"waypoint": number, "x": place[0], "y": place[1]}))
+            elif self._free_place.none_left:
+                self._pass_over(number)
+        if lead.place is None:
+            return points
+        return without(points, in_base(pose, (x, y)), hypot(lead.place[0] - x, lead.place[1] - y))
+
+    def drain(self) -> list[tuple[str, dict[str, Any]]]:
+        """Return what has happened on the route since the last call, as kinds and data of events."""
+        passed = [("waypoint", {"waypoint": n, "off_m": round(off_m, 3)}) for n, off_m in self.lead.passed]
+        told, self._told = [*passed, *self._told], []
+        self.lead.passed.clear()
+        return told
+
+    def _tell_detour(self, off_m: float) -> None:
+        """Tell when the leader has left its route by more than `LEFT_M`, and when it is back on it."""
+        if self._off_max_m is None and off_m > LEFT_M:
+            self._told.append(("route", {"state": "left", "off_m": round(off_m, 3)}))
+            self._off_max_m = off_m
+        elif self._off_max_m is not None:
+            self._off_max_m = max(self._off_max_m, off_m)
+            if off_m < BACK_M:
+                self._told.append(("route", {"state": "back", "off_max_m": round(self._off_max_m, 3)}))
+                self._off_max_m = None
+
+    def _pass_over(self, number: int) -> None:
+        """Give up a way-point that something stands on without a free place beside it: the run, if it is the goal."""
+        reason = f"something stands on way-point {number + 1}, and no place within {FREE_WITHIN_M:g} m of it is free"
+        if self.lead.is_last:
+            self.failure = reason
+        else:
+            self._told.append(("waypoint_skipped", {"waypoint": number, "reason": reason}))
+            self.lead.skip()
 
     def target(self, pose: Pose2D) -> Point:
         """Return the point in `base_link` to which a detour leads back."""

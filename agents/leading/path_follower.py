@@ -74,7 +74,7 @@ class PathFollower:
         self._added = 0
         """Number of points that the route has before the first of its way-points."""
         self._from_m: float | None = None
-        self._place: Point | None = None
+        self.place: Point | None = None
         """Place that replaces the next way-point, where something stands on it."""
         self._s = 0.0
         self._reached_m = 0.0
@@ -91,7 +91,7 @@ class PathFollower:
         that it has driven so far (`driven_m`).
         """
         if team is not None:
-            self._next, self._nearest_m, self._place = min(team.waypoint, self._last), inf, None
+            self._next, self._nearest_m, self.place = min(team.waypoint, self._last), inf, None
         if not (self._planned or self._reactive):
             self._lay(pose)
             if team is not None:
@@ -126,9 +126,9 @@ class PathFollower:
             return RouteProgress(self._next, max(0.0, self._marks[self._next] - self._s))
         return RouteProgress(self._next, _apart(self.waypoint, pose))
 
-    def end_at(self, place: Point | None) -> None:
-        """Drive to `place` instead of the next way-point, on which something stands; None: to the way-point again."""
-        self._place = place
+    def end_at(self, place: Point) -> None:
+        """Drive to `place` instead of the next way-point, on which something stands."""
+        self.place = place
 
     def skip(self) -> None:
         """Pass over the next way-point, which cannot be reached; never the last."""
@@ -143,12 +143,17 @@ class PathFollower:
     @property
     def waypoint(self) -> Point:
         """Way-point that comes next, or the free place beside it."""
-        return self._place or self._leading.route_m[self._next]
+        return self.place or self._leading.route_m[self._next]
 
     @property
     def waypoint_number(self) -> int:
         """Index of the next way-point in the mission's route."""
         return self._next
+
+    @property
+    def drives_up(self) -> bool:
+        """True where the robot drives up to the next way-point itself, and does not round it."""
+        return not self._marks or self.is_last or self._next in self._stops
 
     @property
     def is_last(self) -> bool:
@@ -177,6 +182,10 @@ class PathFollower:
         """
         return max(0.0, self._s - self._marks[0]) if self._last > 0 and self._marks else self._s
 
+    def off_m(self, pose: Pose2D) -> float:
+        """Return the distance [m] to the mission's route; 0 for a motion without one."""
+        return _apart(self._route.point(self._s), pose) if self._route is not None and self._marks else 0.0
+
     @property
     def reached_m(self) -> float:
         """Distance [m] along the mission's route that the team has reached under any leader, as of `progress_m`."""
@@ -204,7 +213,7 @@ class PathFollower:
         elif self._planned:
             self._route = None
         self.passed.append((self._next, self._nearest_m))
-        self._next, self._nearest_m, self._place = self._next + 1, inf, None
+        self._next, self._nearest_m, self.place = self._next + 1, inf, None
 
     def _left_m(self, pose: Pose2D) -> float:
         """Return the straight distance [m] to the goal by way of the way-points that are left."""
@@ -312,14 +321,16 @@ class PathFollower:
             return Twist(0.0, 0.0)
         stop_x, stop_y = self._stop_point
         straight = hypot(stop_x - pose.x, stop_y - pose.y)
-        ends = self._stop == self._last
-        if ends and straight <= 0.3 * self._leading.goal_tolerance_m:
-            return Twist(0.0, 0.0)
         left_m = straight if self._route is None else self._stop_m - self._s
-        near_end = left_m < self._look_ahead_m
+        near_end = left_m < self._look_ahead_m  # near the place is not enough: a route may pass it on the way
+        ends = self._stop == self._last
+        if ends and near_end and straight <= 0.3 * self._leading.goal_tolerance_m:
+            return Twist(0.0, 0.0)
         target = in_base(pose, (stop_x, stop_y)) if near_end else self.ahead(pose, self._look_ahead_m)
         bearing = atan2(target[1], target[0])
-        v = min(self._cruise(slots), self._braking(straight, ends), speed_max_mps)
+        v = min(
+            self._cruise(slots), self._braking(straight if near_end else max(straight, left_m), ends), speed_max_mps
+        )
         if self._planned:
             v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
         # This limit is last: a share of it would be taken again in each following step.

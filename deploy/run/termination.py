@@ -10,6 +10,7 @@ from __future__ import annotations
 from itertools import pairwise
 from math import hypot
 
+from lfa.agents.leading.free_place import FREE_WITHIN_M
 from lfa.deploy.recording.outcome import Verdict
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import NO_TERM, Term
@@ -42,6 +43,8 @@ class Referee:
         self._now_s = 0.0
         self._progress: dict[int, RouteProgress] = {}
         """Progress on the route as last reported by each robot."""
+        self._place: tuple[float, float] | None = None
+        """Place [m] that a leader takes instead of the goal, on which something stands."""
         self._tracking: dict[int, tuple[Tracking, float]] = {}
         """Last report of each follower, and when [s] it came."""
         self.verdict: Verdict | None = None
@@ -55,6 +58,8 @@ class Referee:
                     self.verdict = self._judge(message)
                 case TableRow(progress=RouteProgress() as progress):
                     self._progress[robot_id_of(message.header.sender) or 0] = progress
+                case Event(kind="waypoint_taken", data={"waypoint": int() as n, "x": float() as x, "y": float() as y}):
+                    self._take_place(n, x, y)
                 case Tracking():
                     self._tracking[robot_id_of(message.header.sender) or 0] = message, self._now_s
                 case Event(kind="failed"):
@@ -92,14 +97,20 @@ class Referee:
         progress = self._progress.get(leader.id)
         if progress is None or progress.waypoint < len(points):
             return f"robot {leader.id} is on its way to way-point {1 + (progress.waypoint if progress else 0)}"
-        goal_x, goal_y = points[-1]
-        if hypot(leader.x - goal_x, leader.y - goal_y) > leading.goal_tolerance_m:
+        places = [points[-1], *([] if self._place is None else [self._place])]
+        if min(hypot(leader.x - x, leader.y - y) for x, y in places) > leading.goal_tolerance_m:
             return f"robot {leader.id} is off the goal"
         moving = next((robot.id for robot in chain if not _at_rest(robot)), None)
         if moving is not None:
             return f"robot {moving} moves"
         astray = next((robot.id for ahead, robot in pairwise(chain) if not self._in_slot(robot, ahead)), None)
         return None if astray is None else f"robot {astray} is not in its slot"
+
+    def _take_place(self, number: int, x: float, y: float) -> None:
+        """Accept a place that replaces the goal, if it is no farther from the goal than such a place may be."""
+        goal_x, goal_y = self._scenario.mission.goal_m
+        if number == len(self._scenario.mission.leading.route_m) - 1 and hypot(x - goal_x, y - goal_y) <= FREE_WITHIN_M:
+            self._place = x, y
 
     def _in_slot(self, robot: TrueRobot, ahead: TrueRobot) -> bool:
         """Return whether a follower at rest is in its slot, by its own report and by the ground truth."""

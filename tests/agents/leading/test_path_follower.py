@@ -1,6 +1,6 @@
 """How a leader drives: progress on the route, rest at the goal, and bends that the whole chain can keep up with."""
 
-from math import atan2, hypot, pi
+from math import atan2, cos, hypot, pi, sin
 
 import pytest
 
@@ -133,3 +133,34 @@ def test_a_route_of_one_point_begins_where_the_robot_stands() -> None:
     pose, twist = driven(Leading(route_m=((3.0, 1.0),)), Pose2D())[-1]
     assert hypot(pose.x - 3.0, pose.y - 1.0) <= 0.10
     assert twist.linear_x < 1e-3
+
+
+ROUND = (*((round(4.0 * sin(0.1 * n), 3), round(4.0 - 4.0 * cos(0.1 * n), 3)) for n in range(63)), (0.0, 0.0))
+
+
+@pytest.mark.parametrize("motion", ["path_following", "point_to_point"])
+def test_a_round_that_ends_where_it_began_is_driven_from_its_start_to_its_end(motion: str) -> None:
+    leading = Leading(motion=motion, route_m=ROUND)  # type: ignore[arg-type]
+    course = driven(leading, Pose2D())
+    assert max(hypot(pose.x, pose.y) for pose, _ in course) == pytest.approx(8.0, abs=0.2)
+    assert max(twist.linear_x for _, twist in course[:150]) > 0.4
+    pose, twist = course[-1]
+    assert hypot(pose.x, pose.y) <= 0.10
+    assert abs(twist.linear_x) < 1e-3
+
+
+def test_a_goal_that_the_route_passes_on_the_way_does_not_slow_the_leader() -> None:
+    leading = Leading(route_m=((0.0, 0.0), (4.0, 0.0), (8.0, 0.0), (8.0, 4.0), (4.0, 4.0), (4.0, 0.0)))
+    course = driven(leading, Pose2D())
+    assert min(twist.linear_x for pose, twist in course if 3.0 < pose.x < 5.0 and abs(pose.theta) < 0.3) > 0.3
+
+
+def test_corners_are_passed_within_the_tolerance() -> None:
+    for corner in (
+        ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0)),
+        ((0.0, 0.0), (4.0, 0.0), (8.0, 2.5)),
+        ((4.0, 0.0), (0.0, 0.0)),
+    ):
+        course = driven(Leading(route_m=corner), Pose2D())
+        missed = [min(hypot(pose.x - x, pose.y - y) for pose, _ in course) for x, y in corner]
+        assert max(missed) <= 0.15, f"{corner} is missed by {missed}"

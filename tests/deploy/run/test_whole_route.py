@@ -93,3 +93,30 @@ def test_a_robot_that_restarted_and_leads_goes_on_from_the_teams_progress(tmp_pa
     led = done.truth[2][done.led(2, done.truth[2][:, 0])]
     assert led.size
     assert min(hypot(x - 2.5, y) for _, x, y in led[:, :3]) > 1.0
+
+
+CORNER = """
+title = "a corner behind an obstacle"
+time_limit_s = 60.0
+[mission]
+robots = [1, 2]
+[mission.leading]
+route_m = [[5.0, 0.0], [5.0, 3.0]]
+[[world.obstacles]]
+center_m = [2.5, 0.05]
+radius_m = 0.3
+"""
+
+
+def test_after_a_detour_the_leader_returns_to_the_line_passes_the_corner_and_says_so(tmp_path: Path) -> None:
+    (tmp_path / "corner.toml").write_text(CORNER)
+    done = Run(run(load(str(tmp_path / "corner.toml")), 1, tmp_path / "run").folder)
+    again = f"lfa sim corner.toml --seed 1 with {CORNER}"
+    assert done.summary.outcome == "goal_reached", again
+    assert max(missed_m(done)) <= PASSED_M, again
+    route = [line for line in done.events if line["kind"] == "route"]
+    assert [line["state"] for line in route] == ["left", "back"], again
+    assert route[1]["off_max_m"] > 0.5
+    passed = [line for line in done.events if line["kind"] == "waypoint"]
+    assert [line["waypoint"] for line in passed] == [0]
+    assert passed[0]["off_m"] <= PASSED_M
