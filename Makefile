@@ -31,7 +31,13 @@ test: $(STAMP)
 
 # Programs of others that tests of the ROS side talk to, each in an environment of its own; their tests are skipped
 # without them. Fetches some 400 MB once.
-peers: .peers/genuine/.installed .peers/sdk/.installed
+peers: .peers/genuine/.installed .peers/sdk/.installed .peers/foxglove/.installed
+
+.peers/foxglove/.installed: tests/deploy/ros/peers/foxglove_package.json
+	mkdir -p $(@D)
+	cp $< $(@D)/package.json
+	npm install --prefix $(@D) --silent --no-audit --no-fund
+	touch $@
 
 .peers/%/.installed: tests/deploy/ros/peers/%.txt
 	$(PYTHON) -m venv .peers/$*

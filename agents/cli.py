@@ -70,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--role", required=True, help="initial role: leader, follower or witness; roles change at run time")
     add("--id", required=True, help="robot id from the mission (1, 2, ...), or w for the witness")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
-    add("--connect", metavar="ENDPOINT", help="the router, such as tcp/127.0.0.1:7447 (default: this machine's); a,b: "
+    add("--connect", metavar="ENDPOINT", help="the router, such as tcp/127.0.0.1:7450 (default: this machine's); a,b: "
         "the first that answers, the next one when it is lost")
     add("--keys", type=Path, metavar="DIR", help="this machine's folder of `lfa keys`, with the robot's certificate")
     add("--link", choices=sorted(LINK_LEASES_MS), default="std",

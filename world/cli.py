@@ -30,7 +30,7 @@ def start(
     set_: Annotated[list[str] | None, typer.Option("--set", help="Override a field, a.b=value; repeatable.")] = None,
     robots: Annotated[int | None, typer.Option(help="Team size; the ids become 1 to N.")] = None,
     fleet: Annotated[str, typer.Option(help="Name of the fleet, part of every key.")] = "fleet",
-    connect: Annotated[str | None, typer.Option(help="Router, as tcp/127.0.0.1:7447; a,b: tried in turn.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, as tcp/127.0.0.1:7450; a,b: tried in turn.")] = None,
     keys: Annotated[Path | None, typer.Option(help="This machine's key folder from `lfa keys`.")] = None,
     link: Annotated[
         Literal["fast", "std", "wifi"], typer.Option(help="Timeout of a silent link: 0.5, 1 or 2 s.")

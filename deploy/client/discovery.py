@@ -14,7 +14,7 @@ from lfa.protocol.names import whole_number
 from lfa.protocol.transport.zenoh_config import default_endpoint
 
 LISTEN_S = 1.0  # time to listen [s]: 50 poses of a leader
-DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7447")
+DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7450")
 """Endpoints on which a router without `--listen` listens."""
 
 

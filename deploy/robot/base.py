@@ -46,8 +46,8 @@ class Base(Protocol):
     def drive(self, twist: Twist, now: float) -> None:
         """Drive at `twist` from `now` on [s, monotonic]. `STILL` means brake; it comes whenever no command is valid."""
 
-    def read(self, now: float) -> Reading:
-        """Return the measurements at `now` [s, monotonic]."""
+    def read(self, now: float) -> Reading | None:
+        """Return the measurements at `now` [s, monotonic]; None if the hardware gives none: the driver is silent."""
 
 
 class SimulatedBase:

@@ -12,7 +12,9 @@ import shutil
 import sys
 from math import isfinite
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
+
+from msgspec import structs
 
 from lfa.deploy.robot.base import SimulatedBase
 from lfa.deploy.robot.driver import Driver
@@ -27,6 +29,7 @@ from lfa.protocol.topics import fleet_name
 from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 
+ROS_ROUTER = "tcp/127.0.0.1:7447"
 EXAMPLE = "example: lfa-driver --id 3 --at 0,-2.4,0 (beside lfa-world SCENARIO --set world.real_robots=[3])"
 
 
@@ -43,14 +46,47 @@ def start(arguments: argparse.Namespace) -> int:
     """Drive one robot until stopped (Ctrl-C or SIGTERM). Raises `Refused`."""
     if not 1 <= arguments.id <= 2**31:
         raise Refused(f"--id {arguments.id}: must be a robot's number, 1 or higher")
-    start_map, wall_ms = _pose(arguments.at), clock.wall_ms()
+    fleet = fleet_name(arguments.fleet)
+    start_map = None if arguments.at is None else _pose("--at", arguments.at)
+    if arguments.ros is not None:
+        return _start_ros(arguments, fleet, start_map)
 
     def make_base(limits: Limits, now: float) -> SimulatedBase:
-        return SimulatedBase(start_map, limits, now)
+        return SimulatedBase(start_map or Pose2D(), limits, now)
 
-    fleet = fleet_name(arguments.fleet)
     watchdog = () if arguments.stop_command is None else (_watchdog(arguments.stop_command).alive,)
-    driver = Driver(fleet, arguments.id, incarnations.drawn(), make_base, *watchdog)
+    return _run(Driver(fleet, arguments.id, incarnations.drawn(), make_base, *watchdog), arguments, fleet)
+
+
+def _start_ros(arguments: argparse.Namespace, fleet: str, start_map: Pose2D | None) -> int:
+    """Drive a ROS 2 robot. The ROS side is imported here: other drivers need the base install only."""
+    try:
+        from lfa.deploy.robot.ros_open import RosOptions, RosRobot
+        from lfa.deploy.robot.ros_presets import load_preset
+    except ModuleNotFoundError as error:
+        raise Refused(f"--ros needs {error.name}: install with: pip install 'lfa[ros]'") from None
+    laser = None if arguments.laser is None else _pose("--laser", arguments.laser)
+    changed: dict[str, Any] = {
+        "odom": arguments.odom,
+        "scan": arguments.scan,
+        "cmd_vel": arguments.cmd_vel,
+        "laser": None if laser is None else (laser.x, laser.y, laser.theta),
+    }
+    names = structs.replace(load_preset(arguments.robot), **{k: v for k, v in changed.items() if v is not None})
+    robot = RosRobot(
+        RosOptions(arguments.ros, arguments.domain, arguments.namespace, names, arguments.robot_stops_by_itself),
+        start_map,
+    )
+    try:
+        driver = Driver(fleet, arguments.id, incarnations.drawn(), robot.make_base, robot.alive)
+        return _run(driver, arguments, fleet)
+    finally:
+        robot.close()
+
+
+def _run(driver: Driver, arguments: argparse.Namespace, fleet: str) -> int:
+    """Run the driver until it is stopped; its last command is a stop."""
+    wall_ms = clock.wall_ms()
     known = None if arguments.keys is None else credentials(arguments.keys, driver.name, wall_ms)
     endpoint = arguments.connect or default_endpoint()
     notify = os.environ.get("NOTIFY_SOCKET", "")
@@ -76,14 +112,14 @@ def _watchdog(command: str) -> Watchdog:
     return Watchdog(words)
 
 
-def _pose(text: str) -> Pose2D:
+def _pose(option: str, text: str) -> Pose2D:
     try:
         x, y, theta = (float(part) for part in text.split(","))
         fine = all(map(isfinite, (x, y, theta)))
     except ValueError:
         fine = False
     if not fine:
-        raise Refused(f"--at {text}: must be x,y,theta in map [m, m, rad], like 0,-2.4,0")
+        raise Refused(f"{option} {text}: must be x,y,theta [m, m, rad], like 0,-2.4,0")
     return Pose2D(x, y, theta)
 
 
@@ -99,12 +135,25 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--id", required=True, type=int, help="the robot's id in the mission")
-    add("--at", default="0,0,0", metavar="X,Y,THETA", help="start pose in map [m, m, rad]")
+    add("--at", metavar="X,Y,THETA", help="start pose in map [m, m, rad]; default 0,0,0, with --ros none")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
-    add("--connect", metavar="ENDPOINT", help="router, as tcp/127.0.0.1:7447; a,b: tried in turn")
+    add("--connect", metavar="ENDPOINT", help="router, as tcp/127.0.0.1:7450; a,b: tried in turn")
     add("--keys", type=Path, metavar="DIR", help="this machine's key folder from `lfa keys`")
     add("--stop-command", metavar="COMMAND", help="stops the motors; a second process runs it when this one is silent")
     add("--link", choices=sorted(LINK_LEASES_MS), default="std", help="timeout of a silent link: 0.5, 1 or 2 s")
+    ros = parser.add_argument_group("ROS 2 robots", "a robot on the network of rmw_zenoh; needs pip install 'lfa[ros]'")
+    add = ros.add_argument
+    add("--ros", nargs="?", const=ROS_ROUTER, metavar="ENDPOINT", help="drive a ROS robot; its router (%(const)s)")
+    add(
+        "--robot", default="turtlebot3", metavar="NAME", help="turtlebot3, turtlebot4, create3, clearpath, nav2, F.toml"
+    )
+    add("--namespace", metavar="/NAME", help="the robot's namespace; default the only robot found")
+    add("--domain", type=int, default=0, help="ROS_DOMAIN_ID (default: %(default)s)")
+    add("--odom", metavar="TOPIC", help="instead of the preset's")
+    add("--scan", metavar="TOPIC", help="instead of the preset's")
+    add("--cmd-vel", metavar="TOPIC", help="instead of the preset's; Twist or TwistStamped is found")
+    add("--laser", metavar="X,Y,YAW", help="mount of the scanner in the base frame; default from /tf_static")
+    add("--robot-stops-by-itself", action="store_true", help="allow a link to another machine before the wheels")
     return parser
 
 

@@ -125,6 +125,8 @@ class Driver:
         except Exception:
             self.brake(now)
             raise
+        if reading is None:  # its agent then knows no fresh stamp of this gateway, and the deadman brakes
+            return []
         self._alive(now)
         return self._said(reading, self._gateway, now)
 

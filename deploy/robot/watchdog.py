@@ -14,23 +14,38 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import IO
 
 SILENT_S = 0.25
 """Silence [s] of the driver after which the stop command runs: more than twelve control periods of 20 ms."""
 
 
+PROGRAM = (sys.executable, "-P", "-m", "lfa.deploy.robot.watchdog", str(SILENT_S))
+
+
 class Watchdog:
     """Driver's side: starts the watchdog process, and keeps it quiet with `alive`."""
 
-    def __init__(self, command: Sequence[str]) -> None:
-        """Start the process; `command` stops the motors. Raises OSError when it cannot be started."""
-        words = [sys.executable, "-P", "-m", "lfa.deploy.robot.watchdog", str(SILENT_S), *command]
-        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, start_new_session=True)
+    def __init__(self, command: Sequence[str], program: Sequence[str] = PROGRAM) -> None:
+        """Start the process; `command` stops the motors. Raises OSError when it cannot be started.
+
+        `program` is another watchdog, which takes `command` as its arguments and may report to `output`.
+        """
+        quiet = None if program is PROGRAM else subprocess.PIPE
+        self._process = subprocess.Popen(
+            [*program, *command], stdin=subprocess.PIPE, stdout=quiet, start_new_session=True
+        )
         assert self._process.stdin is not None
         self._pipe = self._process.stdin.fileno()
         os.set_blocking(self._pipe, False)
+
+    @property
+    def output(self) -> IO[bytes]:
+        """Standard output of another watchdog program than `PROGRAM`."""
+        assert self._process.stdout is not None
+        return self._process.stdout
 
     def alive(self, _now: float) -> None:
         """Report a control period in which the hardware answered. A full or broken pipe does not stop the driver."""
@@ -38,8 +53,8 @@ class Watchdog:
             os.write(self._pipe, b".")
 
 
-def watch(pipe: int, silent_s: float, command: Sequence[str]) -> int:
-    """Wait for the driver's first report, then run `command` at each silence, and at the end; return its exit code."""
+def watch(pipe: int, silent_s: float, stop: Callable[[], int]) -> int:
+    """Wait for the driver's first report, then call `stop` at each silence, and at the end; return its exit code."""
     stopped = True  # before the first report no motor has been commanded
     while True:
         ready, _, _ = select.select([pipe], [], [], None if stopped else silent_s)
@@ -47,7 +62,7 @@ def watch(pipe: int, silent_s: float, command: Sequence[str]) -> int:
             stopped = False
             continue
         if not stopped or ready:
-            code = subprocess.run(command, check=False).returncode
+            code = stop()
             stopped = True
         if ready:
             return code
@@ -57,7 +72,7 @@ def main() -> int:
     """Run the watchdog on standard input."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # what ends the driver must not end its watchdog first
-    return watch(sys.stdin.fileno(), float(sys.argv[1]), sys.argv[2:])
+    return watch(sys.stdin.fileno(), float(sys.argv[1]), lambda: subprocess.run(sys.argv[2:], check=False).returncode)
 
 
 if __name__ == "__main__":

@@ -6,22 +6,10 @@ odometry, never by its tokens.
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from lfa.deploy.ros.wire import HASHLESS, Kind, RosEndpoint, RosNode, read_token
 
 TOKENS_MAX = 20_000
 """Maximum number of tokens kept: about 1000 nodes; further ones are dropped and counted."""
-
-
-class RobotCandidate(Struct, frozen=True, order=True):
-    """Robot that the graph suggests: its domain, its namespace and the type of its command."""
-
-    domain: int
-    namespace: str
-    """Like `/robot3`; empty for none."""
-    stamped: bool
-    """True if it listens to TwistStamped, False for Twist."""
 
 
 class RosGraph:
@@ -61,20 +49,9 @@ class RosGraph:
         found = (entity for entity in self._known.values() if isinstance(entity, RosEndpoint))
         return sorted({one.node.full_name for one in found if one.hash != HASHLESS})
 
-    def commanders(self, topic: str, own_sessions: frozenset[str]) -> list[str]:
-        """Return the names of nodes of other sessions that publish on a robot's command topic."""
-        others = (one.node for one in self.endpoints("MP", topic) if one.node.session not in own_sessions)
-        return sorted({node.full_name for node in others})
-
-    def robots(self, command: str, domain: int | None = None) -> list[RobotCandidate]:
-        """Return the robots that listen to Twist or TwistStamped on a topic that ends with `command`."""
-        found: set[RobotCandidate] = set()
-        for one in self.endpoints("MS"):
-            if not one.topic.endswith(f"/{command}") or one.type not in TWISTS:
-                continue
-            if domain in (None, one.node.domain):
-                found.add(RobotCandidate(one.node.domain, one.topic.removesuffix(f"/{command}"), TWISTS[one.type]))
-        return sorted(found)
+    def commanders(self, topic: str) -> list[str]:
+        """Return the names of the nodes that publish on a robot's command topic."""
+        return sorted({one.node.full_name for one in self.endpoints("MP", topic)})
 
 
 TWISTS = {"geometry_msgs/msg/Twist": False, "geometry_msgs/msg/TwistStamped": True}

@@ -71,6 +71,11 @@ class FleetMapping:
         self._robots.pop(robot, None)
         self._described.discard(robot)
 
+    def set_mission(self, mission: Mission) -> None:
+        """Take the mission: the robots' size and the leader's route."""
+        self._mission = mission
+        self._described.clear()
+
     def update(self, stamp_ns: int, owner: str, message: Message) -> list[RosMessage]:
         """Take a message of the key owner `owner`, stamped `stamp_ns`; return the ROS messages that it becomes."""
         robot = robot_id_of(owner)
@@ -97,8 +102,7 @@ class FleetMapping:
             case ObstacleNote():
                 self._obstacle(stamp_ns, owner, message)
             case MissionNote(mission=mission):
-                self._mission = mission
-                self._described.clear()
+                self.set_mission(mission)
             case Event():
                 return self._event(stamp_ns, owner, message)
         return []

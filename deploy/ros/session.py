@@ -27,6 +27,7 @@ from lfa.deploy.ros.wire import (
     attachment,
     read_attachment,
 )
+from lfa.protocol import clock
 from lfa.protocol.transport.bus import ANEW_S, Settable
 from lfa.protocol.transport.zenoh_ros import RosPublication, RosQuery, RosSession, Undeclarable
 
@@ -141,7 +142,7 @@ class RosSubscription:
     def __init__(self, node: NodeHandle, endpoint: RosEndpoint) -> None:
         self._space = node.space
         self._type = endpoint.type
-        self._queue: _Queue[bytes] = _Queue(node.space)
+        self._queue: _Queue[tuple[float, bytes]] = _Queue(node.space)
         qos = endpoint.qos
         kept = qos.depth if qos.latched else None
         node.keep(node.space.session.subscriber(endpoint.key, self._receive, kept=kept))
@@ -149,16 +150,20 @@ class RosSubscription:
 
     def take(self) -> list[Any]:
         """Return the messages received since the last call, oldest first."""
+        return [message for _, message in self.take_timed()]
+
+    def take_timed(self) -> list[tuple[float, Any]]:
+        """Return the messages received since the last call with the times of their arrival [s], oldest first."""
         found = []
-        for payload in self._queue.drain():
+        for arrived, payload in self._queue.drain():
             try:
-                found.append(from_cdr(payload, self._type))
+                found.append((arrived, from_cdr(payload, self._type)))
             except BadRosMessage:
                 self._space.counters.undecodable += 1
         return found
 
     def _receive(self, _key: str, payload: bytes, _attached: bytes) -> None:
-        self._queue.put(payload)
+        self._queue.put((clock.now(), payload))
 
 
 class ServiceCall(Struct, frozen=True):

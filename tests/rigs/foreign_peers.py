@@ -22,10 +22,18 @@ def interpreter(name: str) -> Path:
     return python
 
 
+def modules(name: str) -> Path:
+    """Return the folder of npm modules of the environment `name`; skip the test if the environment is not installed."""
+    if not (ROOT / ".peers" / name / ".installed").is_file():
+        pytest.skip(f"{name} is not installed here: make peers")
+    return ROOT / ".peers" / name / "node_modules"
+
+
 def start(name: str, script: str, *arguments: str, home: Path) -> subprocess.Popen[str]:
     """Start a script of `tests/deploy/ros/peers` in the environment `name`; `home` receives what it caches."""
-    words = [str(interpreter(name)), str(PEERS / script), *arguments]
-    environment = {**os.environ, "HOME": str(home)}
+    program = str(interpreter(name)) if script.endswith(".py") else "node"
+    words = [program, str(PEERS / script), *arguments]
+    environment = {**os.environ, "HOME": str(home), "NODE_PATH": str(modules(name))}
     return subprocess.Popen(
         words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
     )

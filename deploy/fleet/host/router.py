@@ -19,7 +19,7 @@ from lfa.protocol.transport.credentials import Credentials, credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 from lfa.protocol.transport.zenoh_router import open_router
 
-DEFAULT_TCP, DEFAULT_TLS = "tcp/127.0.0.1:7447", "tls/127.0.0.1:7447"
+DEFAULT_TCP, DEFAULT_TLS = "tcp/127.0.0.1:7450", "tls/127.0.0.1:7450"  # 7447 is ROS 2's
 LISTENS = "router listens at"
 ENDING = {signal.SIGTERM, signal.SIGINT}
 

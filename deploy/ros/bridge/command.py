@@ -6,40 +6,32 @@ Two sessions, never one network: an observer of the fleet, and a client of the R
 from __future__ import annotations
 
 import sys
-import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
 import typer
 
-from lfa.deploy.client.operator import Operator
-from lfa.deploy.client.session import Subscriber, find, listen
+from lfa.deploy.client.session import find, listen
 from lfa.deploy.process.signals import Interrupts
-from lfa.deploy.ros import messages
+from lfa.deploy.ros.bridge.bridge import EAGER, PERIOD_S, Bridge
 from lfa.deploy.ros.bridge.inward import OperatorInput
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE, RosOutput
-from lfa.deploy.ros.bridge.sender_clocks import SenderClocks
-from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.session import GraphFeed, RosSpace
 from lfa.deploy.ros.topics import SOURCES
 from lfa.deploy.ros.types import typestore
 from lfa.deploy.ros.wire import Distro, check_domain
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.names import robot_id_of
 from lfa.protocol.transport.bus import Wake
-from lfa.protocol.transport.message_bus import send
 from lfa.protocol.transport.zenoh_ros import ros_session
 
 ROUTER = "tcp/127.0.0.1:7447"
 SERVED = "tcp/[::]:7447"
-PERIOD_S = 0.02
+WARNINGS_MAX = 100
 GRAPH_S = 1.0
 """Time [s] to wait for the tokens of those who are there already."""
-EAGER = frozenset({"sensors", "scan"})
-"""Topics that are passed on at once; all others within a period."""
 
 
 def command(
@@ -73,13 +65,18 @@ def command(
         graph = GraphFeed(space)
         check_graph(graph, distro, 0.0 if serve else GRAPH_S)
         with Interrupts() as interrupts, listen(found, frozenset(SOURCES), every=True, wake=wake, eager=EAGER) as ear:
-            bridge = Bridge(space, ear, sim_time=sim_time, tf_per_robot=tf_per_robot)
+            output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
+            bridge = Bridge(ear, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
+            orders = OperatorInput(output.node, bridge.order, bridge.warn)
+            foreign = ForeignNodes(graph, distro)
             how = "router at" if serve else "through"
             print(f"fleet {found.name} is on ROS domain {domain}, {how} {endpoint}", file=sys.stderr, flush=True)
             while interrupts.signal is None:
                 wake.wait(PERIOD_S)
-                bridge.step(clock.now())
-                bridge.warn_of(graph, clock.now())
+                now = clock.now()
+                bridge.step(now)
+                orders.step(bridge.leader, now)
+                foreign.warn(bridge.warn, now)
     finally:
         session.close()
     facts = {**msgspec.to_builtins(space.counters), "fleet_dropped": ear.dropped}
@@ -103,59 +100,18 @@ def check_graph(graph: GraphFeed, distro: Distro, wait_s: float) -> None:
         )
 
 
-class Bridge:
-    """State of one bridge; `step` passes on what came in since the last call."""
+class ForeignNodes:
+    """Nodes that hear nothing of the bridge; each is warned of once."""
 
-    def __init__(self, space: RosSpace, ear: Subscriber, *, sim_time: bool, tf_per_robot: bool) -> None:
-        self._space = space
-        self._ear = ear
-        self._operator = Operator(ear.fleet.name, clock.wall_ms())
-        self._output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
-        self._mapping = FleetMapping(tf_per_robot=tf_per_robot, sim_time=sim_time, heard=self._output.heard)
-        self._clocks = SenderClocks(time.time_ns() - round(1e9 * clock.now()), sim_time=sim_time)
-        self._orders = OperatorInput(self._output.node, self._order, self._warn)
+    def __init__(self, graph: GraphFeed, distro: Distro) -> None:
+        self._graph = graph
+        self._distro = distro
         self._warned: set[str] = set()
 
-    def step(self, now: float) -> None:
-        """Publish what the fleet said, and pass on what ROS users ordered."""
-        arrivals = self._ear.take()
-        self._follow_robots()
-        present = self._output.robots
-        for arrival, message in arrivals:
-            if isinstance(message, Truth):
-                self._clocks.see_world(arrival.at, message.time_s)
-                continue
-            owner = arrival.key.split("/", 3)[2]
-            robot = robot_id_of(owner)
-            if self._clocks.ready and (not robot or robot in present):
-                stamp_ns = self._clocks.stamp_ns(message.header, arrival.at)
-                self._output.publish(self._mapping.update(stamp_ns, owner, message))
-        if self._clocks.ready:
-            self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
-        self._orders.step(self._mapping.leader, now)
-
-    def warn_of(self, graph: GraphFeed, now: float) -> None:
-        """Warn once of nodes that hear nothing of this bridge."""
-        seen = graph.poll(now)
-        foreign = seen.hashed() if self._space.distro == "humble" else seen.hashless()
-        for name in foreign:
-            if name not in self._warned and len(self._warned) < 100:
+    def warn(self, warn: Callable[[str], None], now: float) -> None:
+        """Call `warn` for each node of another distribution that has appeared."""
+        seen = self._graph.poll(now)
+        for name in seen.hashed() if self._distro == "humble" else seen.hashless():
+            if name not in self._warned and len(self._warned) < WARNINGS_MAX:
                 self._warned.add(name)
-                self._warn(f"{name} is of another distribution than --distro {self._space.distro}: it hears nothing")
-
-    def _follow_robots(self) -> None:
-        """Declare robots whose tokens appeared, undeclare those whose tokens vanished."""
-        living = {robot for name in self._ear.living if (robot := robot_id_of(name))}
-        for robot in living - self._output.robots:
-            self._output.join(robot)
-        for robot in self._output.robots - living:
-            self._mapping.forget(robot)
-            self._output.leave(robot)
-
-    def _order(self, name: str, **arguments: object) -> None:
-        send(self._ear.bus, self._operator.command(name, clock.now(), **arguments))
-
-    def _warn(self, words: str) -> None:
-        print(f"lfa ros: {words}", file=sys.stderr, flush=True)
-        stamp_ns = self._clocks.now_ns(clock.now())
-        self._output.publish([RosMessage("/rosout", stamp_ns, messages.log(stamp_ns, "warn", BRIDGE_NODE, words))])
+                warn(f"{name} is of another distribution than --distro {self._distro}: it hears nothing")

@@ -13,11 +13,40 @@ from lfa.protocol.mission import FormationSpec
 
 HANDOVER_S_MAX = 5.0
 """Time [s] within which another robot must lead after a hand-over was asked for."""
-WORDS_MAX = 80
-"""Number of characters of a foreign text that are repeated in a log line."""
+WORDS_MAX = 120
+"""Number of characters of a line that repeats a foreign text."""
 
 Order = Callable[..., None]
 """Sends an operator's command, by its name and its arguments."""
+
+
+class HandoverCalls:
+    """Calls of the hand-over service that wait for another leader."""
+
+    def __init__(self, order: Order) -> None:
+        self._order = order
+        self._waiting: list[tuple[float, int, ServiceCall]] = []
+        """Deadline [s], the leader at the call, and the call."""
+
+    def ask(self, call: ServiceCall, leader: int, now: float) -> None:
+        """Order a hand-over; `leader`: 0 for none."""
+        if not leader:
+            answer(call, success=False, text="nobody leads at the moment")
+            return
+        self._order("handover")
+        self._waiting.append((now + HANDOVER_S_MAX, leader, call))
+
+    def step(self, leader: int, now: float) -> None:
+        """Answer the calls that are decided."""
+        undecided = []
+        for deadline, before, call in self._waiting:
+            if leader not in (0, before):
+                answer(call, success=True, text=f"robot {leader} leads")
+            elif now > deadline:
+                answer(call, success=False, text=f"robot {before} still leads after {HANDOVER_S_MAX:g} s")
+            else:
+                undecided.append((deadline, before, call))
+        self._waiting = undecided
 
 
 class OperatorInput:
@@ -27,29 +56,16 @@ class OperatorInput:
         self._order = order
         self._warn = warn
         self._formation = node.subscription("/lfa/formation/set", "std_msgs/msg/String")
-        self._handover = node.service("/lfa/handover", "std_srvs/srv/Trigger")
-        self._waiting: list[tuple[float, int, ServiceCall]] = []
-        """Calls of the hand-over: deadline [s], the leader then, and the call."""
+        self._service = node.service("/lfa/handover", "std_srvs/srv/Trigger")
+        self._handovers = HandoverCalls(order)
 
     def step(self, leader: int, now: float) -> None:
         """Obey what came in; answer the calls that are decided. `leader`: 0 for none."""
         for message in self._formation.take():
             self._change_formation(message.data)
-        for call in self._handover.take():
-            if not leader:
-                _answer(call, success=False, text="nobody leads at the moment")
-                continue
-            self._order("handover")
-            self._waiting.append((now + HANDOVER_S_MAX, leader, call))
-        undecided = []
-        for deadline, before, call in self._waiting:
-            if leader not in (0, before):
-                _answer(call, success=True, text=f"robot {leader} leads")
-            elif now > deadline:
-                _answer(call, success=False, text=f"robot {before} still leads after {HANDOVER_S_MAX:g} s")
-            else:
-                undecided.append((deadline, before, call))
-        self._waiting = undecided
+        for call in self._service.take():
+            self._handovers.ask(call, leader, now)
+        self._handovers.step(leader, now)
 
     def _change_formation(self, side: str) -> None:
         try:
@@ -60,6 +76,7 @@ class OperatorInput:
         self._order("formation", side=side)
 
 
-def _answer(call: ServiceCall, *, success: bool, text: str) -> None:
+def answer(call: ServiceCall, *, success: bool, text: str) -> None:
+    """Answer a call of a Trigger service."""
     response: Any = kind("std_srvs/msg/Trigger_Response")(success=success, message=text)
     call.answer(response)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import msgspec
@@ -17,6 +18,7 @@ from lfa.deploy.ros.topics import fleet_topics, robot_topics
 from lfa.deploy.run import simulate
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import draw, load
+from tests.rigs.foreign_peers import answer, start
 
 ROBOTS = (1, 2, 3)
 
@@ -68,6 +70,14 @@ def test_foxgloves_reader_decodes_every_message_by_the_definitions_in_the_file(w
         count = sum(message is not None for *_, message in reader.iter_decoded_messages())
     with AnyReader([written]) as again:
         assert count == again.message_count
+
+
+@pytest.mark.processes
+def test_foxgloves_own_reader_decodes_every_message(written: Path, tmp_path: Path) -> None:
+    (file,) = written.glob("*.mcap")
+    counts = json.loads(answer(start("foxglove", "foxglove_bag.js", str(file), home=tmp_path)))
+    with AnyReader([written]) as reader:
+        assert counts == {topic: info.msgcount for topic, info in reader.topics.items()}
 
 
 def test_the_odometry_of_the_bag_is_the_recorded_one(run: Path, written: Path) -> None:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfa.deploy.ros import graph as graphs
-from lfa.deploy.ros.graph import RobotCandidate, RosGraph
+from lfa.deploy.ros.graph import TWISTS, RosGraph
 from lfa.deploy.ros.types import type_hash
 from lfa.deploy.ros.wire import DEFAULT, RosEndpoint, RosNode
 from tests.deploy.ros.test_wire import GOLDEN
@@ -36,18 +36,17 @@ def test_nodes_and_endpoints_of_genuine_nodes_are_listed() -> None:
 def test_the_graph_tells_whether_a_robot_wants_twist_or_twist_stamped() -> None:
     graph = _of_genuine_nodes()
     graph.update(_twist("MS", "b", "/cmd_vel", stamped=False), up=True)
-    assert graph.robots("cmd_vel") == [RobotCandidate(0, "", False), RobotCandidate(0, "/robot3", True)]
-    assert graph.robots("cmd_vel", domain=7) == []
+    wanted = {one.topic: TWISTS[one.type] for one in graph.endpoints("MS") if one.type in TWISTS}
+    assert wanted == {"/robot3/cmd_vel": True, "/cmd_vel": False}
 
 
 def test_another_publisher_of_a_command_is_seen_until_its_token_vanishes() -> None:
     graph = _of_genuine_nodes()
     teleop = _twist("MP", "b")
-    graph.update(_twist("MP", "own"), up=True)
     graph.update(teleop, up=True)
-    assert graph.commanders("/robot3/cmd_vel", frozenset({"own"})) == ["/teleop"]
+    assert graph.commanders("/robot3/cmd_vel") == ["/teleop"]
     graph.update(teleop, up=False)
-    assert graph.commanders("/robot3/cmd_vel", frozenset({"own"})) == []
+    assert graph.commanders("/robot3/cmd_vel") == []
 
 
 def test_nodes_of_humble_are_told_from_newer_ones() -> None:

@@ -57,4 +57,5 @@ def main():
     os._exit(0)  # its session keeps threads that never end
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""The middle of a bridge: from a fleet's messages through the mapping to an output, ROS or Foxglove."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable
+from typing import Protocol
+
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.session import Subscriber, scenario_of_fleet
+from lfa.deploy.ros import messages
+from lfa.deploy.ros.bridge.outward import BRIDGE_NODE
+from lfa.deploy.ros.bridge.sender_clocks import SenderClocks
+from lfa.deploy.ros.mapping import FleetMapping, RosMessage
+from lfa.protocol import clock, incarnations
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.names import robot_id_of
+from lfa.protocol.transport.message_bus import send
+
+PERIOD_S = 0.02
+EAGER = frozenset({"sensors", "scan"})
+"""Topics that are passed on at once; all others within a period."""
+
+
+class Output(Protocol):
+    """Where ROS messages go."""
+
+    @property
+    def robots(self) -> frozenset[int]:
+        """Robots whose topics exist."""
+
+    def heard(self, topic: str) -> bool:
+        """Return True if someone listens to `topic`."""
+
+    def join(self, robot: int) -> None:
+        """Create a robot's topics."""
+
+    def leave(self, robot: int) -> None:
+        """Remove a robot's topics."""
+
+    def publish(self, sent: Iterable[RosMessage]) -> None:
+        """Publish messages; those on topics that do not exist are dropped."""
+
+
+class Bridge:
+    """State of one bridge; `step` passes on what came in since the last call."""
+
+    def __init__(self, ear: Subscriber, output: Output, *, sim_time: bool, tf_per_robot: bool) -> None:
+        self._ear = ear
+        self._operator = Operator(ear.fleet.name, incarnations.drawn())
+        self._output = output
+        self._mapping = FleetMapping(tf_per_robot=tf_per_robot, sim_time=sim_time, heard=output.heard)
+        scenario = scenario_of_fleet(ear.fleet)
+        if scenario is not None:
+            self._mapping.set_mission(scenario.mission)
+        self._clocks = SenderClocks(time.time_ns() - round(1e9 * clock.now()), sim_time=sim_time)
+
+    @property
+    def leader(self) -> int:
+        """Robot that leads; 0: none."""
+        return self._mapping.leader
+
+    def step(self, now: float) -> None:
+        """Publish what the fleet said."""
+        arrivals = self._ear.take()
+        self._follow_robots()
+        present = self._output.robots
+        for arrival, message in arrivals:
+            if isinstance(message, Truth):
+                self._clocks.see_world(arrival.at, message.time_s)
+                continue
+            owner = arrival.key.split("/", 3)[2]
+            robot = robot_id_of(owner)
+            if self._clocks.ready and (not robot or robot in present):
+                stamp_ns = self._clocks.stamp_ns(message.header, arrival.at)
+                self._output.publish(self._mapping.update(stamp_ns, owner, message))
+        if self._clocks.ready:
+            self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
+
+    def _follow_robots(self) -> None:
+        """Declare robots whose tokens appeared, undeclare those whose tokens vanished."""
+        living = {robot for name in self._ear.living if (robot := robot_id_of(name))}
+        for robot in living - self._output.robots:
+            self._output.join(robot)
+        for robot in self._output.robots - living:
+            self._mapping.forget(robot)
+            self._output.leave(robot)
+
+    def order(self, name: str, **arguments: object) -> None:
+        """Send an operator's command to the fleet."""
+        send(self._ear.bus, self._operator.command(name, clock.now(), **arguments))
+
+    def warn(self, words: str) -> None:
+        """Print a warning, and publish it on /rosout."""
+        print(f"lfa: {words}", file=sys.stderr, flush=True)
+        stamp_ns = self._clocks.now_ns(clock.now())
+        self._output.publish([RosMessage("/rosout", stamp_ns, messages.log(stamp_ns, "warn", BRIDGE_NODE, words))])

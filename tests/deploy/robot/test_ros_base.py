@@ -1,0 +1,212 @@
+"""A ROS robot as a driver's hardware: what it reads, when it is silent, what it warns of."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from math import nan, pi
+from typing import Any
+
+import pytest
+
+from lfa.deploy.robot.ros_base import ODOM_S_MAX, RosBase
+from lfa.deploy.robot.ros_frames import FrameTree
+from lfa.deploy.robot.ros_open import RosOptions, check_place, listeners, only
+from lfa.deploy.robot.ros_presets import PRESETS, RosPreset, load_preset
+from lfa.deploy.ros import messages
+from lfa.deploy.ros.graph import RosGraph
+from lfa.deploy.ros.session import NodeHandle, RosSpace
+from lfa.deploy.ros.types import kind, type_hash
+from lfa.deploy.ros.wire import DEFAULT, LATCHED, RosEndpoint, RosNode
+from lfa.protocol import clock
+from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+from tests.deploy.robot.test_ros_scan import scan
+from tests.deploy.ros.test_mapping import sensors
+from tests.rigs.ros_peers import awaited, ros_pair
+
+TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+
+
+class Robot:
+    """A ROS robot's node and the driver's base for it, over one router."""
+
+    def __init__(self, ours: RosSpace, theirs: RosSpace, *, stamped: bool, at: Pose2D | None) -> None:
+        self.node: NodeHandle = theirs.node("robot", "/r")
+        self.odom = self.node.publisher("/r/odom", "nav_msgs/msg/Odometry")
+        self.scans = self.node.publisher("/r/scan", "sensor_msgs/msg/LaserScan")
+        self.amcl = self.node.publisher("/r/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped", LATCHED)
+        self.tf = self.node.publisher("/tf", "tf2_msgs/msg/TFMessage")
+        self.tf_static = self.node.publisher("/r/tf_static", "tf2_msgs/msg/TFMessage", LATCHED)
+        self.commands = self.node.subscription("/r/cmd_vel", STAMPED if stamped else TWIST)
+        self.warned: dict[str, str] = {}
+        self.base = RosBase(
+            ours.node("lfa_driver", "/r"), "/r", RosPreset(), stamped=stamped, start_map=at, warn=self.warned.setdefault
+        )
+        awaited(self.odom.heard, "odom is heard")
+
+    def moves(self, x: float, late_s: float = 0.0) -> None:
+        """Publish odometry at x [m], stamped `late_s` ago."""
+        stamp_ns = time.time_ns() - round(1e9 * late_s)
+        self.odom.publish(messages.odometry(stamp_ns, sensors(Pose2D(x, 0.0, 0.0)), "odom", "base"))
+
+    def reads(self, what: str = "pose_odom") -> Any:
+        """Return the field `what` of the first reading that has it."""
+
+        def found() -> Any:
+            self.moves(1.0)
+            reading = self.base.read(clock.now())
+            return None if reading is None else getattr(reading, what)
+
+        return awaited(found, what)
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest) -> Iterator[Robot]:
+    options = {"stamped": True, "at": None, **getattr(request, "param", {})}
+    with ros_pair() as (ours, theirs):
+        yield Robot(ours, theirs, **options)
+
+
+def test_while_odometry_is_missing_or_old_there_is_no_reading(robot: Robot) -> None:
+    assert robot.base.read(clock.now()) is None
+    assert robot.reads().x == 1.0
+    assert robot.base.read(clock.now() + ODOM_S_MAX + 0.01) is None
+    assert "no odometry for 0.2 s" in robot.warned["silent"]
+
+
+@pytest.mark.parametrize("robot", [{"stamped": True}, {"stamped": False}], indirect=True)
+def test_a_command_is_published_also_when_it_is_zero(robot: Robot) -> None:
+    awaited(robot.base._cmd_vel.heard, "the robot listens")
+    for twist in (Twist(0.5, 0.2), STILL):
+        robot.base.drive(twist, clock.now())
+    heard: list[Any] = []
+
+    def both() -> bool:
+        heard.extend(getattr(m, "twist", m) for m in robot.commands.take())
+        return len(heard) == 2
+
+    awaited(both, "both commands arrive")
+    assert [(m.linear.x, m.angular.z) for m in heard] == [(0.5, 0.2), (0.0, 0.0)]
+
+
+def test_map_to_odom_on_tf_places_the_robot_in_map(robot: Robot) -> None:
+    awaited(robot.tf.heard, "tf is heard")
+
+    def placed() -> Any:
+        robot.tf.publish(messages.tf([messages.transform(0, "map", "odom", Pose2D(10.0, 5.0, pi / 2))]))
+        robot.moves(1.0)
+        reading = robot.base.read(clock.now())
+        return reading and reading.pose_map
+
+    pose = awaited(placed, "a pose in map")
+    assert (pose.x, pose.y) == pytest.approx((10.0, 6.0))
+
+
+def test_a_latched_pose_of_the_localisation_places_it_too(robot: Robot) -> None:
+    robot.reads()
+    covariant = kind("geometry_msgs/msg/PoseWithCovariance")(
+        messages.pose(Pose2D(3.0, 4.0, 0.0)), messages._diagonal([0.0] * 6)
+    )
+    robot.amcl.publish(kind("geometry_msgs/msg/PoseWithCovarianceStamped")(messages.header(0, "map"), covariant))
+    pose = robot.reads("pose_map")
+    assert (pose.x, pose.y) == pytest.approx((3.0, 4.0))
+
+
+@pytest.mark.parametrize("robot", [{"at": Pose2D(-1.2, 0.0, 0.0)}], indirect=True)
+def test_without_localisation_it_begins_where_at_says(robot: Robot) -> None:
+    assert robot.reads("pose_map").x == pytest.approx(-1.2)
+
+
+def test_a_scan_waits_for_the_mount_of_its_scanner_and_says_so(robot: Robot) -> None:
+    awaited(robot.scans.heard, "scan is heard")
+
+    def unplaced() -> bool:
+        robot.scans.publish(scan([1.0] * 4))
+        robot.moves(1.0)
+        robot.base.read(clock.now())
+        return "mount" in robot.warned
+
+    awaited(unplaced, "the missing mount is told")
+    assert "no /tf_static leads from base to laser" in robot.warned["mount"]
+    robot.tf_static.publish(messages.tf([messages.transform(0, "base", "laser", Pose2D(0.0, 0.0, pi / 2))]))
+
+    def placed() -> Any:
+        robot.scans.publish(scan([1.0] * 4, -pi))
+        robot.moves(1.0)
+        reading = robot.base.read(clock.now())
+        return reading and reading.scan
+
+    assert awaited(placed, "a scan").angle_min == pytest.approx(-pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("x", "late_s", "kind_", "words"),
+    [(1.0, 5.0, "clock", "differ from this clock by 5.0"), (nan, 0.0, "odom", "not finite"),
+     (50.0, 0.0, "jump", "odom jumped by 49.00 m")],
+)  # fmt: skip
+def test_bad_odometry_is_one_warning(x: float, late_s: float, kind_: str, words: str, robot: Robot) -> None:
+    robot.reads()
+
+    def warned() -> bool:
+        robot.moves(x, late_s)
+        robot.base.read(clock.now())
+        return kind_ in robot.warned
+
+    awaited(warned, kind_)
+    assert words in robot.warned[kind_]
+
+
+def test_frames_are_composed_over_a_common_ancestor_and_circles_end() -> None:
+    tree = FrameTree()
+    links = [("base_footprint", "base_link", Pose2D(0.0, 0.0, 0.0)), ("base_link", "scan", Pose2D(-0.1, 0.0, pi / 2)),
+             ("base_link", "imu", Pose2D(0.1, 0.2, 0.0)), ("a", "b", Pose2D()), ("b", "a", Pose2D())]  # fmt: skip
+    tree.update(messages.tf([messages.transform(0, *link) for link in links]), 0.0)
+    assert tree.between("base_footprint", "scan") == Pose2D(-0.1, 0.0, pi / 2)
+    found = tree.between("imu", "/scan")
+    assert found is not None
+    assert (found.x, found.y) == pytest.approx((-0.2, -0.2))
+    assert tree.between("a", "scan") is None
+
+
+def listening(topic: str, of_type: str = STAMPED) -> RosGraph:
+    graph = RosGraph()
+    for one in topic.split():
+        node = RosNode(0, "a", 0, "", "base")
+        graph.update(RosEndpoint(node, 1, "MS", one, of_type, type_hash(of_type), DEFAULT).token, up=True)
+    return graph
+
+
+@pytest.mark.parametrize(
+    ("topics", "namespace", "words"),
+    [("/chatter", None, "no node listens to .../cmd_vel on domain 0"),
+     ("/a/cmd_vel /b/cmd_vel", None, "--namespace /a or --namespace /b"),
+     ("/a/cmd_vel", "/c", "no node listens to /c/cmd_vel")],
+)  # fmt: skip
+def test_no_robot_and_several_are_refused_in_one_line(topics: str, namespace: str | None, words: str) -> None:
+    options = RosOptions("tcp/127.0.0.1:7447", 0, namespace, RosPreset())
+    with pytest.raises(Refused) as refused:
+        only(listeners(listening(topics), options), options)
+    assert words in str(refused.value)
+
+
+def test_a_link_to_another_machine_is_refused_unless_the_robot_stops_by_itself() -> None:
+    far = RosOptions("tcp/10.0.0.7:7447", 0, None, RosPreset())
+    with pytest.raises(Refused, match="run lfa-driver on the robot"):
+        check_place(far)
+    check_place(RosOptions("tcp/10.0.0.7:7447", 0, None, RosPreset(), stops_by_itself=True))
+
+
+def test_a_preset_is_named_or_a_file_of_ones_own(tmp_path: Any) -> None:
+    own = tmp_path / "rover.toml"
+    own.write_text('odom = "wheel/odom"\nlaser = [0.1, 0.0, 3.14]\n')
+    assert load_preset(str(own)) == RosPreset(odom="wheel/odom", laser=(0.1, 0.0, 3.14))
+    assert load_preset("clearpath") == PRESETS["clearpath"]
+    own.write_text('odo = "x"\n')
+    for bad, words in (
+        (str(own), "must be TOML with keys odom"),
+        ("spot", "one of turtlebot3"),
+        ("no.toml", "No such file"),
+    ):
+        with pytest.raises(Refused, match=words):
+            load_preset(bad)
