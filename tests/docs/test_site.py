@@ -29,22 +29,23 @@ RESULTS = 5
 
 
 @cache
-def index() -> tuple[tuple[str, str, str], ...]:
-    """Address, title and text of each section that the search knows."""
+def index() -> tuple[tuple[str, str, str, float], ...]:
+    """Address, title, text and weight of each section that the search knows."""
     found = json.loads((SITE / "search" / "search_index.json").read_text())["docs"]
-    return tuple((d["location"], unescape(d["title"]), unescape(re.sub(r"<[^>]+>", "", d["text"]))) for d in found)
+    plain = ((d, unescape(d["title"]), unescape(re.sub(r"<[^>]+>", "", d["text"]))) for d in found)
+    return tuple((d["location"], title, text, d.get("boost", 1.0)) for d, title, text in plain)
 
 
-def results(words: str) -> list[tuple[str, str, str]]:
+def results(words: str) -> list[tuple[str, str, str, float]]:
     """The sections that a search for `words` lists first: all words, those in a title before those in a text."""
     wanted = re.findall(r"[\w()]+", words.lower())
 
-    def rank(doc: tuple[str, str, str]) -> float:
+    def rank(doc: tuple[str, str, str, float]) -> float:
         title, text = doc[1].lower(), doc[2].lower()
         if not all(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", f"{title} {text}") for word in wanted):
             return 0.0
         share = sum(text.count(word) for word in wanted) / (10.0 + len(text.split()))
-        return share + sum(word in title for word in wanted) + (words.lower() in text)
+        return doc[3] * (share + sum(word in title for word in wanted) + (words.lower() in text))
 
     return sorted((doc for doc in index() if rank(doc) > 0.0), key=rank, reverse=True)[:RESULTS]
 
@@ -52,7 +53,7 @@ def results(words: str) -> list[tuple[str, str, str]]:
 @pytest.mark.parametrize(("question", "words", "answer"), QUESTIONS, ids=[question for question, *_ in QUESTIONS])
 def test_a_newcomers_question_is_answered_by_the_search(question: str, words: str, answer: str) -> None:
     found = results(words)
-    assert any(answer in f"{title} {text}" for _, title, text in found), f"{question}: {[doc[:2] for doc in found]}"
+    assert any(answer in f"{title} {text}" for _, title, text, _ in found), f"{question}: {[doc[:2] for doc in found]}"
 
 
 def test_every_page_of_the_repository_is_on_the_site() -> None:
