@@ -29,6 +29,7 @@ def command(
     kills: Annotated[int | None, typer.Option(help="Number of rounds of each fault.")] = None,
     full: Annotated[bool, typer.Option("--full", help="Run many more rounds, and report the p99.")] = False,
     minutes: Annotated[float | None, typer.Option(help="Duration of a measurement [min].")] = None,
+    worlds: Annotated[str | None, typer.Option(help="File of BARN worlds (barn).")] = None,
     seeds: Annotated[
         int | None, typer.Option(help="Number of runs of each scenario, from seed 1; of pairs on each map.")
     ] = None,
@@ -39,7 +40,7 @@ def command(
         raise Refused(f"no bench {name!r}: must be one of {', '.join(names)}")
     run = import_module(f"lfa.deploy.bench.{name}").run
     given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None, "figures": figures}
-    given |= {"kills": kills, "full": full or None, "minutes": minutes, "seeds": seeds}
+    given |= {"kills": kills, "full": full or None, "minutes": minutes, "seeds": seeds, "worlds": worlds}
     given = {option: value for option, value in given.items() if value is not None}
     for option in given:
         if option not in signature(run).parameters:

@@ -1,0 +1,55 @@
+"""`lfa bench barn`: the benchmark's score, worlds from a file, and one line for a file that is none."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from lfa.deploy.bench import barn
+from lfa.protocol.errors import Refused
+from lfa.world.description.load import load
+
+FIELD = barn.BarnWorlds(
+    (-2.25, 3.0, 1.57), (-2.25, 13.0), 1.0, 100.0, 0.075,
+    (barn.BarnWorld(0, 10.0, ((-4.425, 0.075), (-2.0, 6.0), (-0.075, 3.0))),),
+)  # fmt: skip
+
+
+def test_a_file_of_worlds_is_read_and_each_is_a_scenario_that_loads(tmp_path: Path) -> None:
+    path = tmp_path / "worlds.json"
+    path.write_bytes(msgspec.json.encode(FIELD))
+    field = barn.read(path)
+    assert field == FIELD
+    scenario = tmp_path / "barn_0.toml"
+    scenario.write_text(barn.scenario_text(field, field.worlds[0]))
+    for team in barn.TEAMS:
+        world = load(str(scenario), team.sets).world
+        assert [tuple(one.center_m) for one in world.obstacles] == [(-2.0, 6.0)], "the rim is walls"
+        assert len(world.walls_m) == 3
+
+
+def test_the_time_counts_from_the_first_tenth_of_a_metre_to_the_goals_circle() -> None:
+    truth = [(0.0, -2.25, 3.0), (1.0, -2.25, 3.05), (2.0, -2.25, 3.2), (7.0, -2.25, 12.1), (9.0, -2.25, 13.0)]
+    assert barn.time_s(truth, FIELD) == 5.0
+    assert barn.time_s(truth[:3], FIELD) == inf
+
+
+def test_the_score_is_the_benchmarks() -> None:
+    assert barn.score_of(10.0, 5.0) == 0.5, "no faster than twice the shortest time counts"
+    assert barn.score_of(10.0, 20.0) == 0.25
+    assert barn.score_of(10.0, inf) == 0.125
+
+
+@pytest.mark.parametrize(
+    ("content", "says"), [(b"{", "must be BARN worlds"), (b"{}", "must be BARN worlds"), (None, "worlds.json")]
+)
+def test_a_file_that_is_none_is_refused_in_one_line(tmp_path: Path, content: bytes | None, says: str) -> None:
+    path = tmp_path / "worlds.json"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(Refused, match=says) as refused:
+        barn.read(path)
+    assert "\n" not in str(refused.value)
