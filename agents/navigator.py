@@ -6,19 +6,21 @@ Terms and keys may not be used here.
 
 from __future__ import annotations
 
+from functools import partial
 from math import cos, hypot, inf, pi, sin
 from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
-from lfa.agents.avoidance.moving_obstacle import Crossing
+from lfa.agents.avoidance.moving_obstacle import Crossing, before
 from lfa.agents.avoidance.safety import safe, sharing
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.following.factory import follower_of, predecessor_of
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
+from lfa.agents.leading.narrow_gap import narrow_gap_m
 from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.localization.estimator import Estimator
 from lfa.agents.perception.obstacle_model import ObstacleModel, resting
@@ -47,6 +49,10 @@ this distance: farther ahead the predecessor would block the way."""
 ON_TRACE_M = 0.3
 """Distance [m] to its place on a trace below which a follower makes no detour: its predecessor's path is better."""
 FRESH_S = 0.5
+BEFORE_S = 0.5
+"""Time [s] ahead for which the robot brakes before what comes towards it."""
+ROUND_TRAP = Decision("plan_round", inf, 0.0, "wall", "no local way leads on", "angle")
+"""Decision of a leader whose detour leads nowhere, for the log."""
 
 
 class Navigator:
@@ -66,7 +72,7 @@ class Navigator:
         self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
         self.scan_age = ScanAge()
         self._detour = Detour(mission.radius_m, mission.limits)
-        self._crossing = Crossing()
+        self._crossing = Crossing(mission.radius_m)
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
         self._back_up_path = BackUp()
         self._role = Role.WAITING
@@ -126,10 +132,8 @@ class Navigator:
         known = self.estimator.pose_at(now)
         if known is not None and self.scan_age.update(scan, known[0], now):
             mates = self._mates(now)
-            # An explorer does not track obstacles: its map shows them while they are there.
-            self._obstacles.see(scan, known[0], mates, now, track=self.explore is None)
-            if self.explore is not None:
-                self.explore.see(scan, known[0], known[1], mates)
+            self._obstacles.see(scan, known[0], mates, now)
+            self.leading.see(scan, known[0], known[1], mates)
 
     def update_ground(self, profile: GroundProfile, now: float) -> None:
         """Update the ground map with a profile of the floor ahead."""
@@ -143,7 +147,7 @@ class Navigator:
 
     def _bar(self, trap: Point, now: float) -> None:
         """Block `trap` from now on, except for an explorer: it plans on its map, and would be enclosed in a corner."""
-        if self.explore is None:
+        if self._mission.leading.motion != "explore":
             self._obstacles.avoid_trap(*trap, now)
 
     def back_out(self, pose: Pose2D) -> None:
@@ -201,7 +205,7 @@ class Navigator:
         else:
             wanted = STILL
         if role is not Role.WAITING:
-            wanted = self._crossing.give_way(moving, pose, wanted, now)
+            wanted = self._crossing.give_way(moving, pose, wanted, now, still)
             wanted = self._ground_crossing.cross(wanted, now)
             wanted = sharing(wanted, self._strangers(pose, now), self._mission.radius_m, self._mission.limits)
             usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else self._mission.limits.v_max_mps
@@ -211,12 +215,19 @@ class Navigator:
             self._back_up_path.keep(pose)
         self._watch(role, pose, wanted, now)
         limits = self._mission.limits
-        braked_for = points + self._obstacles.ground.doubtful(pose)
+        braked_for = points + self._obstacles.ground.doubtful(pose) + before(moving, pose, BEFORE_S)
         self._last = safe(wanted, self._last, braked_for, self._mission.radius_m, limits, dt)
         self.follower.overridden(self._last)
         if role is Role.LEADER:
             self._team.progress = self.lead.progress(pose, self._last)
         return self._last
+
+    def narrow_ahead(self, pose: Pose2D) -> str | None:
+        """Return the reason why only a column passes what is ahead of this leader; None when more do."""
+        if self.leading.rounding:
+            return "way round a trap"
+        gap_m = narrow_gap_m(self._obstacles.points(pose), partial(self.lead.ahead, pose), self._mission.radius_m)
+        return None if gap_m is None else f"gap of {gap_m:.1f} m"
 
     def arrived(self, pose: Pose2D, twist: Twist) -> bool:
         return self._role is Role.LEADER and self.lead.arrived(pose, twist)
@@ -242,7 +253,7 @@ class Navigator:
         action = None if decision is None else decision.action
         leads = role is Role.LEADER and self.leading.under_way
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
-        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads)
+        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not self.leading.rounding)
 
     def _mates(self, now: float) -> list[Pose2D]:
         """Return the known poses of the team-mates: the predecessor's from its pose messages, the others' from the
@@ -270,8 +281,11 @@ class Navigator:
     def _lead(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
         around_these = self.leading.look(points, pose, now)
         wanted, speed = self.leading.step(chain, pose, self._last, now)
-        if self.explore is not None:
-            return self.leading.exploring(points, pose, wanted)
+        planned = self.leading.planned(points, pose, wanted, self._last, self._detour.decision, now)
+        if planned is not None:
+            if self.leading.rounding:
+                self._detour.decision = ROUND_TRAP
+            return planned
         around = self._steer(around_these, self.leading.target(pose), wanted, speed, pose, now)
         return wanted if around is None else around
 

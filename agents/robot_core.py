@@ -6,6 +6,7 @@ moment. A robot that becomes leader commands at once.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -262,7 +263,8 @@ class RobotCore:
             self._hand_over(now)
             return
         if role is Role.LEADER:
-            self._formation_commands.lead(navigator.lead, self._place.ids[1:], lease.term, now)
+            narrow = partial(navigator.narrow_ahead, pose)
+            self._formation_commands.lead(navigator.lead, self._place.ids[1:], lease.term, now, narrow)
         if role is Role.LEADER and not self._arrived and navigator.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)

@@ -103,8 +103,8 @@ class Decision(Struct, frozen=True):
     """Present action of a detour, with the values that decided it, for the log."""
 
     action: str
-    """Action: `left`, `right`, `u_turn`, `back`, `creep`, `blocked`; for a moving obstacle `slow`, `wait`, `back`,
-    `ahead`; on the ground `overcome`, `climb`."""
+    """Action: `left`, `right`, `u_turn`, `back`, `creep`, `blocked`, `plan_round`; for a moving obstacle `slow`,
+    `wait`, `back`, `ahead`, `left`, `right`; on the ground `overcome`, `climb`."""
     free_m: float
     """Free distance [m] along the wanted motion."""
     bearing: float

@@ -1,39 +1,77 @@
-"""Avoidance of moving obstacles: slow down, wait or make room, by the predicted closest approach (control.md section
-7).
+"""Avoidance of moving obstacles: slow down, wait, or make room ahead, behind or to a side, by the predicted closest
+approach (control.md section 7).
+
+What crosses is let pass: slower or standing is enough. What comes along the robot's own way, from ahead or from behind,
+meets it wherever it waits: then the motions of `EVASIONS` are compared by the distance that each would keep, as far as
+the scan leaves them free.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, inf
+from math import cos, hypot, inf, sin
+
+from msgspec import Struct
 
 from lfa.agents.avoidance.decision import Decision, Situation, decide
 from lfa.agents.perception.obstacle_tracker import Feature
-from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.agents.perception.scan import Point, free_along
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 
 CLEARANCE_M = 0.6
 """Least distance [m] from the robot's centre to the surface of a moving obstacle; less within the horizon is a
 conflict."""
-HORIZON_S = 3.0
+HORIZON_S = 4.0
 LOOK_S = 6.0
 """Prediction time [s] for choosing the action with the largest clearance when no action keeps `CLEARANCE_M` within the
 horizon: an obstacle that comes slowly from behind has not reached a waiting robot at the end of the horizon."""
 STEP_S = 0.25
 SLOW_SHARE = 0.4
-BACK_MPS = AHEAD_MPS = 0.25
 WAIT_S_MAX = 5.0
 """Maximum waiting time [s]; afterwards a moving obstacle is driven around like a stationary one."""
 HOLD_S = 1.0
 """Time [s] after the last conflict before a robot may choose a less careful action."""
-CARE = {"slow": 0, "wait": 1, "ahead": 2, "back": 2}
 WORTH_M = 0.1
-"""Clearance [m] that driving ahead or back must win over the present action, or over waiting."""
+"""Clearance [m] that another evasion must win over the present action, or over waiting."""
+BODY_M = 0.05
+"""Clearance [m] to what stands that an evasion keeps beside the body."""
+ROOM_S = 1.2
+"""Time [s] for which an evasion has to be free of what stands."""
+AWAY_M = 0.08
+"""Clearance [m] that is left when a robot drives towards what moves; nearer, it drives away from it or stands."""
+
+
+class Evasion(Struct, frozen=True):
+    """Motion out of the way: a bend of `turn_rad` [rad], then straight on, at `v_mps` [m/s]."""
+
+    name: str
+    v_mps: float
+    omega_radps: float = 0.0
+    turn_rad: float = 0.0
+
+
+EVASIONS = (
+    Evasion("wait", 0.0),
+    Evasion("right", 0.35, -0.9, 1.0),
+    Evasion("left", 0.35, 0.9, 1.0),
+    Evasion("right", 0.25, -1.2, 1.5),
+    Evasion("left", 0.25, 1.2, 1.5),
+    Evasion("ahead", 0.25),
+    Evasion("back", -0.25),
+)
+"""Of two that keep the same distance the first is taken: to the right first, as two that meet both do."""
+DRIVEN_M = 0.3
+"""Clearance [m] that backing off must keep beyond the others: what comes after a robot that backs off drives it on."""
+SLOW = Evasion("slow", 0.0)
+CARE = {"slow": 0, "wait": 1, "ahead": 2, "back": 2, "left": 2, "right": 2}
 
 
 class Crossing:
     """Give-way behaviour of one robot towards moving obstacles, for a bounded time."""
 
-    def __init__(self) -> None:
+    def __init__(self, radius_m: float = 0.15) -> None:
+        self._radius_m = radius_m
+        self._evasion, self._heading = SLOW, 0.0
         self.decision: Decision | None = None
         self._waiting_since: float | None = None
         self._held_until = 0.0
@@ -46,11 +84,16 @@ class Crossing:
         """False after the longest wait: a moving obstacle is then driven around like a stationary one."""
         return not self._impatient
 
-    def give_way(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, now: float) -> Twist:
-        """Return `wanted`, or a slower or evading twist. `moving` holds as of now, in `map` like `pose`."""
+    def give_way(
+        self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, now: float, points: Sequence[Point] = ()
+    ) -> Twist:
+        """Return `wanted`, or a slower or evading twist. `moving` holds as of now, in `map` like `pose`; `points` are
+        what stands, in `base_link`.
+        """
         near = _closest(moving, pose, wanted)
         if near >= CLEARANCE_M and now >= self._held_until:
             self.decision, self._waiting_since, self._impatient = None, None, False
+            self._evasion = SLOW
             return wanted
         self._near = near if near < CLEARANCE_M else self._near
         if self._waiting_since is None:
@@ -59,32 +102,66 @@ class Crossing:
         if self._impatient:
             self.decision = None
             return wanted
-        action = "slow" if near >= CLEARANCE_M else self._less(moving, pose, wanted)
-        if self.decision is None or CARE[action] >= CARE[self.decision.action] or now >= self._held_until:
+        evasion = SLOW if near >= CLEARANCE_M else self._less(moving, pose, wanted, points)
+        if self.decision is None or CARE[evasion.name] >= CARE[self.decision.action] or now >= self._held_until:
             row = decide(Situation("moving", near, closest_m=min(near, self._near)))
             named = ("", "") if row is None else (row.name, row.updates)
-            self.decision = Decision(action, near, 0.0, "moving", *named)
+            self.decision = Decision(evasion.name, near, 0.0, "moving", *named)
             self._held_until = now + HOLD_S if near < CLEARANCE_M else self._held_until
-        return _done(self.decision.action, wanted)
+            if evasion != self._evasion:
+                self._evasion, self._heading = evasion, wrap(pose.theta + evasion.turn_rad * _side(evasion))
+        if self._evasion.name not in ("wait", "back"):
+            self._waiting_since = now  # a robot that drives on or makes room does not wait
+        return _done(self._present(pose), wanted)
 
-    def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist) -> str:
+    def _present(self, pose: Pose2D) -> Evasion:
+        """Return what is left of the present evasion: its bend ends at the heading that it was chosen for."""
+        evasion = self._evasion
+        if not evasion.turn_rad:
+            return evasion
+        left_rad = max(0.0, _side(evasion) * wrap(self._heading - pose.theta))
+        return Evasion(evasion.name, evasion.v_mps, evasion.omega_radps if left_rad > 0.0 else 0.0, left_rad)
+
+    def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, points: Sequence[Point]) -> Evasion:
         """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
-        if _closest(moving, pose, _done("slow", wanted)) >= CLEARANCE_M:
-            return "slow"
+        if _closest(moving, pose, _done(SLOW, wanted)) >= CLEARANCE_M:
+            return SLOW
         if _closest(moving, pose, STILL) >= CLEARANCE_M:
-            return "wait"
-        kept = {action: _closest(moving, pose, _done(action, wanted), LOOK_S) for action in ("wait", "back", "ahead")}
-        doing = "wait" if self.decision is None or self.decision.action not in kept else self.decision.action
-        kept[doing] += WORTH_M
-        return max(kept, key=lambda action: kept[action])
+            return EVASIONS[0]
+        best, most = EVASIONS[0], -inf
+        under_way = self.decision is not None and self._evasion is not SLOW
+        for evasion in (self._present(pose), *EVASIONS) if under_way else EVASIONS:
+            twist = _done(evasion, wanted)
+            if twist.linear_x and free_along(points, twist, self._radius_m + BODY_M) < abs(twist.linear_x) * ROOM_S:
+                continue
+            kept = _kept(moving, pose, evasion, twist)
+            kept += WORTH_M if most == -inf else 0.0  # the first is the present one, or waiting
+            kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
+            if kept > most:
+                best, most = evasion, kept
+        return self._evasion if under_way and best.name == self._evasion.name else best
 
 
-def _done(action: str, wanted: Twist) -> Twist:
-    if action == "slow":
+def _side(evasion: Evasion) -> float:
+    return 1.0 if evasion.omega_radps > 0.0 else -1.0
+
+
+def _done(evasion: Evasion, wanted: Twist) -> Twist:
+    if evasion is SLOW:
         return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
-    if action == "ahead":
-        return Twist(max(wanted.linear_x, AHEAD_MPS), 0.0)
-    return STILL if action == "wait" else Twist(-BACK_MPS, 0.0)
+    v = max(wanted.linear_x, evasion.v_mps) if evasion.name == "ahead" else evasion.v_mps
+    return Twist(v, evasion.omega_radps)
+
+
+def _kept(moving: Sequence[Feature], pose: Pose2D, evasion: Evasion, twist: Twist) -> float:
+    """Return the least distance [m] to what moves within `LOOK_S` of an evasion: its bend, then straight on."""
+    if not evasion.turn_rad:
+        return min(_closest(moving, pose, twist, LOOK_S), CLEARANCE_M)
+    bend_s = evasion.turn_rad / abs(evasion.omega_radps)
+    least = _closest(moving, pose, twist, bend_s)
+    later = [Feature(f.kind, *f.at(bend_s), f.radius_m, f.vx, f.vy) for f in moving]
+    straight = Twist(twist.linear_x, 0.0)
+    return min(least, _closest(later, along_arc(pose, twist, bend_s), straight, LOOK_S - bend_s), CLEARANCE_M)
 
 
 def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: float = HORIZON_S) -> float:
@@ -103,3 +180,19 @@ def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: fl
             if apart < first:
                 least = min(least, apart - feature.radius_m)
     return least
+
+
+def before(moving: Sequence[Feature], pose: Pose2D, within_s: float) -> list[Point]:
+    """Return, in `base_link`, the points that the surfaces of what moves reach towards the robot within `within_s` [s]:
+    the last function before the wheels brakes for them as for what stands.
+    """
+    c, s = cos(pose.theta), sin(pose.theta)
+    points = []
+    for feature in moving:
+        x, y = feature.at(within_s)
+        dx, dy = x - pose.x, y - pose.y
+        apart = hypot(dx, dy)
+        if feature.radius_m < apart < hypot(feature.x - pose.x, feature.y - pose.y):
+            share = 1.0 - (feature.radius_m + AWAY_M) / apart
+            points.append((share * (c * dx + s * dy), share * (c * dy - s * dx)))
+    return points

@@ -15,6 +15,8 @@ SKIN_M = 0.02
 """Distance [m] kept between the body and the nearest point when braking."""
 BRAKING_SHARE = 0.8
 """Share of the drive's deceleration that is planned with; the rest covers what a 10 Hz scan has not shown yet."""
+TURNING_MPS = 0.1
+"""Speed [m/s] below which a turn is not slowed with the motion ahead."""
 
 SHARED_RAD = pi / 3
 """Angle [rad] off the motion, now or after turning for `TURN_S`, within which a team-mate counts as ahead."""
@@ -30,7 +32,8 @@ def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, l
     v_stop = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * free_m) ** 0.5
     if abs(v) > v_stop:
         scale = v_stop / abs(v)
-        v, omega = v * scale, omega * scale
+        # A round body may turn at any distance: what stands before its nose must not hold the turn that frees it.
+        v, omega = v * scale, omega * max(scale, 1.0 - v_stop / TURNING_MPS)
     return Twist(
         _near(v, last.linear_x, limits.a_max_mps2 * dt), _near(omega, last.angular_z, limits.alpha_max_radps2 * dt)
     )

@@ -16,9 +16,15 @@ FREE, UNSEEN = 10, 13
 """Cost of a straight step on free and on unknown ground; a diagonal step costs `DIAGONAL` / `STRAIGHT` as much."""
 STRAIGHT, DIAGONAL = 5, 7
 SKIN_M = 0.04
-"""Margin [m] beyond the radius and half a cell between the path and the centre of an occupied cell."""
+"""Margin [m] beyond the radius and half a cell between the path and the centre of an occupied cell where there is
+room."""
+TIGHT_M = 0.05
+"""Depth [m] below the radius at which a cell is barred: an occupied cell's surface may be farther away than its centre,
+and the way through a cell may lead beside its centre, so that a nearer bar would close gaps that the body passes."""
 CLOSE = 60
 """Extra cost of a step just not touching an obstacle; it falls with the square of the clearance gained."""
+TIGHT = 240
+"""Cost of the tightest step: worth a detour of some 24 times its length, since the body may not fit."""
 ROOM_M = 0.45
 """Clearance [m] beyond which the cost does not fall any more."""
 BARRED = 1000
@@ -103,12 +109,14 @@ class Costmap:
 
 def prices_of(radius_m: float) -> bytes:
     """Return the cost of a straight step for each nearness; 0 is blocked."""
-    barred_m = radius_m + 0.5 * CELL_M + SKIN_M
+    close_m, barred_m = radius_m + 0.5 * CELL_M + SKIN_M, radius_m - TIGHT_M
     prices = []
     for near in range(256):
         clear_m = (REACH - near / NEAR_PER_CELL) * CELL_M
-        lacking = min(1.0, max(0.0, (barred_m + ROOM_M - clear_m) / ROOM_M))
-        prices.append(0 if near and clear_m < barred_m - 1e-9 else round(FREE + CLOSE * lacking * lacking))
+        lacking = min(1.0, max(0.0, (close_m + ROOM_M - clear_m) / ROOM_M))
+        tight = max(0.0, (close_m - clear_m) / (close_m - barred_m))
+        price = FREE + CLOSE * lacking * lacking + (TIGHT - FREE - CLOSE) * min(tight, 1.0)
+        prices.append(0 if near and clear_m < barred_m - 1e-9 else round(price))
     return bytes(prices)
 
 

@@ -80,6 +80,15 @@ class Explore:
             self._failures = self._failures + 1 if self.planner.unreachable is not None else 0
         return found
 
+    def free(self, point: Point) -> bool:
+        """Return whether the map shows room for the body at `point`, or nothing yet."""
+        return self.planner is None or self.planner.free(point)
+
+    def bar(self, place: Point, now: float) -> None:
+        """Plan no route through `place` in `map` for a while: the body does not fit there."""
+        if self.planner is not None:
+            self.planner.bar(place, now)
+
     def _begin(self, pose: Pose2D) -> None:
         leading = self._mission.leading
         self.mapping = Mapping(*bounds([(pose.x, pose.y), *leading.route_m], MARGIN_M))

@@ -30,6 +30,10 @@ IMPROVED = 0.85
 RENEW_S = 4.0
 RETRY_S = 1.0
 """Time [s] between two searches that find nothing."""
+ROOMY = 60
+"""Cost of a step up to which a robot has room to spare."""
+BARRED_M, BARRED_S = 0.15, 60.0
+"""Radius [m] around a place where the body did not fit, and time [s] for which no route leads through it."""
 CHECK_S = 0.2
 """Period [s] of the check whether the map still agrees with the route."""
 
@@ -49,6 +53,7 @@ class Planner:
         self._begun_at = -inf
         self._checked_at = -inf
         self._pose: Point = goal
+        self._barred: list[tuple[Point, float]] = []
         self.route: tuple[Point, ...] = ()
         self.number = 0
         """Number of the route; grows with each new one."""
@@ -69,6 +74,7 @@ class Planner:
             if not ((blocked and self.route) or conflict or due):
                 return False
             self._begun_at = now
+            self._barred = [(place, until) for place, until in self._barred if now < until]
             self._search = self._plan(tuple(mates), blocked or conflict)
         number = self.number
         while cells > 0:
@@ -79,6 +85,16 @@ class Planner:
                 break
             cells -= looked
         return self.number != number
+
+    def free(self, point: Point) -> bool:
+        """Return whether a robot has room to spare at `point`, as far as the map shows."""
+        cell = self._grid.cell(*point)
+        return cell is None or 0 < self._prices[self._grid.near[cell]] <= ROOMY
+
+    def bar(self, place: Point, now: float) -> None:
+        """Lead no route through `place` for `BARRED_S`, and drop the present one."""
+        self._barred.append((place, now + BARRED_S))
+        self.forget()
 
     def forget(self) -> None:
         """Drop the route and the search; the next `work` starts anew."""
@@ -150,6 +166,8 @@ class Planner:
         """Return the costmap of the present map, without the keep-out areas and where team-mates are and drive to."""
         footing = Costmap(self._grid, self._prices)
         footing.bar_runs(self._keepout)
+        for place, _ in self._barred:
+            footing.bar(place, BARRED_M, self._pose)
         for mate in mates:
             apart = hypot(mate.x - self._pose[0], mate.y - self._pose[1])
             if apart < MATE_NEAR_M:

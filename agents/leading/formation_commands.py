@@ -1,12 +1,13 @@
 """Orientation requests of a leader: formation, time, term and number (control.md section 4).
 
 Requests come from the mission at points of the route, and from an operator. Before a bend in which the outermost robot
-could not keep up, the chain changes to column. With known obstacles the chain stays in column all the time.
+could not keep up, the chain changes to column. It does so before a narrow gap and on the way round a trap, too, and
+takes its formation again behind it. With known obstacles the chain stays in column all the time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import pi
 
 from lfa.agents.formation.formation import Formation, named, slots_of
@@ -26,6 +27,8 @@ ORDER_S_MAX = 5.0
 """Age [s] up to which a new leader carries out an operator's order that no leader has carried out."""
 BEND_AHEAD_M = 5.0
 """Distance [m] ahead within which bends are checked: enough for a chain of four to form a column at cruise speed."""
+OPEN_M = 3.0
+"""Progress [m] without a narrow place after which the team takes its formation again."""
 
 
 class FormationCommands:
@@ -41,6 +44,10 @@ class FormationCommands:
         """Last order of an operator, and when it came, while another robot leads."""
         self._repeat_at = 0.0
         self._check_at = self._fold_at = 0.0
+        self._narrow_m: float | None = None
+        """Progress [m] at the last narrow place for which the chain is in column; None when it is not."""
+        self._side: str = mission.formation.side
+        """Side before the narrow place."""
 
     def remember(self, side: str, now: float) -> None:
         """Keep an operator's order of another robot's term, which that robot may not live to carry out."""
@@ -55,9 +62,11 @@ class FormationCommands:
         """Start a term: requests of this term count from 0."""
         self._number, self._repeat_at, self._next = 0, now, None
 
-    def lead(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
+    def lead(
+        self, lead: PathFollower, followers: Sequence[int], term: Term, now: float, narrow: Callable[[], str | None]
+    ) -> None:
         """Run one control step of the leader: requests that are due on the route, and the present request once a
-        second.
+        second. `narrow` returns the reason why only a column passes what is ahead, or None.
         """
         orientations = () if self._mission.leading.known_m else self._mission.leading.orientations
         if self._next is None:  # what the route has asked for so far was the former leader's to order
@@ -68,7 +77,7 @@ class FormationCommands:
             self._next += 1
         if now >= self._check_at:
             self._check_at = now + BEND_CHECK_S
-            self._column_where_narrow(lead, followers, term, now)
+            self._column_where_narrow(lead, followers, term, now, narrow)
         if now >= self._repeat_at:
             self._say(self._slots(followers), term, now)
 
@@ -79,6 +88,8 @@ class FormationCommands:
         except Refused:
             return
         self._number += 1
+        if reason in ("mission", "operator"):
+            self._narrow_m = None
         self._formation.side = side
         self._say(slots_of(spec, followers), term, now)
         self._outbox.event("formation", now, term, {"number": self._number, "side": side, "by": reason})
@@ -99,19 +110,51 @@ class FormationCommands:
             self._formation.slot_of(slot.robot) if self._formation.is_named(slot.robot) else slot for slot in ordered
         )
 
-    def _column_where_narrow(self, lead: PathFollower, followers: Sequence[int], term: Term, now: float) -> None:
-        """Order column before a bend that the formation cannot follow, and where obstacles are known (the route passes
-        them).
+    def _column_where_narrow(
+        self,
+        lead: PathFollower,
+        followers: Sequence[int],
+        term: Term,
+        now: float,
+        narrow: Callable[[], str | None],
+    ) -> None:
+        """Order column before a bend that the formation cannot follow, before what is narrow, and where obstacles are
+        known (the route passes them).
         """
         slots = [self._formation.slot_of(robot) for robot in followers]
-        if self._formation.trace or all(map(_behind, slots)):
+        if self._formation.trace:
+            return
+        if self._narrow_m is not None:
+            self._open_again(lead, followers, term, now, narrow)
+            return
+        if all(map(_behind, slots)):
             return
         if self._mission.leading.known_m:
             self._fold(slots, followers, term, now)
             return
+        reason = narrow()
+        if reason is not None:
+            self._narrow_m, self._side = lead.progress_m, self._formation.side or self._mission.formation.side
+            self.order("column", reason, followers, term, now)
+            return
         ahead_m = lead.narrow_bend_m(slots, BEND_AHEAD_M)
         if ahead_m is not None:
             self.order("column", f"bend in {ahead_m:.1f} m", followers, term, now)
+
+    def _open_again(
+        self,
+        lead: PathFollower,
+        followers: Sequence[int],
+        term: Term,
+        now: float,
+        narrow: Callable[[], str | None],
+    ) -> None:
+        """Order the formation of before the narrow place once the team is well behind it."""
+        if self._narrow_m is None or narrow() is not None:
+            self._narrow_m = lead.progress_m
+        elif lead.progress_m - self._narrow_m >= OPEN_M:
+            self._narrow_m = None
+            self.order(self._side, "the narrow place is passed", followers, term, now)
 
     def _fold(self, slots: Sequence[Slot], followers: Sequence[int], term: Term, now: float) -> None:
         """Order column past known obstacles, starting with the last hop that is not yet in column."""

@@ -7,22 +7,25 @@ slowing that lets the team keep up is the same for all (control.md sections 2.2 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import atan2, hypot
+from math import hypot
 from typing import TYPE_CHECKING, Any
 
-from lfa.agents.avoidance.safety import SKIN_M
+from lfa.agents.avoidance.decision import Decision
 from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.free_place import FREE_WITHIN_M, FreePlace
 from lfa.agents.leading.path_follower import PathFollower
-from lfa.agents.perception.scan import Point, free_along, without
+from lfa.agents.perception.scan import Point, without
 from lfa.agents.team_state import TeamState
-from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, in_base
+from lfa.protocol.geometry import Pose2D, Twist, distance, in_base
+from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Mission
 
 if TYPE_CHECKING:
     from lfa.agents.exploration.explorer import Explore
+    from lfa.agents.leading.planned_way import PlannedWay
     from lfa.agents.leading.timed_route import Timetable
+    from lfa.agents.leading.way_round import WayRound
 
 GAP_SLOW = 1.5
 GAP_WAIT = 2.0
@@ -34,9 +37,6 @@ LEADER_OMEGA_MAX_RADPS = 0.6
 SWING_S, SWING_SHARE = 10.0, 0.7
 """Time [s] after an orientation request, and the share of its cruise speed that the leader drives during it."""
 DETOUR_SHARE = 0.7
-NOSE_M, NOSE_RAD, NOSE_RADPS, NOSE_MPS = 0.05, 0.2, 0.5, 0.1
-"""Free distance ahead, bearing of the route, turn rate and speed for an explorer that faces a wall."""
-LOOK_ROUND_M = 0.35
 LEFT_M, BACK_M = 0.5, 0.15
 """Distances [m] from the route beyond which a leader has left it, and within which it is back on it."""
 
@@ -49,13 +49,16 @@ class Leadership:
         self._formation = formation
         self._team = team
         self.lead = PathFollower(mission.leading, mission.limits, mission.radius_m)
-        self.explore: Explore | None = None
+        self._planned: PlannedWay | None = None
+        self._round: WayRound | None = None
+        """Way round the present trap; None before the first one."""
         self._timetable: Timetable | None = None
         if mission.leading.motion == "explore":
             # Imported here: only explorers pay the memory of a map and a planner.
-            from lfa.agents.exploration.explorer import Explore
+            from lfa.agents.leading.planned_way import PlannedWay
 
-            self.explore = Explore(mission)
+            self._planned = PlannedWay(mission)
+            self.lead = self._planned.lead
         elif mission.leading.motion == "trajectory":
             from lfa.agents.leading.timed_route import Timetable
 
@@ -73,6 +76,21 @@ class Leadership:
         self.waited_out = False
         """True when the leader has waited for its team for the longest time allowed."""
         self._speed_mps = 0.0
+        self._slots: list[Slot] = []
+
+    @property
+    def explore(self) -> Explore | None:
+        """Map and planner of an explorer, or of a leader on its way round a trap; otherwise None."""
+        return None if self._way is None else self._way.explore
+
+    @property
+    def rounding(self) -> bool:
+        """True on a planned way round a trap."""
+        return self._round is not None and self._round.way is not None
+
+    @property
+    def _way(self) -> PlannedWay | None:
+        return self._planned if self._planned is not None or self._round is None else self._round.way
 
     @property
     def under_way(self) -> bool:
@@ -87,24 +105,29 @@ class Leadership:
     def begin(self, pose: Pose2D, driven_m: float, now: float) -> None:
         """Start leading at `pose`, from the progress that the team has made; `driven_m` is the own odometer."""
         self._waiting_since, self.waited_out = None, False
+        self._round = None
         self.lead.begin(pose, self._team.progress, driven_m)
         if self._timetable is not None:
             self._timetable.begin(self.lead.waypoints_m, self.lead.place_m, now)
 
+    def see(self, scan: LaserScan, pose: Pose2D, twist: Twist, mates: Sequence[Pose2D]) -> None:
+        """Update the map with a scan, where there is one."""
+        if self.explore is not None:
+            self.explore.see(scan, pose, twist, mates)
+
     def work(self, leads: bool, pose: Pose2D, mates: Callable[[float], Sequence[Pose2D]], now: float) -> None:
         """Do one step's share of mapping and planning, where the ground is unknown."""
-        if self.explore is None:
-            return
-        if leads:
-            self.explore.aim(self.lead.waypoint)
-        if self.explore.work(leads, pose, mates(now), now):
-            self.lead.take(self.explore.route, pose)
-        if self.explore.failure is not None:
-            self.failure = self.explore.failure
+        if self._planned is not None and leads:
+            self._planned.explore.aim(self.lead.waypoint)
+        if self._way is not None:
+            self._way.work(leads, pose, mates(now), now)
+        if self._planned is not None and self._planned.explore.failure is not None:
+            self.failure = self._planned.explore.failure
 
     def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
         """Return the wanted twist, and the maximum speed [m/s] of a detour."""
         slots = [] if self._formation.trace else [self._formation.slot_of(robot) for robot in chain[1:]]
+        self._slots = slots
         speed = self._mission.leading.cruise_mps
         if self._timetable is not None:
             speed = self._timetable.speed(self.lead.place_m, now)
@@ -166,17 +189,24 @@ class Leadership:
         """Return the point in `base_link` to which a detour leads back."""
         return self.lead.ahead(pose, min(LOOK_M, self.lead.remaining_m(pose)))
 
-    def exploring(self, points: list[Point], pose: Pose2D, wanted: Twist) -> Twist:
-        """Follow the planned route; in front of a wall, first turn towards the route, or back up."""
-        if self.explore is None or not self.explore.route:
-            return STILL
-        half_width_m = self._mission.radius_m + SKIN_M
-        if wanted.linear_x <= 0.0 or free_along(points, wanted, half_width_m) > NOSE_M:
-            return wanted
-        x, y = self.lead.ahead(pose, LOOK_ROUND_M)
-        if abs(atan2(y, x)) > NOSE_RAD:
-            return Twist(0.0, NOSE_RADPS if y > 0.0 else -NOSE_RADPS)
-        return Twist(-NOSE_MPS, 0.0) if free_along(points, Twist(-1.0, 0.0), half_width_m) > NOSE_M else STILL
+    def planned(
+        self, points: list[Point], pose: Pose2D, wanted: Twist, last: Twist, local: Decision | None, now: float
+    ) -> Twist | None:
+        """Return the twist of the planned way, that of an explorer or one round a trap; None when there is none.
+
+        `wanted` and `last` are the twists of `step` and of the last command, `local` is the decision of the detour.
+        """
+        if self._planned is not None:
+            return self._planned.follow(points, pose, wanted, now, alone=not self._slots)
+        if self._round is None:
+            if local is None:
+                return None
+            # Imported here: only a leader that meets an obstacle pays the memory.
+            from lfa.agents.leading.way_round import WayRound
+
+            self._round = WayRound(self._mission, self.lead)
+        self._round.watch(local, now)
+        return self._round.steer(points, pose, last, self._slots, self._speed_mps, now)
 
     def _swing(self, slots: Sequence[Slot], now: float) -> float:
         """Return the share of the cruise speed while the formation opens: the last slot swings with all before it.

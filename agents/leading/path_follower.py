@@ -37,8 +37,8 @@ JOIN_M = 1.0
 """Distance [m] to the route within which a robot that knows of no progress may join it on its way."""
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
-IN_PLACE_RADPS, TEAM_RADPS = 0.4, 0.2
-"""Turn rate on the spot, alone and with slots that swing around the robot."""
+ALONE_RADPS, TEAM_RADPS = 2.0, 0.2
+"""Turn rates [rad/s] on the spot at most, alone and with slots that swing around the robot."""
 SLOWEST_SHARE = 0.25
 """Minimum fraction of the cruise speed on a planned route's bends, so that the path is tracked and not cut."""
 REACHED_SHARE = 0.7
@@ -139,6 +139,15 @@ class PathFollower:
         """Replace the route by an own one (`explore`), starting at its nearest point."""
         self._route = Route(points, PLANNED_CORNER_RADIUS_M)
         self._s = self._route.nearest(pose.x, pose.y, 0.0, 2.0 * WINDOW_M)
+
+    def resume(self, at_m: float, pose: Pose2D) -> None:
+        """Go on at the point of the route nearest to `pose` around arc length `at_m`, after a way round a trap; the
+        way-points before it are passed over.
+        """
+        if self._route is not None:
+            self._s = self._route.nearest(pose.x, pose.y, max(0.0, at_m - WINDOW_M), at_m + WINDOW_M)
+            while self._marks and self._next < self._last and self._s > self._marks[self._next]:
+                self._pass()
 
     @property
     def waypoint(self) -> Point:
@@ -314,6 +323,10 @@ class PathFollower:
     def _stop_point(self) -> Point:
         return self.waypoint if self._stop == self._next else self._leading.route_m[self._stop]
 
+    def point(self, by_m: float) -> Point:
+        """Return the point `by_m` ahead on the route in `map`; the next way-point without a route."""
+        return self.waypoint if self._route is None else self._route.point(self._s + by_m)
+
     def step(self, pose: Pose2D, twist: Twist, slots: Sequence[Slot], speed_max_mps: float) -> Twist:
         """Return the wanted twist at `pose`, at most `speed_max_mps`; `slots` are those of the robots behind."""
         self.track(pose)
@@ -336,9 +349,9 @@ class PathFollower:
         # This limit is last: a share of it would be taken again in each following step.
         v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S)
         if ends and near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
-            return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else _turn(bearing, slots)
+            return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing, slots)
         if abs(bearing) > IN_PLACE_RAD:
-            return _turn(bearing, slots)
+            return self._turn(bearing, slots)
         reach = max(hypot(*target), 0.25)
         curvature = 2.0 * target[1] / (reach * reach)
         return Twist(v, v * curvature)
@@ -347,6 +360,10 @@ class PathFollower:
         """Return the speed [m/s] from which the robot can stop at the next way-point that it drives up to."""
         v = float((2.0 * BRAKING_SHARE * self._leading.acceleration_mps2 * straight) ** 0.5)
         return v if ends else max(v, CORNER_MPS)
+
+    def _turn(self, bearing: float, slots: Sequence[Slot]) -> Twist:
+        rate = TEAM_RADPS if slots else min(ALONE_RADPS, self._limits.omega_max_radps)
+        return Twist(0.0, rate if bearing > 0.0 else -rate)
 
     def _cruise(self, slots: Sequence[Slot]) -> float:
         """Return the maximum speed [m/s] from which the robot can brake to the outermost robot's speed limit of each
@@ -365,11 +382,6 @@ class PathFollower:
             brake = (speed * speed + braking * (route.at_m[i + 1] - route.at_m[i])) ** 0.5
             speed = min(cruise, leader_speed_cap(slots, route.curvature[i], self._limits, PLANNED_MARGIN), brake)
         return speed
-
-
-def _turn(bearing: float, slots: Sequence[Slot]) -> Twist:
-    rate = TEAM_RADPS if slots else IN_PLACE_RADPS
-    return Twist(0.0, rate if bearing > 0.0 else -rate)
 
 
 def _apart(point: Point, pose: Pose2D) -> float:

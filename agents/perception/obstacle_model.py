@@ -40,12 +40,11 @@ class ObstacleModel:
         self._tracker = Tracker()
         self.ground = GroundMap(limits)
 
-    def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float, *, track: bool) -> None:
-        """Update with a scan made at `pose`; with `track`, assign its points to obstacles."""
+    def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> None:
+        """Update with a scan made at `pose`, and assign its points to obstacles."""
         self._scan.scan(scan, pose, now)
-        if track:
-            places = [(mate.x, mate.y) for mate in mates]
-            self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now)
+        places = [(mate.x, mate.y) for mate in mates]
+        self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now)
 
     def update_ground(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
         """Update with a profile of the floor ahead, made at `pose`."""

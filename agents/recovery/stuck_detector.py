@@ -21,6 +21,7 @@ SCAN_LOST = "S5: no scan comes any more"
 POSE_LOST_S, NEVER_PLACED_S = 1.0, 3.0
 """Time [s] without a pose from which a robot counts as stuck (S6), once it had one, and after its start."""
 POSE_LOST = "S6: own pose lost"
+COMES_BACK = "S3: in the same place again and again"
 TURN_S_MIN = 1.0
 """Minimum time [s] between two U-turns; nearer ones count as one, since the action flickers."""
 FREED_M = 0.5
@@ -50,14 +51,24 @@ class StuckMonitor:
             self.out()
 
     def watch(
-        self, pose: Pose2D, wanted: Twist, action: str | None, lost: str | None, now: float, *, leads: bool
+        self,
+        pose: Pose2D,
+        wanted: Twist,
+        action: str | None,
+        lost: str | None,
+        now: float,
+        *,
+        leads: bool,
+        again: bool = True,
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
-        move.
+        move. Without `again`, coming back (S3) does not count now: a planned way does.
         """
         if self.backing_out:
             return
         held = self._stuck.watch(pose, wanted, action, lost, now)
+        if held == COMES_BACK and not again:
+            held = None
         if not leads:
             self._stands = None
         elif self._stands_for_s(pose, now) >= STANDS_S and held is None:
@@ -146,7 +157,7 @@ class StuckConditions:
         if self._again and len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
             return "S3: turned round again and again"
         if self._again and self._comes_back(now):
-            return "S3: in the same place again and again"
+            return COMES_BACK
         return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
 
     def _note(self, pose: Pose2D, action: str | None, now: float) -> None:

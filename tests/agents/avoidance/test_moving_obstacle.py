@@ -36,8 +36,17 @@ def test_the_robot_stays_slow_for_a_while_after_the_conflict() -> None:
     assert crossing.give_way([], Pose2D(), AHEAD, 1.1 * HOLD_S) == AHEAD
 
 
-def test_what_comes_straight_at_a_standing_robot_makes_it_back_off() -> None:
-    assert Crossing().give_way(crosser(1.2, 0.0, -0.2, 0.0), Pose2D(), STILL, 0.0).linear_x < 0.0
+def test_what_comes_straight_at_a_robot_is_not_met() -> None:
+    """Head-on, at up to the robot's own speed, whether it drives or stands: it steps aside, and is not driven back."""
+    for speed in (0.2, 0.3, 0.5):
+        for wanted in (AHEAD, STILL):
+            crossing, pose, x, least = Crossing(), Pose2D(), 4.0, 9.0
+            for n in range(900):
+                twist = crossing.give_way(crosser(x, 0.0, -speed, 0.0), pose, wanted, 0.02 * n)
+                pose = along_arc(pose, twist, 0.02)
+                x -= speed * 0.02
+                least = min(least, ((x - pose.x) ** 2 + pose.y**2) ** 0.5 - 0.25 - 0.15)
+            assert least > 0.1, f"{speed} m/s, {wanted}: {least:.2f} m"
 
 
 def test_after_the_longest_wait_the_robot_goes_on() -> None:

@@ -7,6 +7,7 @@ from math import atan2, hypot
 
 import pytest
 
+from lfa.agents.exploration.costmap import FREE, TIGHT_M, prices_of
 from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, OCCUPIED, REACH, Grid, Point
 from lfa.agents.exploration.path_planner import Planner
 from lfa.protocol.geometry import Pose2D, wrap
@@ -152,8 +153,24 @@ def test_no_route_leads_through_what_is_to_be_kept_out_of() -> None:
     assert nearest_m(planner.route, (mask,)) > 0.0
 
 
-def test_prices_bar_what_the_body_would_touch() -> None:
-    planner = Planner(ground(WALL), (8.0, 3.0), RADIUS_M)
-    for near, price in enumerate(planner._prices[: NEAR_PER_CELL * REACH + 1]):
-        clear_m = (REACH - near / NEAR_PER_CELL) * CELL_M - 0.5 * CELL_M
-        assert (price == 0) == (clear_m < RADIUS_M + 0.04 - 1e-9), near
+def test_prices_bar_only_what_no_body_passes() -> None:
+    """Between the half cell's error and the radius a way may fit: dear, so that every roomier way is preferred."""
+    prices = [
+        ((REACH - near / NEAR_PER_CELL) * CELL_M, price)
+        for near, price in enumerate(prices_of(RADIUS_M)[: NEAR_PER_CELL * REACH + 1])
+    ]
+    for clear_m, price in prices:
+        assert (price == 0) == (clear_m < RADIUS_M - TIGHT_M - 1e-9), clear_m
+        if RADIUS_M - TIGHT_M <= clear_m < RADIUS_M:
+            assert price > 3 * FREE, f"{clear_m:.2f} m is tight"
+    dear = [price for _, price in prices if price]
+    assert dear == sorted(dear), "nearer is never cheaper"
+
+
+@pytest.mark.parametrize("middle_m", [0.0, 0.02, 0.05, 0.07])
+def test_no_gap_five_centimetres_wider_than_the_body_on_either_side_is_barred(middle_m: float) -> None:
+    half_m = RADIUS_M + 0.05
+    low, high = 3.0 + middle_m - half_m, 3.0 + middle_m + half_m
+    planner = Planner(ground((5.0, 0.0, 5.2, low), (5.0, high, 5.2, 6.0)), (8.0, 3.0), RADIUS_M)
+    plan(planner, (2.0, 3.0))
+    assert planner.unreachable is None

@@ -29,10 +29,10 @@ def asked(known: tuple[tuple[float, float, float], ...], until_s: float) -> list
     orders = FormationCommands(outbox, mission, Formation.of(mission))
     orders.begin(0.0)
     lead.begin(Pose2D())
-    orders.lead(lead, FOLLOWERS, Term(2, 1, 1), 0.0)
+    orders.lead(lead, FOLLOWERS, Term(2, 1, 1), 0.0, lambda: None)
     lead.track(Pose2D(0.5))
     for n in range(round(until_s * 50)):
-        orders.lead(lead, FOLLOWERS, Term(2, 1, 1), n / 50)
+        orders.lead(lead, FOLLOWERS, Term(2, 1, 1), n / 50, lambda: None)
     said = [envelope.message for envelope in outbox.drain()]
     new = [n for n, message in enumerate(said) if isinstance(message, Event) and message.kind == "formation"]
     return [tuple(slot.phi for slot in note.slots) for n in new if isinstance(note := said[n - 1], FormationNote)]
@@ -67,7 +67,7 @@ class Commands:
         lead = PathFollower(self.leading, Limits())
         lead.begin(Pose2D(x), team)
         self.commands.begin(10.0)
-        self.commands.lead(lead, (3, 1), Term(3, 2, 1), 10.0)
+        self.commands.lead(lead, (3, 1), Term(3, 2, 1), 10.0, lambda: None)
         said = [envelope.message for envelope in self.outbox.drain()]
         notes = [message for message in said if isinstance(message, FormationNote)]
         return {slot.robot: slot.phi for slot in notes[-1].slots}

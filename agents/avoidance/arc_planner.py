@@ -1,0 +1,114 @@
+"""Local planner: the arc that follows a planned route among the points of the newest scan, and past what moves.
+
+A planner on a grid knows the ground to within a cell; a gap that is a few centimetres wider than the body needs the
+scan itself. Where the wanted arc is not free with room to spare, arcs of other curvatures are compared, as in the
+dynamic window approach (Fox, Burgard, Thrun 1997), by their distance to the route, the clearance beside them and the
+way that they leave free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import atan2, cos, hypot, inf, pi, sin
+
+from lfa.agents.perception.scan import Point, free_along
+from lfa.protocol.geometry import Twist, wrap
+from lfa.protocol.mission import Limits
+
+SKIN_M = 0.025
+"""Clearance [m] beside the body that an arc keeps: a little more than the safety function brakes for."""
+ROOM_M = 0.12
+"""Clearance [m] with which the wanted arc is taken without a comparison; less costs."""
+LOOK_M = 0.9
+"""Length [m] of the arcs that are compared."""
+LEAST_M = 0.06
+"""Length [m] below which an arc is none."""
+CURVATURES_PER_M = (0.0, 0.35, 0.8, 1.4, 2.2, 3.4, 5.5, 9.0)
+HEADING_M = 0.25
+"""Distance to the route [m] that an error of heading of 1 rad at the end of an arc counts as."""
+SHORT, CLOSE, CHANGE_M = 0.9, 0.35, 0.05
+"""Cost of each metre that an arc is short of `LOOK_M`, of each metre without `ROOM_M`, and of another curvature than
+the last one's."""
+CLOSE_MPS = 0.45
+"""Speed [m/s] beside what is nearer than `ROOM_M`."""
+ALIGNED_RAD = 0.15
+BACK_MPS = 0.15
+BACK_FREE_M = 0.06
+
+
+class ArcPlanner:
+    """Local planner of one robot that leads along a planned route."""
+
+    def __init__(self, radius_m: float, limits: Limits) -> None:
+        self._radius_m = radius_m
+        self._limits = limits
+        self._curvature: float | None = None
+        self.blocked = False
+        """True while no arc leads on although the robot faces along its route."""
+
+    def steer(
+        self, points: Sequence[Point], route: Callable[[float], Point], wanted: Twist, turn_radps: float
+    ) -> Twist:
+        """Return `wanted` or the twist of a better arc. `points` are in `base_link`, and so is `route(s)`, the point
+        `s` [m] ahead on the route; `turn_radps` is the rate of a turn on the spot.
+        """
+        self.blocked = False
+        if wanted.linear_x <= 0.0:
+            return wanted
+        look_m = min(LOOK_M, max(hypot(*route(LOOK_M)), LEAST_M))
+        if free_along(points, wanted, self._radius_m + ROOM_M) >= look_m:
+            self._curvature = None
+            return wanted
+        reach_m = look_m + self._radius_m + ROOM_M
+        near = [point for point in points if point[0] * point[0] + point[1] * point[1] < reach_m * reach_m]
+        best = self._best(near, route, wanted, look_m)
+        if best is None:
+            return self._turn(near, route, turn_radps)
+        self._curvature, close = best
+        v = min(wanted.linear_x, CLOSE_MPS) if close else wanted.linear_x
+        omega_max = self._limits.omega_max_radps
+        v = min(v, omega_max / max(abs(self._curvature), 1e-9))
+        return Twist(v, v * self._curvature)
+
+    def _best(
+        self, points: Sequence[Point], route: Callable[[float], Point], wanted: Twist, look_m: float
+    ) -> tuple[float, bool] | None:
+        """Return the curvature [1/m] of the best arc, and whether something is close beside it; None without an arc."""
+        least, best = inf, None
+        own = wanted.angular_z / wanted.linear_x
+        for curvature in (own, *CURVATURES_PER_M, *(-c for c in CURVATURES_PER_M[1:])):
+            arc = Twist(1.0, curvature)
+            free_m = min(free_along(points, arc, self._radius_m + SKIN_M), look_m)
+            if free_m < LEAST_M:
+                continue
+            roomy_m = min(free_along(points, arc, self._radius_m + ROOM_M), free_m)
+            cost = _off(route, curvature, free_m) + SHORT * (look_m - free_m) + CLOSE * (free_m - roomy_m)
+            if self._curvature is not None and curvature != self._curvature:
+                cost += CHANGE_M
+            if cost < least:
+                least, best = cost, (curvature, roomy_m < free_m)
+        return best
+
+    def _turn(self, points: Sequence[Point], route: Callable[[float], Point], turn_radps: float) -> Twist:
+        """Return a turn on the spot towards the route, which a round body can always make; back off when it faces
+        along the route already.
+        """
+        x, y = route(self._radius_m + ROOM_M)
+        bearing = atan2(y, x)
+        if abs(bearing) > ALIGNED_RAD:
+            return Twist(0.0, turn_radps if bearing > 0.0 else -turn_radps)
+        self.blocked = True
+        free_m = free_along(points, Twist(-1.0, 0.0), self._radius_m + SKIN_M)
+        return Twist(-BACK_MPS if free_m > BACK_FREE_M else 0.0, 0.0)
+
+
+def _off(route: Callable[[float], Point], curvature: float, length_m: float) -> float:
+    """Return how far [m] the end of an arc of `length_m` is off the route, an error of heading included."""
+    turn = curvature * length_m
+    if abs(turn) < 1e-6:
+        x, y = length_m, 0.0
+    else:
+        x, y = sin(turn) / curvature, (1.0 - cos(turn)) / curvature
+    (rx, ry), (nx, ny) = route(length_m), route(length_m + 0.2)
+    ahead = atan2(ny - ry, nx - rx) if hypot(nx - rx, ny - ry) > 1e-3 else turn
+    return hypot(x - rx, y - ry) + HEADING_M * min(abs(wrap(ahead - turn)), pi)

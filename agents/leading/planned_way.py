@@ -1,0 +1,62 @@
+"""Way of a leader that plans for itself: map, planner, and the arcs that follow the route among what the scan shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from msgspec.structs import replace
+
+from lfa.agents.avoidance.arc_planner import ArcPlanner
+from lfa.agents.exploration.explorer import Explore
+from lfa.agents.leading.path_follower import ALONE_RADPS, PathFollower
+from lfa.agents.perception.scan import Point
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.mission import Mission
+
+TEAM_RADPS = 0.5
+"""Turn rate [rad/s] before what blocks the way, with slots that swing around the robot."""
+BLOCKED_S = 1.0
+"""Time [s] before a gap that no arc leads through, after which its place is barred and another way is searched."""
+
+
+class PlannedWay:
+    """Planned way of one robot to one goal: that of its mission, or the point at which it returns to its route."""
+
+    def __init__(self, mission: Mission, goal: Point | None = None) -> None:
+        route_m = mission.leading.route_m if goal is None else (goal,)
+        leading = replace(mission.leading, motion="explore", route_m=route_m)
+        self.explore = Explore(replace(mission, leading=leading))
+        self.lead = PathFollower(leading, mission.limits, mission.radius_m)
+        self._radius_m, self._omega_max_radps = mission.radius_m, mission.limits.omega_max_radps
+        self._arcs = ArcPlanner(mission.radius_m, mission.limits)
+        self._blocked_since: float | None = None
+
+    def work(self, leads: bool, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> None:
+        """Do one step's share of mapping and, if leading, of planning."""
+        if self.explore.work(leads, pose, mates, now):
+            self.lead.take(self.explore.route, pose)
+
+    def aim(self, goal: Point) -> None:
+        """Lead to another goal in `map` [m] from now on."""
+        self.explore.aim(goal)
+        self.lead.end_at(goal)
+
+    def follow(self, points: list[Point], pose: Pose2D, wanted: Twist, now: float, *, alone: bool) -> Twist:
+        """Follow the planned route through what the scan shows; give up a gap that the body does not fit through.
+
+        `wanted` is the twist of `lead`; `points` are in `base_link`; `alone` is False with slots that swing around the
+        robot as it turns.
+        """
+        if not self.explore.route:
+            return STILL
+        turn_radps = min(ALONE_RADPS, self._omega_max_radps) if alone else TEAM_RADPS
+        twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps)
+        if not self._arcs.blocked:
+            self._blocked_since = None
+        elif self._blocked_since is None:
+            self._blocked_since = now
+        elif now - self._blocked_since >= BLOCKED_S:
+            self._blocked_since = None
+            self.explore.bar(self.lead.point(self._radius_m), now)
+        return twist

@@ -1,0 +1,80 @@
+"""A way round is planned where a detour wins nothing; it ends back on the route, at the first place that is free."""
+
+from __future__ import annotations
+
+from math import inf
+
+import pytest
+
+from lfa.agents.avoidance.decision import Decision
+from lfa.agents.leading.path_follower import PathFollower
+from lfa.agents.leading.way_round import BACK_S, PATIENCE_S, WayRound
+from lfa.agents.perception.obstacle import Class
+from lfa.protocol.geometry import STILL, Pose2D
+from lfa.protocol.mission import Leading, Limits, Mission
+
+ROUTE = ((0.0, 0.0), (20.0, 0.0))
+
+
+def started(*route: tuple[float, float]) -> tuple[WayRound, PathFollower]:
+    leading = Leading(route_m=route or ROUTE)
+    lead = PathFollower(leading, Limits())
+    lead.begin(Pose2D())
+    return WayRound(Mission(robots=(1,), leading=leading), lead), lead
+
+
+def detour(action: str, kind: Class = "wall") -> Decision:
+    return Decision(action, inf, 0.0, kind)
+
+
+@pytest.mark.parametrize(("action", "after_s"), [("left", PATIENCE_S), ("u_turn", PATIENCE_S), ("back", BACK_S)])
+def test_a_detour_that_wins_nothing_begins_a_way_round(action: str, after_s: float) -> None:
+    rounding, _ = started()
+    rounding.watch(detour(action), 0.0)
+    rounding.watch(detour(action), after_s - 0.1)
+    assert rounding.way is None
+    rounding.watch(detour(action), after_s + 0.1)
+    assert rounding.way is not None
+
+
+def test_a_detour_that_wins_its_way_goes_on_alone() -> None:
+    rounding, lead = started()
+    for n in range(40):
+        lead.track(Pose2D(0.25 * n, 0.4, 0.0))
+        rounding.watch(detour("left"), 0.5 * n)
+    assert rounding.way is None
+
+
+def test_two_short_detours_are_not_one_long_one() -> None:
+    rounding, _ = started()
+    rounding.watch(detour("left"), 0.0)
+    rounding.watch(None, 0.6 * PATIENCE_S)
+    rounding.watch(detour("left"), 0.7 * PATIENCE_S)
+    rounding.watch(detour("left"), 1.2 * PATIENCE_S)
+    assert rounding.way is None
+
+
+def test_what_the_scanner_does_not_show_is_left_to_the_detour() -> None:
+    rounding, _ = started()
+    for n in range(20):
+        rounding.watch(detour("left", "ditch"), float(n))
+    assert rounding.way is None
+
+
+def test_back_on_the_route_the_leader_goes_on_from_there() -> None:
+    rounding, lead = started()
+    rounding.watch(detour("back"), 0.0)
+    rounding.watch(detour("back"), BACK_S)
+    assert rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0) == STILL, "no route is planned yet"
+    assert rounding.steer([], Pose2D(1.5, 0.0, 0.0), STILL, [], 0.5, BACK_S + 1.1) is None
+    assert rounding.way is None
+    assert lead.place_m == pytest.approx(1.5, abs=0.1)
+
+
+def test_a_way_point_that_can_be_passed_is_not_passed_over() -> None:
+    rounding, lead = started((0.0, 0.0), (1.0, 0.0), (20.0, 0.0))
+    rounding.watch(detour("back"), 0.0)
+    rounding.watch(detour("back"), BACK_S)
+    rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0)
+    assert rounding.steer([], Pose2D(1.0, 0.0, 0.0), STILL, [], 0.5, BACK_S + 1.1) is None
+    assert lead.place_m == pytest.approx(1.0, abs=0.1)
