@@ -11,6 +11,7 @@ import typer
 
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
+from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime.node_runner import Options, run
@@ -39,13 +40,24 @@ def start(
     witness: Annotated[bool, typer.Option(help="Host the mission's witness here.")] = True,
     state: Annotated[Path | None, typer.Option(help="Run folder for the checkpoint that --resume reads.")] = None,
     resume: Annotated[Path | None, typer.Option(help="Run folder whose last checkpoint to continue from.")] = None,
+    leader_from: Annotated[
+        str | None,
+        typer.Option(
+            help="The leader drives as the robot of a rosbag2 (FOLDER or FOLDER:TOPIC) or of an MRCLAM FILE.dat."
+        ),
+    ] = None,
     faults: Annotated[bool, typer.Option("--faults", help="Obey `lfa fault cut` and `loss`; for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
     from lfa.world import checkpoint  # these need packages that are not in the base install
+    from lfa.world.description.recorded_leader import with_leader
     from lfa.world.world import World
 
-    drawn = draw(load(scenario, set_ or (), robots), seed)
+    loaded = load(scenario, set_ or (), robots)
+    if leader_from is not None:
+        loaded = with_leader(loaded, leader_from)
+        check_mission(loaded.mission)
+    drawn = draw(loaded, seed)
     wall_ms = clock.wall_ms()
     known_as = None if keys is None else credentials(keys, WORLD_NAME, wall_ms)
     endpoint = connect or default_endpoint()
