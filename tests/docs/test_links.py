@@ -80,3 +80,10 @@ def test_a_packages_page_names_every_file_and_folder_at_its_top(package: str) ->
     parts = [p for p in (ROOT / package).iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()]
     names = [p.name for p in parts if p.name != "__init__.py"]
     assert [name for name in names if f"`{name}" not in text] == []
+
+
+def test_the_page_has_a_row_for_each_condition_of_being_stuck_and_no_other() -> None:
+    named = set(re.findall(r'"(S\d): ', (ROOT / "agents" / "recovery" / "stuck_detector.py").read_text()))
+    rows = re.findall(r"^\| (S\d) \|", (ROOT / "agents" / "CONTROL.md").read_text(), re.MULTILINE)
+    assert named
+    assert sorted(named) == rows
