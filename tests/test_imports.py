@@ -35,7 +35,7 @@ ORDER = (
     "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
-    "world/simulator", "world/cli",
+    "world/virtual_time", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/recording",
     "deploy/process", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",

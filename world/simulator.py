@@ -1,4 +1,4 @@
-"""Discrete-event simulator in virtual time: a heap of deliveries and deadlines over any Nodes, with codec and journals.
+"""Discrete-event simulator in virtual time: deliveries and deadlines of any Nodes, with codec and journals.
 
 The same seed gives the same run: all randomness comes from one generator, ties are broken by order of insertion, and
 no real clock is read. Each node has its own monotonic clock (offset and rate), as processes on several machines do.
@@ -6,12 +6,8 @@ no real clock is read. Each node has its own monotonic clock (offset and rate), 
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Sequence
 from random import Random
-from typing import Any
-
-from msgspec import Struct
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
@@ -20,6 +16,7 @@ from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
 from lfa.protocol.transport.link_model import Link, LinkModel, Radio, link_of
+from lfa.world.virtual_time import LocalClock, VirtualTime
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # after a kill the process's token vanishes within this [s] (zenoh.md section 2)
@@ -28,19 +25,6 @@ VITALS_S = 1.0
 FINISH_S_MAX = 1.0
 
 Tap = Callable[[float, str, bytes, Message], None]
-
-
-class LocalClock(Struct, frozen=True):
-    """Clock of a node relative to true time: local = offset + rate * true."""
-
-    offset_s: float = 0.0
-    rate: float = 1.0
-
-    def local(self, true_s: float) -> float:
-        return self.offset_s + self.rate * true_s
-
-    def true(self, local_s: float) -> float:
-        return (local_s - self.offset_s) / self.rate
 
 
 class _SimulatedNode:
@@ -58,11 +42,11 @@ class _SimulatedNode:
         self.stop_by: float | None = None
 
 
-class Simulator:
+class Simulator(VirtualTime):
     """Event loop that runs Nodes in true time from 0. `now` is true time [s]; taps get every published message."""
 
     def __init__(self, radio: Radio, seed: int) -> None:
-        self.now = 0.0
+        super().__init__()
         self.taps: list[Tap] = []
         self.reborn: Callable[[Node], Journal] = _unjournalled
         """Called with a node that goes on under a later number (E23), before it starts; returns its journal."""
@@ -71,8 +55,6 @@ class Simulator:
         self.refused_leave = False
         """True if a node that cannot take part leaves, as its process would, in place of ending the simulation."""
         self._seats: dict[str, _SimulatedNode] = {}
-        self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
-        self._order = 0
         self._routes: dict[str, list[tuple[_SimulatedNode, Link | None]]] = {}
         """Receivers of each key, and the radio link to each (None: not over radio)."""
         self._wanted: dict[tuple[frozenset[str], str], bool] = {}
@@ -138,11 +120,6 @@ class Simulator:
         seat.stop_by = self.now + FINISH_S_MAX
         self._give(seat, "", Stop(), b"")
 
-    def at(self, when: float, action: Callable[..., None], *arguments: Any) -> None:
-        """Schedule `action` with `arguments` at true time `when` [s]."""
-        self._order += 1
-        heapq.heappush(self._heap, (when, self._order, action, arguments))
-
     def publish(self, key: str, payload: bytes) -> None:
         """Publish a message from outside the simulation, such as an operator's, to subscribers of `key` and to taps."""
         message = decode(payload, TOPIC[key.split("/")[3]].type)
@@ -150,18 +127,6 @@ class Simulator:
             tap(self.now, key, payload, message)
         for seat, _ in self._route(key):
             self.at(self.now + LOCAL_DELAY_S, self._give, seat, key, message, payload)
-
-    def run(self, until: float, over: Callable[[], bool] | None = None) -> None:
-        """Advance to true time `until` [s], or until `over()` holds."""
-        heap = self._heap
-        while heap and heap[0][0] <= until:
-            when, _, action, arguments = heapq.heappop(heap)
-            if when > self.now:
-                self.now = when
-            action(*arguments)
-            if over is not None and over():
-                return
-        self.now = max(self.now, until)
 
     # --- one call of one node ---------------------------------------------------------------------------------
 

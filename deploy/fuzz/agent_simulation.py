@@ -41,7 +41,8 @@ from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
 from lfa.world.description.scenario import Lidar, Scenario, WorldSpec
 from lfa.world.physics.kinematics import Kinematic
-from lfa.world.simulator import LocalClock, Simulator
+from lfa.world.simulator import Simulator
+from lfa.world.virtual_time import LocalClock
 from lfa.world.world import World
 
 FLEET = "whole"

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from lfa.deploy.fuzz.network import LinkConditions, Network, SimulatedClock
+from lfa.deploy.fuzz.network import LinkConditions, Network
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Fence, Fenced, GatewayStamp, LeaseBody, Member
 from lfa.protocol.messages.robot import CmdVel
+from lfa.world.virtual_time import LocalClock
 
 
 class GatewayHost(Struct):
     """One incarnation of one robot's gateway, and its clock."""
 
     gateway: Gateway
-    clock: SimulatedClock
+    clock: LocalClock
     born_at: float
     alive: bool = True
 
@@ -48,7 +49,7 @@ class GatewaySimulation(Network):
         """Start a new incarnation of a robot's gateway; with `at` in the past it has been running since then."""
         born_at = self.now if at is None else at
         self._lives += 1
-        clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
+        clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
         gateway = self._gateway_type(robot_id, self._lives, self.timing, clock.local(born_at))
         self.gateways[robot_id] = GatewayHost(gateway, clock, born_at)
         for tell in self._tell["gateway_starts"]:

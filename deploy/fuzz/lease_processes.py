@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from lfa.deploy.fuzz.gateways import GatewaySimulation
-from lfa.deploy.fuzz.network import SimulatedClock, told
+from lfa.deploy.fuzz.network import told
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
 from lfa.protocol.lease.machine.lease import Lease, Observed
@@ -26,6 +26,7 @@ from lfa.protocol.messages.consensus import (
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.names import robot_name
+from lfa.world.virtual_time import LocalClock
 
 FORWARD = Twist(0.5, 0.0)
 FOLLOW_PERIOD_S = 0.1
@@ -42,7 +43,7 @@ Call = Callable[..., list[Effect]]
 class Process:
     """One incarnation of one robot's (or the witness's) lease, with its own clock."""
 
-    def __init__(self, member: Member, lease: Lease, clock: SimulatedClock) -> None:
+    def __init__(self, member: Member, lease: Lease, clock: LocalClock) -> None:
         self.member = member
         self.id = member.id
         self.lease = lease

@@ -7,7 +7,7 @@ the outputs of processes and gateways with the true time, which no process knows
 from __future__ import annotations
 
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
-from lfa.deploy.fuzz.network import LinkConditions, SimulatedClock
+from lfa.deploy.fuzz.network import LinkConditions
 from lfa.protocol.incarnations import after, drawn_at
 from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import Effect
@@ -17,6 +17,7 @@ from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Leading, Mission, Profile
 from lfa.protocol.names import WITNESS_ID
+from lfa.world.virtual_time import LocalClock
 
 
 class LeaseSimulation(Hosts):
@@ -68,7 +69,7 @@ class LeaseSimulation(Hosts):
         self._lives += 1
         drawn = drawn_at(self.wall_ms.get(robot_id, 0), self._lives)
         member = Member(robot_id, drawn if number is None else number)
-        clock = SimulatedClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
+        clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         mission = mission or self.mission
         lease = Lease(member, mission, timing_of(mission.profile), clock.local(self.now), floor, self.observed)

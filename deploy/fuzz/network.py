@@ -1,37 +1,23 @@
 """True time and a faulty network for leases in virtual time.
 
-Events are in one heap of (true time, number, event). All random numbers come from one generator, so the same seed and
-the same calls give the same run. A message sent over a cut link is lost; one already in transit arrives.
+All random numbers come from one generator, so the same seed and the same calls give the same run. A message sent over a
+cut link is lost; one already in transit arrives.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from heapq import heapify, heappop, heappush
 from random import Random
-from typing import Any, Self
 
 from msgspec import Struct
 
 from lfa.deploy.analysis.verification.checker import Checker, listeners
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
+from lfa.world.virtual_time import VirtualTime
 
 REORDER_S = 0.15
 """Maximum delay [s] of a message held back; more than three heartbeats of the profile std."""
-
-
-class SimulatedClock(Struct, frozen=True):
-    """Clock with local = offset + rate * true; offset in seconds."""
-
-    offset: float = 0.0
-    rate: float = 1.0
-
-    def local(self, true: float) -> float:
-        return self.offset + self.rate * true
-
-    def true(self, local: float) -> float:
-        return (local - self.offset) / self.rate
 
 
 class LinkConditions(Struct):
@@ -69,7 +55,7 @@ Trace = Callable[[float, int, str], None]
 """Function (true time [s], id, text of the action) that writes a readable trace."""
 
 
-class Network:
+class Network(VirtualTime):
     """Simulated network between `ids`: time, random numbers, link conditions, cuts.
 
     A gateway's address is minus its robot's id.
@@ -77,8 +63,8 @@ class Network:
 
     def __init__(self, seed: int, ids: tuple[int, ...], weather: LinkConditions, gateways_at: int | None) -> None:
         """Create the network. `gateways_at` is the host of all gateways; None: each gateway is on its robot's host."""
+        super().__init__()
         self.random = Random(seed)
-        self.now = 0.0
         self.ids = ids
         self.weather = weather
         self.filter: Filter | None = None
@@ -86,33 +72,11 @@ class Network:
         self.cuts: set[tuple[int, int]] = set()
         """Directed pairs of ids between which no message passes."""
         self._gateways_at = gateways_at
-        self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
-        self._number = 0
         self.listen(())
 
     def listen(self, checkers: Sequence[Checker]) -> None:
         """Notify these checkers, and only these, of all events from now on."""
         self._tell = listeners(checkers)
-
-    # --- virtual time ------------------------------------------------------------------------------------------
-
-    def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
-        """Schedule the call `what(*arguments)` at true time `time` [s]."""
-        self._number += 1
-        heappush(self._heap, (time, self._number, what, arguments))
-
-    def run(self, until: float) -> Self:
-        """Execute all events up to true time `until` [s]."""
-        while self._heap and self._heap[0][0] <= until:
-            self.now, _, what, arguments = heappop(self._heap)
-            what(*arguments)
-        self.now = until
-        return self
-
-    def lose(self, by: float, arrivals: tuple[Callable[..., None], ...]) -> None:
-        """Drop the scheduled calls of `arrivals` that are later than true time `by` [s]."""
-        self._heap = [event for event in self._heap if event[0] <= by or event[2] not in arrivals]
-        heapify(self._heap)
 
     # --- cuts --------------------------------------------------------------------------------------------------
 

@@ -13,7 +13,8 @@ from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop, Vitals
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import alive_key, key
 from lfa.protocol.transport.link_model import Radio
-from lfa.world.simulator import HINT_DELAY_S, LocalClock, Simulator
+from lfa.world.simulator import HINT_DELAY_S, Simulator
+from lfa.world.virtual_time import LocalClock
 
 
 class Talker:

@@ -40,7 +40,8 @@ from lfa.protocol.transport.link_model import Radio
 from lfa.protocol.witness import Witness
 from lfa.world.description.load import Lidar, Scenario, WorldSpec, load
 from lfa.world.physics.kinematics import Kinematic
-from lfa.world.simulator import LocalClock, Simulator
+from lfa.world.simulator import Simulator
+from lfa.world.virtual_time import LocalClock
 from lfa.world.world import World
 
 FLEET = "bench"

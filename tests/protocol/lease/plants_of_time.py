@@ -11,7 +11,6 @@ from msgspec import structs
 import lfa.protocol.lease.holder
 from lfa.deploy.fuzz import schedules
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
-from lfa.deploy.fuzz.network import SimulatedClock
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.effects import StepDown
 from lfa.protocol.lease.gateway import Gateway
@@ -24,6 +23,7 @@ from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.step_down import PendingRelease
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
+from lfa.world.virtual_time import LocalClock
 from tests.protocol.lease import test_usual_bugs
 
 Plant = Callable[[pytest.MonkeyPatch], None]
@@ -109,7 +109,7 @@ def wall_clock_in_lease_arithmetic(patch: pytest.MonkeyPatch) -> None:
     def step_wall(self: LeaseSimulation, robot_id: int, by_s: float) -> None:
         honest(self, robot_id, by_s)
         process = self.processes[robot_id]
-        process.clock = SimulatedClock(process.clock.offset + by_s, process.clock.rate)
+        process.clock = LocalClock(process.clock.offset_s + by_s, process.clock.rate)
         process.wakes_at = self.now
         self.at(self.now, self._wake, process)
 

@@ -1,0 +1,58 @@
+"""Virtual time: a heap of scheduled calls, and the clocks of processes relative to it.
+
+The one engine of every simulation: of whole nodes (`simulator.py`) and of leases alone (`lfa fuzz`). No real clock is
+read, and calls at the same time come in the order in which they were scheduled: the same calls give the same run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from heapq import heapify, heappop, heappush
+from typing import Any, Self
+
+from msgspec import Struct
+
+
+class LocalClock(Struct, frozen=True):
+    """Clock of a process relative to true time: local = offset + rate * true."""
+
+    offset_s: float = 0.0
+    rate: float = 1.0
+
+    def local(self, true_s: float) -> float:
+        return self.offset_s + self.rate * true_s
+
+    def true(self, local_s: float) -> float:
+        return (local_s - self.offset_s) / self.rate
+
+
+class VirtualTime:
+    """Scheduled calls in true time from 0; `now` is true time [s] and never goes back."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
+        self._order = 0
+
+    def at(self, when: float, action: Callable[..., None], *arguments: Any) -> None:
+        """Schedule `action` with `arguments` at true time `when` [s]."""
+        self._order += 1
+        heappush(self._heap, (when, self._order, action, arguments))
+
+    def run(self, until: float, over: Callable[[], bool] | None = None) -> Self:
+        """Advance to true time `until` [s], or until `over()` holds."""
+        heap = self._heap
+        while heap and heap[0][0] <= until:
+            when, _, action, arguments = heappop(heap)
+            if when > self.now:
+                self.now = when
+            action(*arguments)
+            if over is not None and over():
+                return self
+        self.now = max(self.now, until)
+        return self
+
+    def lose(self, by: float, actions: tuple[Callable[..., None], ...]) -> None:
+        """Drop the scheduled calls of `actions` that are later than true time `by` [s]."""
+        self._heap[:] = [event for event in self._heap if event[0] <= by or event[2] not in actions]
+        heapify(self._heap)
