@@ -111,3 +111,22 @@ def test_a_command_changes_by_one_step_of_acceleration(wanted: float, first: flo
 def test_backwards_has_a_limit_of_its_own() -> None:
     assert within(Twist(-1.0, 0.5), LIMITS) == pytest.approx((-0.3, 0.15))
     assert within(Twist(0.2, 4.0), LIMITS) == pytest.approx((0.1, 2.0))
+
+
+@pytest.mark.parametrize("a_max_mps2", [0.5, 2.0])
+def test_a_weak_drive_drives_slower_towards_a_wall(a_max_mps2: float) -> None:
+    limits = Limits(v_max_mps=3.0, a_max_mps2=a_max_mps2)
+    out = safe(Twist(3.0, 0.0), Twist(3.0, 0.0), [(1.17, 0.0)], 0.15, limits, 10.0)
+    assert out.linear_x == pytest.approx((2.0 * BRAKING_SHARE * a_max_mps2 * 1.0) ** 0.5)
+
+
+@pytest.mark.parametrize("apart_m", [0.5, 1.0, 1.5])
+def test_towards_a_team_mate_a_robot_uses_its_half_of_the_room_and_no_less(apart_m: float) -> None:
+    room_m = 0.5 * (apart_m - 2.0 * 0.15) - SKIN_M
+    out = sharing(Twist(1.5, 0.0), [(apart_m, 0.0)], 0.15, LIMITS)
+    assert out.linear_x == pytest.approx((2.0 * BRAKING_SHARE * LIMITS.a_max_mps2 * room_m) ** 0.5)
+
+
+def test_a_slow_turn_does_not_make_a_team_mate_aside_one_ahead() -> None:
+    mate = (0.5 * cos(1.4), 0.5 * sin(1.4))
+    assert sharing(Twist(0.6, 0.5), [mate], 0.15, LIMITS) == Twist(0.6, 0.5)

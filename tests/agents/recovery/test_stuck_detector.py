@@ -239,3 +239,13 @@ def test_a_robot_that_finds_its_pose_again_is_watched_anew() -> None:
     monitor.find_pose()
     monitor.watch(Pose2D(), AHEAD, None, None, STILL_S, leads=False)
     assert monitor.reason is None
+
+
+@pytest.mark.parametrize("place", [Pose2D(7.1, 0.1, 0.0), Pose2D(0.1, 7.1, 0.0)])
+def test_S3_places_are_half_a_metre_wide_along_both_axes(place: Pose2D) -> None:
+    stuck, reason = StuckConditions(), None
+    for n in range(CELL_ENTRIES):
+        stuck.watch(Pose2D(place.x + 1.0, place.y + 1.0, 0.0), AHEAD, None, None, 4.0 * n)
+        off_m = 0.1 * n  # within the same half metre
+        reason = stuck.watch(Pose2D(place.x + off_m, place.y + off_m, 0.0), AHEAD, None, None, 4.0 * n + 2.0)
+    assert str(reason).startswith("S3")
