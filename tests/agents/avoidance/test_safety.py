@@ -120,11 +120,11 @@ def test_a_weak_drive_drives_slower_towards_a_wall(a_max_mps2: float) -> None:
     assert out.linear_x == pytest.approx((2.0 * BRAKING_SHARE * a_max_mps2 * 1.0) ** 0.5)
 
 
-@pytest.mark.parametrize("apart_m", [0.5, 1.0, 1.5])
-def test_towards_a_team_mate_a_robot_uses_its_half_of_the_room_and_no_less(apart_m: float) -> None:
+@pytest.mark.parametrize(("apart_m", "a_max_mps2"), [(0.5, 1.0), (1.0, 0.5), (1.5, 2.0)])
+def test_towards_a_team_mate_a_robot_uses_its_half_of_the_room_and_no_less(apart_m: float, a_max_mps2: float) -> None:
     room_m = 0.5 * (apart_m - 2.0 * 0.15) - SKIN_M
-    out = sharing(Twist(1.5, 0.0), [(apart_m, 0.0)], 0.15, LIMITS)
-    assert out.linear_x == pytest.approx((2.0 * BRAKING_SHARE * LIMITS.a_max_mps2 * room_m) ** 0.5)
+    out = sharing(Twist(2.5, 0.0), [(apart_m, 0.0)], 0.15, Limits(a_max_mps2=a_max_mps2))
+    assert out.linear_x == pytest.approx((2.0 * BRAKING_SHARE * a_max_mps2 * room_m) ** 0.5)
 
 
 def test_a_slow_turn_does_not_make_a_team_mate_aside_one_ahead() -> None:

@@ -263,3 +263,21 @@ def test_a_blend_never_makes_the_slot_faster_than_its_share_of_the_drive() -> No
         speeds.append(hypot(motion.vx, motion.vy))
     assert 0.61 < max(speeds) <= limit + 0.05
     assert (motion.separation_m, motion.phi) == pytest.approx((2.4, pi / 2))
+
+
+def test_a_filtered_heading_rests_where_the_predecessor_keeps_its_own() -> None:
+    motion, predecessor = SlotMotion(DEFAULT, LIMITS, 2.0), Pose2D(0.0, 0.0, 0.5)
+    motion.reset(Slot(2, 1.2, pi), predecessor)
+    motion.step(Slot(2, 1.2, pi), predecessor, Twist(0.4, 0.0), DT)
+    assert (motion.chi, motion.chi_rate) == (0.5, 0.0)
+
+
+def test_on_a_trace_an_old_reference_is_shifted_ahead_along_the_path() -> None:
+    trace, slot = PoseHistory(4.0), Slot(2, 1.2, pi)
+    for n in range(101):
+        trace.add(Pose2D(0.03 * n, 0.0, 0.0))
+    motion = SlotMotion(DEFAULT, LIMITS, 0.0)
+    motion.reset(slot, Pose2D(3.0, 0.0, 0.0))
+    motion.lead_m = 0.2
+    motion.step_on(trace, trace.travelled_m, slot, Pose2D(3.0, 0.0, 0.0), 0.4, DT)
+    assert (motion.x, motion.y) == pytest.approx((2.0, 0.0), abs=0.02)
