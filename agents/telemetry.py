@@ -142,7 +142,8 @@ class Reports:
             counters["predecessor_refused"] = navigator.predecessor.refused
         text, level = _health(navigator, lease, role, now)
         outbox = self._outbox
-        outbox.publish("status", Status(outbox.header("status", now), level, text, role, lease.term, counters))
+        header = outbox.header("status", now)
+        outbox.publish("status", Status(header, level, text, role, lease.term, counters, lease.chain))
 
     def _tracking(self, navigator: Navigator, predecessor: int, now: float) -> None:
         r = navigator.follower.readout

@@ -70,6 +70,8 @@ class Summary(Struct, kw_only=True):
     violations: list[TermViolation]
     recording: Recording | None = None
     """Counts of the recorder; None when the recorder died before it wrote them."""
+    warnings: list[str] = []
+    """What the results may lack: holes in the recording that they were computed from."""
 
     @property
     def exit_code(self) -> int:

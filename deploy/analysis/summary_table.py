@@ -35,10 +35,10 @@ def text(summary: Summary, folder: Path) -> str:
             *([f"  left behind: robot {', '.join(map(str, summary.left_behind))}"] if summary.left_behind else []),
             *(f"  not ok: {a.name} {a.text}".rstrip() for a in summary.assertions if not a.ok),
             *(f"  violation of {v.invariant} at {v.at_s:.3f} s: {v.text}" for v in summary.violations),
-            *(f"  {line}" for line in (() if summary.recording is None else summary.recording.losses())),
+            *(f"  warning: {warning}" for warning in summary.warnings),
             f"see it: {lfa()} view {folder}",
             f"more: {lfa()} report {folder} (a page for a browser)",
-            f"run folder: {folder}",
+            f"run folder: {folder}{', with holes in its recording' if summary.warnings else ''}",
         ]
     )
 

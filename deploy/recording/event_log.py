@@ -14,7 +14,9 @@ from msgspec import Struct
 from lfa.deploy.recording.recorder import EVENTS
 from lfa.protocol.file_reading import DamagedFile, decode_json
 
-ENDING_FAULTS = ("kill", "terminate", "stop", "cut")
+DIED = "died"
+"""Kind of the end of a process that no fault announced."""
+ENDING_FAULTS = ("kill", "terminate", "stop", "cut", DIED)
 LINE_BYTES_MAX = 1024 * 1024
 """Longest line [bytes]: what a message of 64 KiB becomes at most; a longer one is damage."""
 Line = dict[str, Any]
@@ -86,6 +88,30 @@ def faults(events: Sequence[Line]) -> list[FaultDone]:
     return [FaultDone(line["t"], line["deed"], line["robot"]) for line in of_kind(events, "fault")]
 
 
+def endings(events: Sequence[Line]) -> list[FaultDone]:
+    """Return the faults, and the deaths of robots that no fault announced: the token vanished and did not return.
+
+    A robot that released its lease before has left in order.
+    """
+    found, over_at = faults(events), _over_at(events)
+    for number, line in enumerate(events):
+        if line["kind"] not in (DIED, "peer_down") or not isinstance(line["robot"], int) or line["t"] > over_at:
+            continue
+        own = [other for other in events if other["robot"] == line["robot"]]
+        back = any(_is_return(other, line) for other in events[number:])
+        left = next((e.get("change") for e in reversed(own) if e["kind"] == "lease" and e["t"] <= line["t"]), None)
+        if not back and left not in ("released", "handed_over"):
+            found.append(FaultDone(line["t"], DIED, line["robot"]))
+    return sorted(found, key=lambda fault: fault.at_s)
+
+
+def _is_return(line: Line, vanished: Line) -> bool:
+    return (
+        line["kind"] == "peer_up" and vanished["kind"] == "peer_down" and line.get("name") == vanished.get("name")
+        and line.get("incarnation") == vanished.get("incarnation")
+    )  # fmt: skip
+
+
 def asked_by_leader(line: Line) -> bool:
     """Return True if an event `formation` is a leader's own request, not an operator's nor a follower's echo."""
     return bool(line.get("by", "operator") != "operator")
@@ -94,7 +120,7 @@ def asked_by_leader(line: Line) -> bool:
 def reigns(events: Sequence[Line]) -> list[LeaderTerm]:
     """Return the leaders' terms in order, from the leader commands accepted by all gateways."""
     found: list[LeaderTerm] = []
-    done = faults(events)
+    done = endings(events)
     for line in of_kind(events, "leader_command"):
         term, robot, at_s = (line["term"][0], line["term"][1]), line["robot"], line["t"]
         if any((reign.term, reign.robot_id) == (term, robot) for reign in found):
@@ -125,10 +151,13 @@ def places(events: Sequence[Line], robots: Sequence[int], end_s: float) -> dict[
 
 
 def failovers(events: Sequence[Line], reigns: Sequence[LeaderTerm]) -> list[Failover]:
-    """Return one failover for each fault that ended a leader's term; None for durations that the run did not reach."""
+    """Return one failover for each fault or death that ended a leader's term.
+
+    None for durations that the run did not reach.
+    """
     found = []
     for reign, successor in zip_longest(reigns, reigns[1:]):
-        fault = next((f for f in faults(events) if _ended_by(f, reign) and f.at_s == reign.until_s), None)
+        fault = next((f for f in endings(events) if _ended_by(f, reign) and f.at_s == reign.until_s), None)
         if fault is None:
             continue
         later = [line for line in events if line["t"] >= fault.at_s]
@@ -157,7 +186,7 @@ def last_chain(events: Sequence[Line]) -> list[int]:
 
     Events after `over` are ignored: when the run stops, the leader sees other robots leave before itself.
     """
-    over_at = next((line["t"] for line in of_kind(events, "over")), float("inf"))
+    over_at = _over_at(events)
     spoken = [line for line in of_kind(events, "chain") if line["term"] is not None and line["t"] <= over_at]
     newest = max(spoken, key=lambda line: (line["term"], line.get("seq", 0)), default=None)
     return [] if newest is None else list(newest["chain"])
@@ -174,6 +203,11 @@ def terms_that_went_back(events: Sequence[Line]) -> list[TermViolation]:
             found.append(TermViolation("I2", line["t"], text))
         newest = max(newest, term)
     return found
+
+
+def _over_at(events: Sequence[Line]) -> float:
+    """Return the time [s] at which the run stopped; inf if it did not."""
+    return next((line["t"] for line in of_kind(events, "over")), float("inf"))
 
 
 def _line(text: bytes) -> Line | None:

@@ -16,6 +16,7 @@ from msgspec import Struct
 
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_writer import ChunkWriter
+from lfa.deploy.recording.said_again import SaidAgain
 from lfa.deploy.recording.sender_caps import SenderCaps
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
@@ -27,6 +28,7 @@ RECORDING = "recording.mcap"
 PART = "recording-{}.mcap"
 """Name of the second and later files of a recording in several files."""
 EVENTS = "events.jsonl"
+HOLES_NAMED = 3
 FLUSH_S = 1.0  # interval between flushes, the most that a SIGKILL of the recorder loses
 ONLOOKERS = (WORLD_NAME, OPERATOR_NAME, RECORDER_NAME)
 CHUNK_BYTES_MAX = 4 * 1024 * 1024
@@ -49,16 +51,37 @@ class Recording(Struct, kw_only=True):
     """Number of messages that the disk refused."""
     left_out: dict[str, int] = {}
     """Number of messages of each member above what one may add to a recording (`sender_caps.py`)."""
+    holes: list[Hole] = []
+    """Streams with gaps beyond what the topic may lose, the widest first."""
 
     def losses(self) -> list[str]:
-        """Return a line for each reason why messages are not in the recording."""
+        """Return a line for each reason why messages are not in the recording; short gaps of states are none."""
         counts = {
-            "never arrived": self.missing,
+            f"never arrived{_widest(self.holes)}": sum(hole.missing for hole in self.holes),
             "dropped, the recorder was too slow": self.dropped,
             "refused by the disk": self.unwritten,
             **{f"of {name}, above the cap on one member": count for name, count in self.left_out.items()},
         }
         return [f"not recorded: {count} messages {reason}" for reason, count in counts.items() if count]
+
+
+class Hole(Struct):
+    """Messages of one stream that are missing in a recording, between two times [s] of the run."""
+
+    stream: str
+    """Owner and topic, as `robot2/pose`."""
+    missing: int
+    from_s: float
+    until_s: float
+
+
+def _widest(holes: list[Hole]) -> str:
+    """Return the times [s] and the widest of the holes as text."""
+    if not holes:
+        return ""
+    from_s, until_s = min(hole.from_s for hole in holes), max(hole.until_s for hole in holes)
+    named = ", ".join(f"{hole.stream} {hole.missing}" for hole in holes[:HOLES_NAMED])
+    return f", between {from_s:.1f} and {until_s:.1f} s: {named}{', ...' if len(holes) > HOLES_NAMED else ''}"
 
 
 def parts(folder: Path) -> list[Path]:
@@ -88,6 +111,7 @@ class Recorder:
         self._unwritten = 0
         self._refused = ""
         """Why the disk took no message at the last attempt; empty: it took all."""
+        self._said = SaidAgain()
         self._events = AppendedFile(folder / EVENTS, fresh=True)
         reason = self._next_file()
         if reason:
@@ -107,6 +131,7 @@ class Recorder:
         self._writer.add_message(channel, stamp_ns, body, stamp_ns, message.header.seq)
         self._messages += 1
         line = event_line(t, message) if isinstance(message, Event) else b""
+        line += b"".join(event_line(t, event) for event in self._said.late(key, message))
         if line:
             self._events.append(line)
         self._caps.spend(key, len(body) + len(line))

@@ -55,6 +55,7 @@ def finish(
     """Read the closed recording, write `summary.json`, and return the finished run."""
     summary = summarize(folder, about, verdict, duration_s, faults_left)
     summary.recording = recording
+    summary.warnings = [] if recording is None else recording.losses()
     summaries.write(folder, summary)
     return Ended(folder, summary, ended_by)
 

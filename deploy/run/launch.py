@@ -36,8 +36,8 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope
-from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, key
-from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, alive_key, key
+from lfa.protocol.transport.bus import Inbox, Links
 from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
@@ -100,6 +100,7 @@ class _Launch:
         self._operator = Operator(about.fleet, incarnations.drawn())
         self._inbox = Inbox()
         self._decoder = Decoder()
+        self._links = Links()
         self._bus: ZenohBus | None = None
         self._processes = RestartedProcesses(self._group, self._rows, drawn.restart, self._publish_event)
         self._faults = FaultExecution(drawn.mission, faults, self._processes, self._time, self._operator, self._publish)
@@ -148,9 +149,11 @@ class _Launch:
         self._group.start(recorder)
         self._bus = bus = ZenohBus(self._endpoint, self._inbox)
         topics = ("event", "tracking", "table", "status", "truth", "operator")
-        bus.follow(frozenset(key(self._about.fleet, "*", topic) for topic in topics))
         fleet = self._about.fleet
+        followed = frozenset(key(fleet, "*", topic) for topic in topics)
+        bus.follow(followed)
         self._await(recorder.name, lambda: bool(bus.living(fleet, RECORDER_NAME)), interrupts)
+        bus.follow(followed | {alive_key(fleet, "*", "*")})  # only now: queries for tokens beside it may return nothing
         self._publish_event("start", scenario=self._about.scenario, seed=self._about.seed)
         for row in others:
             self._group.start(row)
@@ -169,7 +172,13 @@ class _Launch:
     # --- received messages ------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        for arrival, message in self._decoder.messages(self._inbox.take()):
+        now, arrivals = clock.now(), self._inbox.take()
+        for arrival in arrivals:
+            if not isinstance(arrival.payload, bytes):
+                self._links.see(arrival.payload, now)
+        if self._links.due(now) and self._bus is not None:
+            self._bus.resubscribe()
+        for arrival, message in self._decoder.messages(arrivals):
             self._hear(arrival.at, message)
 
     def _hear(self, at: float, message: Message) -> None:

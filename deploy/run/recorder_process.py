@@ -17,27 +17,25 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.client.operator import Operator
+from lfa.deploy.recording.holes import Holes
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import About
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.finish import finish
 from lfa.protocol import clock, incarnations
-from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import Envelope, PeerDown, PeerUp
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.output import write_line
 from lfa.protocol.topics import RECORDER_NAME, alive_key
-from lfa.protocol.transport.bus import Arrival, Inbox, Wake
+from lfa.protocol.transport.bus import Arrival, Inbox, Links, Wake
 from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 INBOX_SIZE_MAX = 65536  # one minute of a fleet of four, in case the disk is slow
 WAIT_S = 0.05
-STREAMS_MAX = 16384
-"""Maximum number of streams whose sequence numbers are followed."""
 LAST_WORDS_S = 0.2  # for messages in transit when the verdict arrives
 
 
@@ -101,8 +99,8 @@ class _Tape:
         self._incarnation = incarnations.drawn()
         self._outbox = Outbox(fleet, RECORDER_NAME, self._incarnation, first=1)
         self._decoder = Decoder()
-        self._missing = 0
-        self._last_seq: dict[tuple[str, str, int], int] = {}
+        self._holes = Holes()
+        self._links = Links()
         self._time = WorldTime()
         self._operator = Operator(fleet, self._incarnation)
         self._recorder = Recorder(Path(task.folder), task.about.metadata())
@@ -112,7 +110,10 @@ class _Tape:
 
     def drain(self) -> None:
         """Record all pending messages."""
+        now = clock.now()
         for arrival in self._inbox.take():
+            if not isinstance(arrival.payload, bytes):
+                self._links.see(arrival.payload, now)
             heard = self._heard(arrival)
             if heard is None:
                 continue
@@ -120,18 +121,10 @@ class _Tape:
             if isinstance(message, Truth):
                 self._time.see(arrival.at, message.time_s)
             self._recorder.record(self._time.of(arrival.at), where, message)
-            self._count_missing(where, message.header)
+            self._holes.see(self._time.of(arrival.at), where, message.header)
+        if self._links.due(now):
+            self._bus.resubscribe()
         self._recorder.flush_when_due(self._time.of(clock.now()))
-
-    def _count_missing(self, where: str, header: Header) -> None:
-        """Count the gaps in a sender's sequence numbers, which are lost messages; the recorder should lose none."""
-        owner_and_topic = "/".join(where.split("/")[2:4])
-        stream = (owner_and_topic, header.sender, header.incarnation)
-        if len(self._last_seq) >= STREAMS_MAX:  # a member may invent incarnations
-            self._last_seq.clear()
-        before = self._last_seq.get(stream, header.seq - 1)
-        self._missing += max(0, header.seq - before - 1)
-        self._last_seq[stream] = max(before, header.seq)
 
     def close(self, verdict: Verdict) -> Recording:
         """Record the end of the run, close recorder and bus, and return the counts."""
@@ -140,7 +133,8 @@ class _Tape:
         self._recorder.record(self._time.of(now), end.key, end.message)
         recording = self._recorder.close()
         self._bus.close()
-        recording.missing, recording.dropped = self._missing, self._inbox.dropped
+        recording.missing, recording.dropped = self._holes.missing, self._inbox.dropped
+        recording.holes = self._holes.widest()
         recording.undecodable = self._decoder.undecodable
         lost = f"{recording.missing} missing, {recording.dropped} dropped, {recording.unwritten} refused by the disk"
         write_line(f"{recording.messages} recorded, {recording.undecodable} undecodable, {lost}", sys.stdout)

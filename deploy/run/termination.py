@@ -13,9 +13,9 @@ from math import hypot
 from lfa.agents.leading.free_place import FREE_WITHIN_M
 from lfa.deploy.recording.outcome import Verdict
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.consensus import NO_TERM, Term
+from lfa.protocol.messages.consensus import NO_TERM, Role, Term
 from lfa.protocol.messages.simulation import TrueRobot, Truth
-from lfa.protocol.messages.team import Event, RouteProgress, TableRow, Tracking
+from lfa.protocol.messages.team import Event, RouteProgress, Status, TableRow, Tracking
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.topics import TOPIC
 from lfa.world.description.load import Scenario
@@ -68,6 +68,10 @@ class Referee:
                 case Event(kind="chain", term=Term() as term) if term >= self._term:
                     self._term = term
                     self.chain = _ids(message.data.get("chain")) or self.chain
+                case Status(role=Role.LEADER, term=term, chain=chain) if term >= self._term and chain:
+                    self._term, self.chain = term, chain  # said again each second, in case the event was missed
+                    if term > self._led:
+                        self._led, self.leader = term, chain[0]
                 case Event(kind="leader_command", term=Term() as term) if term >= self._led:
                     self._led = term
                     self.leader = next(iter(_ids([message.data.get("robot")])), self.leader)

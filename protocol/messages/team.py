@@ -156,6 +156,8 @@ class Status(Struct, frozen=True, array_like=True, tag="status"):
     role: Role
     term: Term
     counters: dict[str, float]
+    chain: tuple[int, ...] = ()
+    """Chain that the robot follows, leader first: an observer that missed the event `chain` learns it here."""
 
 
 class Event(Struct, frozen=True, array_like=True, tag="event"):

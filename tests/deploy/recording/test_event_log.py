@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.event_log import Failover, Line
 
@@ -32,6 +34,31 @@ def test_a_reign_ends_when_its_holder_is_killed() -> None:
 def test_a_failover_counts_from_the_fault() -> None:
     (failover,) = event_log.failovers(KILLED, event_log.reigns(KILLED))
     assert failover == Failover("kill", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
+
+
+def _killed_unannounced(*more: Line, kind: str = "peer_down") -> list[Line]:
+    vanished = _line(8.0, 1, kind, name="robot1", incarnation=5)
+    return sorted([line for line in KILLED if line["kind"] != "fault"] + [vanished, *more], key=lambda line: line["t"])
+
+
+@pytest.mark.parametrize("kind", ["peer_down", "died"])
+def test_a_leader_that_dies_without_an_announced_fault_is_a_failover(kind: str) -> None:
+    events = _killed_unannounced(kind=kind)
+    (failover,) = event_log.failovers(events, event_log.reigns(events))
+    assert failover == Failover("died", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        _line(8.05, 1, "peer_up", name="robot1", incarnation=5),  # its token returned: a router died
+        _line(7.9, 1, "lease", FIRST, change="released"),  # it left in order
+        _line(7.9, None, "over"),  # type: ignore[arg-type]  # the run stopped
+    ],
+)
+def test_a_vanished_token_that_is_no_death_is_no_failover(more: Line) -> None:
+    events = _killed_unannounced(more)
+    assert event_log.failovers(events, event_log.reigns(events)) == []
 
 
 def test_a_chain_that_not_all_have_closed_is_not_closed() -> None:

@@ -10,7 +10,7 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Role, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import TrueRobot, Truth
-from lfa.protocol.messages.team import Event, RouteProgress, TableRow, Tracking
+from lfa.protocol.messages.team import Event, Level, RouteProgress, Status, TableRow, Tracking
 from lfa.world.description.load import Scenario, load
 
 
@@ -135,3 +135,20 @@ def test_events_with_foreign_data_do_no_harm() -> None:
         referee.see(_event("leader_command", "world", Term(9, 1, 1), **data))
     assert referee.chain == (1, 2)
     assert referee.leader is None
+
+
+def test_a_chain_whose_event_was_missed_is_learned_from_the_leaders_status() -> None:
+    """Robot 1 is gone, and the event of the chain without it was lost: the run must not end by its time limit."""
+    status = Status(Header("robot2", 1, 1, 0.0), Level.OK, "", Role.LEADER, Term(4, 2, 1), {}, (2,))
+    referee = Referee(_scenario())
+    referee.see(_event("chain", "robot1", Term(2, 1, 1), chain=[1, 2], seq=0))
+    for message in (status, _row(1, 2), _truth(9.0, 1.0, follower_x=2.95), _truth(9.0 + REST_S, 1.0, follower_x=2.95)):
+        referee.see(message)
+    assert (referee.chain, referee.leader) == ((2,), 2)
+
+
+def test_a_leader_of_an_earlier_term_changes_no_chain() -> None:
+    referee = Referee(_scenario())
+    referee.see(_event("chain", "robot2", Term(4, 2, 1), chain=[2], seq=0))
+    referee.see(Status(Header("robot1", 1, 1, 0.0), Level.OK, "", Role.LEADER, Term(2, 1, 1), {}, (1, 2)))
+    assert referee.chain == (2,)
