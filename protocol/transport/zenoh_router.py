@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
 from lfa.protocol.transport.endpoints import check_endpoints
+from lfa.protocol.transport.tls_door import FAILED_S, TlsDoor
 from lfa.protocol.transport.zenoh_config import (
     LINK_LEASE_MS,
     SECURE_PROTOCOLS,
@@ -29,6 +31,7 @@ ROUTER_RX_THREADS = (
     32  # more than the tcp links that can fail at once: each blocks one thread for 10 s (zenoh.md section 2)
 )
 UNIX_PATH_BYTES_MAX = 107
+HANDSHAKE_LIMIT = f"tls_handshake_timeout_ms={round(1000.0 * FAILED_S)}"
 
 
 def open_router(
@@ -50,7 +53,9 @@ def open_router(
         check_listen(endpoint, credentials, secure)
     for endpoint in connect:
         check_endpoints(endpoint, "connect")
-    config = session_config("router", listen, connect, lease_ms, credentials)
+    doors = {endpoint: _free_port() for endpoint in listen if endpoint.startswith("tls/")}
+    behind = [f"tls/127.0.0.1:{doors[end]}#{HANDSHAKE_LIMIT}" if end in doors else end for end in listen]
+    config = session_config("router", behind, connect, lease_ms, credentials)
     if secure:
         assert credentials is not None
         insert_settings(config, _guard(credentials))
@@ -61,8 +66,18 @@ def open_router(
         raise Refused(f"listen {' '.join(listen)}: {reason_of(error)}") from None
     finally:
         os.umask(mask)
+    opened: list[TlsDoor] = []
+    try:
+        for endpoint, port in doors.items():
+            host, _, public = endpoint.removeprefix("tls/").rpartition(":")
+            opened.append(TlsDoor(host.strip("[]"), int(public), ("127.0.0.1", port)))
+    except OSError as error:
+        session.close()  # type: ignore[no-untyped-call]
+        raise Refused(f"listen {' '.join(listen)}: {error.strerror}") from None
 
     def close() -> None:
+        for door in opened:
+            door.close()
         session.close()  # type: ignore[no-untyped-call]
         for endpoint in listen:
             path = socket_path(endpoint)
@@ -71,6 +86,13 @@ def open_router(
                 Path(f"{path}.lock").unlink(missing_ok=True)
 
     return close
+
+
+def _free_port() -> int:
+    """Return a free port on loopback, for the listener behind a door."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:

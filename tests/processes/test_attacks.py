@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import socket
 import stat
 import subprocess
 import sys
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -28,6 +31,7 @@ pytestmark = pytest.mark.processes
 
 BASE = f"lfa/{FLEET}"
 FLOOD_S = 3.0
+SILENT_GAP_S, SILENT_S = 0.05, 12.0
 REPLAYED = 20
 
 
@@ -270,6 +274,35 @@ def test_old_messages_of_another_played_again_on_its_key(fleet: Attacked) -> Non
         assert not fleet.passes(again, "nothing")
         eventually(lambda: len(heard) >= REPLAYED, "nor does what robot 1 itself says")
     assert not before & set(heard)
+
+
+def test_silent_connections_lock_out_neither_a_new_member_nor_one_that_returns(fleet: Attacked) -> None:
+    """Twenty a second from anyone, without any certificate: Zenoh alone lets nobody in any more after some seconds."""
+    silent: list[socket.socket] = []
+    stop = threading.Event()
+
+    def stand() -> None:
+        while not stop.wait(SILENT_GAP_S):
+            with suppress(OSError):
+                silent.append(socket.create_connection(("127.0.0.1", fleet.port), timeout=5.0))
+
+    standing = threading.Thread(target=stand)
+    standing.start()
+    try:
+        eventually(lambda: len(silent) > SILENT_S / SILENT_GAP_S, "nobody stands at the door", 4.0 * SILENT_S)
+        assert not fleet.refused(fleet.tls)
+        fleet.team.signal(2, signal.SIGKILL)  # the robot whose link goes through the door
+        fleet.team.wait_until(lambda: 2 not in fleet.team.chain(), "robot 2 is not missed")
+        fleet.team.restart(2)
+        fleet.team.wait_until(lambda: set(fleet.team.chain()) == {1, 2, 3}, "robot 2 does not come back", SILENT_S)
+    finally:
+        stop.set()
+        standing.join()
+        for one in silent:
+            one.close()
+    fleet.team.signal(3, signal.SIGKILL)  # so that the chain is in its order again for the other tests
+    fleet.team.wait_until(lambda: 3 not in fleet.team.chain(), "robot 3 is not missed")
+    fleet.team.restart(3)
 
 
 @pytest.mark.alone
