@@ -17,6 +17,7 @@ from msgspec import Struct
 from lfa.deploy.robot.watchdog import watch
 from lfa.deploy.ros.wire import DEFAULT, RosEndpoint, RosNode, attachment
 from lfa.protocol import clock
+from lfa.protocol.output import write_line
 from lfa.protocol.transport.zenoh_ros import ros_session
 
 NODE = "lfa_watchdog"
@@ -78,7 +79,7 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # what ends the driver must not end its watchdog first
     speaker = ZeroSpeaker(msgspec.json.decode(sys.argv[2], type=StopTask))
-    print(READY, flush=True)
+    write_line(READY, sys.stdout)
     try:
         return watch(sys.stdin.fileno(), float(sys.argv[1]), speaker.stop)
     finally:
