@@ -134,7 +134,7 @@ class LeaseCore(LeaseTime):
         bond_term = s[w + BOND_TERM]
         holder = s[self.at[bond_term] + HOLDER] if bond_term else None
         hint = self.gateways and holder != v
-        if not may_promise(k, i, promised=s[w], bond_holder=holder, holder_gone=hint):
+        if not self._agree(v, i) or not may_promise(k, i, promised=s[w], bond_holder=holder, holder_gone=hint):
             return False
         b[w + PROMISED] = k
         if self.mutant == "hint_is_proof" and bond_term and holder != i:
@@ -176,7 +176,7 @@ class LeaseCore(LeaseTime):
         at, w = self.at[k], 5 * v
         bond_term = s[w + BOND_TERM]
         bond_holder = s[self.at[bond_term] + HOLDER] if bond_term else None
-        return may_grant(
+        return self._agree(v, s[at + HOLDER]) and may_grant(
             k, s[at + HOLDER], self.issuer[k], SETS[s[at + FENCED]],
             promised=s[w], released=s[w + RELEASED], bond_term=bond_term, bond_holder=bond_holder,
         )  # fmt: skip
@@ -221,7 +221,7 @@ class LeaseCore(LeaseTime):
             for successor in VOTERS:
                 w = 5 * successor
                 age = self.grant - s[w + BOND_LEFT]
-                if successor == i or s[w + BOND_TERM] != old or age >= self.act or s[w + PROMISED] > k:
+                if successor == i or s[w + BOND_TERM] != old or age >= self.acts[successor] or s[w + PROMISED] > k:
                     continue  # none, or one that would never lead: that only binds voters
                 b = bytearray(s)
                 self._stop_all(b, i, k, keep_gateway=self.mutant == "hand_over_unconfirmed")

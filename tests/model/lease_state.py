@@ -35,6 +35,7 @@ MUTANTS = {
     "hint_is_proof": "a vanished token voids the bond",
     "lease_from_ack": "the lease runs from when the grant arrived, not from when it was asked",
     "stamp_after_check": "the gateway stamp is read after the lease check",
+    "not_agreed": "voters bind themselves to a holder that counts longer leases than their bonds allow for",
 }
 
 
@@ -49,16 +50,19 @@ class LeaseState:
         gateways: bool = False,
         delays: bool = False,
         mutant: str = "",
+        odd: int = 0,
     ) -> None:
         """`issuers[k-1]` issues term k. `act` and `deadman` in units of a clock.
 
         Without `gateways` there is no hint, fence, command or D: leases alone. With `delays` each round is an event of
         its own and ages on its way; without, a voter grants the newest as it leaves (an older one only forbids).
+        Robot 1 counts its leases `odd` units longer than the others count theirs: it has another profile (E25).
         """
         assert mutant in ("", *MUTANTS) and (gateways or deadman == 0), (mutant, deadman)
         self.issuer = (-1, *issuers)
         self.terms = tuple(range(1, len(issuers) + 1))
-        self.act, self.deadman, self.gateways, self.mutant = act, deadman, gateways, mutant
+        self.acts = (act + odd, act, act)
+        self.act_max, self.deadman, self.gateways, self.mutant = act + odd, deadman, gateways, mutant
         self.delays = delays
         self.grant = RATE_RATIO * (act + deadman) - (mutant == "t_grant_short")
         self.at = (0, *(TERMS + TERM_SIZE * (k - 1) for k in self.terms))
@@ -73,11 +77,15 @@ class LeaseState:
 
     def _valid(self, s: State | bytearray, k: int) -> bool:
         """A quorum has granted rounds of k that were sent less than T_act ago."""
-        at, act = self.at[k], self.act
+        at, act = self.at[k], self.acts[s[self.at[k] + HOLDER]]
         return s[at] == OPEN and (s[at + 4] < act) + (s[at + 5] < act) + (s[at + 6] < act) >= 2
 
+    def _agree(self, v: int, holder: int) -> bool:
+        """Both count leases alike (E25)."""
+        return self.acts[v] == self.acts[holder] or self.mutant == "not_agreed"
+
     def _ages(self, s: State | bytearray, k: int) -> bool:
-        at, act = self.at[k], self.act
+        at, act = self.at[k], self.acts[s[self.at[k] + HOLDER]]
         return s[at + 3] < act or s[at + 4] < act or s[at + 5] < act or s[at + 6] < act
 
     def _next_of(self, s: State, k: int, i: int) -> bool:
@@ -98,7 +106,7 @@ class LeaseState:
 
     def _forget_ages(self, b: bytearray, k: int) -> None:
         at = self.at[k]
-        b[at + 3] = b[at + 4] = b[at + 5] = b[at + 6] = self.act
+        b[at + 3] = b[at + 4] = b[at + 5] = b[at + 6] = self.act_max
 
     def _drop(self, b: bytearray, j: int) -> None:
         at = self.at[j]

@@ -88,7 +88,7 @@ class LeaseTime(LeaseState):
             at = self.at[k]
             if b[at] == OPEN and b[at + HOLDER] == v:
                 for age in (at + ROUND_AGE, at + ACK_AGE, at + ACK_AGE + 1, at + ACK_AGE + 2):
-                    b[age] = min(self.act, b[age] + 1)
+                    b[age] = min(self.act_max, b[age] + 1)
 
     def _gateway_advances(self, b: bytearray, s: State, v: int) -> None:
         if self.mutant == "stamp_after_check":
@@ -125,7 +125,7 @@ class LeaseTime(LeaseState):
 
     def _can_be_valid(self, b: bytearray, k: int) -> bool:
         """Two voters' grants are young or may still come; what was handed over needs its first round's age for that."""
-        at, act = self.at[k], self.act
+        at, act = self.at[k], self.acts[b[self.at[k] + HOLDER]]
         if b[at + HOLDER] != self.issuer[k] and b[at + ROUND_AGE] >= act and not self._valid(b, k):
             return False
         count = 0

@@ -32,11 +32,12 @@ def lease(
     gateways: bool,
     delays: bool = False,
     short: bool = False,
+    odd: int = 0,
 ) -> Run:
     terms = tuple(int(digit) - 1 for digit in issuers)
     return Run(
         f"{name}, terms of {issuers}, T_act {act}, D {deadman}",
-        lambda: LeaseCore(terms, act, deadman, gateways, delays),
+        lambda: LeaseCore(terms, act, deadman, gateways, delays, odd=odd),
         short=short,
     )
 
@@ -63,6 +64,9 @@ def config(
 
 RULES = (
     lease("leases", "12", 2, gateways=False, delays=True, short=True),
+    lease("leases, robot 1 of another profile", "12", 1, gateways=False, short=True, odd=1),
+    lease("leases, robot 1 of another profile", "121", 1, gateways=False, odd=1),
+    lease("fences, robot 1 of another profile", "12", 1, 1, gateways=True, odd=1),
     lease("leases", "11", 2, gateways=False, delays=True),
     lease("leases", "111", 1, gateways=False),
     lease("leases", "112", 1, gateways=False),
@@ -91,9 +95,11 @@ RULES = (
 )
 
 
-def lease_mutant(mutant: str, issuers: str, act: int, deadman: int = 0, *, gateways: bool, short: bool = True) -> Run:
+def lease_mutant(
+    mutant: str, issuers: str, act: int, deadman: int = 0, *, gateways: bool, short: bool = True, odd: int = 0
+) -> Run:
     terms = tuple(int(digit) - 1 for digit in issuers)
-    build: Callable[[], Model] = lambda: LeaseCore(terms, act, deadman, gateways, mutant=mutant)  # noqa: E731
+    build: Callable[[], Model] = lambda: LeaseCore(terms, act, deadman, gateways, mutant=mutant, odd=odd)  # noqa: E731
     return Run(lease_state.MUTANTS[mutant], build, short, mutant)
 
 
@@ -114,6 +120,7 @@ MUTANTS = (
     lease_mutant("stamp_after_check", "12", 1, 1, gateways=True),
     lease_mutant("early_restamp", "112", 1, gateways=True),
     lease_mutant("fence_issuer", "112", 1, gateways=True),
+    lease_mutant("not_agreed", "12", 1, gateways=False, odd=1),
     lease_mutant("highest_fenced", "123", 1, gateways=True),
     config_mutant("no_joint", 2, "12"),
     config_mutant("same_life", 2, "12", (0, 1, 2)),

@@ -19,8 +19,10 @@ import zenoh
 
 from lfa.deploy.fleet.security import authority, keys
 from lfa.protocol import clock
-from lfa.protocol.messages.codec import decode
-from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
+from lfa.protocol.lease.term_window import FREE
+from lfa.protocol.messages.codec import decode, encode
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Prepare, Propose, Release, Term, Version
+from lfa.protocol.messages.header import MESSAGE_BYTES_MAX, Header
 from lfa.protocol.messages.team import Status
 from lfa.protocol.topics import RECORDER_NAME, TOPIC
 from lfa.protocol.transport.credentials import ACCESS_FILE
@@ -303,6 +305,32 @@ def test_silent_connections_lock_out_neither_a_new_member_nor_one_that_returns(f
     fleet.team.signal(3, signal.SIGKILL)  # so that the chain is in its order again for the other tests
     fleet.team.wait_until(lambda: 3 not in fleet.team.chain(), "robot 3 is not missed")
     fleet.team.restart(3)
+
+
+def test_made_up_terms_stop_nobody(fleet: Attacked) -> None:
+    """E26: the last term there is, said with robot 3's keys, does nothing; after a far one comes the leader's own."""
+    proposes: list[Propose] = []
+    statuses: list[Status] = []
+
+    def hear(sample: zenoh.Sample) -> None:
+        note = decode(sample.payload.to_bytes(), LeaseNote)
+        if isinstance(note, LeaseNote) and isinstance(note.body, Propose):
+            proposes.append(note.body)
+
+    with fleet.open(fleet.unix) as attacker:
+        attacker.declare_subscriber(f"{BASE}/robot1/lease/all", hear)
+        attacker.declare_subscriber(f"{BASE}/{TRAITOR}/status", lambda sample: statuses.append(_status(sample)))
+        eventually(lambda: bool(proposes) and bool(statuses), "robot 1 or robot 3 says nothing")
+        agreed, mine = proposes[-1].agreed, statuses[-1].header.incarnation
+        for number, term in enumerate((Term(2**53, 3, mine), Term(FREE, 3, mine))):
+            said = (Prepare(term, Version(), agreed=agreed), Prepare(term, Version(term), agreed=agreed), Release(term))
+            orders = {f"gateway{robot}": (Fence(term, term),) for robot in (1, 2, 3)}
+            for to, bodies in ({"all": said} | orders).items():
+                for body in bodies:
+                    note = LeaseNote(Header(TRAITOR, mine, number, 0.0), body)
+                    attacker.put(f"{BASE}/{TRAITOR}/lease/{to}", encode(note))
+        eventually(lambda: proposes[-1].term.n > FREE, "robot 1 does not go on under a term after the made-up one")
+        assert proposes[-1].term.n < 2**53
 
 
 @pytest.mark.alone
