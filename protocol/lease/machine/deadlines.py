@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from lfa.protocol.lease.machine.memory import LeaseMemory
-from lfa.protocol.lease.machine.table import LeaseEvent
+from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState
 
 NEVER = float("inf")
 LATE_S = 1e-3
@@ -107,3 +107,15 @@ DEADLINES = (
 )
 """In the order in which a tick does what is due."""
 # fmt: on
+
+
+def wakes_by_state(deadlines: tuple[Deadline, ...]) -> dict[LeaseState, tuple[When, ...]]:
+    """Return for each state the wake-up times of the events that do something in it."""
+    return {
+        state: tuple(deadline.wakes for deadline in deadlines if (deadline.event, state) in ACTIONS)
+        for state in LeaseState
+    }
+
+
+WAKES = wakes_by_state(DEADLINES)
+"""What `next_deadline` asks, several hundred times a second."""

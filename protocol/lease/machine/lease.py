@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.machine import voting
-from lfa.protocol.lease.machine.deadlines import DEADLINES, expiry
+from lfa.protocol.lease.machine.deadlines import DEADLINES, NEVER, WAKES, expiry
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState, refusal, state_of
 from lfa.protocol.lease.membership import ids, is_first
@@ -181,11 +181,11 @@ class Lease:
 
     def next_deadline(self, again_at: float = SOONEST) -> float:
         """Return the time [s] of the next tick, for a process that ticks at `again_at` [s] anyway."""
-        m, at = self._memory, float("inf")
-        state = state_of(m)
-        for deadline in DEADLINES:
-            if (deadline.event, state) in ACTIONS:
-                at = min(at, deadline.wakes(m, again_at))
+        m, at = self._memory, NEVER
+        for wakes in WAKES[state_of(m)]:
+            when = wakes(m, again_at)
+            if when < at:
+                at = when
         return at
 
     def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:

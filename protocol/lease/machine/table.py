@@ -59,6 +59,8 @@ class LeaseState(StrEnum):
     RAISING = "raising"
     SWITCHING = "switching"
 
+    __hash__ = str.__hash__  # an enum's own is a Python function, and the table is read at every message
+
 
 MEANING: dict[LeaseState, str] = {
     LeaseState.FOLLOWER: "neither lease nor candidacy: waits for its turn to stand",
@@ -106,6 +108,8 @@ class LeaseEvent(StrEnum):
     PROMISES_DUE = "PREPARE due"
     HELLO_DUE = "HELLO due"
     LEADER_LOST = "leader's lease over"
+
+    __hash__ = str.__hash__
 
 
 Action = Callable[..., object]
