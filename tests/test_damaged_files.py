@@ -18,7 +18,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from lfa.agents.cli import read_mission
 from lfa.deploy.analysis import summary as summaries
-from lfa.deploy.fleet.host.supervisor import LEDGER, Ledger, end_orphans, ledger
+from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, ledger
 from lfa.deploy.fleet.plan import fleet_file, host_plan
 from lfa.deploy.fleet.security import authority, keys
 from lfa.deploy.process.identity import Identity

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lfa.deploy.fleet.host.supervisor import living
+from lfa.deploy.fleet.host.ledger import living
 from lfa.deploy.process.identity import send
 from tests.rigs.machines import Machines, machines, why_not
 from tests.rigs.network_namespaces import PORT

@@ -19,8 +19,8 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
+from lfa.deploy.fleet.host.ledger import Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.router import LISTENS
-from lfa.deploy.fleet.host.supervisor import Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.plan import host_plan as parts
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import unpack

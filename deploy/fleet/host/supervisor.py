@@ -14,22 +14,19 @@ import signal
 import sys
 import threading
 from collections import OrderedDict
-from contextlib import suppress
 from pathlib import Path
 
 import msgspec
-from msgspec import Struct
 
+from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.log_tail import Tail
 from lfa.deploy.fleet.plan import host_plan as parts
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
-from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
 from lfa.deploy.process.restart_policy import REFUSED_CODE, ROUTER, RestartBackoff
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
 from lfa.protocol.outbox import Outbox
@@ -41,8 +38,6 @@ from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
 from lfa.world.description.scenario import STATE
 
-LEDGER = "processes.json"
-"""File beside the plan with the supervisor and its children; read by a later incarnation, `lfa down`, `lfa doctor`."""
 TELL_S = 1.0
 STEP_S = 0.1
 JOIN_S = 0.1
@@ -55,51 +50,12 @@ LEAVE_S = 0.5
 OPERATORS_MAX = 64
 
 
-class Ledger(Struct, frozen=True):
-    """Identities of a fleet's supervisor and child processes on this machine."""
-
-    run: str
-    digest: str
-    supervisor: Identity
-    children: tuple[Identity, ...] = ()
-
-
-def ledger(folder: Path) -> Ledger | None:
-    """Return what the supervisor of that folder wrote last, None without a readable file."""
-    try:
-        return read_json(folder / LEDGER, Ledger)
-    except (OSError, DamagedFile):
-        return None
-
-
-def living(folder: Path) -> Ledger | None:
-    """Return the ledger of that folder if its supervisor is running, else None."""
-    written = ledger(folder)
-    alive = written is not None and identity.identify(written.supervisor.pid) == written.supervisor
-    return written if alive else None
-
-
-def end_orphans(folder: Path) -> list[str]:
-    """Kill exactly the processes that the last supervisor of that folder left; return their command lines."""
-    written = ledger(folder)
-    if written is None or living(folder) is not None:
-        return []
-    return [" ".join(child.arguments) for child in written.children if identity.send(child, signal.SIGKILL)]
-
-
-def sweep(folder: Path) -> None:
-    """Remove the files that a supervisor could not remove itself: socket, its lock, ledger."""
-    for name in (parts.SOCKET, f"{parts.SOCKET}.lock", LEDGER):
-        with suppress(OSError):  # of a file system that became read-only: a later start replaces them
-            (folder / name).unlink(missing_ok=True)
-
-
 class _ManagedProcess:
     """One supervised process: its specification, restart backoff and state."""
 
-    def __init__(self, row: ProcessSpec, lives: RestartBackoff) -> None:
+    def __init__(self, row: ProcessSpec, backoff: RestartBackoff) -> None:
         self.row = row
-        self.lives = lives
+        self.backoff = backoff
         self.starts = 0
         self.began = 0.0
         self.began_ms = 0
@@ -169,7 +125,7 @@ class Supervisor:
         self._ending = True
 
     def _step(self, now: float) -> None:
-        changed = [ward for ward in self._managed.values() if self._look_after(ward, now)]
+        changed = [managed for managed in self._managed.values() if self._look_after(managed, now)]
         self._join(now)
         told = self._hear(now)
         if changed or told or now >= self._tell_at:
@@ -183,51 +139,51 @@ class Supervisor:
 
     # --- the processes ---------------------------------------------------------------------------------------------
 
-    def _look_after(self, ward: _ManagedProcess, now: float) -> bool:
+    def _look_after(self, managed: _ManagedProcess, now: float) -> bool:
         """Start the process when it is due, detect its end; return True when its state changed."""
-        name = ward.row.name
-        if ward.start_at is not None:
-            if now < ward.start_at or (name != ROUTER_NAME and self._waits_for_router(now)):
+        name = managed.row.name
+        if managed.start_at is not None:
+            if now < managed.start_at or (name != ROUTER_NAME and self._waits_for_router(now)):
                 return False
-            self._start(ward, now)
+            self._start(managed, now)
             return True
         code = self._processes.code(name)
-        if ward.state != "running" or code is None:
+        if managed.state != "running" or code is None:
             return False
-        ward.ended = str(self._processes.exit_of(name))
-        write_line(ward.ended, sys.stdout)
-        if ward.ordered_end:
-            ward.ordered_end = False
-            ward.start_at, ward.state = now, "waiting"
+        managed.ended = str(self._processes.exit_of(name))
+        write_line(managed.ended, sys.stdout)
+        if managed.ordered_end:
+            managed.ordered_end = False
+            managed.start_at, managed.state = now, "waiting"
             return True
-        verdict = ward.lives.ended(code, now)
-        ward.start_at, ward.state = verdict.at, verdict.word
+        verdict = managed.backoff.ended(code, now)
+        managed.start_at, managed.state = verdict.at, verdict.word
         if name == ROUTER_NAME and verdict.at is None:
-            if ward.starts == 1:
-                raise Refused(ward.ended)
-            ward.start_at, ward.state = now + TELL_S, "waiting"  # it could listen before: retry
+            if managed.starts == 1:
+                raise Refused(managed.ended)
+            managed.start_at, managed.state = now + TELL_S, "waiting"  # it could listen before: retry
         return True
 
     def _waits_for_router(self, now: float) -> bool:
         """Return True during startup until the router is up, so that processes need not retry to connect."""
         return self._bus is None and now < self._began + ROUTER_S
 
-    def _start(self, ward: _ManagedProcess, now: float) -> None:
-        row = ward.row if ward.starts == 0 or not self._remembers(ward) else ward.row.restarted()
-        ward.start_at = None
-        ward.began, ward.began_ms = now, clock.wall_ms()
-        ward.starts += 1
+    def _start(self, managed: _ManagedProcess, now: float) -> None:
+        row = managed.row if managed.starts == 0 or not self._remembers(managed) else managed.row.restarted()
+        managed.start_at = None
+        managed.began, managed.began_ms = now, clock.wall_ms()
+        managed.starts += 1
         try:
             self._processes.start(row)
-            ward.state = "running"
+            managed.state = "running"
         except OSError as error:
-            ward.ended = f"{row.name} cannot be started: {error.strerror}"
-            verdict = ward.lives.ended(1, now)
-            ward.start_at, ward.state = verdict.at, verdict.word
+            managed.ended = f"{row.name} cannot be started: {error.strerror}"
+            verdict = managed.backoff.ended(1, now)
+            managed.start_at, managed.state = verdict.at, verdict.word
 
-    def _remembers(self, ward: _ManagedProcess) -> bool:
+    def _remembers(self, managed: _ManagedProcess) -> bool:
         """Return False for a world that ended before it wrote its first state: it starts without `--resume`."""
-        return not ward.row.restart_args or (self._part.run_folder / STATE).exists()
+        return not managed.row.restart_args or (self._part.run_folder / STATE).exists()
 
     def _write_ledger(self) -> None:
         me = identity.identify(os.getpid())
@@ -247,9 +203,9 @@ class Supervisor:
     def _end(self) -> None:
         """Terminate robots and world in order, publish a last status, then terminate the router."""
         self._processes.terminate([name for name in self._managed if name != ROUTER_NAME], END_S)
-        for ward in self._managed.values():
-            if ward.row.name != ROUTER_NAME:
-                ward.state, ward.ended = "ended", "lfa down"
+        for managed in self._managed.values():
+            if managed.row.name != ROUTER_NAME:
+                managed.state, managed.ended = "ended", "lfa down"
         self._tell(clock.now())
         if self._bus is not None:
             clock.sleep(LAST_WORDS_S)
@@ -306,8 +262,8 @@ class Supervisor:
         if order.deed == "down" and here:
             self._ending = True
         elif order.deed == "restart":
-            for ward in self._managed.values() if here else (self._managed[name],):
-                self._start_again(ward, now)
+            for managed in self._managed.values() if here else (self._managed[name],):
+                self._start_again(managed, now)
         elif order.deed == "logs":
             for one in self._managed if here else (name,):
                 if order.lines or one not in self._tails:
@@ -315,19 +271,19 @@ class Supervisor:
                 self._tails[one].prolong(now)
         return True
 
-    def _start_again(self, ward: _ManagedProcess, now: float) -> None:
-        ward.lives.forget()
-        if self._processes.runs(ward.row.name):
-            ward.ordered_end = True
-            self._processes.signal(ward.row.name, signal.SIGTERM)
-            self._processes.signal(ward.row.name, signal.SIGCONT)
+    def _start_again(self, managed: _ManagedProcess, now: float) -> None:
+        managed.backoff.forget()
+        if self._processes.runs(managed.row.name):
+            managed.ordered_end = True
+            self._processes.signal(managed.row.name, signal.SIGTERM)
+            self._processes.signal(managed.row.name, signal.SIGCONT)
         else:
-            ward.start_at = now
+            managed.start_at = now
 
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_S
         self._write_ledger()
-        reports = tuple(ward.report(self._processes.pid(name), now) for name, ward in self._managed.items())
+        reports = tuple(managed.report(self._processes.pid(name), now) for name, managed in self._managed.items())
         part = self._part
         header = self._outbox.header("host", now)
         self._publish("host", HostStatus(header, part.host, part.version, part.run, self._obeyed, reports))

@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from lfa.deploy.fleet.host.supervisor import LEDGER, Ledger, end_orphans, living
+from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, living
 from lfa.deploy.fleet.plan import host_plan as parts
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity, identify, own_processes
