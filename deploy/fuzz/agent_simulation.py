@@ -121,7 +121,7 @@ class AgentSimulation:
         self.gateways: dict[int, Hardware] = {}
         self.accepted: list[tuple[float, CmdVel]] = []
         self.log: list[tuple[float, int, Effect]] = []
-        world = WorldSpec(lidar=Lidar(beams=8, rate_hz=2.0))
+        world = WorldSpec(lidar=Lidar(beams=8))
         self._scenario = Scenario("A straight road", self.mission, 1e6, world=world, name=FLEET)
         self._operator = Operator(FLEET, 1)
         self._lives = 0

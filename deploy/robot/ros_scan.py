@@ -23,9 +23,11 @@ def converted(message: Any, mount: Pose2D) -> Scan:
     """
     step, count = float(message.angle_increment), len(message.ranges)
     low, high, first = float(message.range_min), float(message.range_max), float(message.angle_min)
-    if not count or not step or not all(map(isfinite, (step, low, high, first))) or not 0.0 <= low < high:
+    angles = 0.0 < abs(step) <= TAU and abs(first) <= 2.0 * TAU
+    if not count or not angles or not (0.0 <= low < high and isfinite(high)):
         raise Refused(
-            f"{count} beams from {first:g} rad by {step:g} rad, {low:g} to {high:g} m: must be finite, above 0"
+            f"{count} beams from {first:g} rad by {step:g} rad, {low:g} to {high:g} m: must be finite, above 0, angles "
+            "of a turn at most"
         )
     ranges = [_reading(float(value), low, high) for value in message.ranges]
     if step < 0.0:
