@@ -130,12 +130,13 @@ class Crossing:
             return EVASIONS[0]
         best, most = EVASIONS[0], -inf
         under_way = self.decision is not None and self._evasion is not SLOW
-        for evasion in (self._present(pose), *EVASIONS) if under_way else EVASIONS:
+        candidates = (self._present(pose), *EVASIONS) if under_way else EVASIONS
+        for evasion in candidates:
             twist = _done(evasion, wanted)
             if twist.linear_x and free_along(points, twist, self._radius_m + BODY_M) < abs(twist.linear_x) * ROOM_S:
                 continue
             kept = _kept(moving, pose, evasion, twist)
-            kept += WORTH_M if most == -inf else 0.0  # the first is the present one, or waiting
+            kept += WORTH_M if evasion is candidates[0] else 0.0  # the present one, or waiting
             kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
             if kept > most:
                 best, most = evasion, kept

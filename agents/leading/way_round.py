@@ -16,7 +16,6 @@ from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.leading.planned_way import PlannedWay
 from lfa.agents.perception.scan import Point
 from lfa.protocol.geometry import Pose2D, Twist
-from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Mission
 
@@ -38,7 +37,7 @@ MAPPED_S = 0.6
 
 
 class WayRound:
-    """Way round of one leader; `active` from the trap until the robot is back on its route."""
+    """Way round of one leader: `way` from the trap until the robot is back on its route, else None."""
 
     def __init__(self, mission: Mission, lead: PathFollower) -> None:
         self._mission = mission
@@ -77,11 +76,6 @@ class WayRound:
             self._ahead_m = min(2.0 * self._ahead_m, AHEAD_M_MAX) if again else AHEAD_M
             self.way, self._begun_at, self._back_m = PlannedWay(self._mission, self._lead.waypoint), now, None
 
-    def see(self, scan: LaserScan, pose: Pose2D, twist: Twist, mates: Sequence[Pose2D]) -> None:
-        """Update the map with a scan, while there is one."""
-        if self.way is not None:
-            self.way.explore.see(scan, pose, twist, mates)
-
     def steer(
         self, points: list[Point], pose: Pose2D, last: Twist, slots: Sequence[Slot], speed_mps: float, now: float
     ) -> Twist | None:
@@ -91,8 +85,9 @@ class WayRound:
             return None
         if self._back_m is None and now - self._begun_at >= MAPPED_S:
             self._aim(way)
-        if self._ended(pose) or way.explore.failure is not None:
-            if self._back_m is not None:
+        ended = self._ended(pose)
+        if ended or way.explore.failure is not None:
+            if ended and self._back_m is not None:
                 self._lead.resume(self._back_m, pose)
             self._returned_m = self._lead.progress_m
             self.end()

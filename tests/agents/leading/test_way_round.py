@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, pi
 
 import pytest
 
@@ -11,6 +11,8 @@ from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.leading.way_round import BACK_S, PATIENCE_S, WayRound
 from lfa.agents.perception.obstacle import Class
 from lfa.protocol.geometry import STILL, Pose2D
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.mission import Leading, Limits, Mission
 
 ROUTE = ((0.0, 0.0), (20.0, 0.0))
@@ -78,3 +80,21 @@ def test_a_way_point_that_can_be_passed_is_not_passed_over() -> None:
     rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0)
     assert rounding.steer([], Pose2D(1.0, 0.0, 0.0), STILL, [], 0.5, BACK_S + 1.1) is None
     assert lead.place_m == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_way_round_that_is_not_found_wins_no_progress() -> None:
+    """Walled in on all sides: the detour has the robot again, where it was on its route."""
+    rounding, lead = started()
+    rounding.watch(detour("back"), 0.0)
+    rounding.watch(detour("back"), BACK_S)
+    way = rounding.way
+    assert way is not None
+    scan = LaserScan(Header("robot1", 1, 1, 0.0), -pi, 2.0 * pi / 180, 0.05, 10.0, (0.6,) * 180)
+    for n in range(2000):
+        now = BACK_S + 0.02 * n
+        way.explore.see(scan, Pose2D(), STILL, [])
+        way.work(True, Pose2D(), [], now)
+        if rounding.steer([], Pose2D(), STILL, [], 0.5, now) is None:
+            break
+    assert rounding.way is None
+    assert lead.place_m == pytest.approx(0.0, abs=0.1)
