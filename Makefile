@@ -8,6 +8,10 @@ PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tes
 
 .PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted mutants coverage same pages pictures docs clean setup
 
+COMPUTE := 'not processes and not hosts and not campaign'
+TEAMS := 'processes and not hosts and not campaign and not wheel'
+ALONE := echo 'failed beside others; once more, alone:'; $(BIN)/pytest --last-failed --last-failed-no-failures none
+
 setup: $(STAMP)
 
 $(STAMP): pyproject.toml constraints.txt
@@ -19,15 +23,13 @@ demo: $(STAMP)
 	$(BIN)/lfa run paper_path1 --fault 'kill leader at 20 s'
 
 # First what computes, on two workers; then the teams of real processes, two at a time, for they keep time and mostly wait.
-# A team that a busy machine kept from keeping time is tried once more, alone: a fault of the code fails there too.
+# What a busy machine kept from keeping time is tried once more, alone: a fault of the code fails there too.
 # Bytecode, also where the environment says not to write any: without it each of some 600 processes compiles its own.
 test test-fast: export PYTHONDONTWRITEBYTECODE =
 test test-fast: export PYTHONPYCACHEPREFIX = $(CURDIR)/$(VENV)/bytecode
 test: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadgroup -m 'not processes and not hosts and not campaign'
-	$(BIN)/pytest -n 2 --dist loadgroup -m 'processes and not hosts and not campaign and not wheel' \
-	|| { echo 'failed beside another team; once more, alone:'; $(BIN)/pytest --last-failed --last-failed-no-failures none \
-	-m 'processes and not hosts and not campaign and not wheel'; }
+	$(BIN)/pytest -n 2 --dist loadgroup -m $(COMPUTE) || { $(ALONE) -m $(COMPUTE); }
+	$(BIN)/pytest -n 2 --dist loadgroup -m $(TEAMS) || { $(ALONE) -m $(TEAMS); }
 
 # Programs of others that tests of the ROS side talk to, each in an environment of its own; their tests are skipped
 # without them. Fetches some 400 MB once.
@@ -46,7 +48,7 @@ peers: .peers/genuine/.installed .peers/sdk/.installed .peers/foxglove/.installe
 
 # The tests that start no process.
 test-fast: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadgroup -m 'not processes and not hosts and not campaign'
+	$(BIN)/pytest -n 2 --dist loadgroup -m $(COMPUTE)
 
 # The wheel, built and installed with and without extras: fetches packages.
 test-wheel: $(STAMP)
