@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from lfa.deploy.fleet.host.host import ANSWER
 from lfa.deploy.fleet.host.ledger import living
 from lfa.deploy.process.identity import send
 from tests.rigs.machines import Machines, machines, why_not
@@ -19,7 +20,7 @@ WHY_NOT = why_not()
 pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
 
 NOBODY = "10.77.0.99"
-OLD_PYTHON = '#!/bin/sh\necho \'{"python": [3, 9, 2], "lfa": "", "wall_ms": 0}\'\nexit 0\n'
+OLD_PYTHON = f'#!/bin/sh\necho \'{ANSWER}{{"python": [3, 9, 2], "lfa": "", "wall_ms": 0}}\'\nexit 0\n'
 AN_HOUR_AHEAD = """
 import time
 ns, s = time.time_ns, time.time
@@ -79,7 +80,7 @@ def test_machines_that_would_not_do_are_named_a_line_each(clean: Machines) -> No
     """Another lfa, a clock an hour ahead, a port in use, no room: and doctor finds the same, and a closed port."""
     fleet = clean
     fleet.state("e").mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(fleet.state("e"))], check=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m,mode=0700", "none", str(fleet.state("e"))], check=True)
     bind = f"s = socket.socket(type=socket.SOCK_DGRAM); s.bind(('', {PORT}))"
     listen = f"import socket, time; {bind}; print(flush=True); time.sleep(120)"
     taken = [*fleet.net.enter(fleet.host("d")), sys.executable, "-c", listen]

@@ -50,7 +50,7 @@ def test_a_ros_users_sdk_lists_echoes_and_hands_over_and_the_robots_obey(tmp_pat
             assert {"/robot2/odom", "/robot3/odom"} <= set(told["topics"])
             live = set(ECHOED) - {"/tf_static", "/lfa/leader"}  # latched before this SDK came, which asks for none
             assert live <= set(told["heard"]), told["heard"]
-            transforms = told["last"]["/tf"]  # a message tells of one robot: whichever came last
+            transforms = told["last"]["/tf"]  # a message tells of the robots with news: whichever came last
             assert any(f"robot{n}/odom" in transforms for n in (1, 2, 3)), transforms
             assert told["called"] == [True, "robot 2 leads"]
             eventually(lambda: any(e.get("by") == "operator" for e in run.events()), "the formation was not ordered")
