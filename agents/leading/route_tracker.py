@@ -64,6 +64,9 @@ class RouteTracker:
         """Arc length [m] that the former leader had reached."""
         self.passed: list[tuple[int, float]] = []
         """Way-points passed since the list was last emptied, with the least distance [m] to each."""
+        fixed = leading.motion in ("path_following", "trajectory") and self._last > 0
+        self._whole = self._laid(list(leading.route_m)) if fixed else None
+        """Route through all way-points, laid before it is needed: a new leader must not lose milliseconds with it."""
 
     def begin(self, pose: Pose2D, team: RouteProgress | None = None, driven_m: float = 0.0) -> None:
         """Start leading at `pose`, from the progress of the `team`.
@@ -219,14 +222,23 @@ class RouteTracker:
         if self._added:
             same = _apart(points[0], pose) < 1e-6
             points.insert(0, (pose.x - 0.01, pose.y) if same else (pose.x, pose.y))
-        self._route = route = self._route_through(points)
-        self._marks = (*[0.0] * first, *route.passes(points)[self._added :])
+        if self._whole is not None and not self._added:
+            self._route, passes_m = self._whole
+        else:
+            self._route, passes_m = self._laid(points)
+        route = self._route
+        self._marks = (*[0.0] * first, *passes_m[self._added :])
         self._stops = tuple(
             n
             for n in range(first, self._last)
             if direct or any(abs(self._marks[n] - at_m) < 1e-6 for at_m in route.sharp_m)
         )
         self._s = 0.0
+
+    def _laid(self, points: list[Point]) -> tuple[Route, tuple[float, ...]]:
+        """Return the route through `points`, and the arc length [m] at which it passes each."""
+        route = self._route_through(points)
+        return route, tuple(route.passes(points))
 
     def _route_through(self, points: list[Point]) -> Route:
         leading = self._leading

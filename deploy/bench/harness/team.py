@@ -48,9 +48,13 @@ class Broken(Exception):
 
 
 def endless(robots: int, profile: Profile = "std", laps: int = 3) -> Scenario:
-    """Return a scenario of slow laps on a circle, some 30 min, with room for a robot that returns to the tail."""
+    """Return a scenario of slow laps on a circle, some 30 min, with room for a robot that returns to the tail.
+
+    The route begins where the team does: only a leader that is killed before its first way-point costs the next one the
+    time to lay the route anew.
+    """
     radius_m, corners = 10.0, 16
-    turns = (2.0 * pi * n / corners for n in range(1, corners * laps - corners // 2))
+    turns = (2.0 * pi * n / corners for n in range(corners * laps - corners // 2))
     route_m = tuple((radius_m * sin(turn), radius_m * (1.0 - cos(turn))) for turn in turns)
     leading = Leading(route_m=route_m, cruise_mps=0.1)
     formation = FormationSpec(separation_m=3.0)
