@@ -14,8 +14,8 @@ from typing import Any
 from msgspec import Struct
 
 from lfa.agents.agent import Agent
-from lfa.deploy.analysis.verification.checker import Checker, listeners
-from lfa.deploy.analysis.verification.lease_observer import effect_facts
+from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
+from lfa.deploy.analysis.verification.lease_observer import report_effect
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.fuzz import network
 from lfa.deploy.fuzz.network import LinkConditions, Trace
@@ -136,7 +136,7 @@ class AgentSimulation:
 
     def listen(self, checkers: Sequence[Checker]) -> None:
         """Notify these checkers, and only these, of all events from now on."""
-        self._listeners = listeners(checkers)
+        self._report = CheckerGroup(checkers).report
 
     # --- virtual time ------------------------------------------------------------------------------------------
 
@@ -189,16 +189,16 @@ class AgentSimulation:
         life = self.processes[robot_id] = Life(self.simulator, node, member, clock)
         node.lease_observer = lambda observed: self._observed(life, observed)
         self._say(robot_id, f"starts, life {member.incarnation}")
-        self._tell("lives", self.now, member)
-        self._tell("holds", self.now, member, self._agreed[robot_id])
+        self._report(Checker.lives, self.now, member)
+        self._report(Checker.holds, self.now, member, self._agreed[robot_id])
 
     def _reborn(self, node: Node) -> Journal:
         """Watch the node that goes on under a later number (E23) in the place of one that the simulator has ended."""
         robot_id = robot_id_of(node.name)
         assert isinstance(node, Agent | Witness) and robot_id is not None
         before = self.processes[robot_id]
-        self._tell("leads_no_more", self.now, before.member)
-        self._tell("ends", self.now, before.member)
+        self._report(Checker.leads_no_more, self.now, before.member)
+        self._report(Checker.ends, self.now, before.member)
         self._watch(node, robot_id, before.clock)
         return _unread(node)
 
@@ -208,8 +208,8 @@ class AgentSimulation:
         if life.alive:
             self.simulator.kill(robot_name(robot_id), hinted=hinted)
             self._say(robot_id, "dies")
-            self._tell("leads_no_more", self.now, life.member)
-            self._tell("ends", self.now, life.member)
+            self._report(Checker.leads_no_more, self.now, life.member)
+            self._report(Checker.ends, self.now, life.member)
 
     def exit(self, robot_id: int) -> None:
         """Request the process to exit (SIGTERM); a paused process ignores it."""
@@ -267,17 +267,17 @@ class AgentSimulation:
     def part(self, pairs: set[tuple[int, int]]) -> None:
         """Block all messages from the first to the second id of each pair."""
         self.cuts |= pairs
-        self._tell("parts", self.now, self.cuts)
+        self._report(Checker.parts, self.now, self.cuts)
 
     def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
         """Remove the cuts of these directed pairs."""
         self.cuts -= pairs
-        self._tell("parts", self.now, self.cuts)
+        self._report(Checker.parts, self.now, self.cuts)
 
     def heal(self) -> None:
         """Remove all cuts."""
         self.cuts.clear()
-        self._tell("parts", self.now, self.cuts)
+        self._report(Checker.parts, self.now, self.cuts)
 
     def lose_late(self, within_s: float) -> None:
         """Remove the limit `late_at` on arrivals: late messages of the faults have already been dropped."""
@@ -286,14 +286,14 @@ class AgentSimulation:
     def step_wall(self, robot_id: int, by_s: float) -> None:
         """Set a host's wall clock wrong by `by_s` [s]."""
         self.wall_ms[robot_id] = round(by_s * 1000.0)
-        self._tell("wall_steps", self.now, robot_id)
+        self._report(Checker.wall_steps, self.now, robot_id)
 
     def tell_healed(self) -> None:
         """Notify the checkers of the ended processes, and that the last fault is over."""
         for life in self.processes.values():
             if not life.alive:
-                self._tell("ends", self.now, life.member)
-        self._tell("heals", self.now, 4.0 * self.weather.delay_max + CONTROL_PERIOD_S)
+                self._report(Checker.ends, self.now, life.member)
+        self._report(Checker.heals, self.now, 4.0 * self.weather.delay_max + CONTROL_PERIOD_S)
 
     def _start_world(self, world: World) -> None:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
@@ -301,8 +301,8 @@ class AgentSimulation:
         self.gateways = dict.fromkeys(self.mission.robots, hardware)
         self._say(WITNESS_ID, "world starts")
         for robot_id in self.mission.robots:
-            self._tell("gateway_starts", self.now, robot_id, self.now + self.timing.grant_s / clock.rate)
-        self._add(world, clock, GatewayObserver(self.simulator, world, self._tell, self.accepted))
+            self._report(Checker.gateway_starts, self.now, robot_id, self.now + self.timing.grant_s / clock.rate)
+        self._add(world, clock, GatewayObserver(self.simulator, world, self._report, self.accepted))
 
     def _add(self, node: Node, clock: LocalClock, *observers: NodeObserver) -> None:
         self.simulator.add(node, _unread(node), clock, observers)
@@ -313,24 +313,18 @@ class AgentSimulation:
 
     # --- facts for the checkers --------------------------------------------------------------------------------
 
-    def _tell(self, what: str, *facts: Any) -> None:
-        for listen in self._listeners[what]:
-            listen(*facts)
-
     def _observed(self, life: Life, observed: Observed) -> None:
         if observed.event is LeaseEvent.PROMISE:
-            self._tell("promises", self.now, *observed.given)
+            self._report(Checker.promises, self.now, *observed.given)
         for effect in observed.effects:
             self._say(life.id, network.told(effect))
             if isinstance(effect, StandAside):
-                self._tell("leads_no_more", self.now, life.member)
-                self._tell("ends", self.now, life.member)
+                self._report(Checker.leads_no_more, self.now, life.member)
+                self._report(Checker.ends, self.now, life.member)
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, life.id, effect))
-            for words in effect_facts(
-                effect, life.member, self.now, self.timing.grant_s / life.clock.rate, life.clock.true
-            ):
-                self._tell(*words)
+            grant_s = self.timing.grant_s / life.clock.rate
+            report_effect(self._report, effect, life.member, self.now, grant_s, life.clock.true)
 
     def _hear(self, _now: float, key: str, payload: bytes, message: Message) -> None:
         if isinstance(message, CmdVel) and message.as_leader:

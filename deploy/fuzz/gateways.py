@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.network import LinkConditions, Network
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import Timing
@@ -52,8 +53,7 @@ class GatewaySimulation(Network):
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
         gateway = self._gateway_type(robot_id, self._lives, self.timing, clock.local(born_at))
         self.gateways[robot_id] = GatewayHost(gateway, clock, born_at)
-        for tell in self._tell["gateway_starts"]:
-            tell(self.now, robot_id, born_at + self._grant_s / clock.rate)
+        self._report(Checker.gateway_starts, self.now, robot_id, born_at + self._grant_s / clock.rate)
 
     def kill_gateway(self, robot_id: int) -> None:
         self.gateways[robot_id].alive = False
@@ -88,10 +88,8 @@ class GatewaySimulation(Network):
             return
         if cmd.as_leader:
             self.accepted.append((self.now, cmd))
-        for tell in self._tell["obeys"]:
-            tell(self.now, robot_id, cmd, local - cmd.gateway.time)
-        for tell in self._tell["bars"]:
-            tell(self.now, robot_id, cmd.term)
+        self._report(Checker.obeys, self.now, robot_id, cmd, local - cmd.gateway.time)
+        self._report(Checker.bars, self.now, robot_id, cmd.term)
 
     def fence(self, robot_id: int, body: LeaseBody) -> tuple[Member, Fenced] | None:
         """Return the gateway as sender and its answer to a FENCE; None for other messages or a gateway that is down."""
@@ -99,6 +97,5 @@ class GatewaySimulation(Network):
         if host is None or not host.alive or not isinstance(body, Fence):
             return None
         answer = host.gateway.fence(body, host.clock.local(self.now))
-        for tell in self._tell["bars"]:
-            tell(self.now, robot_id, answer.term)
+        self._report(Checker.bars, self.now, robot_id, answer.term)
         return Member(robot_id, host.gateway.incarnation), answer

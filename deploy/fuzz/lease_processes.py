@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.gateways import GatewaySimulation
 from lfa.deploy.fuzz.network import told
 from lfa.protocol.geometry import Twist
@@ -88,8 +89,7 @@ class Hosts(GatewaySimulation):
     def observed(self, observed: Observed) -> None:
         """Notify the checkers of a promise that a lease receives."""
         if observed.event is LeaseEvent.PROMISE:
-            for tell in self._tell["promises"]:
-                tell(self.now, *observed.given)
+            self._report(Checker.promises, self.now, *observed.given)
 
     def wake_at(self, process: Process, true: float) -> None:
         """Schedule a wake-up of the process at a true time [s], unless an earlier one is scheduled."""
@@ -146,14 +146,12 @@ class Hosts(GatewaySimulation):
         """Notify the checkers of an effect other than a message; a new leader commands at once."""
         match effect:
             case AdoptChain(config=config):
-                for tell in self._tell["adopts"]:
-                    tell(self.now, process.member, config)
+                self._report(Checker.adopts, self.now, process.member, config)
             case StandAside():
                 self.log.append((self.now, process.id, effect))
             case StepDown():
                 self.log.append((self.now, process.id, effect))
-                for tell in self._tell["leads_no_more"]:
-                    tell(self.now, process.member)
+                self._report(Checker.leads_no_more, self.now, process.member)
             case BecomeLeader(term=term, expiry=expiry):
                 self._tell_leads(process, term, expiry)
                 self.log.append((self.now, process.id, effect))
@@ -164,15 +162,12 @@ class Hosts(GatewaySimulation):
                 self._tell_leads(process, term, expiry)
 
     def _tell_leads(self, process: Process, term: Term, expiry: float) -> None:
-        for tell in self._tell["leads"]:
-            tell(self.now, process.member, term, process.clock.true(expiry))
+        self._report(Checker.leads, self.now, process.member, term, process.clock.true(expiry))
 
     def tell_end(self, process: Process) -> None:
         """Notify the checkers that a process has ended."""
-        for tell in self._tell["leads_no_more"]:
-            tell(self.now, process.member)
-        for tell in self._tell["ends"]:
-            tell(self.now, process.member)
+        self._report(Checker.leads_no_more, self.now, process.member)
+        self._report(Checker.ends, self.now, process.member)
 
     def tell_token(self, member: Member, up: bool) -> None:
         """Deliver the liveliness event of a member to the connected processes, each after a random delay."""
@@ -214,18 +209,15 @@ class Hosts(GatewaySimulation):
         if isinstance(body, Grant):
             self._tell_grant(process, body)
         elif isinstance(body, Propose):
-            for tell in self._tell["proposes"]:
-                tell(self.now, process.member, body)
+            self._report(Checker.proposes, self.now, process.member, body)
             if body.holder == process.member:
                 self._tell_grant(process, Grant(body.term, body.round, body.config.version, 0.0))
         elif isinstance(body, Release):
-            for tell in self._tell["releases"]:
-                tell(self.now, body.term)
+            self._report(Checker.releases, self.now, body.term)
 
     def _tell_grant(self, process: Process, grant: Grant) -> None:
         until = self.now + self._grant_s / process.clock.rate
-        for tell in self._tell["grants"]:
-            tell(self.now, process.member, grant, until)
+        self._report(Checker.grants, self.now, process.member, grant, until)
 
     # --- commands ----------------------------------------------------------------------------------------------
 

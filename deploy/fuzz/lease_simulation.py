@@ -6,6 +6,7 @@ the outputs of processes and gateways with the true time, which no process knows
 
 from __future__ import annotations
 
+from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
 from lfa.deploy.fuzz.network import LinkConditions
 from lfa.protocol.incarnations import after, drawn_at
@@ -77,10 +78,8 @@ class LeaseSimulation(Hosts):
         self.processes[robot_id] = process
         if self.trace is not None:
             self.trace(self.now, robot_id, f"starts, life {member.incarnation}")
-        for tell in self._tell["lives"]:
-            tell(self.now, member)
-        for tell in self._tell["holds"]:
-            tell(self.now, member, digest(agreement_of(mission, timing_of(mission.profile))))
+        self._report(Checker.lives, self.now, member)
+        self._report(Checker.holds, self.now, member, digest(agreement_of(mission, timing_of(mission.profile))))
         self.tell_token(member, up=True)
         if robot_id != WITNESS_ID:
             self.at(self.now + self.random.uniform(0.0, FOLLOW_PERIOD_S), self.follow, process)
@@ -160,8 +159,7 @@ class LeaseSimulation(Hosts):
     def step_wall(self, robot_id: int, by_s: float) -> None:
         """Set a host's wall clock wrong by `by_s` [s]; no other clock can be stepped."""
         self.wall_ms[robot_id] = round(by_s * 1000.0)
-        for tell in self._tell["wall_steps"]:
-            tell(self.now, robot_id)
+        self._report(Checker.wall_steps, self.now, robot_id)
 
     def lose_late(self, within_s: float) -> None:
         """Drop the messages in transit that would arrive later than `within_s` [s] from now."""
@@ -169,8 +167,7 @@ class LeaseSimulation(Hosts):
 
     def tell_healed(self) -> None:
         """Notify the checkers that the last fault is over."""
-        for tell in self._tell["heals"]:
-            tell(self.now, 4.0 * self.weather.delay_max)
+        self._report(Checker.heals, self.now, 4.0 * self.weather.delay_max)
 
     # --- queries of tests --------------------------------------------------------------------------------------
 

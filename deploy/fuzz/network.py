@@ -11,7 +11,7 @@ from random import Random
 
 from msgspec import Struct
 
-from lfa.deploy.analysis.verification.checker import Checker, listeners
+from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
 from lfa.world.virtual_time import VirtualTime
@@ -76,7 +76,7 @@ class Network(VirtualTime):
 
     def listen(self, checkers: Sequence[Checker]) -> None:
         """Notify these checkers, and only these, of all events from now on."""
-        self._tell = listeners(checkers)
+        self._report = CheckerGroup(checkers).report
 
     # --- cuts --------------------------------------------------------------------------------------------------
 
@@ -102,8 +102,7 @@ class Network(VirtualTime):
         self._tell_cuts()
 
     def _tell_cuts(self) -> None:
-        for tell in self._tell["parts"]:
-            tell(self.now, self.cuts)
+        self._report(Checker.parts, self.now, self.cuts)
 
     # --- messages ----------------------------------------------------------------------------------------------
 

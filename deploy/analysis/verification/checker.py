@@ -7,12 +7,15 @@ while a schedule runs; a recording of real processes can feed them as well.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Set
+from typing import Any, Protocol, TypeVarTuple
 
 from msgspec import Struct
 
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Grant, Member, Promise, Propose, Term
 from lfa.protocol.messages.robot import CmdVel
+
+Arguments = TypeVarTuple("Arguments")
 
 EARLY_S = 1e-6
 """Tolerance [s] for the rounding of clock conversions."""
@@ -92,13 +95,33 @@ class Checker:
         """Record that the gateway of `robot_id` accepted `cmd`, whose stamp is `age` [s] old by the gateway's clock."""
 
 
-def listeners(checkers: Sequence[Checker]) -> dict[str, list[Callable[..., None]]]:
-    """Return by name of the fact the methods of those checkers that override it."""
-    return {
-        name: [getattr(c, name) for c in checkers if getattr(type(c), name) is not getattr(Checker, name)]
-        for name in vars(Checker)
-        if not name.startswith("_")
-    }
+class Report(Protocol):
+    """Receiver of a fact: a method of `Checker`, and its arguments."""
+
+    def __call__(self, fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None: ...
+
+
+class CheckerGroup:
+    """Checkers of one run. A fact reaches those of them that override its method, in their order."""
+
+    def __init__(self, checkers: Sequence[Checker] = ()) -> None:
+        self._hearing: dict[Callable[..., None], list[Callable[..., None]]] = {
+            fact: [getattr(c, name) for c in checkers if getattr(type(c), name) is not fact]
+            for name, fact in _FACTS.items()
+        }
+
+    def report(self, fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None:
+        """Call the method `fact` of each checker that has one of its own."""
+        for hear in self._hearing[fact]:
+            hear(*arguments)
+
+
+_FACTS: dict[str, Callable[..., Any]] = {
+    name: method
+    for name, method in vars(Checker).items()
+    if callable(method) and not name.startswith("_") and name != "broken"
+}
+"""Methods of the facts by their names."""
 
 
 class Fences:

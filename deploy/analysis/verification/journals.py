@@ -8,16 +8,16 @@ own journal; they are then taken from the journals of their receivers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 from msgspec import Struct
 
 from lfa.agents.agent import Agent
-from lfa.deploy.analysis.verification.checker import Violation, listeners
-from lfa.deploy.analysis.verification.lease_observer import Words, effect_facts, message_facts
+from lfa.deploy.analysis.verification.checker import Arguments, Checker, CheckerGroup, Report, Violation
+from lfa.deploy.analysis.verification.lease_observer import report_effect, report_message
 from lfa.deploy.analysis.verification.reexecution import call, node_of
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.recording import event_log
@@ -42,10 +42,11 @@ _local_decoder = msgspec.msgpack.Decoder(Local)
 
 
 class Happening(Struct, frozen=True):
-    """Fact for the checkers, with its time [s]."""
+    """Fact for the checkers, with its time [s]: a method of `Checker`, and its arguments."""
 
     at: float
-    words: Words
+    fact: Callable[..., None]
+    arguments: tuple[Any, ...]
 
 
 class JournalVerdict(Struct, frozen=True):
@@ -69,10 +70,9 @@ def verify(folder: Path) -> JournalVerdict:
     timing = timing_of(mission.profile)
     happenings = sorted((h for path in paths for h in _happenings(path, timing)), key=lambda h: h.at)
     checkers = [checker(timing) for checker in SAFETY]
-    tell = listeners(checkers)
-    for what, *facts in (happening.words for happening in happenings):
-        for listen in tell[what]:
-            listen(*facts)
+    group = CheckerGroup(checkers)
+    for happening in happenings:
+        group.report(happening.fact, *happening.arguments)
     began = happenings[0].at if happenings else 0.0
     broken = sorted((v for checker in checkers for v in checker.violations), key=lambda v: v.at)
     return JournalVerdict(len(paths), len(happenings), tuple(Violation(v.name, v.at - began, v.text) for v in broken))
@@ -94,24 +94,35 @@ def obeyed(folder: Path) -> Iterator[tuple[float, CmdVel]]:
     timing = timing_of(scenario_of(folder).mission.profile)
     for path in sorted((folder / JOURNALS).glob(f"{WORLD_NAME}-*.bin")):
         for happening in _happenings(path, timing):
-            if happening.words[0] == "obeys":
-                yield happening.at, happening.words[3]
+            if happening.fact is Checker.obeys:
+                yield happening.at, happening.arguments[2]
 
 
-def _happenings(path: Path, timing: Timing) -> Iterator[Happening]:
+def _happenings(path: Path, timing: Timing) -> list[Happening]:
+    """Return what the journal at `path` tells of its process. Raises Refused for a file that is no journal."""
+    found: list[Happening] = []
+
+    def report(fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None:
+        at, *_ = cast("tuple[float, *tuple[Any, ...]]", arguments)  # as of every fact
+        found.append(Happening(at, fact, arguments))
+
     try:
         heading, entries = journal.read(path)
     except (OSError, ValueError) as error:
         raise Refused(f"{path}: cannot be read ({error})") from None
     if heading.node == WORLD_NAME:
-        return _of_gateways(heading, entries, timing)
-    return _of_lease(path, heading, entries, timing)
+        _report_gateways(report, heading, entries, timing)
+    else:
+        _report_lease(report, path, heading, entries, timing)
+    return found
 
 
 # --- leases ---------------------------------------------------------------------------------------------------------
 
 
-def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], timing: Timing) -> Iterator[Happening]:
+def _report_lease(
+    report: Report, path: Path, heading: Heading, entries: Iterator[JournalEntry], timing: Timing
+) -> None:
     node = node_of(path, heading)
     robot = robot_id_of(heading.node)
     if robot is None or not isinstance(node, Agent | Witness):
@@ -124,18 +135,17 @@ def _of_lease(path: Path, heading: Heading, entries: Iterator[JournalEntry], tim
     for entry in entries:
         at = max(at, entry.at)
         note = _message(entry)
-        for words in message_facts(note, at) if isinstance(note, LeaseNote) else ():
-            yield Happening(at, words)
+        if isinstance(note, LeaseNote):
+            report_message(report, note, at)
         effects.clear()
         if digest(call(host, entry)) != entry.digest:
             raise Refused(f"{path}: cannot be verified, it was written by another version of the cores (lfa replay)")
         if agreed is None and node.lease is not None:
             agreed = node.lease.agreed
-            yield Happening(at, ("holds", at, me, agreed))
+            report(Checker.holds, at, me, agreed)
         for effect in effects:
-            for words in effect_facts(effect, me, at, timing.grant_s, float):
-                yield Happening(at, words)
-    yield Happening(at, ("leads_no_more", at, me))
+            report_effect(report, effect, me, at, timing.grant_s, float)
+    report(Checker.leads_no_more, at, me)
 
 
 # --- gateways -------------------------------------------------------------------------------------------------------
@@ -148,19 +158,20 @@ class _Gateways:
         self.gateways = {robot: Gateway(robot, incarnation, timing, now) for robot in robots}
         self._cut_off = False
 
-    def feed(self, entry: JournalEntry, at: float) -> Iterator[Words]:
+    def feed(self, report: Report, entry: JournalEntry, at: float) -> None:
+        """Deliver an input of the world to the gateways, and report what they obey."""
         message = _message(entry)
         where = address(entry.key) if entry.key else None
         match message:
             case CmdVel() if where is not None and (robot := robot_id_of(where.owner)) in self.gateways:
                 gateway = self.gateways[robot]
                 if gateway.command(message, at) is None:
-                    yield ("obeys", at, robot, message, at - message.gateway.time)
-                    yield ("bars", at, robot, message.term)
+                    report(Checker.obeys, at, robot, message, at - message.gateway.time)
+                    report(Checker.bars, at, robot, message.term)
             case LeaseNote(body=Fence() as fence) if where is not None and where.to is not None:
                 robot = int(where.to.removeprefix("gateway"))
                 if robot in self.gateways:
-                    yield ("bars", at, robot, self.gateways[robot].fence(fence, at).term)
+                    report(Checker.bars, at, robot, self.gateways[robot].fence(fence, at).term)
             case PeerUp(name, incarnation) if (robot := robot_id_of(name)) in self.gateways:
                 self._cut_off = False
                 self.gateways[robot].agent_up(incarnation, at)
@@ -170,7 +181,7 @@ class _Gateways:
                 self._cut_off = True
 
 
-def _of_gateways(heading: Heading, entries: Iterator[JournalEntry], timing: Timing) -> Iterator[Happening]:
+def _report_gateways(report: Report, heading: Heading, entries: Iterator[JournalEntry], timing: Timing) -> None:
     robots = heading.config["scenario"]["mission"]["robots"]
     gateways: _Gateways | None = None
     at = 0.0
@@ -179,9 +190,8 @@ def _of_gateways(heading: Heading, entries: Iterator[JournalEntry], timing: Timi
         if gateways is None:
             gateways = _Gateways(robots, heading.incarnation, timing, at)
             for robot in robots:
-                yield Happening(at, ("gateway_starts", at, robot, at + timing.grant_s))
-        for words in gateways.feed(entry, at):
-            yield Happening(at, words)
+                report(Checker.gateway_starts, at, robot, at + timing.grant_s)
+        gateways.feed(report, entry, at)
 
 
 def _message(entry: JournalEntry) -> Any:
