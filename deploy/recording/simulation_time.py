@@ -28,8 +28,13 @@ class WorldTime:
 
     def see(self, at: float, time_s: float) -> None:
         """Update the offset by a ground truth of world time `time_s` [s] that arrived at `at`."""
-        self._offsets.append(at - time_s)
-        self._offset = min(self._offsets)
+        offsets, offset = self._offsets, at - time_s
+        leaves = offsets[0] if len(offsets) == WINDOW else None
+        offsets.append(offset)
+        if offset <= self._offset or len(offsets) == 1:
+            self._offset = offset
+        elif leaves == self._offset:  # only then may the least of the others be another
+            self._offset = min(offsets)
 
     def of(self, at: float) -> float:
         """Return the world time [s] at `at`; 0 before the first ground truth."""

@@ -31,7 +31,7 @@ from lfa.protocol.topics import TOPIC
 FOLDER = "rosbag2"
 FORMAT: Literal[9] = 9
 _INFINITE = QosTime(9223372036, 854775807)
-_TOPICS = frozenset(source.split("/")[1] for source in SOURCES) - {"truth"}
+_TOPICS = frozenset(source.split("/")[1] for source in SOURCES)
 
 
 class BagFacts(Struct, frozen=True):

@@ -244,7 +244,7 @@ class FleetMapping:
         for view in self._robots.values():
             if view.trail_changed:
                 view.trail_changed = False
-                sent.append(RosMessage(f"{view.namespace}/trail", now_ns, messages.path(now_ns, view.trail)))
+                sent.append(RosMessage(f"{view.namespace}/trail", now_ns, messages.path_of(now_ns, list(view.trail))))
         if self._map.changed and (grid := self._map.grid()) is not None:
             sent.append(RosMessage("/map", now_ns, messages.occupancy_grid(now_ns, *grid)))
         if self._heard("/diagnostics"):

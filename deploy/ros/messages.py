@@ -48,8 +48,8 @@ def pose(at: Pose2D) -> Any:
     return kind("geometry_msgs/msg/Pose")(position=point(at.x, at.y), orientation=quaternion(at.theta))
 
 
-def pose_stamped(stamp_ns: int, at: Pose2D, frame: str = "map") -> Any:
-    return kind("geometry_msgs/msg/PoseStamped")(header=header(stamp_ns, frame), pose=pose(at))
+def pose_stamped(stamp_ns: int, at: Pose2D) -> Any:
+    return kind("geometry_msgs/msg/PoseStamped")(header=header(stamp_ns, "map"), pose=pose(at))
 
 
 def twist(of: Twist) -> Any:
@@ -101,10 +101,14 @@ def tf(transforms: list[Any]) -> Any:
     return kind("tf2_msgs/msg/TFMessage")(transforms=transforms)
 
 
-def path(stamp_ns: int, poses: Iterable[Pose2D], frame: str = "map") -> Any:
-    return kind("nav_msgs/msg/Path")(
-        header=header(stamp_ns, frame), poses=[pose_stamped(stamp_ns, one, frame) for one in poses]
-    )
+def path(stamp_ns: int, poses: Iterable[Pose2D]) -> Any:
+    """Return nav_msgs/Path in `map` of poses that are meant for now."""
+    return path_of(stamp_ns, [pose_stamped(stamp_ns, one) for one in poses])
+
+
+def path_of(stamp_ns: int, poses: list[Any]) -> Any:
+    """Return nav_msgs/Path in `map` of geometry_msgs/PoseStamped, each with a stamp of its own."""
+    return kind("nav_msgs/msg/Path")(header=header(stamp_ns, "map"), poses=poses)
 
 
 def occupancy_grid(stamp_ns: int, cell_m: float, corner: tuple[float, float], cells: Any) -> Any:

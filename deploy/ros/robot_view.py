@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from math import hypot
+from typing import Any
 
+from lfa.deploy.ros import messages
 from lfa.deploy.ros.messages import NS
 from lfa.protocol.geometry import Pose2D, along_arc, compose, inverse
 from lfa.protocol.messages.robot import CmdVel, Sensors
@@ -29,7 +31,9 @@ class RobotView:
         self.tracking: tuple[int, Tracking] | None = None
         self.status: Status | None = None
         self.map_odom: Pose2D | None = None
-        self.trail: deque[Pose2D] = deque(maxlen=TRAIL_POINTS_MAX)
+        self.trail: deque[Any] = deque(maxlen=TRAIL_POINTS_MAX)
+        """The way driven as geometry_msgs/PoseStamped, each built and stamped when the robot was there."""
+        self._trail_end: Pose2D | None = None
         self.trail_changed = False
         self.tf_due = False
 
@@ -37,9 +41,10 @@ class RobotView:
         """Take a pose in `map`; return it. Updates the trail, and `odom` in `map` by the odometry of the same time."""
         at = Pose2D(message.x, message.y, message.theta)
         self.pose = (stamp_ns, message)
-        last = self.trail[-1] if self.trail else None
+        last = self._trail_end
         if last is None or hypot(at.x - last.x, at.y - last.y) >= TRAIL_STEP_M:
-            self.trail.append(at)
+            self._trail_end = at
+            self.trail.append(messages.pose_stamped(stamp_ns, at))
             self.trail_changed = True
         if self.sensors is not None:
             since_s = (stamp_ns - self.sensors[0]) / NS

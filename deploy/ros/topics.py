@@ -46,11 +46,13 @@ TF = (
 robot, with frames `odom` and `base_link`."""
 CLOCK = RosTopic("/clock", "rosgraph_msgs/msg/Clock", CLOCK_QOS, "truth, with --sim-time")
 
-SOURCES = (
+SOURCES = frozenset({
     "*/sensors", "*/scan", "*/pose", "*/cmd_vel", "*/tracking", "*/plan", "*/mission", "*/status", "*/event",
-    "*/obstacles", "*/lease/*", "sim/truth",
-)  # fmt: skip
-"""Key expressions, without the fleet's part, of all topics that the table is made from."""
+    "*/obstacles", "*/lease/all",
+})  # fmt: skip
+"""Key expressions, without the fleet's part, of all topics that the table is made from; votes are not among them."""
+WORLD_TIME = "sim/truth"
+"""Source of `/clock` and of stamps in the world's time."""
 
 
 def robot_topics(robot: int, *, tf_per_robot: bool) -> tuple[RosTopic, ...]:

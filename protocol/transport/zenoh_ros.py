@@ -198,17 +198,27 @@ class RosSession:
 
 
 class _Volatile:
+    """Publisher that is told of the first and the last subscriber: asking at each message costs more."""
+
     def __init__(self, publisher: zenoh.Publisher) -> None:
         self._publisher = publisher
+        self._matched = False
+        self._listener = publisher.declare_matching_listener(handlers.Callback(self._match, indirect=False))
+        if publisher.matching_status.matching:  # type: ignore[attr-defined]  # no bool, as its stub says
+            self._matched = True
 
     def put(self, payload: bytes, attachment: bytes) -> None:
         self._publisher.put(payload, attachment=attachment)
 
     def matched(self) -> bool:
-        return bool(self._publisher.matching_status.matching)  # type: ignore[attr-defined]  # no bool, as its stub says
+        return self._matched
 
     def undeclare(self) -> None:
+        self._listener.undeclare()
         self._publisher.undeclare()  # type: ignore[no-untyped-call]
+
+    def _match(self, status: zenoh.MatchingStatus) -> None:
+        self._matched = bool(status.matching)
 
 
 class _Latched:

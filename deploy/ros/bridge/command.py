@@ -19,7 +19,7 @@ from lfa.deploy.ros.bridge.bridge import EAGER, PERIOD_S, Bridge
 from lfa.deploy.ros.bridge.inward import OperatorInput
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE, RosOutput
 from lfa.deploy.ros.session import GraphFeed, RosSpace
-from lfa.deploy.ros.topics import SOURCES
+from lfa.deploy.ros.topics import SOURCES, WORLD_TIME
 from lfa.deploy.ros.types import typestore
 from lfa.deploy.ros.wire import Distro, check_domain
 from lfa.protocol import clock
@@ -31,7 +31,7 @@ ROUTER = "tcp/127.0.0.1:7447"
 SERVED = "tcp/[::]:7447"
 WARNINGS_MAX = 100
 GRAPH_S = 1.0
-"""Time [s] to wait for the tokens of those who are there already."""
+"""Time [s] to wait for the tokens of those who are there already, and period of looking for newcomers."""
 
 
 def command(
@@ -64,7 +64,8 @@ def command(
         space = RosSpace(session, domain, distro, wake)
         graph = GraphFeed(space)
         check_graph(graph, distro, 0.0 if serve else GRAPH_S)
-        with Interrupts() as interrupts, listen(found, frozenset(SOURCES), every=True, wake=wake, eager=EAGER) as ear:
+        sources = SOURCES | {WORLD_TIME} if sim_time else SOURCES
+        with Interrupts() as interrupts, listen(found, sources, every=True, wake=wake, eager=EAGER) as ear:
             output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
             bridge = Bridge(ear, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
             orders = OperatorInput(output.node, bridge.order, bridge.warn)
@@ -101,16 +102,20 @@ def check_graph(graph: GraphFeed, distro: Distro, wait_s: float) -> None:
 
 
 class ForeignNodes:
-    """Nodes that hear nothing of the bridge; each is warned of once."""
+    """Nodes that hear nothing of the bridge; each is warned of once, within GRAPH_S."""
 
     def __init__(self, graph: GraphFeed, distro: Distro) -> None:
         self._graph = graph
         self._distro = distro
         self._warned: set[str] = set()
+        self._due = 0.0
 
     def warn(self, warn: Callable[[str], None], now: float) -> None:
         """Call `warn` for each node of another distribution that has appeared."""
         seen = self._graph.poll(now)
+        if now < self._due:
+            return
+        self._due = now + GRAPH_S
         for name in seen.hashed() if self._distro == "humble" else seen.hashless():
             if name not in self._warned and len(self._warned) < WARNINGS_MAX:
                 self._warned.add(name)

@@ -44,7 +44,7 @@ def command(
         raise Refused(f"--port {port}: must be 0 to 65535")
     found = find(fleet, connect, keys)
     wake = Wake()
-    with Interrupts() as interrupts, listen(found, frozenset(SOURCES), every=True, wake=wake, eager=EAGER) as ear:
+    with Interrupts() as interrupts, listen(found, SOURCES, every=True, wake=wake, eager=EAGER) as ear:
         output = FoxgloveOutput(host, port, (HANDOVER, *FORMATIONS), tf_per_robot=tf_per_robot)
         try:
             bridge = Bridge(ear, output, sim_time=False, tf_per_robot=tf_per_robot)
