@@ -214,7 +214,7 @@ class _Volatile:
         return self._matched
 
     def undeclare(self) -> None:
-        self._listener.undeclare()
+        self._listener.undeclare()  # type: ignore[no-untyped-call]
         self._publisher.undeclare()  # type: ignore[no-untyped-call]
 
     def _match(self, status: zenoh.MatchingStatus) -> None:
