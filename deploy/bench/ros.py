@@ -1,6 +1,7 @@
-"""Bench `ros`: what the bridge to ROS 2 costs, and how much later its topics come than the fleet's own messages.
+"""Bench `ros`: what the bridge to ROS 2 costs, how late its topics come, and how a ROS robot does as a member.
 
-One process listens to both at once, so that the machine's load delays both alike; a sample is recognised by its pose.
+One process listens to the fleet and to the bridge at once, so that the machine's load delays both alike; a sample is
+recognised by its pose.
 """
 
 from __future__ import annotations
@@ -9,11 +10,14 @@ import re
 import statistics
 import subprocess
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
+from itertools import chain
 from math import isfinite
 from pathlib import Path
 from socket import socket
 
 from lfa.deploy.bench.harness.child_process import cpu_s, pause, started
+from lfa.deploy.bench.harness.ros_member import member_rows
 from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Team, endless
 from lfa.deploy.bench.look import LFA
@@ -34,15 +38,22 @@ Arrivals = dict[tuple[float, float], float]
 """Time [s] of arrival by the pose x, y [m] of a sample."""
 
 
-def run(as_json: bool) -> int:
-    """Print the rows; return 0 if all hold, else 1."""
-    return show(_rows(), as_json)
+def run(as_json: bool, rows: str = "*") -> int:
+    """Print the rows of the groups `bridge` and `member` that match; return 0 if all hold, else 1."""
+    groups = {"bridge": _bridge_rows, "member": member_rows}
+    chosen = [group for name, group in groups.items() if fnmatchcase(name, rows.split("/")[0])]
+    if not chosen:
+        raise Refused(f"--rows {rows!r}: no row has such a name; they begin with {', '.join(groups)}")
+    return show(chain.from_iterable(group(_free_endpoint()) for group in chosen), as_json)
 
 
-def _rows() -> Iterator[list[BenchRow]]:
+def _free_endpoint() -> str:
     with socket() as free:
         free.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+
+
+def _bridge_rows(endpoint: str) -> Iterator[list[BenchRow]]:
     with Team(endless(ROBOTS)) as team:
         team.await_chain(ROBOTS)
         pause(team, SETTLE_S)
@@ -86,13 +97,13 @@ def _with_bridge(
         row("bridge", Quantity("messages a second", "1/s"), count / WATCHED_S),
     ]
     yield [
-        row("odom after sensors", Quantity("p50", "ms", 1.0), later[len(later) // 2]),
-        row("odom after sensors", Quantity("p99", "ms"), later[len(later) * 99 // 100]),
-        row("odom after sensors", Quantity("samples", "1"), float(len(later))),
+        row("bridge/odom after sensors", Quantity("p50", "ms", 1.0), later[len(later) // 2]),
+        row("bridge/odom after sensors", Quantity("p99", "ms"), later[len(later) * 99 // 100]),
+        row("bridge/odom after sensors", Quantity("samples", "1"), float(len(later))),
     ]
     yield [
-        row("loop lag", Quantity("median without the bridge", "ms"), alone),
-        row("loop lag", Quantity("median with the bridge", "ms", max(1.25 * alone, alone + 0.5)), watched),
+        row("bridge/loop lag", Quantity("median without the bridge", "ms"), alone),
+        row("bridge/loop lag", Quantity("median with the bridge", "ms", max(1.25 * alone, alone + 0.5)), watched),
     ]
 
 

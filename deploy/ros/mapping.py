@@ -129,7 +129,8 @@ class FleetMapping:
         topic = f"{view.namespace}/odom"
         if not self._heard(topic):
             return []
-        return [RosMessage(topic, stamp_ns, messages.odometry(stamp_ns, message, view.odom, view.base))]
+        at, of, odometer_m = message.pose_odom, message.twist, message.odometer_m
+        return [RosMessage(topic, stamp_ns, messages.odometry(stamp_ns, at, of, odometer_m, view.odom, view.base))]
 
     def _pose(self, stamp_ns: int, view: RobotView, message: PoseStamped) -> list[RosMessage]:
         at = view.place(stamp_ns, message)

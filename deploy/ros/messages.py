@@ -10,7 +10,7 @@ import numpy as np
 
 from lfa.deploy.ros.types import kind
 from lfa.protocol.geometry import Pose2D, Twist
-from lfa.protocol.messages.robot import LaserScan, Sensors
+from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.team import Level, Status
 
 NS = 1_000_000_000
@@ -60,16 +60,16 @@ def twist_stamped(stamp_ns: int, of: Twist, frame: str) -> Any:
     return kind("geometry_msgs/msg/TwistStamped")(header=header(stamp_ns, frame), twist=twist(of))
 
 
-def odometry(stamp_ns: int, sensors: Sensors, odom: str, base: str) -> Any:
+def odometry(stamp_ns: int, at: Pose2D, of: Twist, odometer_m: float, odom: str, base: str) -> Any:
     """Return nav_msgs/Odometry: pose in `odom`, twist in `base`, covariances of a planar robot that drifts."""
-    drift = LEAST_VARIANCE + (DRIFT_SHARE * sensors.odometer_m) ** 2
+    drift = LEAST_VARIANCE + (DRIFT_SHARE * odometer_m) ** 2
     of_pose = (drift, drift, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, drift)
     of_twist = (TWIST_VARIANCE, TWIST_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, TWIST_VARIANCE)
     return kind("nav_msgs/msg/Odometry")(
         header=header(stamp_ns, odom),
         child_frame_id=base,
-        pose=kind("geometry_msgs/msg/PoseWithCovariance")(pose=pose(sensors.pose_odom), covariance=_diagonal(of_pose)),
-        twist=kind("geometry_msgs/msg/TwistWithCovariance")(twist=twist(sensors.twist), covariance=_diagonal(of_twist)),
+        pose=kind("geometry_msgs/msg/PoseWithCovariance")(pose=pose(at), covariance=_diagonal(of_pose)),
+        twist=kind("geometry_msgs/msg/TwistWithCovariance")(twist=twist(of), covariance=_diagonal(of_twist)),
     )
 
 

@@ -22,7 +22,6 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from tests.deploy.robot.test_ros_scan import scan
-from tests.deploy.ros.test_mapping import sensors
 from tests.rigs.ros_peers import awaited, ros_pair
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
@@ -48,7 +47,7 @@ class Robot:
     def moves(self, x: float, late_s: float = 0.0) -> None:
         """Publish odometry at x [m], stamped `late_s` ago."""
         stamp_ns = time.time_ns() - round(1e9 * late_s)
-        self.odom.publish(messages.odometry(stamp_ns, sensors(Pose2D(x, 0.0, 0.0)), "odom", "base"))
+        self.odom.publish(messages.odometry(stamp_ns, Pose2D(x, 0.0, 0.0), Twist(), 0.0, "odom", "base"))
 
     def reads(self, what: str = "pose_odom") -> Any:
         """Return the field `what` of the first reading that has it."""

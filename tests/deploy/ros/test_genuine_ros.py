@@ -17,7 +17,7 @@ from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.team import Level, Status
-from tests.deploy.ros.test_mapping import TERM, header, sensors
+from tests.deploy.ros.test_mapping import TERM, header
 from tests.rigs.foreign_peers import answer, start
 
 pytestmark = pytest.mark.processes
@@ -35,7 +35,7 @@ def examples() -> dict[str, Any]:
     )
     covariant = kind("geometry_msgs/msg/PoseWithCovariance")(messages.pose(AT), np.arange(36.0))
     found = [
-        messages.odometry(T, sensors(AT, Twist(0.5, 0.1)), "odom", "base_link"),
+        messages.odometry(T, AT, Twist(0.5, 0.1), 2.0, "odom", "base_link"),
         messages.laser_scan(T, scan, "base_scan"),
         messages.pose_stamped(T, AT),
         messages.twist(Twist(0.5, 0.1)),
