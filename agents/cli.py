@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from lfa.agents.agent import Agent
+from lfa.agents.following.plugin import add_controller_file
 from lfa.protocol import clock, incarnations
 from lfa.protocol.config_file.mistake import apply_rules
 from lfa.protocol.errors import Refused
@@ -46,6 +47,8 @@ def main() -> None:
 
 def start(arguments: argparse.Namespace) -> int:
     """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raise `Refused`."""
+    if arguments.controller is not None:
+        add_controller_file(arguments.controller)
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
     fleet, wall_ms = fleet_name(arguments.fleet), clock.wall_ms()
@@ -77,6 +80,7 @@ def _parser() -> argparse.ArgumentParser:
         help="time after which a silent link counts as lost: fast (0.5 s), std (1 s) or wifi (2 s)")
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; without it, received over Zenoh")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
+    add("--controller", metavar="FILE.py:Class", help="a controller of your own, for a mission that chooses it")
     add("--faults", action="store_true", help="obey an operator's link conditions (lfa fault cut, loss): for tests")
     # fmt: on
     return parser

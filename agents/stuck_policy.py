@@ -53,6 +53,9 @@ class StuckPolicy:
         if driver.stuck != self._said:
             self._said = driver.stuck
             self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
+        broken = driver.follower.failure
+        if broken is not None:
+            self._fail(broken, lease, now, controller=True)
         if role is not Role.LEADER:
             lease.left_out, chain = frozenset(), lease.chain
             self._led_before = chain[0] if chain else None
@@ -99,11 +102,11 @@ class StuckPolicy:
         driver.back_out(pose)
         return True
 
-    def _fail(self, reason: str, lease: Lease, now: float) -> None:
+    def _fail(self, reason: str, lease: Lease, now: float, **data: object) -> None:
         """Publish once that the mission has failed."""
         if not self._failed:
             self._failed = True
-            self._event("failed", now, lease, {"reason": reason})
+            self._event("failed", now, lease, {"reason": reason, **data})
 
     def _event(self, kind: str, now: float, lease: Lease, data: dict[str, object]) -> None:
         self._outbox.event(kind, now, lease.term, data)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
+from lfa.agents.config import Gains
 from lfa.agents.following.controller import find_controller
 from lfa.agents.following.factory import gains_of
+from lfa.agents.following.plugin import add_controller_file, make_controller
 from lfa.deploy.faults.script import parse
+from lfa.deploy.recording.run_folder import SCENARIO, scenario_of
 from lfa.protocol.config_file.mistake import Mistake, Rule
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
@@ -20,6 +25,30 @@ def load_scenario(scenario: str, overrides: Sequence[str] = (), robots: int | No
     return load(scenario, overrides, robots, RULES)
 
 
+def with_controller(overrides: Sequence[str], controller: str | None) -> list[str]:
+    """Return `overrides` with the choice of `controller`, loaded if it is `FILE.py:Class`. Raises Refused."""
+    if controller is None:
+        return list(overrides)
+    return [*overrides, f"mission.following.controller='{add_controller_file(controller)}'"]
+
+
+def load_controller_of_run(folder: Path, controller: str | None) -> None:
+    """Load what re-executes a run: `controller`, if given, else nothing where the run's own is installed.
+
+    Code in a run folder is not run unless it is asked for. Raises Refused with the option that would load the copy of
+    the run's controller.
+    """
+    if controller is not None:
+        add_controller_file(controller)
+    if not (folder / SCENARIO).is_file():
+        return
+    needed = scenario_of(folder).mission.following.controller
+    try:
+        find_controller(needed)
+    except Refused:
+        raise Refused(f"{folder}: its controller {needed} is not loaded: add --controller {folder / needed}") from None
+
+
 def _gains(scenario: Scenario) -> Iterator[Mistake]:
     try:
         gains_of(scenario.mission)
@@ -28,10 +57,13 @@ def _gains(scenario: Scenario) -> Iterator[Mistake]:
 
 
 def _controller(scenario: Scenario) -> Iterator[Mistake]:
+    following = scenario.mission.following
     try:
-        find_controller(scenario.mission.following.controller)
+        make_controller(following, Gains(), scenario.mission.limits)
     except Refused as refused:
-        yield Mistake("mission.following.controller", f": {refused}")
+        name = re.match(r"[\w.]+", str(refused))
+        end = 0 if name is None else name.end()
+        yield Mistake(f"mission.following.{str(refused)[:end]}", str(refused)[end:])
 
 
 def _faults(scenario: Scenario) -> Iterator[Mistake]:

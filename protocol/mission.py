@@ -23,6 +23,8 @@ ColdStart = Literal["full_house", "majority"]
 Shrink = Literal["dynamic", "static"]
 Lonely = Literal["stop", "continue_after"]
 Profile = Literal["fast", "std", "wifi"]
+Parameter = bool | float | str | tuple[float, ...]
+"""Value of a plug-in's own parameter."""
 
 
 class FormationSpec(Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,6 +44,8 @@ class Following(Struct, frozen=True, forbid_unknown_fields=True):
 
     controller: str = "law"
     """Name of an installed controller: `law`, `kanayama`, `headway` or a custom one (entry point `lfa.controllers`)."""
+    parameters: dict[str, Parameter] = {}
+    """Parameters of the controller itself, by the names and types that its class gives in `Parameters`."""
     observer: Literal["velocity", "pose", "paper"] = "velocity"
     """Input from the predecessor's messages: pose and velocity, pose only, or pose only (the paper's matrix)."""
     trace: bool = False

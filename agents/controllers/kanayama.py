@@ -7,19 +7,27 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from msgspec import Struct
+
 from lfa.agents.config import Gains
 from lfa.agents.following.controller import Reference, guard
 from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.mission import Limits
 
-KX_PER_S = 1.5
-KY_PER_M2 = 6.0
-KTHETA_PER_M = 4.0
-"""Gains with critically damped lateral motion: K_theta^2 >= 4 K_y / 1.5."""
+
+class KanayamaParameters(Struct, frozen=True, forbid_unknown_fields=True):
+    """Gains, by default with critically damped lateral motion: K_theta^2 >= 4 K_y / 1.5."""
+
+    kx_per_s: float = 1.5
+    ky_per_m2: float = 6.0
+    ktheta_per_m: float = 4.0
 
 
 class Kanayama:
-    def __init__(self, gains: Gains, limits: Limits) -> None:
+    Parameters = KanayamaParameters
+
+    def __init__(self, gains: Gains, limits: Limits, parameters: KanayamaParameters) -> None:
+        self._k = parameters
         self._gains = gains
         self._omega_max = limits.omega_max_radps
         self._heading: float | None = None
@@ -37,10 +45,10 @@ class Kanayama:
         dx, dy = reference.x - own_pose.x, reference.y - own_pose.y
         x_e, y_e, theta_e = c * dx + s * dy, c * dy - s * dx, wrap(reference.heading - theta)
         v_r = reference.direction * reference.speed
-        pull, bound = KX_PER_S * x_e, self._gains.m_mps
+        pull, bound = self._k.kx_per_s * x_e, self._gains.m_mps
         pull = bound if pull > bound else -bound if pull < -bound else pull
         v = v_r * cos(theta_e) + pull
         if reference.guarded:
             ux, uy = guard(v * c, v * s, reference, own_pose, self._gains)
             v = c * ux + s * uy
-        return Twist(v, turn + v_r * KY_PER_M2 * y_e + abs(v_r) * KTHETA_PER_M * sin(theta_e))
+        return Twist(v, turn + v_r * self._k.ky_per_m2 * y_e + abs(v_r) * self._k.ktheta_per_m * sin(theta_e))

@@ -12,6 +12,7 @@ from typing import Protocol
 from msgspec import Struct
 
 from lfa.agents.config import Gains
+from lfa.agents.following.plugin_error import told
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.mission import Limits
@@ -66,9 +67,9 @@ class Controller(Protocol):
 
 
 class MakeController(Protocol):
-    """Class or function that an entry point names."""
+    """Class or function that an entry point names. With a `Parameters` of its own, called with a third argument."""
 
-    def __call__(self, gains: Gains, limits: Limits) -> Controller: ...
+    def __call__(self, gains: Gains, limits: Limits, /) -> Controller: ...
 
 
 _added: dict[str, MakeController] = {}
@@ -78,7 +79,8 @@ _added: dict[str, MakeController] = {}
 def add_controller(name: str, make: MakeController) -> None:
     """Make `make` the controller called `name` in this process: for a script or a notebook that simulates.
 
-    Robots that are processes find controllers by entry point only. Raise `Refused` for the default's name.
+    Robots that are processes find controllers by entry point or by their option `--controller`. Raise `Refused` for
+    the default's name.
     """
     if name == DEFAULT_CONTROLLER:
         raise Refused(f"controller {name}: the default one cannot be replaced, give another name")
@@ -96,9 +98,21 @@ def find_controller(name: str) -> MakeController:
 
     known = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
     if name not in known:
-        raise Refused(f"controller = {name}: must be one of {', '.join(sorted(known))} (entry points {ENTRY_POINTS})")
-    make: MakeController = known[name].load()
+        choices = ", ".join(sorted({*known, *_added}))
+        raise Refused(f"controller = {name}: must be one of {choices} (entry points {ENTRY_POINTS}), or be given by "
+                      "--controller FILE.py:Class")  # fmt: skip
+    try:
+        make: MakeController = known[name].load()
+    except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
+        raise Refused(f"controller = {name}: {known[name].value} cannot be loaded: {told(error)}") from None
     return make
+
+
+def installed_controllers() -> list[str]:
+    """Return the names of the installed controllers."""
+    from importlib.metadata import entry_points
+
+    return sorted({point.name for point in entry_points(group=ENTRY_POINTS)})
 
 
 class Law:

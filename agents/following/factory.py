@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 
 from lfa.agents.config import CONTROL_PERIOD_S, Gains, check_gains
-from lfa.agents.following.controller import find_controller
 from lfa.agents.following.follower import Follower
+from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Mission
@@ -29,7 +29,8 @@ def follower_of(mission: Mission) -> Follower:
     return Follower(
         gains,
         mission.limits,
-        find_controller(following.controller)(gains, mission.limits),
+        make_controller(following, gains, mission.limits),
+        name=following.controller,
         heading_filter_m=mission.formation.heading_filter_m,
         cruise_mps=mission.leading.cruise_mps,
         radius_m=mission.radius_m,

@@ -8,11 +8,12 @@ finite and within the limits.
 from __future__ import annotations
 
 from enum import StrEnum
-from math import atan2, cos, hypot, isfinite, sin
+from math import atan2, cos, hypot, sin
 
 from msgspec import Struct
 
 from lfa.agents.config import CONTROL_PERIOD_S, Gains
+from lfa.agents.following.checked_controller import CheckedController
 from lfa.agents.following.controller import SLOT_SPEED_MIN_MPS, Controller, Reference
 from lfa.agents.following.observer import SlotVelocityObserver
 from lfa.agents.following.predecessor import Sighting
@@ -73,6 +74,7 @@ class Follower:
         limits: Limits,
         controller: Controller,
         *,
+        name: str = "",
         heading_filter_m: float = 0.0,
         cruise_mps: float = 0.0,
         radius_m: float = 0.15,
@@ -80,11 +82,13 @@ class Follower:
     ) -> None:
         """Create a follower. `cruise_mps` is the leader's nominal speed, which shifts an old reference ahead (5.2).
 
+        `name` is that of the controller in texts.
+
         With `paper_observer` the slot's velocity is the estimate of form A of the observer from the slot's positions.
         """
         self._gains = gains
         self._limits = limits
-        self._controller = controller
+        self._controller = CheckedController(controller, name or type(controller).__name__)
         self._cruise_mps = cruise_mps
         self._overlap_m = 2.0 * radius_m
         self._motion = SlotMotion(gains, limits, heading_filter_m)
@@ -100,7 +104,7 @@ class Follower:
         self._error_m = 0.0
         self._state = State.HOLD
         self.refused = 0
-        """Number of steps whose input or result was not finite or was implausible."""
+        """Number of steps whose input was not finite or was implausible."""
 
     def step(
         self,
@@ -136,15 +140,14 @@ class Follower:
         reference = self._reference(sighting, own_pose)
         self._error_m = hypot(motion.x - own_pose.x, motion.y - own_pose.y)
         wanted = self._controller.step(reference, own_pose, own_twist, dt)
+        if wanted is None:
+            return self._brake(dt)
         self._state = State.FOLLOW if motion.settled else State.BLEND
         if self._stands(sighting, wanted):
             self._state, wanted = State.STAND, STILL
             if self._error_m > ASTRAY_M:
                 self._standing_m = -1.0
                 self._controller.reset(own_pose, own_twist)
-        if not (isfinite(wanted.linear_x) and isfinite(wanted.angular_z)):
-            self.refused += 1
-            return self._brake(dt)
         return self._drive(wanted, dt)
 
     def rejoin(self, own_pose: Pose2D, own_twist: Twist) -> None:
@@ -160,6 +163,11 @@ class Follower:
     def overridden(self, twist: Twist) -> None:
         """Record that another twist than `step`'s was sent: acceleration limits count from it."""
         self._last = twist
+
+    @property
+    def failure(self) -> str | None:
+        """What the controller did wrong, with file and line; None while it works. A failed one is not called again."""
+        return self._controller.failure
 
     @property
     def readout(self) -> Readout:

@@ -72,7 +72,8 @@ def _robot(robot: int, seen: RecordedRun, events: Sequence[Line]) -> RobotSummar
         orientation_requests=sum(map(event_log.asked_by_leader, event_log.of_kind(own, "formation"))),
     )
     followed = tracking_errors.of_follower(seen, robot)
-    if followed is not None:
+    broken = any(line.get("controller") for line in event_log.of_kind(own, "failed"))
+    if followed is not None and not broken:  # a robot that was not controlled has kept no distance
         _fill_errors(summary, followed)
     return summary
 

@@ -18,9 +18,12 @@ import typer
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo, fields
 
+from lfa.agents.following.controller import find_controller, installed_controllers
+from lfa.agents.following.plugin import parameters_of
 from lfa.deploy.fleet.plan.fleet_file import FleetFile
 from lfa.world.description.load import Scenario
 
+PARAMETERS = "mission.following.parameters"
 UNITS = {
     "m": "m", "s": "s", "ms": "ms", "rad": "rad", "mps": "m/s", "mps2": "m/s²", "radps": "rad/s", "radps2": "rad/s²",
     "hz": "Hz", "kg": "kg", "n": "N",
@@ -61,6 +64,10 @@ def schema(kind: type[Struct] = Scenario) -> dict[str, Any]:
             if text and field.encode_name in properties:
                 properties[field.encode_name]["description"] = text
     made["$defs"][kind.__name__]["properties"].pop("name", None)
+    if kind is Scenario:
+        own = {key.path.rpartition(".")[2]: key.text for key in _controller_keys(PARAMETERS)}
+        described = {name: {"description": text} for name, text in own.items()}
+        made["$defs"]["Following"]["properties"]["parameters"]["properties"] = described
     title = f"lfa {'scenario' if kind is Scenario else 'fleet'}"
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **made}
 
@@ -89,10 +96,25 @@ def _keys(struct: type[Struct], where: str) -> Iterator[Key]:
             continue
         inner = next(_structs_of(kind), None)
         if inner is None:
+            if path == PARAMETERS:
+                yield from _controller_keys(path)
             yield Key(path, _type(kind), _unit(field.encode_name), _default(field), _texts(struct).get(field.name, ""))
         else:
             one = {tuple: "[]", dict: ".NAME"}.get(get_origin(kind), "")
             yield from _keys(inner, f"{path}{one}.")
+
+
+def _controller_keys(path: str) -> Iterator[Key]:
+    """Yield the parameters of each installed controller that has some."""
+    for name, kind in controller_parameters().items():
+        for key in _keys(kind, f"{path}."):
+            yield msgspec.structs.replace(key, text=f"With controller `{name}`. {key.text}".rstrip())
+
+
+def controller_parameters() -> dict[str, type[Struct]]:
+    """Return the type of the parameters of each installed controller that has some, by name."""
+    kinds = {name: parameters_of(find_controller(name)) for name in installed_controllers()}
+    return {name: kind for name, kind in kinds.items() if kind is not None}
 
 
 def _structs(struct: type[Struct]) -> Iterator[type[Struct]]:

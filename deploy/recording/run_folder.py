@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from lfa.agents.following.plugin import file_of
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
 
@@ -33,13 +35,16 @@ class About(Struct, frozen=True):
 def make(out: Path | None, scenario: Scenario) -> Path:
     """Create and return a folder with the scenario in it: `out` or `runs/<scenario>-<time>`, with -2, -3 ... if taken.
 
-    Raises Refused when it cannot be created.
+    The file of a controller of one's own is copied into it. Raises Refused when it cannot be created.
     """
     path = out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
         path = _free(path)
         path.mkdir(parents=True, exist_ok=True)
         (path / SCENARIO).write_text(toml(scenario), encoding="utf-8")
+        own_code = file_of(scenario.mission.following.controller)
+        if own_code is not None:
+            shutil.copy(own_code.rpartition(":")[0], path)
     except OSError as error:
         raise Refused(f"--out {path}: cannot be made ({error.strerror}), give a place to write to") from None
     return path

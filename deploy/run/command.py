@@ -9,7 +9,20 @@ from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.faults.script import Fault, parse_all
 from lfa.deploy.run.finish import Ended, report
 from lfa.deploy.run.load import rebuild_scenario
-from lfa.deploy.run.options import AsJson, Faults, Figures, JUnit, MapFrom, Out, Overrides, Robots, ScenarioName, Seed
+from lfa.deploy.run.options import (
+    AsJson,
+    Controller,
+    Faults,
+    Figures,
+    JUnit,
+    MapFrom,
+    Out,
+    Overrides,
+    Robots,
+    ScenarioName,
+    Seed,
+)
+from lfa.deploy.scenario_loading import with_controller
 from lfa.world.description.load import Scenario
 
 
@@ -20,6 +33,7 @@ def scenario_command(run: Callable[[Scenario, int, Path | None, Sequence[Fault]]
         scenario: ScenarioName,
         seed: Seed = None,
         overrides: Overrides = None,
+        controller: Controller = None,
         robots: Robots = None,
         fault: Faults = None,
         out: Out = None,
@@ -28,7 +42,9 @@ def scenario_command(run: Callable[[Scenario, int, Path | None, Sequence[Fault]]
         junit: JUnit = None,
         as_json: AsJson = False,
     ) -> int:
-        chosen, number = rebuild_scenario(scenario, overrides or (), robots, seed, map_from)
+        chosen, number = rebuild_scenario(
+            scenario, with_controller(overrides or (), controller), robots, seed, map_from
+        )
         faults = parse_all(chosen.mission, chosen.faults, fault or ())
         if junit is not None:
             check_junit(junit)

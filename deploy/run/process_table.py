@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lfa.agents.following.plugin import file_of
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, About
 from lfa.protocol.mission import Mission
@@ -13,13 +14,16 @@ from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
 
 def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[ProcessSpec]:
     """Return the processes of a run in the order in which they are started."""
+    own_code = file_of(mission.following.controller)
+    controller = () if own_code is None else ("--controller", own_code)
     team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
     world = ("lfa.world.cli", str(folder / SCENARIO), "--seed", str(about.seed), "--state", str(folder), *team)
     return [
         ProcessSpec(ROUTER_NAME, ("lfa.deploy.fleet.host.router", "--listen", endpoint)),
         ProcessSpec(RECORDER_NAME, ("lfa.deploy.run.recorder_process", recorder_task), outlives_launcher=True),
         ProcessSpec(WORLD_NAME, world, restart_args=("--resume", str(folder))),
-        *(ProcessSpec(robot_name(i), ("lfa.agents.cli", "--role", _role(i, mission), "--id", str(i), *team))
+        *(ProcessSpec(robot_name(i), ("lfa.agents.cli", "--role", _role(i, mission), "--id", str(i), *team,
+                                          *controller))
           for i in mission.robots),
     ]  # fmt: skip
 

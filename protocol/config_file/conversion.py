@@ -22,6 +22,7 @@ OWN_NAME = "name"
 
 _KINDS: dict[type, str] = {
     bool: "true or false", int: "a whole number", float: "a number", str: "text", dict: "a table", list: "a list",
+    tuple: "a list of numbers",
 }  # fmt: skip
 
 
@@ -68,7 +69,8 @@ class _Converter:
 
     def _value(self, value: Any, kind: Any, name: str, field: FieldInfo | None = None) -> Any:
         """Return `value` as `kind`; after a mistake the default of its `field`, else zero."""
-        kind, origin = _given(kind), get_origin(_given(kind))
+        kind = _chosen(value, _given(kind))
+        origin = get_origin(kind)
         right = self._right(value, kind, origin)
         if right:
             self.mistakes.append(wrong(name, value, right))
@@ -85,6 +87,8 @@ class _Converter:
 
     def _right(self, value: Any, kind: Any, origin: Any) -> str:
         """Return what would be right instead of `value`, as far as itself and not its members say; else nothing."""
+        if origin in (Union, UnionType):
+            return " or ".join(_KINDS[get_origin(one) or one] for one in get_args(kind))
         if origin is Literal:
             choices = get_args(kind)
             return "" if value in choices and type(value) is str else f"one of {', '.join(map(str, choices))}"
@@ -109,8 +113,16 @@ def _hints(struct: type[Struct]) -> dict[str, Any]:
 def _given(kind: Any) -> Any:
     """Return `kind` without None: for `float | None` the type of a value that is given."""
     if get_origin(kind) in (Union, UnionType):
-        (kind,) = (one for one in get_args(kind) if one is not type(None))
+        return Union[tuple(one for one in get_args(kind) if one is not type(None))]  # noqa: UP007
     return kind
+
+
+def _chosen(value: Any, kind: Any) -> Any:
+    """Return the member of a union that the type of `value` chooses; `kind` itself if it is none, or if none fits."""
+    if get_origin(kind) not in (Union, UnionType):
+        return kind
+    meant = {int: float, list: tuple}.get(type(value), type(value))
+    return next((one for one in get_args(kind) if (get_origin(one) or one) is meant), kind)
 
 
 def _zero(kind: Any) -> Any:

@@ -19,6 +19,7 @@ from lfa.deploy.analysis.summary import SUMMARY
 from lfa.deploy.analysis.verification.checker import Violation
 from lfa.deploy.analysis.verification.journals import verify
 from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.scenario_loading import load_controller_of_run
 from lfa.protocol.errors import Refused
 
 
@@ -46,12 +47,16 @@ class VerifyReport(Struct, frozen=True):
 
 def command(
     folders: Annotated[list[Path], typer.Argument(help="Run folders with journals; several are compared.")],
+    controller: Annotated[
+        str | None, typer.Option(help="FILE.py:Class of the runs' controller, if it is not installed.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print all findings as JSON.")] = False,
 ) -> int:
     """Check the run folders and print the findings; exit code 1 for a broken invariant or a failed property."""
     checked: list[Checked] = []
     kept: list[Kept] = []
     for folder in folders:
+        load_controller_of_run(folder, controller)
         one, of_it = check(folder)
         checked.append(one)
         kept += [of_it] if of_it.scenario in PATHS else []

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
+from lfa.deploy.scenario_loading import load_controller_of_run
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name, whole_number
 
@@ -23,9 +24,13 @@ def command(
     speed: Annotated[float, typer.Option(help="Play back: speed relative to the recording.")] = 1.0,
     fleet: Annotated[str, typer.Option(help="Play back: name of the fleet to publish as.")] = PLAYBACK_FLEET,
     connect: Annotated[str | None, typer.Option(help="Play back: endpoint of the router.")] = None,
+    controller: Annotated[
+        str | None, typer.Option(help="FILE.py:Class of the runs' controller, if it is not installed.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Compare: print the result as JSON.")] = False,
 ) -> int:
     if robot is not None:
+        load_controller_of_run(folder, controller)
         return _compare(folder, robot, as_json)
     from lfa.deploy.analysis.verification.playback import play
 

@@ -14,8 +14,8 @@ from random import Random
 from msgspec import Struct
 
 from lfa.agents.config import CONTROL_PERIOD_S, Gains
-from lfa.agents.following.controller import find_controller
 from lfa.agents.following.follower import Follower
+from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import SlotMotion
 from lfa.agents.formation.pose_history import PoseHistory
@@ -25,7 +25,7 @@ from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp, Role
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import Localization, Sensors
 from lfa.protocol.messages.team import PoseStamped, Slot
-from lfa.protocol.mission import Limits
+from lfa.protocol.mission import Following, Limits
 
 FIX_EVERY = 5
 """Number of control periods between two localisation fixes: 10 Hz."""
@@ -91,7 +91,7 @@ class ChainRobot:
         self.follower = Follower(
             gains,
             limits,
-            find_controller(setup.controller)(gains, limits),
+            make_controller(Following(controller=setup.controller), gains, limits),
             heading_filter_m=setup.heading_filter_m,
             cruise_mps=setup.cruise_mps,
             paper_observer=setup.mode == "paper",

@@ -25,7 +25,7 @@ SCENARIO = (
     ('profile = "slow"',                           "mission.profile = slow: must be one of fast, std, wifi"),
     ('can_lead = [4]',                             "mission.can_lead = [4]: must be a non-empty part of"),
     ('[mission.following]',                        None),
-    ('controller = "pid"',                         "mission.following.controller: controller = pid: must be one of"),
+    ('controller = "pid"',                         "mission.following.controller = pid: must be one of"),
     ('[mission.leading]',                          None),
     ('route_m = [[4, 0], [9, 0]]',                 None),
     ('crusie_mps = 0.3',                           "mission.leading.crusie_mps = 0.3: no such key: did you mean"),

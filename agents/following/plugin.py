@@ -1,0 +1,110 @@
+"""Making of the controller that a mission chooses, and loading of one from a file `FILE.py:Class`.
+
+A controller with parameters of its own names their types in a `Struct` called `Parameters`, and gets one as its third
+argument. Code is loaded only by the name of an installed package or from the command line, never because a message
+or a scenario names a file.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from lfa.agents.config import Gains
+from lfa.agents.following.controller import Controller, add_controller, find_controller
+from lfa.agents.following.plugin_error import told
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Following, Limits, Parameter
+
+_files: dict[str, str] = {}
+"""Absolute `FILE.py:Class` of each controller that was added from a file, by name."""
+
+
+def add_controller_file(text: str) -> str:
+    """Load the class that `FILE.py:Class` names, and return the name by which a mission chooses it: without folders.
+
+    A text without `.py:` is the name of an installed controller, and returned as it is. Raise `Refused` with one line
+    for a file that cannot be read or run, or that has no such class.
+    """
+    file, colon, name = text.rpartition(":")
+    if not colon or not file.endswith(".py"):
+        find_controller(text)
+        return text
+    path = Path(file).absolute()
+    known_as = f"{path.name}:{name}"
+    make = getattr(_module(path, text), name, None)
+    if not callable(make):
+        raise Refused(f"--controller {text}: {file} has no class {name!r}, must be FILE.py:Class")
+    add_controller(known_as, make)
+    _files[known_as] = f"{path}:{name}"
+    return known_as
+
+
+def file_of(name: str) -> str | None:
+    """Return the absolute `FILE.py:Class` of a controller that was added from a file, else None."""
+    return _files.get(name)
+
+
+def parameters_of(make: Any) -> type[Struct] | None:
+    """Return the type of a controller's own parameters, None for a controller without."""
+    kind = getattr(make, "Parameters", None)
+    return kind if isinstance(kind, type) and issubclass(kind, Struct) else None
+
+
+def make_controller(following: Following, gains: Gains, limits: Limits) -> Controller:
+    """Return the controller that the mission chooses, with its parameters.
+
+    Raise `Refused` for an unknown controller, a parameter that it has not or of another type, and for a class that
+    raises.
+    """
+    make: Any = find_controller(following.controller)
+    kind = parameters_of(make)
+    if kind is None and following.parameters:
+        raise Refused(f"parameters = {{{_names(following.parameters)}}}: controller {following.controller} has none")
+    try:
+        made: Controller = make(gains, limits) if kind is None else make(gains, limits, _convert(following, kind))
+    except Refused:
+        raise
+    except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
+        raise Refused(f"controller = {following.controller}: cannot be made: {told(error)}") from None
+    if not (callable(getattr(made, "step", None)) and callable(getattr(made, "reset", None))):
+        raise Refused(f"controller = {following.controller}: must be a class with the methods reset and step")
+    return made
+
+
+def _module(path: Path, text: str) -> Any:
+    from importlib.util import module_from_spec, spec_from_file_location
+
+    if not path.is_file():
+        raise Refused(f"--controller {text}: no such file, must be FILE.py:Class")
+    spec = spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # noqa: BLE001 - the file of a user may fail in any way
+        raise Refused(f"--controller {text}: {told(error)}") from None
+    return module
+
+
+def _convert(following: Following, kind: type[Struct]) -> Struct:
+    """Return the mission's parameters as `kind`. Raise `Refused` with the name and the type that would be right."""
+    known = {field.encode_name for field in msgspec.structs.fields(kind)}
+    unknown = sorted(set(following.parameters) - known)
+    if unknown:
+        raise Refused(f"parameters.{unknown[0]}: no such parameter of {following.controller}: known are "
+                      f"{', '.join(sorted(known)) or 'none'}")  # fmt: skip
+    try:
+        return msgspec.convert(following.parameters, kind)
+    except msgspec.ValidationError as error:
+        says, _, place = str(error).partition(" - at `$")
+        key = f"parameters{place.rstrip('`')}"
+        value = following.parameters.get(key.rpartition(".")[2])
+        raise Refused(f"{key}{'' if value is None else f' = {value}'}: {says}") from None
+
+
+def _names(parameters: dict[str, Parameter]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in parameters.items())
