@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from lfa.deploy.ros.topics import fleet_topics, robot_topics
-from lfa.deploy.ros.types import type_hash
+from lfa.deploy.ros.types import kind, type_hash
 from tests.rigs.foreign_peers import answer, start
 from tests.rigs.lfa_runs import LFA, eventually, lfa, running
-from tests.rigs.ros_peers import free_endpoint
+from tests.rigs.ros_peers import awaited, free_endpoint, ros_client
+from tests.rigs.secured_fleet import FLEET, attacked
 
 pytestmark = pytest.mark.processes
 ECHOED = ("/robot1/odom", "/robot1/scan", "/tf", "/tf_static", "/lfa/leader", "/robot1/cmd_vel", "/diagnostics")
@@ -52,6 +53,7 @@ def test_a_ros_users_sdk_lists_echoes_and_hands_over_and_the_robots_obey(tmp_pat
             assert live <= set(told["heard"]), told["heard"]
             transforms = told["last"]["/tf"]  # a message tells of the robots with news: whichever came last
             assert any(f"robot{n}/odom" in transforms for n in (1, 2, 3)), transforms
+            assert "qos='2::,5:" in told["scan"][0], "best effort, depth 5"
             assert told["called"] == [True, "robot 2 leads"]
             eventually(lambda: any(e.get("by") == "operator" for e in run.events()), "the formation was not ordered")
             eventually(lambda: any(e.get("change") == "handed_over" for e in run.events()), "nobody handed over")
@@ -60,6 +62,20 @@ def test_a_ros_users_sdk_lists_echoes_and_hands_over_and_the_robots_obey(tmp_pat
             facts = json.loads(out)
             assert (facts["undecodable"], facts["fleet_dropped"]) == (0, 0)
             assert bridged.returncode == 0
+
+
+def test_the_bridge_of_a_secured_fleet_shows_it_and_hands_over_with_the_operators_keys(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with attacked() as fleet:
+        words = ("--serve", "--fleet", FLEET, "--connect", fleet.unix, "--keys", str(fleet.home))
+        with bridge(endpoint, *words), ros_client(endpoint) as space:
+            node = space.node("user")
+            odom = node.subscription("/robot1/odom", "nav_msgs/msg/Odometry")
+            awaited(odom.take, "the secured fleet's odometry")
+            trigger = node.client("/lfa/handover", "std_srvs/srv/Trigger")
+            answered = trigger.call(kind("std_srvs/msg/Trigger_Request")(0), timeout_s=10.0)
+            assert answered is not None
+            assert (answered.success, answered.message) == (True, "robot 2 leads")
 
 
 def test_without_a_ros_router_the_bridge_says_in_one_line_what_to_do(tmp_path: Path) -> None:

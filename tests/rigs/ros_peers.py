@@ -30,13 +30,20 @@ def ros_pair(distro: Distro = "jazzy") -> Iterator[tuple[RosSpace, RosSpace]]:
     endpoint = free_endpoint()
     served = ros_session(endpoint, serve=True)
     try:
-        used = ros_session(endpoint, serve=False)
-        try:
-            yield RosSpace(served, 0, distro, Wake()), RosSpace(used, 0, distro, Wake())
-        finally:
-            used.close()
+        with ros_client(endpoint, distro) as used:
+            yield RosSpace(served, 0, distro, Wake()), used
     finally:
         served.close()
+
+
+@contextmanager
+def ros_client(endpoint: str, distro: Distro = "jazzy") -> Iterator[RosSpace]:
+    """Yield the space of a client of the ROS router at `endpoint`, in domain 0."""
+    session = ros_session(endpoint, serve=False)
+    try:
+        yield RosSpace(session, 0, distro, Wake())
+    finally:
+        session.close()
 
 
 def awaited(found: Callable[[], T], what: str) -> T:
