@@ -10,11 +10,13 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import typer
-from lfa.deploy.command_line import PLAIN, print_errors, run_cli
+from lfa.deploy.command_line import PLAIN, print_refusal, run_cli
+from lfa.protocol.errors import Refused
 
 
 class Command(NamedTuple):
@@ -98,6 +100,13 @@ COMMANDS = (
     Command("completion", "lfa.deploy.completion", "Print a script that completes commands and options in your shell.",
           "lfa completion bash > ~/.local/share/bash-completion/completions/lfa"),
 )  # fmt: skip
+RUNS, RECORDINGS, ROS = ("numpy", "pymunk", "PIL", "mcap"), ("numpy", "mcap"), ("numpy", "rosbags", "xxhash")
+NEEDS: dict[str, tuple[str, ...]] = {
+    "run": RUNS, "sim": RUNS, "verify": RUNS, "map": RUNS, "record": RECORDINGS, "plot": (*RECORDINGS, "matplotlib"),
+    "report": (*RECORDINGS, "matplotlib"), "view": (*RECORDINGS, "rerun"), "bag": (*ROS, "mcap"), "ros": ROS,
+    "foxglove": (*ROS, "foxglove"), "up": ("cryptography",), "keys": ("cryptography",), "top": ("rich",),
+}  # fmt: skip
+"""Modules outside the base install without which a command can do nothing."""
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
@@ -117,15 +126,28 @@ def main() -> None:
         print(overview())
         sys.exit(0)
     signal.signal(signal.SIGTERM, _end)
+    absent = _absent_modules(sys.argv[1])
+    if absent and not {"-h", "--help"} & set(sys.argv[2:]):
+        sys.exit(print_refusal("lfa", Refused(_install(sys.argv[1], absent))))
     try:
         sys.exit(run_cli("lfa", build(sys.argv[1:2])))
     except KeyboardInterrupt:
         sys.exit(130)
     except ModuleNotFoundError as error:
-        extra = EXTRAS.get((error.name or "").partition(".")[0])
-        if extra is None:
+        module = (error.name or "").partition(".")[0]
+        if module not in EXTRAS:
             raise
-        sys.exit(print_errors("lfa", f"{sys.argv[1]} needs {error.name}: install with: pip install 'lfa[{extra}]'"))
+        sys.exit(print_refusal("lfa", Refused(_install(sys.argv[1], [module]))))
+
+
+def _absent_modules(name: str) -> list[str]:
+    """Return the modules that a command needs and that are not installed: known before it does anything."""
+    return [module for module in NEEDS.get(name, ()) if find_spec(module) is None]
+
+
+def _install(name: str, absent: Sequence[str]) -> str:
+    extras = [EXTRAS[module] for module in absent if module != "numpy"] or [EXTRAS["numpy"]]  # the others bring numpy
+    return f"{name} needs {', '.join(absent)}: install with: pip install 'lfa[{','.join(dict.fromkeys(extras))}]'"
 
 
 def _end(*_: object) -> None:

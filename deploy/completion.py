@@ -14,7 +14,7 @@ from msgspec import Struct
 from typer.models import OptionInfo
 
 from lfa.deploy.cli import COMMANDS, Command
-from lfa.world.description.load import shipped
+from lfa.world.description.load import titled
 
 
 class Words(Struct, frozen=True):
@@ -52,7 +52,7 @@ def _words_of(entry: Command, function: Callable[..., Any]) -> Words:
             )
             options += [word for word in said if word.startswith("--")]
         elif name == "scenario":
-            choices += list(shipped())
+            choices += list(titled())
         elif get_origin(kind) is Literal:
             choices += list(get_args(kind))
     return Words(entry.name, entry.help, tuple(options), tuple(choices))

@@ -47,6 +47,8 @@ def command(
     once: Annotated[bool, typer.Option("--once", help="Print the table once and exit.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows once as JSON and exit.")] = False,
 ) -> int:
+    if not as_json:
+        import rich  # noqa: F401  an extra: missed here, before anything is done
     if not (once or as_json):
         _check_terminal()
     found = find(fleet, connect, keys)
