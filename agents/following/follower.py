@@ -17,7 +17,7 @@ from lfa.agents.following.checked_controller import CheckedController
 from lfa.agents.following.controller import SLOT_SPEED_MIN_MPS, Controller, Reference
 from lfa.agents.following.observer import SlotVelocityObserver
 from lfa.agents.following.predecessor import Sighting
-from lfa.agents.formation.formation import SlotMotion
+from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.agents.localization.plausibility import plausible
 from lfa.protocol.geometry import STILL, Pose2D, Twist, wrap
 from lfa.protocol.messages.team import Slot

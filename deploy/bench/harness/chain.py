@@ -17,8 +17,8 @@ from lfa.agents.config import CONTROL_PERIOD_S, Gains
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import Predecessor
-from lfa.agents.formation.formation import SlotMotion
 from lfa.agents.formation.pose_history import PoseHistory
+from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.agents.localization.estimator import Estimator
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, bearing, wrap
 from lfa.protocol.messages.consensus import NO_TERM, GatewayStamp, Role

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lfa.agents.config import DEFAULT, Gains
 from lfa.agents.following.controller import Law, Reference
-from lfa.agents.formation.formation import SlotMotion
+from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Limits

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from lfa.agents.config import DEFAULT
 from lfa.agents.formation.formation import (
     Formation,
-    SlotMotion,
     check_slot,
     leader_speed_cap,
     leader_speed_floor,
@@ -24,6 +23,7 @@ from lfa.agents.formation.formation import (
     speed_factors,
 )
 from lfa.agents.formation.pose_history import PoseHistory
+from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
 from lfa.protocol.messages.consensus import Term
