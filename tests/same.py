@@ -38,7 +38,7 @@ from lfa.world.description.load import load, shipped
 Task = tuple[Callable[..., "list[Row]"], tuple[Any, ...]]
 
 SEEDS = (1, 2, 3)
-ARENA_SEEDS = 60
+LEASE_SEEDS = 60
 WHOLE_SEEDS = 20
 WHOLE_CHUNK = 5  # seeds that one worker plays at a time
 WALL_CLOCK = ("duration_s", "real_time_factor", "recording")
@@ -99,7 +99,7 @@ def _of_calls(path: Path) -> Digest:
 
 def fuzzed(whole: bool, first: int, beyond: int) -> list[Row]:
     """Play the seeds from `first` to before `beyond`; return a row for each."""
-    name = "whole" if whole else "arena"
+    name = "whole" if whole else "leases"
     return [Row("fuzz", name, str(seed), "trace", str(_of_seed(whole, seed))) for seed in range(first, beyond)]
 
 
@@ -110,7 +110,7 @@ def _of_seed(whole: bool, seed: int) -> Digest:
     with patch.object(stage, "listen", lambda self, checkers: listen(self, [*checkers, heard])):
         played = player(draw(seed), lambda *facts: digest.add("trace", *facts))
     digest.add(played.schedule, played.violations, played.counts, played.elections)
-    digest.add(played.arena.log, repr(played.arena.random.getstate()))
+    digest.add(played.simulation.log, repr(played.simulation.random.getstate()))
     return digest
 
 
@@ -144,7 +144,7 @@ def tasks(runs: Path | None) -> list[Task]:
         *((simulated, (name, seed)) for name, _ in scenarios for seed in SEEDS),
         *((replayed, (folder,)) for folder in folders),
         *((fuzzed, (True, first, first + WHOLE_CHUNK)) for first in range(0, WHOLE_SEEDS, WHOLE_CHUNK)),
-        (fuzzed, (False, 0, ARENA_SEEDS)),
+        (fuzzed, (False, 0, LEASE_SEEDS)),
     ]
 
 

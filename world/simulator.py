@@ -120,6 +120,10 @@ class Simulator(VirtualTime):
         seat.stop_by = self.now + FINISH_S_MAX
         self._give(seat, "", Stop(), b"")
 
+    def lose_late(self, by: float) -> None:
+        """Drop the messages in transit that would arrive later than true time `by` [s]."""
+        self.lose(by, (self._give,))
+
     def publish(self, key: str, payload: bytes) -> None:
         """Publish a message from outside the simulation, such as an operator's, to subscribers of `key` and to taps."""
         message = decode(payload, TOPIC[key.split("/")[3]].type)

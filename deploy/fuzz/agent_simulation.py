@@ -11,16 +11,15 @@ from collections.abc import Callable, Sequence
 from random import Random
 from typing import Any
 
-from msgspec import Struct
-
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
 from lfa.deploy.analysis.verification.lease_observer import report_effect
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.fuzz import network
-from lfa.deploy.fuzz.network import LinkConditions, Trace
+from lfa.deploy.fuzz.agent_processes import AgentProcess, WorldProcess, unread
+from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.observers import GatewayObserver
-from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, Schedule
+from lfa.deploy.fuzz.schedules import Schedule
 from lfa.protocol.incarnations import drawn_at
 from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import BecomeLeader, Effect, StandAside
@@ -33,9 +32,9 @@ from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
 from lfa.protocol.node import Node, NodeObserver, PeerDown, PeerUp
-from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.runtime.journal import Journal
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import LinkModel, Radio
+from lfa.protocol.transport.link_model import LinkModel
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
@@ -49,55 +48,6 @@ FLEET = "whole"
 ROAD_M = 100.0
 
 
-class Gale(LinkModel):
-    """Link conditions and cuts of a schedule, applied to the simulator's links."""
-
-    def __init__(self, whole: AgentSimulation) -> None:
-        super().__init__(Radio(), whole.random)
-        self._whole = whole
-
-    def delays(self, sender: str, receiver: str) -> list[float]:
-        whole = self._whole
-        if whole.cuts and (_place(sender), _place(receiver)) in whole.cuts:
-            return []
-        latest_s = whole.late_at - whole.now
-        return [delay_s for delay_s in whole.weather.delays(whole.random) if delay_s <= latest_s]
-
-
-class Life:
-    """One incarnation of an agent or of the witness."""
-
-    def __init__(self, simulator: Simulator, node: Agent | Witness, member: Member, clock: LocalClock) -> None:
-        self.node = node
-        self.member = member
-        self.id = member.id
-        self.clock = clock
-        self.paused = False
-        self.leaving = False
-        """True after a request to exit, while the process sends its last messages."""
-        self.drawn: tuple[str, bytes] | None = None
-        """Key and payload of the last command published as leader; a pause may hold it back."""
-        self.simulator = simulator
-
-    @property
-    def alive(self) -> bool:
-        """True while this incarnation runs in the simulator."""
-        return self.simulator.lives(self.node)
-
-    @property
-    def lease(self) -> Lease | None:
-        """Lease of the node; None just after its start."""
-        return self.node.lease
-
-
-class Hardware(Struct):
-    """One incarnation of the world, and so of all gateways."""
-
-    world: World
-    clock: LocalClock
-    alive: bool = True
-
-
 class AgentSimulation:
     """Simulation of a team with the same operations as `LeaseSimulation`."""
 
@@ -108,28 +58,24 @@ class AgentSimulation:
         robots = tuple(range(1, schedule.robots + 1))
         self.mission = Mission(robots, witness=schedule.witness, profile=schedule.profile, leading=leading)
         self.timing = timing_of(schedule.profile)
-        self.weather: LinkConditions = schedule.weather
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
-        self.late_at = FAULTS_UNTIL_S + schedule.weather.delay_max if schedule.faults else float("inf")
-        """True time [s] of the latest arrival; messages that would arrive later are lost."""
         self.wall_ms: dict[int, int] = {}
         """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
         self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots
         self.rates = schedule.rates
-        self.processes: dict[int, Life] = {}
-        self.gateways: dict[int, Hardware] = {}
+        self.processes: dict[int, AgentProcess] = {}
+        self.gateways: dict[int, WorldProcess] = {}
         self.accepted: list[tuple[float, CmdVel]] = []
         self.log: list[tuple[float, int, Effect]] = []
         world = WorldSpec(lidar=Lidar(beams=8))
         self._scenario = Scenario("A straight road", self.mission, 1e6, world=world, name=FLEET)
         self._operator = Operator(FLEET, 1)
-        self._lives = 0
+        self._incarnations = 0
         self._agreed: dict[int, int] = {}
         """Digest of what the newest incarnation of each id holds to be agreed."""
-        self.simulator = Simulator(Radio(), schedule.seed)
+        self.simulator = Simulator(schedule.radio, schedule.seed)
         self.simulator.refused_leave = True
-        self.simulator.air = Gale(self)
         self.simulator.taps.append(self._hear)
         self.simulator.reborn = self._reborn
         self.listen(())
@@ -145,6 +91,11 @@ class AgentSimulation:
         """True time [s]."""
         return self.simulator.now
 
+    @property
+    def air(self) -> LinkModel:
+        """Link model between the hosts."""
+        return self.simulator.air
+
     def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
         """Schedule the call `what(*arguments)` at true time `time` [s]."""
         self.simulator.at(time, lambda: what(*arguments))
@@ -158,7 +109,7 @@ class AgentSimulation:
 
     def start_all(self) -> AgentSimulation:
         """Start the world with its gateways, then all other processes at once."""
-        self._start_world(World(FLEET, self._scenario, 1, self._next_life(), start_at=None, bodies=Kinematic))
+        self._start_world(World(FLEET, self._scenario, 1, self._next_incarnation(), start_at=None, bodies=Kinematic))
         for robot_id in self.ids:
             self.start(robot_id)
         return self
@@ -173,7 +124,7 @@ class AgentSimulation:
         if robot_id in self.processes:
             self.kill(robot_id)
         wall_ms = self.wall_ms.get(robot_id, 0)
-        number, floor = drawn_at(wall_ms, self._next_life()), max(round(self.now * 1000.0) + wall_ms, 0)
+        number, floor = drawn_at(wall_ms, self._next_incarnation()), max(round(self.now * 1000.0) + wall_ms, 0)
         node: Agent | Witness = (
             Witness(FLEET, number, floor, mission)
             if robot_id == WITNESS_ID
@@ -186,9 +137,9 @@ class AgentSimulation:
     def _watch(self, node: Agent | Witness, robot_id: int, clock: LocalClock) -> None:
         """Pass what a new incarnation does to the checkers and the trace."""
         member = Member(robot_id, node.incarnation)
-        life = self.processes[robot_id] = Life(self.simulator, node, member, clock)
-        node.lease_observer = lambda observed: self._observed(life, observed)
-        self._say(robot_id, f"starts, life {member.incarnation}")
+        process = self.processes[robot_id] = AgentProcess(self.simulator, node, member, clock)
+        node.lease_observer = lambda observed: self._observed(process, observed)
+        self._say(robot_id, f"starts, incarnation {member.incarnation}")
         self._report(Checker.lives, self.now, member)
         self._report(Checker.holds, self.now, member, self._agreed[robot_id])
 
@@ -200,22 +151,22 @@ class AgentSimulation:
         self._report(Checker.leads_no_more, self.now, before.member)
         self._report(Checker.ends, self.now, before.member)
         self._watch(node, robot_id, before.clock)
-        return _unread(node)
+        return unread(node)
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
         """Kill the process (SIGKILL); with `hinted`, connected processes see its token vanish."""
-        life = self.processes[robot_id]
-        if life.alive:
+        process = self.processes[robot_id]
+        if process.alive:
             self.simulator.kill(robot_name(robot_id), hinted=hinted)
             self._say(robot_id, "dies")
-            self._report(Checker.leads_no_more, self.now, life.member)
-            self._report(Checker.ends, self.now, life.member)
+            self._report(Checker.leads_no_more, self.now, process.member)
+            self._report(Checker.ends, self.now, process.member)
 
     def exit(self, robot_id: int) -> None:
         """Request the process to exit (SIGTERM); a paused process ignores it."""
-        life = self.processes[robot_id]
-        if life.alive and not life.paused:
-            life.leaving = True
+        process = self.processes[robot_id]
+        if process.alive and not process.paused:
+            process.leaving = True
             self.simulator.terminate(robot_name(robot_id))
 
     def hand_over(self, robot_id: int) -> None:
@@ -230,11 +181,11 @@ class AgentSimulation:
 
     def resume(self, robot_id: int, shuffled: bool = False) -> None:
         """Resume the process (SIGCONT): send the command held back, then handle the kept messages."""
-        life = self.processes[robot_id]
-        if life.paused and life.alive:
-            life.paused = False
-            if life.drawn is not None:
-                self.simulator.publish(*life.drawn)
+        process = self.processes[robot_id]
+        if process.paused and process.alive:
+            process.paused = False
+            if process.drawn is not None:
+                self.simulator.publish(*process.drawn)
             self.simulator.resume(robot_name(robot_id), shuffled=shuffled)
 
     def start_gateway(self, robot_id: int) -> None:
@@ -242,13 +193,13 @@ class AgentSimulation:
         if not self.gateways[robot_id].alive:
             memory = self.gateways[robot_id].world.memory()
             scenario = resumed(self._scenario, memory)
-            self._start_world(World(FLEET, scenario, 1, self._next_life(), None, Kinematic, memory))
+            self._start_world(World(FLEET, scenario, 1, self._next_incarnation(), None, Kinematic, memory))
 
     def kill_gateway(self, robot_id: int) -> None:
         """Kill the world, and with it all gateways."""
-        hardware = self.gateways[robot_id]
-        if hardware.alive:
-            hardware.alive = False
+        process = self.gateways[robot_id]
+        if process.alive:
+            process.alive = False
             self.simulator.kill(WORLD_NAME)
             self._say(WITNESS_ID, "world dies")
 
@@ -266,22 +217,23 @@ class AgentSimulation:
 
     def part(self, pairs: set[tuple[int, int]]) -> None:
         """Block all messages from the first to the second id of each pair."""
-        self.cuts |= pairs
-        self._report(Checker.parts, self.now, self.cuts)
+        self._cut_exactly(self.cuts | pairs)
 
     def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
         """Remove the cuts of these directed pairs."""
-        self.cuts -= pairs
-        self._report(Checker.parts, self.now, self.cuts)
+        self._cut_exactly(self.cuts - pairs)
 
     def heal(self) -> None:
         """Remove all cuts."""
-        self.cuts.clear()
+        self._cut_exactly(set())
+
+    def _cut_exactly(self, pairs: set[tuple[int, int]]) -> None:
+        self.cuts, self.air.cuts = pairs, network.links(pairs)
         self._report(Checker.parts, self.now, self.cuts)
 
     def lose_late(self, within_s: float) -> None:
-        """Remove the limit `late_at` on arrivals: late messages of the faults have already been dropped."""
-        self.late_at = float("inf")
+        """Drop the messages in transit that would arrive later than `within_s` [s] from now."""
+        self.simulator.lose_late(self.now + within_s)
 
     def step_wall(self, robot_id: int, by_s: float) -> None:
         """Set a host's wall clock wrong by `by_s` [s]."""
@@ -290,47 +242,47 @@ class AgentSimulation:
 
     def tell_healed(self) -> None:
         """Notify the checkers of the ended processes, and that the last fault is over."""
-        for life in self.processes.values():
-            if not life.alive:
-                self._report(Checker.ends, self.now, life.member)
-        self._report(Checker.heals, self.now, 4.0 * self.weather.delay_max + CONTROL_PERIOD_S)
+        for process in self.processes.values():
+            if not process.alive:
+                self._report(Checker.ends, self.now, process.member)
+        self._report(Checker.heals, self.now, 4.0 * self.air.radio.prompt_s + CONTROL_PERIOD_S)
 
     def _start_world(self, world: World) -> None:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
-        hardware = Hardware(world, clock)
-        self.gateways = dict.fromkeys(self.mission.robots, hardware)
+        process = WorldProcess(world, clock)
+        self.gateways = dict.fromkeys(self.mission.robots, process)
         self._say(WITNESS_ID, "world starts")
         for robot_id in self.mission.robots:
             self._report(Checker.gateway_starts, self.now, robot_id, self.now + self.timing.grant_s / clock.rate)
         self._add(world, clock, GatewayObserver(self.simulator, world, self._report, self.accepted))
 
     def _add(self, node: Node, clock: LocalClock, *observers: NodeObserver) -> None:
-        self.simulator.add(node, _unread(node), clock, observers)
+        self.simulator.add(node, unread(node), clock, observers)
 
-    def _next_life(self) -> int:
-        self._lives += 1
-        return self._lives
+    def _next_incarnation(self) -> int:
+        self._incarnations += 1
+        return self._incarnations
 
     # --- facts for the checkers --------------------------------------------------------------------------------
 
-    def _observed(self, life: Life, observed: Observed) -> None:
+    def _observed(self, process: AgentProcess, observed: Observed) -> None:
         if observed.event is LeaseEvent.PROMISE:
             self._report(Checker.promises, self.now, *observed.given)
         for effect in observed.effects:
-            self._say(life.id, network.told(effect))
+            self._say(process.id, network.told(effect))
             if isinstance(effect, StandAside):
-                self._report(Checker.leads_no_more, self.now, life.member)
-                self._report(Checker.ends, self.now, life.member)
+                self._report(Checker.leads_no_more, self.now, process.member)
+                self._report(Checker.ends, self.now, process.member)
             if isinstance(effect, BecomeLeader):
-                self.log.append((self.now, life.id, effect))
-            grant_s = self.timing.grant_s / life.clock.rate
-            report_effect(self._report, effect, life.member, self.now, grant_s, life.clock.true)
+                self.log.append((self.now, process.id, effect))
+            grant_s = self.timing.grant_s / process.clock.rate
+            report_effect(self._report, effect, process.member, self.now, grant_s, process.clock.true)
 
     def _hear(self, _now: float, key: str, payload: bytes, message: Message) -> None:
         if isinstance(message, CmdVel) and message.as_leader:
-            life = self.processes.get(robot_id_of(message.header.sender) or WITNESS_ID)
-            if life is not None and life.member.incarnation == message.header.incarnation:
-                life.drawn = key, payload
+            process = self.processes.get(robot_id_of(message.header.sender) or WITNESS_ID)
+            if process is not None and process.member.incarnation == message.header.incarnation:
+                process.drawn = key, payload
 
     def _say(self, who: int, what: str) -> None:
         if self.trace is not None:
@@ -340,20 +292,11 @@ class AgentSimulation:
 
     def leaders(self) -> list[int]:
         """Return the ids whose lease is valid now by their own clocks."""
-        living = [(i, life, life.lease) for i, life in sorted(self.processes.items()) if life.alive]
-        return [i for i, life, lease in living if lease is not None and lease.may_command(life.clock.local(self.now))]
+        living = [(i, p.clock.local(self.now), p.lease) for i, p in sorted(self.processes.items()) if p.alive]
+        return [i for i, local, lease in living if lease is not None and lease.may_command(local)]
 
     def lease_of(self, robot_id: int) -> Lease:
         """Return the lease of the newest incarnation of an id, which must have started."""
         lease = self.processes[robot_id].lease
         assert lease is not None, robot_id
         return lease
-
-
-def _unread(node: Node) -> Journal:
-    return Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, 1, {}))
-
-
-def _place(name: str) -> int:
-    """Return the host id of a node; 0 is the host of the world and the witness."""
-    return WITNESS_ID if name == WORLD_NAME else robot_id_of(name) or WITNESS_ID

@@ -217,9 +217,9 @@ def columns(lines: list[str], schedule: Schedule) -> Trace:
 
 def describe(schedule: Schedule) -> str:
     """Return a schedule as text: the link conditions in one line, then one line for each fault."""
-    calm = schedule.weather
-    head = f"{schedule.robots} robots, witness {schedule.witness}, {schedule.profile}, delay <= {calm.delay_max} s"
-    lines = [f"{head}, loss {calm.loss}, duplicate {calm.duplicate}, tail {calm.tail}"]
+    radio = schedule.radio
+    head = f"{schedule.robots} robots, witness {schedule.witness}, {schedule.profile}, delay <= {radio.prompt_s:g} s"
+    lines = [f"{head}, loss {radio.loss}, duplicate {radio.duplication}, tail {radio.tail}"]
     for fault in schedule.faults:
         targets = ", ".join("leader" if t < 0 else str(t) for t in fault.targets)
         lines.append(f"{fault.at * 1000.0:8.1f}  {fault.kind} {targets} ({fault.duration_s:.3f} s, {fault.value:.2f})")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Union
 from msgspec import Struct, structs
 
 from lfa.deploy.analysis.verification.checker import Checker, Violation
-from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS, NextInChain, Steady, StopsWithoutQuorum
+from lfa.deploy.analysis.verification.leadership import NextInChain, Steady, StopsWithoutQuorum
+from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
@@ -18,12 +19,15 @@ from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID
+from lfa.protocol.transport.link_model import Radio
 
 if TYPE_CHECKING:
     from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 
-Stage = Union["LeaseSimulation", "AgentSimulation"]
+Simulation = Union["LeaseSimulation", "AgentSimulation"]
 """Simulation that executes a schedule: leases only, or complete agents."""
+RADIO_FIELDS = {"loss": "loss", "burst": "loss", "duplicate": "duplication", "tail": "tail", "reorder": "reorder"}
+"""Field of the link conditions that each kind of fault sets."""
 EXIT_S = 0.3
 """Time [s] sufficient for the last messages of a process that was requested to exit."""
 
@@ -36,87 +40,89 @@ class Played(Struct):
     counts: Counter[str]
     """Number of faults that took effect, by kind."""
     elections: int
-    arena: Stage
+    simulation: Simulation
 
 
 class Faults:
     """Injector of a schedule's faults into a simulation: counts those that took effect, then heals."""
 
-    def __init__(self, arena: Stage, schedule: Schedule) -> None:
-        self.arena = arena
+    def __init__(self, simulation: Simulation, schedule: Schedule) -> None:
+        self.simulation = simulation
         self.schedule = schedule
+        self._radio = schedule.radio
+        """Link conditions to which a fault of the links returns."""
         self.counts: Counter[str] = Counter()
         for fault in schedule.faults:
-            arena.at(fault.at, self._do, fault)
-        arena.at(FAULTS_UNTIL_S, self.heal)
+            simulation.at(fault.at, self._do, fault)
+        simulation.at(FAULTS_UNTIL_S, self.heal)
 
     def _target(self, fault: ScheduledFault) -> int | None:
         """Return the id of the fault's target, or None if no such process is running."""
         target = fault.targets[0] if fault.targets else WITNESS_ID
         if target == LEADER:
-            leaders = self.arena.leaders()
+            leaders = self.simulation.leaders()
             return leaders[0] if leaders else None
-        process = self.arena.processes.get(target)
+        process = self.simulation.processes.get(target)
         return target if process is not None and process.alive else None
 
     def _do(self, fault: ScheduledFault) -> None:
         target = self._target(fault)
         # The effects of a fault end at FAULTS_UNTIL_S at the latest: L1-L4 count from there.
-        arena, lasts = self.arena, min(self.arena.now + fault.duration_s, FAULTS_UNTIL_S)
+        simulation, lasts = self.simulation, min(self.simulation.now + fault.duration_s, FAULTS_UNTIL_S)
         done = True
         match fault.kind:
             case "kill" if target is not None:
-                arena.kill(target, hinted=arena.random.random() < 0.8)
+                simulation.kill(target, hinted=simulation.random.random() < 0.8)
             case "restart" | "witness" if target is not None:
-                arena.kill(target)
-                arena.at(lasts, self._start, target)
+                simulation.kill(target)
+                simulation.at(lasts, self._start, target)
             case "mixed" if target is not None:
-                arena.start(target, mission=self._other_mission(fault))
-                arena.at(lasts, self._start_right, target, arena.processes[target].member)
+                simulation.start(target, mission=self._other_mission(fault))
+                simulation.at(lasts, self._start_right, target, simulation.processes[target].member)
             case "exit" if target is not None:
-                arena.exit(target)
-                arena.at(min(lasts + EXIT_S, FAULTS_UNTIL_S), self._start, target)
+                simulation.exit(target)
+                simulation.at(min(lasts + EXIT_S, FAULTS_UNTIL_S), self._start, target)
             case "clock_step" if target is not None:
                 self._step_wall(fault, target, lasts)
             case "pause" if target is not None:
-                arena.pause(target)
-                arena.at(lasts, arena.resume, target, fault.value > 0.0)
+                simulation.pause(target)
+                simulation.at(lasts, simulation.resume, target, fault.value > 0.0)
             case "hand_over" if target is not None:
-                arena.hand_over(target)
+                simulation.hand_over(target)
             case "false_hint" if target is not None:
-                seers = [i for i in fault.targets[1:] if i != target and i in arena.ids]
-                arena.hint(target, *seers)
+                seers = [i for i in fault.targets[1:] if i != target and i in simulation.ids]
+                simulation.hint(target, *seers)
                 if fault.value > 0.0:
-                    arena.latch(target, arena.processes[target].member.incarnation)
+                    simulation.latch(target, simulation.processes[target].member.incarnation)
                 if fault.duration_s > 0.0:
-                    arena.at(lasts, self._hint_back, target, arena.processes[target].member, tuple(seers))
+                    simulation.at(lasts, self._hint_back, target, simulation.processes[target].member, tuple(seers))
             case "gateway" if target is not None and target != WITNESS_ID:
-                arena.kill_gateway(target)
-                arena.at(lasts, self._start_gateway, target)
+                simulation.kill_gateway(target)
+                simulation.at(lasts, self._start_gateway, target)
             case _:
                 done = self._disturb(fault, target, lasts)
         self.counts[fault.kind] += done
-        if done and arena.trace is not None:
-            arena.trace(arena.now, WITNESS_ID if target is None else target, f"# {fault.kind}")
+        if done and simulation.trace is not None:
+            simulation.trace(simulation.now, WITNESS_ID if target is None else target, f"# {fault.kind}")
 
     def _disturb(self, fault: ScheduledFault, target: int | None, lasts: float) -> bool:
         """Inject a fault of the network; return True if it took effect."""
-        arena = self.arena
+        simulation = self.simulation
         match fault.kind:
             case "cut" | "cut_one_way" | "cut_pair":
                 pairs = self._pairs(fault, target)
-                arena.part(pairs)
-                arena.at(lasts, arena.heal_partition, pairs)
+                simulation.part(pairs)
+                simulation.at(lasts, simulation.heal_partition, pairs)
                 return bool(pairs)
-            case "loss" | "burst" | "duplicate" | "tail" | "reorder":
-                name = "loss" if fault.kind == "burst" else fault.kind
-                setattr(arena.weather, name, fault.value)
-                arena.at(lasts, self._calm, name)
+            case kind if kind in RADIO_FIELDS:
+                field = RADIO_FIELDS[kind]
+                simulation.air.radio = _with(simulation.air.radio, field, fault.value)
+                simulation.at(lasts, self._calm, field)
                 return True
         return False
 
     def _pairs(self, fault: ScheduledFault, target: int | None) -> set[tuple[int, int]]:
-        ids = set(self.arena.ids)
+        ids = set(self.simulation.ids)
         if fault.kind == "cut_pair":
             other = fault.targets[1]
             return set() if target is None or target == other else {(target, other), (other, target)}
@@ -124,64 +130,64 @@ class Faults:
         there = {(a, b) for a in side for b in ids - side}
         return there if fault.kind == "cut_one_way" else there | {(b, a) for a, b in there}
 
-    def _calm(self, name: str) -> None:
-        setattr(self.arena.weather, name, getattr(self.schedule.weather, name))
+    def _calm(self, field: str) -> None:
+        air = self.simulation.air
+        air.radio = _with(air.radio, field, getattr(self._radio, field))
 
     def _start(self, target: int) -> None:
-        if not self.arena.processes[target].alive:
-            self.arena.start(target)
+        if not self.simulation.processes[target].alive:
+            self.simulation.start(target)
 
     def _other_mission(self, fault: ScheduledFault) -> Mission:
         """Return the mission that a mixed-up process holds: of another version, or with another profile."""
-        mission = self.arena.mission
+        mission = self.simulation.mission
         if fault.value > 0.0:
             return structs.replace(mission, version=mission.version + 1)
         return structs.replace(mission, profile="wifi" if mission.profile != "wifi" else "fast")
 
     def _start_right(self, target: int, mixed: Member) -> None:
-        if self.arena.processes[target].member == mixed:
-            self.arena.start(target)
+        if self.simulation.processes[target].member == mixed:
+            self.simulation.start(target)
 
     def _step_wall(self, fault: ScheduledFault, target: int, lasts: float) -> None:
-        self.arena.step_wall(target, fault.value)
+        self.simulation.step_wall(target, fault.value)
         if fault.duration_s > 0.0:
-            self.arena.kill(target)
-            self.arena.at(lasts, self._start, target)
+            self.simulation.kill(target)
+            self.simulation.at(lasts, self._start, target)
 
     def _start_gateway(self, robot_id: int) -> None:
-        if not self.arena.gateways[robot_id].alive:
-            self.arena.start_gateway(robot_id)
+        if not self.simulation.gateways[robot_id].alive:
+            self.simulation.start_gateway(robot_id)
 
     def _hint_back(self, target: int, member: Member, seers: tuple[int, ...]) -> None:
-        if self.arena.processes[target].member == member and self.arena.processes[target].alive:
-            self.arena.hint(target, *seers, up=True)
+        if self.simulation.processes[target].member == member and self.simulation.processes[target].alive:
+            self.simulation.hint(target, *seers, up=True)
 
     def heal(self) -> None:
         """End all faults: reconnect everyone and start processes until a quorum runs.
 
         All processes start if `revive_all` is set, or if no running process remembers a leader.
         """
-        arena = self.arena
-        arena.heal()
-        weather = arena.weather
-        for name in ("loss", "duplicate", "tail", "reorder"):
-            setattr(weather, name, 0.0)
-            setattr(self.schedule.weather, name, 0.0)
-        arena.lose_late(weather.delay_max)
-        for robot_id in arena.mission.robots:
+        simulation = self.simulation
+        simulation.heal()
+        self._radio = simulation.air.radio = structs.replace(
+            simulation.air.radio, loss=0.0, duplication=0.0, tail=0.0, reorder=0.0
+        )
+        simulation.lose_late(self._radio.prompt_s)
+        for robot_id in simulation.mission.robots:
             self._start_gateway(robot_id)
-        for target in list(arena.processes):
-            if arena.processes[target].paused:
-                arena.resume(target)
-            if arena.processes[target].leaving:
-                arena.kill(target)
-        for target in sorted(arena.processes):
-            if not arena.processes[target].alive and (self.schedule.revive_all or not self._quorum_lives()):
-                arena.start(target)
-        arena.tell_healed()
+        for target in list(simulation.processes):
+            if simulation.processes[target].paused:
+                simulation.resume(target)
+            if simulation.processes[target].leaving:
+                simulation.kill(target)
+        for target in sorted(simulation.processes):
+            if not simulation.processes[target].alive and (self.schedule.revive_all or not self._quorum_lives()):
+                simulation.start(target)
+        simulation.tell_healed()
 
     def _quorum_lives(self) -> bool:
-        living = [p for p in self.arena.processes.values() if p.alive]
+        living = [p for p in self.simulation.processes.values() if p.alive]
         configs = [p.lease.config for p in living if p.lease is not None]
         newest = max(configs, key=lambda c: c.version, default=None)
         robots = any(p.id != WITNESS_ID for p in living)
@@ -190,7 +196,7 @@ class Faults:
 
 def play(schedule: Schedule, trace: Trace | None = None) -> Played:
     """Run one schedule on leases and gateways only. The result depends on the schedule alone, not on earlier runs."""
-    return _play(schedule, trace, _arena)
+    return _play(schedule, trace, _lease_simulation)
 
 
 def play_whole(schedule: Schedule, trace: Trace | None = None) -> Played:
@@ -200,32 +206,31 @@ def play_whole(schedule: Schedule, trace: Trace | None = None) -> Played:
     return _play(schedule, trace, AgentSimulation)
 
 
-def _arena(schedule: Schedule) -> Stage:
+def _lease_simulation(schedule: Schedule) -> Simulation:
     return LeaseSimulation(
         schedule.robots,
         seed=schedule.seed,
         profile=schedule.profile,
         witness=schedule.witness,
         rates=schedule.rates,
-        weather=schedule.weather,
+        radio=schedule.radio,
         gateways_at_world=schedule.gateways_at_world,
     )
 
 
-def _play(schedule: Schedule, trace: Trace | None, stage: Callable[[Schedule], Stage]) -> Played:
-    schedule = _copied(schedule)
-    arena = stage(_copied(schedule))
-    arena.trace = trace
-    checkers = [checker(arena.timing) for checker in _checkers(schedule)]
-    arena.listen(checkers)
-    faults = Faults(arena, schedule)
-    arena.start_all()
-    arena.run(DURATION_S)
+def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule], Simulation]) -> Played:
+    simulation = simulate(schedule)
+    simulation.trace = trace
+    checkers = [checker(simulation.timing) for checker in _checkers(schedule)]
+    simulation.listen(checkers)
+    faults = Faults(simulation, schedule)
+    simulation.start_all()
+    simulation.run(DURATION_S)
     for checker in checkers:
-        checker.over(arena.now)
+        checker.over(simulation.now)
     violations = [v for checker in checkers for v in checker.violations]
-    elections = sum(1 for _, _, effect in arena.log if type(effect).__name__ == "BecomeLeader")
-    return Played(schedule, violations, faults.counts, elections, arena)
+    elections = sum(1 for _, _, effect in simulation.log if type(effect).__name__ == "BecomeLeader")
+    return Played(schedule, violations, faults.counts, elections, simulation)
 
 
 def _checkers(schedule: Schedule) -> list[type[Checker]]:
@@ -238,5 +243,5 @@ def _checkers(schedule: Schedule) -> list[type[Checker]]:
     return kinds
 
 
-def _copied(schedule: Schedule) -> Schedule:
-    return structs.replace(schedule, weather=structs.replace(schedule.weather))
+def _with(radio: Radio, field: str, value: float) -> Radio:
+    return structs.replace(radio, **{field: value})

@@ -5,11 +5,12 @@ from __future__ import annotations
 from msgspec import Struct
 
 from lfa.deploy.analysis.verification.checker import Checker
-from lfa.deploy.fuzz.network import LinkConditions, Network
+from lfa.deploy.fuzz.network import Network
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Fence, Fenced, GatewayStamp, LeaseBody, Member
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.transport.link_model import Radio
 from lfa.world.virtual_time import LocalClock
 
 
@@ -29,29 +30,29 @@ class GatewaySimulation(Network):
         self,
         seed: int,
         ids: tuple[int, ...],
-        weather: LinkConditions,
+        radio: Radio,
         gateways_at: int | None,
         timing: Timing,
         rates: dict[int, float],
         gateway_type: type[Gateway],
     ) -> None:
         """Create the network without gateway. `rates` are clock rates by id, a gateway's by minus the id; default 1."""
-        super().__init__(seed, ids, weather, gateways_at)
+        super().__init__(seed, ids, radio, gateways_at)
         self.timing = timing
         self.rates = rates
         self.gateways: dict[int, GatewayHost] = {}
         self.accepted: list[tuple[float, CmdVel]] = []
         """Leader commands that a gateway accepted, each with its true time [s]."""
         self._gateway_type = gateway_type
-        self._lives = 0
+        self._incarnations = 0
         self._grant_s = timing.grant_s
 
     def start_gateway(self, robot_id: int, at: float | None = None) -> None:
         """Start a new incarnation of a robot's gateway; with `at` in the past it has been running since then."""
         born_at = self.now if at is None else at
-        self._lives += 1
+        self._incarnations += 1
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-robot_id, 1.0))
-        gateway = self._gateway_type(robot_id, self._lives, self.timing, clock.local(born_at))
+        gateway = self._gateway_type(robot_id, self._incarnations, self.timing, clock.local(born_at))
         self.gateways[robot_id] = GatewayHost(gateway, clock, born_at)
         self._report(Checker.gateway_starts, self.now, robot_id, born_at + self._grant_s / clock.rate)
 

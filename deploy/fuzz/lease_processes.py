@@ -27,6 +27,7 @@ from lfa.protocol.messages.consensus import (
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.names import robot_name
+from lfa.world.simulator import HINT_DELAY_S
 from lfa.world.virtual_time import LocalClock
 
 FORWARD = Twist(0.5, 0.0)
@@ -174,7 +175,7 @@ class Hosts(GatewaySimulation):
         for other in list(self.processes.values()):
             connected = (member.id, other.id) not in self.cuts
             if other.alive and other.id != member.id and connected:
-                delay = self.random.uniform(0.001, self.weather.hint_delay_max)
+                delay = self.random.uniform(*HINT_DELAY_S)
                 self.at(self.now + delay, self._hinted, other, (member.id, member.incarnation, up))
 
     def _hinted(self, process: Process, hint: tuple[int, int, bool]) -> None:

@@ -1,14 +1,14 @@
 """Simulation of leases without agents: processes and gateways with own clocks, a faulty network, virtual time.
 
-Directed tests and `lfa fuzz` drive it. The checkers (`deploy/analysis/verification/safety.py`, `liveness.py`) receive
-the outputs of processes and gateways with the true time, which no process knows.
+Directed tests and `lfa fuzz` drive it. The checkers (`deploy/analysis/verification/`) receive the outputs of processes
+and gateways with the true time, which no process knows.
 """
 
 from __future__ import annotations
 
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
-from lfa.deploy.fuzz.network import LinkConditions
+from lfa.deploy.fuzz.network import FAIR
 from lfa.protocol.incarnations import after, drawn_at
 from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import Effect
@@ -18,6 +18,8 @@ from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Leading, Mission, Profile
 from lfa.protocol.names import WITNESS_ID
+from lfa.protocol.transport.link_model import Radio
+from lfa.world.simulator import HINT_DELAY_S
 from lfa.world.virtual_time import LocalClock
 
 
@@ -33,7 +35,7 @@ class LeaseSimulation(Hosts):
         witness: bool = True,
         rates: dict[int, float] | None = None,
         mission: Mission | None = None,
-        weather: LinkConditions | None = None,
+        radio: Radio = FAIR,
         gateways_at_world: bool = False,
         gateway_type: type[Gateway] = Gateway,
     ) -> None:
@@ -45,7 +47,7 @@ class LeaseSimulation(Hosts):
         )
         ids = ((WITNESS_ID,) if self.mission.witness else ()) + self.mission.robots
         timing, gateways_at = timing_of(self.mission.profile), WITNESS_ID if gateways_at_world else None
-        super().__init__(seed, ids, weather or LinkConditions(), gateways_at, timing, rates or {}, gateway_type)
+        super().__init__(seed, ids, radio, gateways_at, timing, rates or {}, gateway_type)
         self.wall_ms: dict[int, int] = {}
         """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
 
@@ -67,8 +69,8 @@ class LeaseSimulation(Hosts):
         """
         if robot_id in self.processes and self.processes[robot_id].alive:
             self.kill(robot_id)
-        self._lives += 1
-        drawn = drawn_at(self.wall_ms.get(robot_id, 0), self._lives)
+        self._incarnations += 1
+        drawn = drawn_at(self.wall_ms.get(robot_id, 0), self._incarnations)
         member = Member(robot_id, drawn if number is None else number)
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
@@ -77,7 +79,7 @@ class LeaseSimulation(Hosts):
         process = Process(member, lease, clock)
         self.processes[robot_id] = process
         if self.trace is not None:
-            self.trace(self.now, robot_id, f"starts, life {member.incarnation}")
+            self.trace(self.now, robot_id, f"starts, incarnation {member.incarnation}")
         self._report(Checker.lives, self.now, member)
         self._report(Checker.holds, self.now, member, digest(agreement_of(mission, timing_of(mission.profile))))
         self.tell_token(member, up=True)
@@ -96,7 +98,7 @@ class LeaseSimulation(Hosts):
             self.start(process.id, after(newest, process.member.incarnation))
 
     def kill(self, robot_id: int, *, hinted: bool = True) -> None:
-        """Kill the process (SIGKILL); with `hinted`, connected ones see its token vanish within `hint_delay_max`."""
+        """Kill the process (SIGKILL); with `hinted`, connected ones see its token vanish within 5 ms."""
         process = self.processes[robot_id]
         if not process.alive:
             return
@@ -106,7 +108,7 @@ class LeaseSimulation(Hosts):
         self.tell_end(process)
         if hinted:
             self.tell_token(process.member, up=False)
-            self.at(self.now + self.random.uniform(0.001, 0.005), self.latch, robot_id, process.member.incarnation)
+            self.at(self.now + self.random.uniform(*HINT_DELAY_S), self.latch, robot_id, process.member.incarnation)
 
     def exit(self, robot_id: int) -> None:
         """Request the process to release its lease and exit (SIGTERM); a paused process ignores it."""
@@ -167,7 +169,7 @@ class LeaseSimulation(Hosts):
 
     def tell_healed(self) -> None:
         """Notify the checkers that the last fault is over."""
-        self._report(Checker.heals, self.now, 4.0 * self.weather.delay_max)
+        self._report(Checker.heals, self.now, 4.0 * self.air.radio.prompt_s)
 
     # --- queries of tests --------------------------------------------------------------------------------------
 

@@ -6,72 +6,43 @@ cut link is lost; one already in transit arrives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from random import Random
-
-from msgspec import Struct
 
 from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
+from lfa.protocol.names import WITNESS_ID, robot_name
+from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.transport.link_model import Link, LinkModel, Radio
 from lfa.world.virtual_time import VirtualTime
-
-REORDER_S = 0.15
-"""Maximum delay [s] of a message held back; more than three heartbeats of the profile std."""
-
-
-class LinkConditions(Struct):
-    """Link conditions for messages sent now; times in seconds."""
-
-    delay_min: float = 0.0003
-    delay_max: float = 0.002
-    loss: float = 0.0
-    duplicate: float = 0.0
-    tail: float = 0.0
-    """Probability of an additional exponential delay of mean `tail_mean`."""
-    tail_mean: float = 0.05
-    reorder: float = 0.0
-    """Probability that a message is held back for up to `REORDER_S`, so that later ones overtake it."""
-    hint_delay_max: float = 0.005
-
-    def delays(self, random: Random) -> Sequence[float]:
-        """Return the delay [s] of each copy of a message; empty if it is lost."""
-        chance = random.random
-        if self.loss and chance() < self.loss:
-            return ()
-        delay = self.delay_min + (self.delay_max - self.delay_min) * chance()
-        if self.tail and chance() < self.tail:
-            delay += random.expovariate(1.0 / self.tail_mean)
-        if self.reorder and chance() < self.reorder:
-            delay += REORDER_S * chance()
-        if self.duplicate and chance() < self.duplicate:
-            return delay, delay + 2.0 * self.tail_mean * chance()
-        return (delay,)
-
 
 Filter = Callable[[int, int, LeaseBody], float | None]
 """Function (from, to, body) -> extra delay [s]; None drops the message. A gateway's address is minus its robot's id."""
+FAIR = Radio(delay_s=0.0003, jitter_s=0.0017)
+"""Link conditions without a fault."""
 Trace = Callable[[float, int, str], None]
 """Function (true time [s], id, text of the action) that writes a readable trace."""
 
 
 class Network(VirtualTime):
-    """Simulated network between `ids`: time, random numbers, link conditions, cuts.
+    """Simulated network between `ids`: time, random numbers, link model, cuts.
 
     A gateway's address is minus its robot's id.
     """
 
-    def __init__(self, seed: int, ids: tuple[int, ...], weather: LinkConditions, gateways_at: int | None) -> None:
+    def __init__(self, seed: int, ids: tuple[int, ...], radio: Radio, gateways_at: int | None) -> None:
         """Create the network. `gateways_at` is the host of all gateways; None: each gateway is on its robot's host."""
         super().__init__()
         self.random = Random(seed)
         self.ids = ids
-        self.weather = weather
+        self.air = LinkModel(radio, self.random)
         self.filter: Filter | None = None
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
         """Directed pairs of ids between which no message passes."""
         self._gateways_at = gateways_at
+        self._places = {i: place(i) for i in ids}
         self.listen(())
 
     def listen(self, checkers: Sequence[Checker]) -> None:
@@ -88,20 +59,18 @@ class Network(VirtualTime):
 
     def part(self, pairs: set[tuple[int, int]]) -> None:
         """Block all messages from the first to the second id of each pair."""
-        self.cuts |= pairs
-        self._tell_cuts()
+        self._cut_exactly(self.cuts | pairs)
 
     def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
         """Remove the cuts of these directed pairs."""
-        self.cuts -= pairs
-        self._tell_cuts()
+        self._cut_exactly(self.cuts - pairs)
 
     def heal(self) -> None:
         """Remove all cuts."""
-        self.cuts.clear()
-        self._tell_cuts()
+        self._cut_exactly(set())
 
-    def _tell_cuts(self) -> None:
+    def _cut_exactly(self, pairs: set[tuple[int, int]]) -> None:
+        self.cuts, self.air.cuts = pairs, links(pairs)
         self._report(Checker.parts, self.now, self.cuts)
 
     # --- messages ----------------------------------------------------------------------------------------------
@@ -115,9 +84,17 @@ class Network(VirtualTime):
         there = to if to >= 0 else self.host_of_gateway(-to)
         if here == there:
             return (0.0001 + 0.0004 * self.random.random(),)
-        if self.cuts and (here, there) in self.cuts:
-            return ()
-        return self.weather.delays(self.random)
+        return self.air.delays(self._places[here], self._places[there])
+
+
+def place(host: int) -> str:
+    """Return the place of a host in the link model; id 0 is the host of the witness and the world."""
+    return WORLD_NAME if host == WITNESS_ID else robot_name(host)
+
+
+def links(pairs: Set[tuple[int, int]]) -> frozenset[Link]:
+    """Return the links between these hosts."""
+    return frozenset((place(one), place(other)) for one, other in pairs)
 
 
 def told(effect: Effect) -> str:

@@ -10,9 +10,10 @@ from random import Random
 
 from msgspec import Struct, structs
 
-from lfa.deploy.fuzz.network import LinkConditions
+from lfa.deploy.fuzz.network import FAIR
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
 from lfa.protocol.mission import Profile
+from lfa.protocol.transport.link_model import Radio
 
 FAULTS_UNTIL_S = 4.0
 DURATION_S = 8.0
@@ -51,7 +52,7 @@ class Schedule(Struct, frozen=True):
     gateways_at_world: bool
     rates: dict[int, float]
     faults: tuple[ScheduledFault, ...]
-    weather: LinkConditions
+    radio: Radio
     revive_all: bool
     """True if every dead process restarts at the end of the faults; else only as many as a quorum needs."""
 
@@ -59,10 +60,9 @@ class Schedule(Struct, frozen=True):
     def is_single(self) -> bool:
         """Schedule with perfect links and one fault: the leader is killed."""
         kinds = [fault.kind for fault in self.faults]
-        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.weather == FAIR
+        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.radio == FAIR
 
 
-FAIR = LinkConditions()
 KINDS: tuple[str, ...] = (
     "kill",
     "restart",
@@ -99,12 +99,12 @@ def draw(seed: int) -> Schedule:
     ids = tuple(range(1, robots + 1))
     kinds = [kind for kind in KINDS if random.random() < 0.4 and (witness or kind != "witness")] or ["kill"]
     share = random.random()
-    weather = _weather(random)
+    radio = _radio(random)
     faults = [_fault(random, kinds, ids) for _ in range(_count(random, FAULTS_MEAN))]
     if share < CALM_SHARE:
         faults = []
     elif share < CALM_SHARE + SINGLE_SHARE:
-        faults, weather = [ScheduledFault(random.uniform(1.5, FAULTS_UNTIL_S), "kill", (LEADER,))], FAIR
+        faults, radio = [ScheduledFault(random.uniform(1.5, FAULTS_UNTIL_S), "kill", (LEADER,))], FAIR
     return Schedule(
         seed=seed,
         robots=robots,
@@ -113,7 +113,7 @@ def draw(seed: int) -> Schedule:
         gateways_at_world=witness and random.random() < 0.5,
         rates={i: _rate(random) for i in (*ids, 0, *(-i for i in ids))},
         faults=tuple(sorted(faults, key=_when)),
-        weather=weather,
+        radio=radio,
         revive_all=random.random() < 0.5,
     )
 
@@ -131,13 +131,20 @@ def _rate(random: Random) -> float:
     return 1.0 + CLOCK_RATE_ERROR * random.choice((-1.0, 1.0, random.uniform(-1.0, 1.0)))
 
 
-def _weather(random: Random) -> LinkConditions:
-    return LinkConditions(
-        delay_max=random.choice((0.002, 0.002, 0.005, 0.02)),
-        loss=random.choice((0.0, 0.0, 0.0, 0.05, 0.2)),
-        duplicate=random.choice((0.0, 0.0, 0.05, 0.3)),
-        tail=random.choice((0.0, 0.0, 0.02, 0.1)),
-        tail_mean=random.choice((0.02, 0.1, 0.3)),
+def _radio(random: Random) -> Radio:
+    prompt_s = random.choice((0.002, 0.002, 0.005, 0.02))
+    loss = random.choice((0.0, 0.0, 0.0, 0.05, 0.2))
+    duplication = random.choice((0.0, 0.0, 0.05, 0.3))
+    tail = random.choice((0.0, 0.0, 0.02, 0.1))
+    tail_mean_s = random.choice((0.02, 0.1, 0.3))
+    return structs.replace(
+        FAIR,
+        jitter_s=prompt_s - FAIR.delay_s,
+        loss=loss,
+        duplication=duplication,
+        duplication_lag_s=2.0 * tail_mean_s,
+        tail=tail,
+        tail_mean_s=tail_mean_s,
     )
 
 

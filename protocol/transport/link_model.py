@@ -1,4 +1,4 @@
-"""Link model (delay, loss, duplication, cuts) for the simulator and, at a receiver, for the live bus.
+"""Link model (delay, loss, duplication, order, cuts) for the simulations and, at a receiver, for the live bus.
 
 A link connects two places: robots, or the world (with the witness); a robot's gateway and sensors are on the robot. A
 cut affects one link in one direction, so partial and asymmetric partitions are sets of cuts. Liveliness tokens are not
@@ -39,8 +39,24 @@ class Radio(Struct, frozen=True, forbid_unknown_fields=True):
     loss_burst: float = 1.0
     """Mean number of consecutive losses, if above that of independent losses (Gilbert's two-state channel)."""
     duplication: float = 0.0
+    """Probability that a message arrives twice; each copy has its own delay."""
+    duplication_lag_s: float = 0.0
+    """Upper bound [s] of a uniform random delay added to the second copy."""
+    tail: float = 0.0
+    """Probability of an additional exponential delay of mean `tail_mean_s`."""
+    tail_mean_s: float = 0.05
+    """Mean [s] of the additional delay."""
+    reorder: float = 0.0
+    """Probability that a message is held back for up to 0.15 s, so that later ones overtake it."""
+
+    @property
+    def prompt_s(self) -> float:
+        """Longest delay [s] of a message that neither the tail nor a reordering holds back."""
+        return self.delay_s + self.jitter_s
 
 
+REORDER_S = 0.15
+"""Maximum delay [s] of a message held back; more than three heartbeats of the profile std."""
 CLEAR = Radio(delay_s=0.0, jitter_s=0.0)
 """Link conditions that add nothing to those of the live bus."""
 
@@ -86,10 +102,21 @@ class LinkModel:
             return []
         if radio.loss > 0.0 and self._lost(sender, receiver):
             return []
-        delays = [radio.delay_s + radio.jitter_s * self._random.random()]
+        delays = [self._delay_s()]
         if radio.duplication > 0.0 and self._random.random() < radio.duplication:
-            delays.append(radio.delay_s + radio.jitter_s * self._random.random())
+            lag_s = radio.duplication_lag_s * self._random.random() if radio.duplication_lag_s > 0.0 else 0.0
+            delays.append(self._delay_s() + lag_s)
         return delays
+
+    def _delay_s(self) -> float:
+        """Draw the delay of one copy; what is zero draws nothing, so that a new condition changes no earlier run."""
+        radio, chance = self.radio, self._random.random
+        delay_s = radio.delay_s + radio.jitter_s * chance()
+        if radio.tail > 0.0 and chance() < radio.tail:
+            delay_s += self._random.expovariate(1.0 / radio.tail_mean_s)
+        if radio.reorder > 0.0 and chance() < radio.reorder:
+            delay_s += REORDER_S * chance()
+        return delay_s
 
     def obey(self, arguments: Mapping[str, Any]) -> bool:
         """Change the link conditions by an operator's command; return False, without a change, if it is malformed.

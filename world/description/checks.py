@@ -92,6 +92,10 @@ def _ranges(scenario: Scenario) -> Iterator[Mistake]:
         Range("radio.loss", radio.loss, 0.0, 1.0),
         Range("radio.loss_burst", radio.loss_burst, 1.0, 1e4),
         Range("radio.duplication", radio.duplication, 0.0, 1.0),
+        Range("radio.duplication_lag_s", radio.duplication_lag_s, 0.0, 10.0),
+        Range("radio.tail", radio.tail, 0.0, 1.0),
+        Range("radio.tail_mean_s", radio.tail_mean_s, 1e-4, 10.0),
+        Range("radio.reorder", radio.reorder, 0.0, 1.0),
     ))  # fmt: skip
 
 

@@ -169,9 +169,6 @@ class WithFences(Checker):
         self.fences.gateway_starts(robot_id, shut_until)
 
 
-def term_text(term: Term) -> str:
-    return f"({term.n},{term.issuer},{term.incarnation})"
-
-
-def member_text(member: Member) -> str:
-    return f"{member.id}/{member.incarnation}"
+def shown(one: Term | Member) -> str:
+    """Return a term or an incarnation as a short text."""
+    return f"({one.n},{one.issuer},{one.incarnation})" if isinstance(one, Term) else f"{one.id}/{one.incarnation}"

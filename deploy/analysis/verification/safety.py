@@ -1,10 +1,11 @@
-"""Checkers of the invariants I1-I8 of protocol/README.md, by outside observation. L1-L7 are in `liveness.py`."""
+"""Checkers of the invariants I1-I8 of protocol/README.md, by outside observation.
+
+L1-L4 are in `liveness.py`, L5-L7 in `leadership.py`.
+"""
 
 from __future__ import annotations
 
-from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, WithFences
-from lfa.deploy.analysis.verification.checker import member_text as _m
-from lfa.deploy.analysis.verification.checker import term_text as _t
+from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, WithFences, shown
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
 from lfa.protocol.messages.consensus import Config, Electorate, Grant, Member, Promise, Propose, Term, Version
@@ -32,7 +33,7 @@ class LeaseExclusivity(WithFences):
             if not self.fences.refuses(holder.id, lower, end):
                 self.broken(
                     at,
-                    f"{_t(term)} of {_m(who)} and {_t(its_term)} of {_m(other)} are valid together",
+                    f"{shown(term)} of {shown(who)} and {shown(its_term)} of {shown(other)} are valid together",
                 )
 
     def leads_no_more(self, at: float, who: Member) -> None:
@@ -69,18 +70,18 @@ class Acting(Checker):
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
         if cmd.term < self._of_gateway.get(robot_id, cmd.term):
-            self.broken(at, f"gateway {robot_id} obeyed {_t(cmd.term)} after {_t(self._of_gateway[robot_id])}")
+            self.broken(at, f"gateway {robot_id} obeyed {shown(cmd.term)} after {shown(self._of_gateway[robot_id])}")
         self._of_gateway[robot_id] = cmd.term
         if age > self.timing.deadman_s + EARLY_S:
             self.broken(at, f"gateway {robot_id} obeyed a command {age * 1000:.1f} ms old")
         if self._holder.setdefault(cmd.term, cmd.holder) != cmd.holder:
-            self.broken(at, f"{_t(cmd.term)} obeyed for {cmd.holder} and for {self._holder[cmd.term]}")
+            self.broken(at, f"{shown(cmd.term)} obeyed for {cmd.holder} and for {self._holder[cmd.term]}")
         if not cmd.as_leader:
             return
         if cmd.holder != robot_id:
             self.broken(at, f"gateway {robot_id} obeyed a leader command of {cmd.holder}")
         if cmd.term < self._highest:
-            self.broken(at, f"leader command of {_t(cmd.term)} obeyed after one of {_t(self._highest)}")
+            self.broken(at, f"leader command of {shown(cmd.term)} obeyed after one of {shown(self._highest)}")
         self._highest = max(self._highest, cmd.term)
 
 
@@ -96,9 +97,9 @@ class OneHolder(Checker):
     def proposes(self, at: float, who: Member, propose: Propose) -> None:
         known = self._holder.setdefault(propose.term, propose.holder)
         if known != propose.holder:
-            self.broken(at, f"{_t(propose.term)} held by {_m(known)} and by {_m(propose.holder)}")
+            self.broken(at, f"{shown(propose.term)} held by {shown(known)} and by {shown(propose.holder)}")
         if who != propose.holder and (who.id, who.incarnation) != (propose.term.issuer, propose.term.incarnation):
-            self.broken(at, f"{_t(propose.term)} proposed by {_m(who)}")
+            self.broken(at, f"{shown(propose.term)} proposed by {shown(who)}")
 
 
 class OneBond(WithFences):
@@ -130,10 +131,8 @@ class OneBond(WithFences):
         free = other == holder or its_until <= at + EARLY_S or term in self._released or handed_over
         fenced = self.fences.fenced(other.id, term) or self.fences.refuses(other.id, term, its_until)
         if not free and not fenced:
-            self.broken(
-                at,
-                f"{_m(voter)} granted {_t(grant.term)} to {_m(holder)}, bound to {_t(term)} of {_m(other)}",
-            )
+            bond = f"bound to {shown(term)} of {shown(other)}"
+            self.broken(at, f"{shown(voter)} granted {shown(grant.term)} to {shown(holder)}, {bond}")
         self._bond[voter] = (grant.term, holder, until)
 
 
@@ -149,15 +148,15 @@ class OneChain(Checker):
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
         if self._content.setdefault(config.version, config) != config:
-            self.broken(at, f"{_m(who)} has another config of version {config.version}")
+            self.broken(at, f"{shown(who)} has another config of version {config.version}")
         if who in self._newest and config.version <= self._newest[who].version:
-            self.broken(at, f"{_m(who)} went back to version {config.version}")
+            self.broken(at, f"{shown(who)} went back to version {config.version}")
         self._newest[who] = config
 
     def leads(self, at: float, who: Member, term: Term, until: float) -> None:
         chain = self._newest[who].chain if who in self._newest else ()
         if not chain or chain[0] != who:
-            self.broken(at, f"{_m(who)} leads {_t(term)} with chain {[m.id for m in chain]}")
+            self.broken(at, f"{shown(who)} leads {shown(term)} with chain {[m.id for m in chain]}")
 
 
 class JointChange(Checker):
@@ -183,11 +182,11 @@ class JointChange(Checker):
             return
         if (config.voters, config.tie) != (before.voters, before.tie):
             if before.previous is not None or config.previous != Electorate(before.voters, before.tie):
-                self.broken(at, f"version {_t(term)}.{seq} has other voters and is not joint with those before")
+                self.broken(at, f"version {shown(term)}.{seq} has other voters and is not joint with those before")
         elif config.previous != before.previous:
             accepted = {m for m, version in self._accepted.items() if version >= before.version}
             if config.previous is not None or not is_quorum(before, accepted):
-                self.broken(at, f"version {_t(term)}.{seq} ends a joint config that its quorums have not accepted")
+                self.broken(at, f"version {shown(term)}.{seq} ends a joint config that its quorums have not accepted")
 
 
 class NoAmnesiacVote(Checker):
@@ -211,7 +210,7 @@ class NoAmnesiacVote(Checker):
         full = previous is not None and previous.rule == "all" and set(previous.voters) <= set(promised)
         remembering = {m for m, blank in promised.items() if not blank}
         if not is_quorum(config, remembering) and not full:
-            self.broken(at, f"{_t(propose.term)} proposed on promises of {sorted(_m(m) for m in promised)}")
+            self.broken(at, f"{shown(propose.term)} proposed on promises of {sorted(shown(m) for m in promised)}")
 
 
 class Residual(WithFences):
@@ -233,7 +232,7 @@ class Residual(WithFences):
                 early = (rest_at - at) * 1000.0
                 self.broken(
                     at,
-                    f"{_t(cmd.term)} obeyed {early:.1f} ms before {_t(old.term)} of {old.holder} is at rest",
+                    f"{shown(cmd.term)} obeyed {early:.1f} ms before {shown(old.term)} of {old.holder} is at rest",
                 )
         self._last = (at - age, cmd)
 
@@ -264,7 +263,7 @@ class OneAgreement(Checker):
     def _alike(self, at: float, voter: Member, asker: Member, deed: str) -> None:
         mine = self._agreed.get(voter)
         if self._agreed.get(asker, mine) != mine:
-            self.broken(at, f"{_m(voter)} {deed} {_m(asker)}, which holds another agreement")
+            self.broken(at, f"{shown(voter)} {deed} {shown(asker)}, which holds another agreement")
 
 
 SAFETY: tuple[type[Checker], ...] = (

@@ -56,6 +56,8 @@ def radio(run: Run, _s: Summary) -> str:
         ("loss", f"{100.0 * radio.loss:g} %"),
         ("mean losses in a row", f"{radio.loss_burst:g}"),
         ("duplication", f"{100.0 * radio.duplication:g} %"),
+        ("held back", f"{100.0 * radio.tail:g} % (mean {in_ms(1000.0 * radio.tail_mean_s)} ms)"),
+        ("overtaken", f"{100.0 * radio.reorder:g} %"),
     ]
     heard: dict[str, list[float]] = {}
     for owner, _, _, status in messages(run.folder, frozenset({"status"})):

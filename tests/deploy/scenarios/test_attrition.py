@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from lfa.deploy.fuzz.agent_simulation import AgentSimulation
-from lfa.deploy.fuzz.network import LinkConditions
+from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import draw
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
@@ -29,9 +29,7 @@ def test_in_every_order_the_chain_is_the_old_one_without_the_dead_and_the_last_o
 
 
 def _check(order: tuple[int, ...]) -> None:
-    schedule = structs.replace(
-        draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), weather=LinkConditions()
-    )
+    schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), radio=FAIR)
     team = AgentSimulation(schedule, ROAD_M)
     arrived: list[str] = []
 

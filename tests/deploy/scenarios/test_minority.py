@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from msgspec import structs
 
 from lfa.deploy.fuzz.agent_simulation import AgentSimulation
-from lfa.deploy.fuzz.network import LinkConditions
+from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import draw
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S
 from lfa.protocol.messages.codec import Message
@@ -29,8 +29,8 @@ class Cut:
     """A team of four, of which `side` is cut off from the rest and the witness; what became of it."""
 
     def __init__(self, side: Sequence[int]) -> None:
-        calm = LinkConditions(delay_max=HEARD_S)
-        schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), weather=calm)
+        calm = structs.replace(FAIR, jitter_s=HEARD_S - FAIR.delay_s)
+        schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), radio=calm)
         self.team = AgentSimulation(schedule).start_all()
         self.timing = self.team.timing
         self.limits = self.team.mission.limits
@@ -39,7 +39,7 @@ class Cut:
         self.team.simulator.taps.append(self._hear)
         self.team.run(CUT_S)
         rest = [robot for robot in self.team.ids if robot not in side]
-        self.team.cuts |= {pair for a in side for b in rest for pair in ((a, b), (b, a))}
+        self.team.part({pair for a in side for b in rest for pair in ((a, b), (b, a))})
         self.team.run(END_S)
 
     def _hear(self, now: float, _key: str, _payload: bytes, message: Message) -> None:

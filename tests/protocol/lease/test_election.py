@@ -167,23 +167,23 @@ MAJORITY = Mission(robots=(1, 2, 3, 4), cold_start="majority", leading=Leading(r
 
 def started(*ids: int, mission: Mission) -> LeaseSimulation:
     """Only these processes, for six seconds."""
-    arena = LeaseSimulation(4, mission=mission)
+    leases = LeaseSimulation(4, mission=mission)
     for robot_id in ids:
-        arena.start(robot_id)
-    arena.run(6.0)
-    return arena
+        leases.start(robot_id)
+    leases.run(6.0)
+    return leases
 
 
 def test_e19_a_majority_with_the_witness_starts_after_its_patience_and_latecomers_join() -> None:
-    arena = started(0, 1, 2, mission=MAJORITY)
-    assert arena.leaders() == [1]
-    assert next(at for at, _, effect in arena.log if isinstance(effect, BecomeLeader)) >= COLD_START_S
-    arena.start(3)
-    arena.start(4)
-    arena.run(10.0)
-    assert arena.leaders() == [1]
-    assert arena.lease_of(4).chain[:2] == (1, 2)
-    assert sorted(arena.lease_of(4).chain) == [1, 2, 3, 4]
+    leases = started(0, 1, 2, mission=MAJORITY)
+    assert leases.leaders() == [1]
+    assert next(at for at, _, effect in leases.log if isinstance(effect, BecomeLeader)) >= COLD_START_S
+    leases.start(3)
+    leases.start(4)
+    leases.run(10.0)
+    assert leases.leaders() == [1]
+    assert leases.lease_of(4).chain[:2] == (1, 2)
+    assert sorted(leases.lease_of(4).chain) == [1, 2, 3, 4]
 
 
 def test_e19_needs_the_witness_and_more_than_half() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from msgspec import structs
 
+from lfa.deploy.fuzz.network import FAIR
 from lfa.protocol.messages.consensus import Nack, Prepare, Promise, Version
 from tests.rigs.lease_scenes import HIGH, LOW, STD, A, B, Team, ask, config_of, voter
 
@@ -89,7 +91,7 @@ def test_e16_a_hand_over_to_one_that_just_died_ends_in_an_election() -> None:
 
 def test_e16_a_second_copy_of_a_hand_over_changes_nothing() -> None:
     team = Team()
-    team.weather.duplicate, team.weather.tail_mean = 1.0, 0.2
+    team.air.radio = structs.replace(FAIR, duplication=1.0, duplication_lag_s=0.4)
     team.hand_over(1)
     team.run(3.0)
     assert team.leaders() == [2]

@@ -129,7 +129,7 @@ def test_e21_two_without_a_quorum_go_on_together_and_make_one_chain_with_the_oth
 
 def test_e21_whom_a_voter_tells_of_a_lease_is_not_lonely() -> None:
     team = Team(mission=LONELY, gateways_at_world=True)
-    team.cuts |= {(a, b) for a in (1, 2) for b in (3, 4)} | {(a, b) for a in (3, 4) for b in (1, 2)}
+    team.part({(a, b) for a in (1, 2) for b in (3, 4)} | {(a, b) for a in (3, 4) for b in (1, 2)})
     team.run(9.0)
     assert team.leaders() == [1]
     assert {who for who, _ in team.changes()} <= {1}

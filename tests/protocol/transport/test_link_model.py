@@ -3,9 +3,10 @@
 from random import Random
 
 import pytest
+from msgspec import structs
 
 from lfa.protocol.transport.bus import Arrival
-from lfa.protocol.transport.link_model import WAITING_MAX, LinkModel, Radio, Reception, link_of
+from lfa.protocol.transport.link_model import REORDER_S, WAITING_MAX, LinkModel, Radio, Reception, link_of
 
 
 def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:
@@ -35,6 +36,30 @@ def test_delays_lie_between_delay_and_delay_plus_jitter() -> None:
 def test_duplication_delivers_twice() -> None:
     doubled = sum(len(fate) == 2 for fate in fates(Radio(duplication=0.3), 10_000))
     assert abs(doubled / 10_000 - 0.3) < 0.03
+
+
+def test_the_second_copy_comes_up_to_its_lag_later() -> None:
+    both = fates(Radio(delay_s=0.01, jitter_s=0.0, duplication=1.0, duplication_lag_s=0.2), 2000)
+    assert {first for first, _ in both} == {0.01}
+    assert 0.19 < max(second for _, second in both) <= 0.21
+
+
+def test_the_tail_holds_its_share_back_by_its_mean() -> None:
+    later = [delay - 0.01 for (delay,) in fates(Radio(delay_s=0.01, jitter_s=0.0, tail=0.2, tail_mean_s=0.1), 20_000)]
+    held = [delay for delay in later if delay > 0.0]
+    assert abs(len(held) / 20_000 - 0.2) < 0.02
+    assert abs(sum(held) / len(held) - 0.1) < 0.01
+
+
+def test_a_message_held_back_is_overtaken() -> None:
+    delays = [delay for (delay,) in fates(Radio(delay_s=0.01, jitter_s=0.0, reorder=0.3), 10_000)]
+    assert abs(sum(delay > 0.01 for delay in delays) / 10_000 - 0.3) < 0.03
+    assert 0.01 + 0.9 * REORDER_S < max(delays) <= 0.01 + REORDER_S
+
+
+def test_a_condition_that_is_off_changes_no_run() -> None:
+    plain = Radio(loss=0.3, loss_burst=3.0, duplication=0.1)
+    assert fates(plain, 500) == fates(structs.replace(plain, tail_mean_s=9.0), 500)
 
 
 def test_the_same_seed_is_the_same_weather() -> None:
