@@ -64,6 +64,11 @@ class Agent:
         return self._core is not None and self._core.defer_grants
 
     @property
+    def lacks_messages(self) -> bool:
+        """True while this robot does not hear all that its team sends, or has no mission (E27)."""
+        return self._core is None or self._core.lacks_messages
+
+    @property
     def refusal(self) -> str | None:
         """Reason, in one line, why this robot cannot take part with its mission; None if it can."""
         return self._refusal if self._core is None else self._core.refusal

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from lfa.agents.attendance import Attendance
 from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
 from lfa.agents.config import CONTROL_PERIOD_S
@@ -72,6 +73,7 @@ class RobotCore:
         self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place)
         self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
         self._reports = Reports(outbox, len(mission.robots))
+        self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
         self._next_control = now
         self._arrived = False
@@ -86,6 +88,11 @@ class RobotCore:
     def finished(self) -> bool:
         """True when a requested exit is complete: the final messages are out."""
         return self._pending_release and self.lease.released
+
+    @property
+    def lacks_messages(self) -> bool:
+        """True while this robot has no leader, is in no chain, or does not hear what its team sends (E27)."""
+        return self._attendance.lacks_messages
 
     @property
     def superseded_by(self) -> int | None:
@@ -138,7 +145,9 @@ class RobotCore:
             case OperatorNote():
                 self._obey(message, now)
             case Vitals():
-                self._reports.status(message, navigator, self._team, lease, self._role(), now)
+                self._attendance.update(lease, self._team, now)
+                outside = self._attendance.text()
+                self._reports.status(message, navigator, self._team, lease, self._role(), outside, now)
             case Stop():
                 self._stop(now)
 

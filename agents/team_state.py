@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D
@@ -79,6 +81,11 @@ class TeamState:
     def poses(self, now: float) -> list[Pose2D | None]:
         """Return the poses in `map` of all robots in the table; None for a stale one."""
         return [self.pose_of(robot, now) for robot in self._table]
+
+    def row_age(self, robot: int, now: float) -> float:
+        """Return the time [s] since the last row of `robot`; infinite if there was none."""
+        known = self._table.get(robot)
+        return inf if known is None else now - known[1]
 
     def stuck(self, robot: int, now: float) -> bool:
         """Return whether `robot` reports that it is stuck; a stale report does not count."""

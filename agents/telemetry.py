@@ -130,9 +130,9 @@ class Reports:
             self._outbox.publish("plan", PlanNote(self._outbox.header("plan", now), route, *tile))
 
     def status(
-        self, vitals: Vitals, navigator: Navigator, team: TeamState, lease: Lease, role: Role, now: float
+        self, vitals: Vitals, navigator: Navigator, team: TeamState, lease: Lease, role: Role, outside: str, now: float
     ) -> None:
-        """Publish the diagnostics (as in ROS)."""
+        """Publish the diagnostics (as in ROS); `outside` says who is there and not in the chain."""
         counters = _counters(vitals, team.rows_heard, team.rows_lost)
         version = lease.config.version  # and so of the chain: an observer that missed the event learns it here
         counters |= {"config_n": version.term.n, "config_seq": version.seq}
@@ -140,7 +140,7 @@ class Reports:
         if navigator.predecessor is not None:
             counters["predecessor_clock_offset_s"] = navigator.predecessor.clock.offset(now)
             counters["predecessor_refused"] = navigator.predecessor.refused
-        text, level = _health(navigator, lease, role, now)
+        text, level = _health(navigator, lease, role, outside, now)
         outbox = self._outbox
         header = outbox.header("status", now)
         outbox.publish("status", Status(header, level, text, role, lease.term, counters, lease.chain))
@@ -175,18 +175,16 @@ def _counters(vitals: Vitals, rows_heard: int, rows_lost: int) -> dict[str, floa
     }
 
 
-def _health(navigator: Navigator, lease: Lease, role: Role, now: float) -> tuple[str, Level]:
+def _health(navigator: Navigator, lease: Lease, role: Role, outside: str, now: float) -> tuple[str, Level]:
     """Return the text and level of the status: the robots that the first election waits for (E18) come first."""
     if lease.missing:
         return f"waiting for {', '.join(robot_name(i) for i in lease.missing)}", Level.WARN
     lost = navigator.lost_input(now)
     if lost is None:
         slow_hz = navigator.scan_age.slow_hz
-        return (
-            (role.value, Level.OK)
-            if slow_hz is None
-            else (f"{role.value}, slow: scans at {slow_hz:.1f} Hz", Level.WARN)
-        )
+        slow = "" if slow_hz is None else f"slow: scans at {slow_hz:.1f} Hz"
+        warnings = [warning for warning in (slow, outside) if warning]
+        return ", ".join([role.value, *warnings]), Level.WARN if warnings else Level.OK
     if navigator.pose_lost:
         return f"{role.value}, own pose lost: no {lost}", Level.ERROR
     if not navigator.was_placed:

@@ -121,6 +121,15 @@ class NodeObserver(Protocol):
         """Process an input that the node has processed; what it answered is not published yet."""
 
 
+def lacks_messages(node: Node) -> bool:
+    """Return True while the node lacks messages that its team sends: its subscriptions are then declared again (E27).
+
+    Always False for a node that follows no team: world, driver.
+    """
+    lacks: bool = getattr(node, "lacks_messages", False)
+    return lacks
+
+
 def reborn(node: Node) -> Node | None:
     """Return the node to run in the place of this one, under a later number, once others know a later one (E23).
 

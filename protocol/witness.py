@@ -57,6 +57,11 @@ class Witness:
         return self._lease
 
     @property
+    def lacks_messages(self) -> bool:
+        """True while the witness has no mission, or knows of no leader (E27)."""
+        return self._lease is None or self._lease.leader is None
+
+    @property
     def reborn(self) -> Witness | None:
         """Return the witness under a later number, once it is told of a later incarnation of its name (E23)."""
         newest = None if self._lease is None else self._lease.superseded_by

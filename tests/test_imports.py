@@ -31,8 +31,9 @@ ORDER = (
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
-    "agents/leading", "agents/navigator", "agents/stuck_policy", "agents/telemetry", "agents/chain_place",
-    "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
+    "agents/leading", "agents/navigator", "agents/stuck_policy", "agents/telemetry", "agents/attendance",
+    "agents/chain_place", "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent",
+    "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
     "world/virtual_time", "world/simulator", "world/cli",

@@ -11,11 +11,23 @@ from random import Random
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
-from lfa.protocol.node import Local, Node, NodeObserver, PeerDown, PeerUp, Stop, Vitals, reborn
+from lfa.protocol.node import (
+    Local,
+    Node,
+    NodeObserver,
+    PeerDown,
+    PeerUp,
+    RouterLost,
+    Stop,
+    Vitals,
+    lacks_messages,
+    reborn,
+)
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
 from lfa.protocol.transport.link_model import Link, LinkModel, Radio, link_of
+from lfa.protocol.transport.links import Links
 from lfa.world.virtual_time import LocalClock, VirtualTime
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
@@ -38,6 +50,7 @@ class _SimulatedNode:
         self.deadline: float | None = None
         self.interests: frozenset[str] = frozenset()
         self.paused = False
+        self.links = Links()
         self.waiting: list[tuple[str, Message | Local, bytes]] = []
         self.stop_by: float | None = None
 
@@ -54,6 +67,11 @@ class Simulator(VirtualTime):
         self.air = LinkModel(radio, self._random)
         self.refused_leave = False
         """True if a node that cannot take part leaves, as its process would, in place of ending the simulation."""
+        self.deaf: set[tuple[str, str]] = set()
+        """Pairs (receiver, sender) of names between which a router lost the receiver's declarations, until it declares
+        its subscriptions again."""
+        self.loses_declarations = False
+        """True while routers lose all declarations, also those made again."""
         self._seats: dict[str, _SimulatedNode] = {}
         self._routes: dict[str, list[tuple[_SimulatedNode, Link | None]]] = {}
         """Receivers of each key, and the radio link to each (None: not over radio)."""
@@ -90,7 +108,7 @@ class Simulator(VirtualTime):
         if hinted:
             self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
 
-    def hint(self, event: PeerUp | PeerDown, observers: Sequence[str]) -> None:
+    def hint(self, event: PeerUp | PeerDown | RouterLost, observers: Sequence[str]) -> None:
         """Deliver a liveliness event to `observers`, true or false."""
         for seat in [self._seats[name] for name in observers if name in self._seats]:
             self._give(seat, "", event, b"")
@@ -140,7 +158,10 @@ class Simulator(VirtualTime):
         if seat.paused:
             seat.waiting.append((key, message, payload))
             return
-        self._after(seat, seat.host.deliver(seat.clock.local(self.now), key, message, payload))
+        now = seat.clock.local(self.now)
+        if isinstance(message, Local):
+            seat.links.see(message, now)
+        self._after(seat, seat.host.deliver(now, key, message, payload))
 
     def _tick(self, seat: _SimulatedNode, deadline: float) -> None:
         """Call the node's tick if `deadline` [s, its own clock], from its last call, has come; else plan again."""
@@ -158,6 +179,8 @@ class Simulator(VirtualTime):
             self._publish(seat, key, payload)
         if node.interests is not seat.interests:
             self._refresh(seat)
+        if self.deaf:
+            self._declare_again(seat)
         if node.refusal is not None and not self.refused_leave:
             raise Refused(node.refusal)
         later = reborn(node)
@@ -168,6 +191,13 @@ class Simulator(VirtualTime):
             self._leave(seat)
         else:
             self._plan(seat)
+
+    def _declare_again(self, seat: _SimulatedNode) -> None:
+        """Declare the node's subscriptions again when it is time, as a real process does."""
+        now = seat.clock.local(self.now)
+        seat.links.lacks(lacks_messages(seat.node), now)
+        if seat.links.due(now) and not self.loses_declarations:
+            self.deaf = {pair for pair in self.deaf if pair[0] != seat.node.name}
 
     def _plan(self, seat: _SimulatedNode) -> None:
         deadline = seat.node.next_deadline()
@@ -209,6 +239,8 @@ class Simulator(VirtualTime):
         routes = self._routes.get(key)
         for seat, link in self._route(key) if routes is None else routes:
             if seat is sender and key.split("/", 4)[3] in NO_ECHO:
+                continue
+            if self.deaf and (seat.node.name, sender.node.name) in self.deaf:
                 continue
             for delay_s in LOCAL_DELAYS_S if link is None else self.air.delays(*link):
                 self.at(self.now + delay_s, self._give, seat, key, message, payload)

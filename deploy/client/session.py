@@ -15,8 +15,9 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.node import Local, PeerDown, PeerUp
 from lfa.protocol.topics import OPERATOR_NAME, alive_key, fleet_name
-from lfa.protocol.transport.bus import Arrival, Inbox, Links, Wake
+from lfa.protocol.transport.bus import Arrival, Inbox, Wake
 from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.links import Links
 from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent, default_endpoint

@@ -21,6 +21,11 @@ class Health:
         self._namesakes: dict[int, float] = {}
         """Time [s] of the last message from a process outside the fleet under that robot's name."""
 
+    @property
+    def texts(self) -> dict[str, str]:
+        """Status text of each process, by name."""
+        return {name: heard.message.text for name, heard in self._state.status.items()}
+
     def see(self, at: float, message: Message) -> None:
         """Update the state by a message that arrived at `at` [s]."""
         robot = robot_id_of(message.header.sender)

@@ -28,7 +28,8 @@ from lfa.deploy.ros.wire import (
     read_attachment,
 )
 from lfa.protocol import clock
-from lfa.protocol.transport.bus import ANEW_S, Settable
+from lfa.protocol.transport.bus import Settable
+from lfa.protocol.transport.links import ANEW_S
 from lfa.protocol.transport.zenoh_ros import RosPublication, RosQuery, RosSession, Undeclarable
 
 T = TypeVar("T")

@@ -37,7 +37,8 @@ from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope
 from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, alive_key, key
-from lfa.protocol.transport.bus import Inbox, Links
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.links import Links
 from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers

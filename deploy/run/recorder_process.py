@@ -30,7 +30,8 @@ from lfa.protocol.node import Envelope, PeerDown, PeerUp
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.output import write_line
 from lfa.protocol.topics import RECORDER_NAME, alive_key
-from lfa.protocol.transport.bus import Arrival, Inbox, Links, Wake
+from lfa.protocol.transport.bus import Arrival, Inbox, Wake
+from lfa.protocol.transport.links import Links
 from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 

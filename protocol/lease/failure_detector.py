@@ -17,6 +17,8 @@ class FailureDetector:
         """Time [s] of the last message, by id."""
         self._gone: dict[int, tuple[int, float]] = {}
         """Incarnation and time [s] of a vanished token, by id."""
+        self._tokens: dict[int, int] = {}
+        """Incarnation of the token that is there, by id."""
         self._last_words_s = LAST_WORDS_HEARTBEATS * heartbeat_s
 
     def heard(self, src: Member, now: float) -> None:
@@ -34,10 +36,13 @@ class FailureDetector:
                 del self._gone[src.id]
 
     def appeared(self, id: int, incarnation: int) -> None:
+        self._tokens[id] = incarnation
         if id in self._gone and not is_later(self._gone[id][0], incarnation):
             del self._gone[id]
 
     def vanished(self, id: int, incarnation: int, now: float) -> None:
+        if self._tokens.get(id) == incarnation:
+            del self._tokens[id]
         if id in self._gone and is_later(self._gone[id][0], incarnation):
             incarnation = self._gone[id][0]
         self._gone[id] = (incarnation, now)
@@ -45,6 +50,10 @@ class FailureDetector:
     def is_gone(self, member: Member) -> bool:
         """Return True if the token of this incarnation, or of a later one, vanished."""
         return member.id in self._gone and not is_later(member.incarnation, self._gone[member.id][0])
+
+    def is_here(self, id: int) -> bool:
+        """Return True if a token of `id` appeared and has not vanished."""
+        return id in self._tokens
 
     def knows(self, id: int) -> bool:
         """Return True if any incarnation of `id` was heard."""

@@ -20,7 +20,7 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import OperatorNote
-from lfa.protocol.node import Local, Node, Stop, reborn
+from lfa.protocol.node import Local, Node, Stop, lacks_messages, reborn
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
@@ -29,9 +29,10 @@ from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.runtime.systemd import Notify
 from lfa.protocol.runtime.vital_signs import VitalSigns, keep_one_heap, settle
 from lfa.protocol.topics import OPERATOR_NAME, key, matches
-from lfa.protocol.transport.bus import Arrival, Inbox, Links, Tokens, Wake
+from lfa.protocol.transport.bus import Arrival, Inbox, Tokens, Wake
 from lfa.protocol.transport.credentials import Credentials
 from lfa.protocol.transport.link_model import WEATHER, Reception
+from lfa.protocol.transport.links import Links
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASE_MS, RouterAbsent
 
@@ -93,6 +94,7 @@ class _NodeRunner:
             sent = host.tick(clock.now())
             self._ticks_s.append(clock.thread_s() - before_s)
             self._publish(sent)
+        self._links.lacks(lacks_messages(node), now)
         if not self._follow() and self._links.due(now):
             self.bus.resubscribe()
         host.journal.flush()

@@ -11,12 +11,10 @@ from typing import Protocol
 
 from msgspec import Struct, structs
 
-from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
+from lfa.protocol.node import PeerDown, PeerUp, RouterLost
 from lfa.protocol.topics import TO_ALL, TO_HELLO, TOPIC, Address, address
 
 INBOX_SIZE_MAX = 4096  # about 5 s of all messages of a fleet of 16 to one process
-ANEW_S = (1.5, 6.5)
-"""Delays [s] until the repeated subscriptions: routers retry links every second, and a busy machine takes longer."""
 TOKEN_HOLD_S = 0.001
 """Time [s] that a vanished token is held: six times the measured delay from it to the report of a router's death."""
 OWNER_RATE_MAX_HZ = 500.0
@@ -193,45 +191,6 @@ class Tokens:
 
     def next_due(self) -> float:
         return min([held.at for held in self._held]) if self._held else float("inf")
-
-
-class Links:
-    """Times at which subscriptions are repeated: ANEW_S after a link between routers may have broken and recovered.
-
-    A busy router permanently drops declarations that cross a link while it recovers (zenoh#1886), and with them the
-    subscribed messages. Liveliness events indicate such a link: a token that vanishes, one that reappears with the same
-    incarnation, or any token that appears after the own link was lost.
-    """
-
-    def __init__(self) -> None:
-        self._due: list[float] = []
-        self._gone: set[tuple[str, int]] = set()
-        self._cut_off = False
-
-    @property
-    def anew_at(self) -> float:
-        return self._due[0] if self._due else float("inf")
-
-    def see(self, event: Local, now: float) -> None:
-        match event:
-            case PeerDown(name, incarnation):
-                self._gone.add((name, incarnation))
-            case PeerUp(name, incarnation) if self._cut_off or (name, incarnation) in self._gone:
-                self._gone.discard((name, incarnation))
-            case RouterLost():
-                self._cut_off = True
-                return
-            case _:
-                return
-        self._due = [now + after_s for after_s in ANEW_S]
-
-    def due(self, now: float) -> bool:
-        """Return True once for each due time."""
-        if now < self.anew_at:
-            return False
-        self._due.pop(0)
-        self._cut_off = False
-        return True
 
 
 def _at(arrival: Arrival) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from random import Random
 from threading import get_ident
 from typing import Any
 
@@ -21,6 +22,7 @@ from lfa.protocol.topics import NO_ECHO, TOPIC, Topic, address, alive_key
 from lfa.protocol.transport.bus import Arrival, Inbox
 from lfa.protocol.transport.credentials import Credentials
 from lfa.protocol.transport.endpoints import check_endpoints
+from lfa.protocol.transport.spelling import respelled
 from lfa.protocol.transport.zenoh_config import FOLLOWED_AT_ONCE, LINK_LEASE_MS, RouterAbsent, client_session, reason_of
 
 _PRIORITY = {
@@ -50,6 +52,9 @@ class ZenohBus:
             raise RouterAbsent(reason_of(error)) from None
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._followed: dict[str, Any] = {}
+        self._spelled: dict[str, str] = {}
+        """Spelling under which each followed key expression is declared at the moment; only its samples count."""
+        self._random = Random()
         self._token: zenoh.LivelinessToken | None = None
         self._links = self._session.info.declare_transport_events_listener(
             zenoh.handlers.Callback(self._on_transport, indirect=False), history=False
@@ -81,17 +86,26 @@ class ZenohBus:
         for key in sorted(self._followed.keys() - interests):
             self._followed.pop(key).undeclare()
         for key in sorted(interests - self._followed.keys()):
+            self._spelled[key] = key
             self._followed[key] = self._subscribe(key)
 
     def resubscribe(self) -> None:
-        """Declare all subscriptions to the router again.
+        """Declare all subscriptions to the router again, each in another spelling where it has one.
 
         A busy router permanently drops declarations that cross a link while it recovers (zenoh#1886), and with them the
-        subscribed messages.
+        subscribed messages. What another client of the own router has declared in the same words is not passed on.
         """
         for key in sorted(self._followed):
-            self._followed[key].undeclare()
-            self._followed[key] = self._subscribe(key)
+            before = self._followed[key]
+            spelling = key if _is_token(key) else respelled(key, self._random)
+            if spelling == self._spelled[key]:
+                before.undeclare()
+                self._followed[key] = self._subscribe(key)
+                continue
+            after = self._declared(key, spelling)
+            self._spelled[key] = spelling  # from here on its samples count: none is lost between, none comes twice
+            before.undeclare()
+            self._followed[key] = after
 
     def close(self) -> None:
         """Close the session with all its declarations; otherwise a callback subscriber keeps the interpreter alive."""
@@ -109,21 +123,25 @@ class ZenohBus:
         )
 
     def _subscribe(self, key: str) -> Any:
-        parts = key.split("/")
-        if len(parts) == 5 and parts[3] == "alive":
+        if _is_token(key):
             callback = zenoh.handlers.Callback(self._on_token, indirect=False)
             return self._session.liveliness().declare_subscriber(key, callback, history=True)
-        return self._session.declare_subscriber(key, zenoh.handlers.Callback(self._on_sample(key), indirect=False))
+        return self._declared(key, self._spelled[key])
 
-    def _on_sample(self, expression: str) -> Callable[[zenoh.Sample], None]:
-        """Return the callback for samples on `expression`, which is the key itself if it has no wildcard."""
-        put = self._inbox.put
-        known = None if "*" in expression else expression
+    def _declared(self, key: str, spelling: str) -> Any:
+        callback = zenoh.handlers.Callback(self._on_sample(key, spelling), indirect=False)
+        return self._session.declare_subscriber(spelling, callback)
+
+    def _on_sample(self, expression: str, spelling: str) -> Callable[[zenoh.Sample], None]:
+        """Return the callback for samples on `spelling` of `expression`: the key itself if it has no wildcard."""
+        put, spelled = self._inbox.put, self._spelled
+        known = None if "*" in spelling else expression
 
         def on_sample(sample: zenoh.Sample) -> None:
             if get_ident() not in _attached:
                 _attach()
-            put(Arrival(clock.now(), known or str(sample.key_expr), sample.payload.to_bytes()))
+            if spelled.get(expression) == spelling:
+                put(Arrival(clock.now(), known or str(sample.key_expr), sample.payload.to_bytes()))
 
         return on_sample
 
@@ -151,6 +169,11 @@ def _attach() -> None:
     """
     _attached.add(get_ident())
     ctypes.pythonapi.PyGILState_Ensure()
+
+
+def _is_token(key: str) -> bool:
+    parts = key.split("/")
+    return len(parts) == 5 and parts[3] == "alive"
 
 
 def _peer(key: str, kind: type[PeerUp] | type[PeerDown]) -> PeerUp | PeerDown | None:

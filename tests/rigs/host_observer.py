@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -24,8 +25,10 @@ TOPICS = frozenset({"*/pose", "*/tracking", "*/host", "*/event", "*/status"})
 class Onlooker:
     """Poses as they arrive, with the longest silence of each robot since `begin`."""
 
-    def __init__(self, ear: Subscriber, robots: tuple[int, ...]) -> None:
+    def __init__(self, ear: Subscriber, robots: tuple[int, ...], keep: Callable[[], Path]) -> None:
+        """`keep` stores what explains a failure, and returns its folder."""
         self._ear = ear
+        self._keep = keep
         self.robots = robots
         self.health = Health(robots, ())
         self.events: list[Event] = []
@@ -66,9 +69,14 @@ class Onlooker:
             if holds():
                 return
             if clock.now() > until:
-                now = clock.now()
-                pytest.fail(f"{complaint} within {within_s:g} s: chain {self.health.chain(now)}, gaps {self.gaps()}")
+                pytest.fail(f"{complaint} within {within_s:g} s: {self._explanation(clock.now())}")
             clock.sleep(POLL_S)
+
+    def _explanation(self, now: float) -> str:
+        """Return what each robot says of itself; a leader also says who is there and not in its chain (E27)."""
+        texts = "".join(f"\n  {name}: {text}" for name, text in sorted(self.health.texts.items()))
+        gaps = {robot: round(gap, 2) for robot, gap in self.gaps().items()}
+        return f"chain {self.health.chain(now)}, gaps {gaps}{texts}\n  journals and logs of all hosts: {self._keep()}"
 
     def chain(self) -> tuple[int, ...]:
         return self.health.chain(clock.now())
@@ -83,4 +91,4 @@ def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[O
     part = machines.part(at)
     eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at}")), f"no router answers at {at}")
     with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS, every=True) as ear:
-        yield Onlooker(ear, robots)
+        yield Onlooker(ear, robots, machines.keep)

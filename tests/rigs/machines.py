@@ -25,6 +25,8 @@ from tests.rigs.network_namespaces import Net, missing
 OPERATOR = 0
 """Number of the host on which `lfa up` runs; machine n of the fleet is host n."""
 NAMES = "abcdefgh"
+KEPT = "lfa-failed-hosts-"
+"""Prefix of the folder in which a failed test leaves the journals and logs of its machines."""
 SSHD = "/usr/sbin/sshd"
 LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
@@ -158,6 +160,13 @@ class Machines:
             str(path) for path in self.state(name).glob("*.sock*")
         ]
 
+    def keep(self) -> Path:
+        """Copy the state folders of all machines, with their journals and logs, to where they survive the test."""
+        kept = Path(tempfile.mkdtemp(prefix=KEPT, dir="/tmp"))
+        for name in self.names:
+            shutil.copytree(self.state(name), kept / name, ignore=_no_file, ignore_dangling_symlinks=True)
+        return kept
+
     # --- actions ---------------------------------------------------------------------------------------------------
 
     def lfa(self, *arguments: str, on: int = OPERATOR, timeout_s: float = 90.0) -> subprocess.CompletedProcess[str]:
@@ -188,6 +197,11 @@ class Machines:
 
     def _number(self, name: str) -> int:
         return self.names.index(name) + 1
+
+
+def _no_file(folder: str, names: list[str]) -> list[str]:
+    """Return the names in `folder` that cannot be copied: sockets."""
+    return [name for name in names if (Path(folder) / name).is_socket()]
 
 
 @contextmanager

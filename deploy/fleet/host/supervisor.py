@@ -32,7 +32,8 @@ from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, Process
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.output import replace_file, write_line
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
-from lfa.protocol.transport.bus import Inbox, Links
+from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.links import Links
 from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent

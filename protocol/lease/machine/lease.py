@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from lfa.protocol.lease.effects import Effect
+from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.machine import voting
 from lfa.protocol.lease.machine.deadlines import DEADLINES, NEVER, WAKES, expiry
 from lfa.protocol.lease.machine.memory import LeaseMemory
@@ -145,6 +146,15 @@ class Lease:
         if not is_first(m.config):
             return ()
         return tuple(i for i in m.election.all_member_ids if not m.peers.knows(i))
+
+    def hello_of(self, id: int) -> tuple[Member, float] | None:
+        """Return the sender and the time [s] of the last HELLO heard of `id`; None if none was."""
+        return self._memory.hellos.get(id)
+
+    @property
+    def peers(self) -> FailureDetector:
+        """Incarnations heard and tokens of the other processes, to be read only."""
+        return self._memory.peers
 
     def may_command(self, now: float) -> bool:
         """Return True if leading and `now` is before the lease's expiry (I1, I2)."""

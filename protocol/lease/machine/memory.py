@@ -54,6 +54,8 @@ class LeaseMemory:
         self.policy = Policy(mission.tiebreak, mission.shrink, len(self.election.all_member_ids))
         self.peers = FailureDetector(me, timing.heartbeat_s)
         self.hello_at = now
+        self.hellos: dict[int, tuple[Member, float]] = {}
+        """Sender and time [s] of the last HELLO heard of each id."""
         self.released = False
         self.refused_prepare: tuple[Member, Prepare] | None = None
         """Last PREPARE refused because of a bond, with its sender."""

@@ -117,6 +117,8 @@ def keep_grant(m: LeaseMemory, src: Member, body: Grant, _now: float) -> None:
 
 def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
     """Answer with the newest config while no leader is known (E9); tell an earlier incarnation so (E23)."""
+    if src.id in m.election.all_member_ids:
+        m.hellos[src.id] = (src, now)
     later = m.peers.later_than(src)
     if later is not None:
         m.send(robot_name(src.id), Superseded(later))

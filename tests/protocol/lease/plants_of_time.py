@@ -23,6 +23,7 @@ from lfa.protocol.lease.machine.table import LeaseEvent
 from lfa.protocol.lease.step_down import PendingRelease
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Fenced, Grantee, Member, Nack, Promise, Propose, Term
+from lfa.protocol.transport.links import Links
 from lfa.world.virtual_time import LocalClock
 from tests.protocol.lease import test_usual_bugs
 
@@ -216,3 +217,7 @@ def stamp_read_after_the_check(patch: pytest.MonkeyPatch) -> None:
         honest(self, robot_id, shuffled)
 
     patch.setattr(LeaseSimulation, "resume", resume)
+
+
+def declared_again_after_events_only(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Links, "lacks", lambda *_: None)

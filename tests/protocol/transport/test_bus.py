@@ -10,14 +10,12 @@ from lfa.protocol.lease.effects import Send
 from lfa.protocol.messages.consensus import Hello, Release, Term
 from lfa.protocol.node import PeerDown, PeerUp, RouterLost
 from lfa.protocol.transport.bus import (
-    ANEW_S,
     OWNER_BURST_MAX,
     OWNER_RATE_MAX_HZ,
     OWNERS_MAX,
     TOKEN_HOLD_S,
     Arrival,
     Inbox,
-    Links,
     Tokens,
     Wake,
 )
@@ -168,29 +166,3 @@ def test_names_without_end_take_no_memory_without_end() -> None:
     for n in range(10 * OWNERS_MAX):
         inbox.put(Arrival(0.0, f"lfa/f/stranger{n}/lease/all", b""))
     assert len(inbox._allowances) <= OWNERS_MAX
-
-
-@pytest.mark.parametrize(
-    ("events", "last_s"),
-    [
-        (["up 1"], None),
-        (["lost"], None),
-        (["down 1"], 0.0),
-        (["down 1", "up 2"], 0.0),
-        (["down 1", "up 1"], 1.0),
-        (["down 1", "up 1", "up 1"], 1.0),
-        (["lost", "up 1"], 1.0),
-    ],
-)
-def test_what_is_followed_is_told_anew_twice_after_a_token_went_or_came_back(
-    events: list[str], last_s: float | None
-) -> None:
-    links = Links()
-    kinds = {"up": PeerUp, "down": PeerDown}
-    for at, event in enumerate(events):
-        kind, _, life = event.partition(" ")
-        links.see(kinds[kind]("robot2", int(life)) if life else RouterLost(), float(at))
-    for after_s in () if last_s is None else ANEW_S:
-        assert not links.due(last_s + after_s - 0.001)  # type: ignore[operator]
-        assert links.due(last_s + after_s)  # type: ignore[operator]
-    assert not links.due(1000.0)
