@@ -33,6 +33,7 @@ def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, f
         scenario=about.scenario,
         mode=about.mode,
         seed=about.seed,
+        provenance=about.provenance,
         outcome=verdict.outcome,
         reason=verdict.reason,
         duration_s=round(duration_s, 3),

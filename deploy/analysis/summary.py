@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.recording.event_log import Failover, FaultDone, LeaderTerm, TermViolation
+from lfa.deploy.recording.provenance import Provenance
 from lfa.deploy.recording.recorder import Recording
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
@@ -68,6 +69,8 @@ class Summary(Struct, kw_only=True):
     faults: list[FaultDone]
     assertions: list[Assertion]
     violations: list[TermViolation]
+    provenance: Provenance | None = None
+    """What made the run; None in runs of versions that did not say."""
     recording: Recording | None = None
     """Counts of the recorder; None when the recorder died before it wrote them."""
     warnings: list[str] = []

@@ -115,11 +115,14 @@ def _hunt(seeds: range, jobs: int, out: Path, as_json: bool, player: Player) -> 
         raise Refused(f"--jobs {jobs}: must be 1 or more")
     began, tally = time.perf_counter(), Tally()
     told_at = began
-    for part in _played(seeds, jobs, player):
-        tally.add(part)
-        if time.perf_counter() > told_at + TELL_EVERY_S:
-            told_at = time.perf_counter()
-            typer.echo(so_far(tally, len(seeds), told_at - began), err=True)
+    try:
+        for part in _played(seeds, jobs, player):
+            tally.add(part)
+            if time.perf_counter() > told_at + TELL_EVERY_S:
+                told_at = time.perf_counter()
+                typer.echo(so_far(tally, len(seeds), told_at - began), err=True)
+    except KeyboardInterrupt:
+        return _interrupted(tally, seeds, time.perf_counter() - began, as_json)
     minutes = (time.perf_counter() - began) / 60.0
     missing = [kind for kind in KINDS if kind not in tally.faults] if len(seeds) >= KINDS_CLAIM_SEEDS else []
     for seed in sorted(tally.failed)[:FAILURES_SHOWN_MAX]:
@@ -137,6 +140,16 @@ def _hunt(seeds: range, jobs: int, out: Path, as_json: bool, player: Player) -> 
         rate_text = f"{tally.seeds / minutes:.0f} a minute with {jobs} jobs"
         typer.echo(f"{tally.seeds} schedules ({rate_text}), {tally.elections} elections, {len(tally.failed)} failed")
     return 1 if tally.failed or missing else 0
+
+
+def _interrupted(tally: Tally, seeds: range, seconds: float, as_json: bool) -> int:
+    """Print what a search that Ctrl-C ended has found; the failed seeds are not shrunk."""
+    typer.echo(f"interrupted: {so_far(tally, len(seeds), seconds)}", err=as_json)
+    if as_json:
+        failed = {str(seed): what for seed, what in tally.failed.items()}
+        facts = {"seeds": tally.seeds, "elections": tally.elections, "faults": tally.faults, "failed": failed}
+        typer.echo(json.dumps({**facts, "interrupted": True}))
+    return 130
 
 
 def so_far(tally: Tally, of: int, seconds: float) -> str:

@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from lfa.agents.following.plugin import file_of
+from lfa.deploy.recording.provenance import Provenance
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
 
@@ -27,8 +28,10 @@ class About(Struct, frozen=True):
     mode: str
     seed: int
     fleet: str
+    provenance: Provenance | None = None
 
     def metadata(self) -> dict[str, str]:
+        """Return what the recording says: equal for equal runs, so nothing of where and when it was made."""
         return {"scenario": self.scenario, "mode": self.mode, "seed": str(self.seed), "fleet": self.fleet}
 
 

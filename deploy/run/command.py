@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.faults.script import Fault, parse_all
-from lfa.deploy.run.finish import Ended, report
+from lfa.deploy.run.finish import Ended, kept_as, report
 from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import (
     AsJson,
@@ -18,15 +18,20 @@ from lfa.deploy.run.options import (
     MapFrom,
     Out,
     Overrides,
+    Record,
     Robots,
     ScenarioName,
     Seed,
+    Verbose,
 )
 from lfa.deploy.scenario_loading import with_controller
+from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario
 
+Run = Callable[[Scenario, int, Path | None, Sequence[Fault]], Ended]
 
-def scenario_command(run: Callable[[Scenario, int, Path | None, Sequence[Fault]], Ended]) -> Callable[..., int]:
+
+def scenario_command(run: Run, *, figures_by_default: bool) -> Callable[..., int]:
     """Return the command that runs a scenario by `run` and exits with the code of its summary."""
 
     def command(
@@ -38,8 +43,10 @@ def scenario_command(run: Callable[[Scenario, int, Path | None, Sequence[Fault]]
         fault: Faults = None,
         out: Out = None,
         map_from: MapFrom = None,
-        figures: Figures = True,
+        figures: Figures = figures_by_default,
+        record: Record = "full",
         junit: JUnit = None,
+        verbose: Verbose = False,
         as_json: AsJson = False,
     ) -> int:
         chosen, number = rebuild_scenario(
@@ -48,7 +55,11 @@ def scenario_command(run: Callable[[Scenario, int, Path | None, Sequence[Fault]]
         faults = parse_all(chosen.mission, chosen.faults, fault or ())
         if junit is not None:
             check_junit(junit)
-        ended = run(chosen, number, out, faults)
-        return report(ended, figures=figures and ended.signal is None, as_json=as_json, junit=junit)
+        if record == "none" and out is not None:
+            raise Refused(f"--record none with --out {out}: nothing is kept, must be one of the two")
+        with kept_as(record, out) as place:
+            ended = run(chosen, number, place, faults)
+            figures = figures and ended.signal is None and record == "full"
+            return report(ended, figures=figures, as_json=as_json, junit=junit, verbose=verbose, record=record)
 
     return command

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
-from collections.abc import Sequence
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -16,8 +20,9 @@ from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.analysis.summary_table import text
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
-from lfa.deploy.recording.recorder import Recording
-from lfa.deploy.recording.run_folder import About
+from lfa.deploy.recording.recorder import Recording, parts
+from lfa.deploy.recording.run_folder import JOURNALS, About
+from lfa.protocol.output import write_line
 
 
 class Ended(Struct, frozen=True):
@@ -60,20 +65,49 @@ def finish(
     return Ended(folder, summary, ended_by)
 
 
-def report(ended: Ended, *, figures: bool, as_json: bool, junit: Path | None = None) -> int:
+@contextmanager
+def kept_as(record: str, out: Path | None) -> Iterator[Path | None]:
+    """Yield the run folder to write: `out`, or with `record` none a temporary one, which is removed at the end."""
+    if record != "none":
+        yield out
+        return
+    with tempfile.TemporaryDirectory(prefix="lfa-run-") as folder:
+        yield Path(folder)
+
+
+def report(
+    ended: Ended,
+    *,
+    figures: bool,
+    as_json: bool,
+    junit: Path | None = None,
+    verbose: bool = False,
+    record: str = "full",
+) -> int:
     """Draw figures, print the summary, write assertions as JUnit XML if requested; return the exit code.
 
-    Raises Refused.
+    With `record` summary, remove what is larger than a summary. Raises Refused.
     """
+    kept = None if record == "none" else ended.folder
+    if record == "summary":
+        _remove_recording(ended.folder)
     if figures:
         from lfa.deploy.view.figures.command import draw
 
+        write_line("drawing the figures ...", sys.stderr)
         draw(ended.folder)
     if as_json:
-        facts = {"folder": str(ended.folder), **msgspec.to_builtins(ended.summary)}
+        facts = {"folder": None if kept is None else str(kept), **msgspec.to_builtins(ended.summary)}
         print(msgspec.json.format(msgspec.json.encode(facts), indent=1).decode())
     else:
-        print(text(ended.summary, ended.folder))
+        print(text(ended.summary, kept, verbose=verbose))
     if junit is not None:
         assertions.junit(junit, ended.summary)
     return ended.exit_code
+
+
+def _remove_recording(folder: Path) -> None:
+    """Remove the messages and journals of a run: its summary, events and scenario stay."""
+    for part in parts(folder):
+        part.unlink()
+    shutil.rmtree(folder / JOURNALS, ignore_errors=True)

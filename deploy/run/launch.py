@@ -20,6 +20,7 @@ from lfa.deploy.faults.script import Fault
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.provenance import provenance
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.command import scenario_command
@@ -56,7 +57,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out`."""
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
-    about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}")
+    about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}", provenance())
     sockets = _socket_folder()
     try:
         with Interrupts() as interrupts:
@@ -69,7 +70,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
         shutil.rmtree(sockets, ignore_errors=True)
 
 
-command = scenario_command(run)
+command = scenario_command(run, figures_by_default=True)
 
 
 def _socket_folder() -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -19,6 +19,11 @@ Out = Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenar
 MapFrom = Annotated[
     Path | None, typer.Option(help="Folder of an earlier run: same world, known obstacles (iteration 2).")
 ]
-Figures = Annotated[bool, typer.Option(help="Draw figures/*.png.")]
+Figures = Annotated[bool, typer.Option(help="Draw figures/*.png; later: lfa plot RUN.")]
+Record = Annotated[
+    Literal["full", "summary", "none"],
+    typer.Option(help="Keep the whole run folder, only its summary and events, or nothing."),
+]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Show terms as in messages, not counted in the run.")]
 JUnit = Annotated[Path | None, typer.Option(help="Write the assertions' results as JUnit XML.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")]

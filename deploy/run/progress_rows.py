@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import hypot
 
 from lfa.deploy.client.fleet_state import FleetState
+from lfa.deploy.client.term_count import TermCount
 from lfa.protocol.names import robot_name
 
 
@@ -14,6 +15,7 @@ class ProgressRows:
     def __init__(self, robots: tuple[int, ...], state: FleetState) -> None:
         self._robots = robots
         self._state = state
+        self._terms = TermCount()
         self.gone: set[int] = set()
 
     @property
@@ -21,7 +23,7 @@ class ProgressRows:
         return 0.0 if self._state.truth is None else self._state.truth.time_s
 
     def headline(self, leader: int | None) -> str:
-        who = "no leader yet" if leader is None else f"leader {leader}, term {self._state.term}"
+        who = "no leader yet" if leader is None else f"leader {leader}, term {self._terms.number(self._state.term)}"
         return f"{self.time_s:7.1f} s  {who}"
 
     def rows(self) -> list[tuple[str, str, str, str]]:

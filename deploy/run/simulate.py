@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import COMMON, ORDERS, Fault, FaultAction, FaultSchedule
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.provenance import provenance
 from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import JOURNALS, About, make
 from lfa.deploy.run.command import scenario_command
@@ -22,6 +24,7 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import OperatorNote
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Node
+from lfa.protocol.output import write_line
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER
@@ -34,6 +37,7 @@ from lfa.world.world import World
 FLEET = "sim"
 JOURNAL_FLUSH_S = 1.0
 SILENCE_S_MAX = 1.0
+SHOW_EVERY_S = 5.0  # of wall-clock time
 LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
 
 
@@ -49,7 +53,7 @@ def run(
         raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
-    about = About(scenario.name, "simulated", seed, FLEET)
+    about = About(scenario.name, "simulated", seed, FLEET, provenance())
     recorder = Recorder(folder, about.metadata())
     run = _Run(drawn, seed, folder, recorder, drivers)
     started = time.perf_counter()
@@ -59,7 +63,7 @@ def run(
     return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, run.recording)
 
 
-command = scenario_command(run)
+command = scenario_command(run, figures_by_default=False)
 
 
 class _Run:
@@ -78,6 +82,7 @@ class _Run:
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
         self._simulator.reborn = self._journal
+        self._show_at = time.perf_counter() + SHOW_EVERY_S
         self.faults_left: list[str] = []
         self.recording: Recording | None = None
 
@@ -109,11 +114,22 @@ class _Run:
                 self._do(deed, victim)
             next_s = schedule.pending[0].at_s if schedule.pending else silent_at
             until = max(next_s, simulator.now + LEADER_WAIT_S)
-            simulator.run(until, over=lambda: referee.verdict is not None or interrupts.signal is not None)
+            simulator.run(
+                until, over=lambda: self._shown() or referee.verdict is not None or interrupts.signal is not None
+            )
             verdict = verdict_of(interrupts) or referee.verdict
             if verdict is not None:
                 return verdict
         return Verdict("aborted", "the world fell silent")
+
+    def _shown(self) -> bool:
+        """Show the progress from time to time; return False, so that it stands beside conditions of an end."""
+        if time.perf_counter() >= self._show_at:
+            self._show_at = time.perf_counter() + SHOW_EVERY_S
+            leader = "no leader" if self._referee.leader is None else f"leader {self._referee.leader}"
+            limit_s = self._scenario.time_limit_s
+            write_line(f"{self._simulator.now:7.1f} s of at most {limit_s:g} s simulated, {leader}", sys.stderr)
+        return False
 
     def _do(self, deed: FaultAction, victim: int | str) -> None:
         """Execute a fault action; it has no effect on an absent robot, nor has a restart on a running one."""

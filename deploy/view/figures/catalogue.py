@@ -8,22 +8,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure, FigureBase
 
 from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording import event_log
 from lfa.deploy.view.figures import timeline
 from lfa.deploy.view.figures.paper_figures import distance_error, orientation_error, tracking
 from lfa.deploy.view.figures.path_plot import path_flow
 from lfa.deploy.view.figures.style import COLOURS, LEGEND_MAX, label, look
 from lfa.deploy.view.figures.time_panels import finish
-
-if TYPE_CHECKING:
-    pass
 
 TERM_SHARE_MIN = 0.15  # share of the run's duration: a shorter bar has no room for its term
 FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": True, "grid.alpha": 0.3,
@@ -63,12 +61,14 @@ def overview(run: Run) -> Figure:
 
 def _leader_timeline(figure: FigureBase, run: Run) -> None:
     axes, end_s = figure.subplots(), max(run.seen.end_s, 1.0)
+    terms = TermCount(reign.term[0] for reign in run.reigns)
     for reign in run.reigns:
         lasted_s = (end_s if reign.until_s is None else reign.until_s) - reign.from_s
         colour = look(run, reign.robot_id)["color"]
         axes.barh(reign.robot_id, lasted_s, left=reign.from_s, height=0.6, color=colour, edgecolor="white")
         if lasted_s > TERM_SHARE_MIN * end_s:
-            axes.annotate(f"term {reign.term[0]}", (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
+            term = f"term {terms.number(reign.term[0])}"
+            axes.annotate(term, (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
                           textcoords="offset points", color="white")  # fmt: skip
     for failover in event_log.failovers(run.events, run.reigns):
         if failover.leader is not None and failover.first_command_ms is not None:

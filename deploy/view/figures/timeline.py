@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import FigureBase
 
 from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording import event_log
 from lfa.deploy.view.figures.style import LEGEND_MAX, levels, look
 
@@ -37,18 +38,18 @@ def draw(figure: FigureBase, run: Run) -> None:
 
 def _holders(axes: Axes, run: Run, end_s: float) -> None:
     """Draw a bar for each term; above it the cause of its start, and the faults."""
-    first = min((reign.term[0] for reign in run.reigns), default=0)
+    terms = TermCount(reign.term[0] for reign in run.reigns)
     for reign in run.reigns:
         until_s = end_s if reign.until_s is None else reign.until_s
         _cell(axes, 0.0, reign.from_s, until_s, run, reign.robot_id, end_s)
-    began = [(reign.from_s, f"{_said(reign.cause)}, term +{reign.term[0] - first}") for reign in run.reigns]
+    began = [(reign.from_s, f"{_said(reign.cause)}, term {terms.number(reign.term[0])}") for reign in run.reigns]
     _labels(axes, began, 0.55, end_s)
     done = [(fault.at_s, f"{fault.kind} {fault.target}") for fault in event_log.faults(run.events)]
     top = 0.65 + LINE * LINES
     _labels(axes, done, top, end_s, weight="bold")
     axes.set(ylim=(-0.5, top + LINE * LINES), yticks=[0.0, 0.65 + LINE * LINES / 2.5, top + LINE * LINES / 2.5])
     axes.set_yticklabels(["lease", "began by", "faults"])
-    axes.set_title(f"Who held the lease, and what ended the one before (terms count from {first})")
+    axes.set_title("Who held the lease, and what ended the one before")
     axes.tick_params(left=False)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from lfa.deploy.analysis import summary
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.analysis.summary import RobotSummary, Summary
+from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import SCENARIO
 from lfa.deploy.view.figures import catalogue
@@ -102,9 +103,10 @@ def _figure(name: str) -> Callable[[Run, Summary], str]:
 
 
 def _leaders(run: Run, s: Summary) -> str:
+    terms = TermCount(r.term[0] for r in s.leaders)
     reigns = table(
         ("robot", "term", "from", "until", "because of"),
-        [(r.robot_id, r.term[0], in_s(r.from_s), in_s(r.until_s), r.cause) for r in s.leaders],
+        [(r.robot_id, terms.number(r.term[0]), in_s(r.from_s), in_s(r.until_s), r.cause) for r in s.leaders],
         text=(4,),
     )
     failovers = table(

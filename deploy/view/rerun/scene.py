@@ -17,6 +17,7 @@ import numpy as np
 import rerun as rr
 
 from lfa.deploy.client.team_status import told
+from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.view.rerun import static_scene
 from lfa.protocol.geometry import wrap
 from lfa.protocol.mission import Mission
@@ -53,6 +54,7 @@ class Scene:
         self._counts: dict[str, int] = {}
         self._roles: dict[int, str] = {}
         self._leader = ""
+        self._terms = TermCount()
         self._planner = ""
         self._angles: dict[str, float] = {}
         self._heard: dict[int, deque[tuple[float, float, float]]] = {}
@@ -235,7 +237,7 @@ class Scene:
         self._say(t, f"lease/robot{robot}", rr.StateChange(state=role))
 
     def _lead(self, t: float, robot: int, term: int) -> None:
-        leader = f"robot {robot}, term {term}"
+        leader = f"robot {robot}, term {self._terms.number(term)}"
         if leader != self._leader:
             self._leader = leader
             self._say(t, "lease/leader", rr.StateChange(state=leader))
