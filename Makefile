@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.installed-docs
 PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tests
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted mutants coverage same pages pictures docs clean setup
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted why mutants coverage same pages pictures docs clean setup
 
 COMPUTE := 'not processes and not hosts and not campaign'
 TEAMS := 'processes and not hosts and not campaign and not wheel'
@@ -86,6 +86,10 @@ model: $(STAMP)
 # Planted bugs: which invariant falls after how many schedules of faults; minutes.
 planted: $(STAMP)
 	$(BIN)/python -m tests.protocol.lease.hunt
+
+# Faults drawn from seeds: which of them does lfa why name? Some three minutes.
+why: $(STAMP)
+	$(BIN)/python -m tests.deploy.analysis.causes.drawn_faults
 
 # The lines of agents, world and protocol that the fast tests of their rooms reach: a short form, for a traced Python takes
 # three times as long. The floor is in pyproject.toml.

@@ -40,7 +40,8 @@ ORDER = (
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/recording",
     "deploy/process", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",
-    "deploy/analysis/paper", "deploy/analysis/verification", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
+    "deploy/analysis/paper", "deploy/analysis/verification",
+    "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/robot",
     "deploy/run", "deploy/simulate", "deploy/examples", "deploy/fuzz", "deploy/fleet/plan", "deploy/config",
     "deploy/fleet/security", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/bench/harness",

@@ -18,6 +18,7 @@ MAKEFILE = (ROOT / "Makefile").read_text()
 ON_A_RUN = (
     "lfa verify RUN...", "lfa report RUN", "lfa report A B", "lfa replay RUN --robot 2", "lfa plot RUN", "lfa list",
     "lfa validate FILE", "lfa schema", "lfa completion bash", "lfa sim SCENARIO --seed 7", "lfa --version",
+    "lfa why RUN",
 )  # fmt: skip
 ON_A_FLEET = ("lfa watch", "lfa topic", "lfa formation column", "lfa fault kill leader")
 ELSEWHERE = {
@@ -29,6 +30,7 @@ ELSEWHERE = {
     "lfa map RUN --out DIR": "tests/deploy/scenarios/test_explore.py",
     "lfa view RUN": "tests/deploy/view/rerun/test_view.py",
     "lfa view": "tests/deploy/view/test_bad_input.py",
+    "lfa metrics": "tests/processes/test_metrics.py",
     "lfa record": "tests/processes/test_looking.py",
     "lfa bench control --jobs 2": "tests/deploy/bench/test_control.py",
     "lfa-driver --id 3": "tests/processes/test_driver.py",
