@@ -29,8 +29,12 @@ class Command(NamedTuple):
 COMMANDS = (
     Command("run", "lfa.deploy.run.launch", "Run a scenario as processes on this machine; write a run folder.",
           "lfa run paper_path1 --robots 4 --fault 'kill leader at 20 s'"),
-    Command("sim", "lfa.deploy.run.simulate", "Run a scenario in one process, in virtual time; write a run folder.",
-          "lfa sim paper_path1 --seed 7 --set world.lidar.beams=90"),
+    Command("sim", "lfa.deploy.campaign.commands.sim",
+          "Run a scenario in one process, in virtual time, once or many times; write a run folder.",
+          "lfa sim paper_path1 --set world.lidar.beams=90; lfa sim circle --seeds 1..9 --set radio.loss=0.1,0.2"),
+    Command("campaign", "lfa.deploy.campaign.commands.campaign",
+          "Run a plan of simulations, whole or in shares; merge results into tables and a page.",
+          "lfa campaign plan.toml --jobs 2; lfa campaign plan.toml --shard 3/16; lfa campaign merge runs/plan"),
     Command("fuzz", "lfa.deploy.fuzz.command", "Search for fault schedules that violate invariants of the lease.",
           "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v; lfa fuzz --whole"),
     Command("up", "lfa.deploy.fleet.up", "Start a fleet on its machines, over ssh; wait until all are in the chain.",
@@ -116,7 +120,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
-    "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove",
+    "pyarrow": "campaign", "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove",
 }  # fmt: skip
 """Modules outside the base install, each with the extra that installs it."""
 

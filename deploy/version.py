@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 """Folder that holds the packages: the checkout, or `lfa/` of an installation."""
+PACKAGES = ("protocol", "agents", "world", "deploy")
+CODE_DIGITS = 12
 GIT_TIMEOUT_S = 5.0
 
 
@@ -15,6 +19,20 @@ def version_line(root: Path = ROOT) -> str:
 
     at = commit(root)
     return f"lfa {version('lfa')}" + (f" (commit {at})" if at else "")
+
+
+@cache
+def code_line(root: Path = ROOT) -> str:
+    """Return name, version and a hash of the code: equal where the same runs would give the same results.
+
+    A commit says less: an installation has none, and a checkout may have been changed.
+    """
+    from importlib.metadata import version
+
+    digest = hashlib.sha256()
+    for path in sorted(found for package in PACKAGES for found in (root / package).rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return f"lfa {version('lfa')} (code {digest.hexdigest()[:CODE_DIGITS]})"
 
 
 def commit(root: Path) -> str | None:

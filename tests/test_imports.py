@@ -39,13 +39,14 @@ ORDER = (
     "world/virtual_time", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/recording",
-    "deploy/process", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",
+    "deploy/process", "deploy/campaign", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",
     "deploy/analysis/paper", "deploy/analysis/verification",
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/robot",
     "deploy/run", "deploy/simulate", "deploy/examples", "deploy/fuzz", "deploy/fleet/plan", "deploy/config",
     "deploy/fleet/security", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/bench/harness",
-    "deploy/bench/control_cases", "deploy/bench", "deploy/cli", "deploy/completion",
+    "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/commands", "deploy/bench/control_cases",
+    "deploy/bench", "deploy/cli", "deploy/completion",
 )  # fmt: skip
 """Rooms: a folder, or a file that lies directly in a package. Each imports only rooms that stand before it, so there is
 no circle and nothing runs upwards."""

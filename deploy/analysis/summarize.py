@@ -16,6 +16,7 @@ from lfa.deploy.recording.event_log import Line
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, scenario_of
+from lfa.world.description.load import Scenario
 
 LEFT_BEHIND_M = 0.5
 """Distance error [m] at the end of a run above which a follower counts as left behind."""
@@ -24,7 +25,20 @@ OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
 
 def summarize(folder: Path, about: About, verdict: Verdict, duration_s: float, faults_left: Sequence[str]) -> Summary:
     """Return the summary of the run in `folder`. `faults_left`: planned faults that the run ended too early for."""
-    seen, events, scenario = mcap_reader.read(folder), event_log.lines(folder), scenario_of(folder)
+    seen, events = mcap_reader.read(folder), event_log.lines(folder)
+    return summary_of(scenario_of(folder), seen, events, about, verdict, duration_s, faults_left)
+
+
+def summary_of(
+    scenario: Scenario,
+    seen: RecordedRun,
+    events: list[Line],
+    about: About,
+    verdict: Verdict,
+    duration_s: float,
+    faults_left: Sequence[str],
+) -> Summary:
+    """Return the summary of a run of `scenario` (as drawn) from its arrays and its event log."""
     robots = [_robot(robot, seen, events) for robot in scenario.mission.robots]
     chain = event_log.last_chain(events)
     reigns = event_log.reigns(events)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 from math import isfinite, nan
 from pathlib import Path
@@ -76,7 +76,12 @@ def lines(folder: Path) -> list[Line]:
     if not path.is_file():
         return []
     with path.open("rb") as file:
-        found = [_line(text) for text in iter(lambda: file.readline(LINE_BYTES_MAX), b"")]
+        return in_order(iter(lambda: file.readline(LINE_BYTES_MAX), b""))
+
+
+def in_order(texts: Iterable[bytes]) -> list[Line]:
+    """Return the events in the lines `texts`, ordered by time; damaged ones are skipped."""
+    found = map(_line, texts)
     return sorted((line for line in found if line is not None), key=lambda line: float(line["t"]))
 
 

@@ -11,7 +11,7 @@ import struct
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
 import numpy as np
@@ -57,26 +57,42 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 
 def read(folder: Path) -> RecordedRun:
     """Return the arrays of the run in `folder`; empty when nothing was recorded."""
-    truth: dict[int, list[Row]] = {}
-    obstacles: dict[int, list[Row]] = {}
-    commanded: dict[int, list[Row]] = {}
-    said: dict[str, dict[int, list[Row]]] = {topic: {} for topic in _ROWS}
-    for owner, topic, t, message in messages(folder, frozenset({"truth", "formation", *_ROWS})):
+    rows = RunRows()
+    for owner, topic, t, message in messages(folder, RunRows.TOPICS):
+        rows.add(owner, topic, t, message)
+    return rows.arrays()
+
+
+class RunRows:
+    """Rows of a run's arrays, collected message by message."""
+
+    TOPICS: ClassVar[frozenset[str]] = frozenset({"truth", "formation", "tracking", "cmd_vel"})
+
+    def __init__(self) -> None:
+        self._truth: dict[int, list[Row]] = {}
+        self._obstacles: dict[int, list[Row]] = {}
+        self._commanded: dict[int, list[Row]] = {}
+        self._said: dict[str, dict[int, list[Row]]] = {topic: {} for topic in _ROWS}
+
+    def add(self, owner: str, topic: str, t: float, message: Any) -> None:
+        """Add a message of one of `TOPICS`, published at `t` [s]."""
         robot = robot_id_of(owner)
         if owner == TRUTH_OWNER:
             for r in message.robots:
                 row = (message.time_s, r.x, r.y, r.theta, r.linear_x, r.angular_z)
-                truth.setdefault(r.id, []).append(row)
+                self._truth.setdefault(r.id, []).append(row)
             for body in message.obstacles:
-                obstacles.setdefault(body.index, []).append((message.time_s, body.x, body.y))
+                self._obstacles.setdefault(body.index, []).append((message.time_s, body.x, body.y))
         elif topic == "formation":
             for slot in message.slots:
-                commanded.setdefault(slot.robot, []).append((t, slot.separation_m, slot.phi))
+                self._commanded.setdefault(slot.robot, []).append((t, slot.separation_m, slot.phi))
         elif robot is not None and topic in _ROWS:
-            said[topic].setdefault(robot, []).append(_ROWS[topic](t, message))
-    return RecordedRun(
-        _arrays(truth), _arrays(said["tracking"]), _arrays(said["cmd_vel"]), _arrays(obstacles), _arrays(commanded)
-    )
+            self._said[topic].setdefault(robot, []).append(_ROWS[topic](t, message))
+
+    def arrays(self) -> RecordedRun:
+        """Return all rows as arrays."""
+        truth, obstacles, commanded = _arrays(self._truth), _arrays(self._obstacles), _arrays(self._commanded)
+        return RecordedRun(truth, _arrays(self._said["tracking"]), _arrays(self._said["cmd_vel"]), obstacles, commanded)
 
 
 def messages(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, str, float, Any]]:

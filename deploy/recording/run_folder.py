@@ -68,14 +68,15 @@ def toml(scenario: Scenario) -> str:
 
 
 def _lines(fields: dict[str, Any]) -> str:
-    return "".join(f"{name} = {_value(value)}\n" for name, value in fields.items() if value is not None)
+    return "".join(f"{name} = {toml_value(value)}\n" for name, value in fields.items() if value is not None)
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """Return a value as TOML writes it; members of a table that are None are left out."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{k} = {_value(v)}" for k, v in value.items() if v is not None) + "}"
+        return "{" + ", ".join(f"{k} = {toml_value(v)}" for k, v in value.items() if v is not None) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     return msgspec.json.encode(value).decode()
 
 

@@ -5,17 +5,23 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
+from typing import NamedTuple, Protocol
 
 from lfa.agents.agent import Agent
+from lfa.deploy.analysis.summarize import summary_of
+from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import COMMON, ORDERS, Fault, FaultAction, FaultSchedule
 from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.recording.mcap_reader import RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.provenance import provenance
 from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import JOURNALS, About, make
+from lfa.deploy.recording.run_memory import RunMemory
 from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.finish import Ended, finish, verdict_of
 from lfa.deploy.run.termination import Referee
@@ -35,6 +41,7 @@ from lfa.world.simulator import Simulator
 from lfa.world.world import World
 
 FLEET = "sim"
+MODE = "simulated"
 JOURNAL_FLUSH_S = 1.0
 SILENCE_S_MAX = 1.0
 SHOW_EVERY_S = 5.0  # of wall-clock time
@@ -48,14 +55,12 @@ def run(
 
     `drivers` are the hardware of the scenario's real robots; nothing of them is journalled.
     """
-    common = next((fault for fault in faults if fault.target in COMMON), None)
-    if common is not None:
-        raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
+    refuse_common(faults)
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
-    about = About(scenario.name, "simulated", seed, FLEET, provenance())
+    about = About(scenario.name, MODE, seed, FLEET, provenance())
     recorder = Recorder(folder, about.metadata())
-    run = _Run(drawn, seed, folder, recorder, drivers)
+    run = _Run(drawn, seed, folder / JOURNALS, recorder, drivers)
     started = time.perf_counter()
     with Interrupts() as interrupts:
         verdict = run.play(FaultSchedule(faults), interrupts)
@@ -63,18 +68,61 @@ def run(
     return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, run.recording)
 
 
+def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> UnrecordedRun:
+    """Run `scenario` drawn with `seed` as `run` does, and write nothing.
+
+    The summary is the one that `run` would write, but for durations of this machine's clock, which are 0. Raises
+    Refused for a bad fault, and KeyboardInterrupt on a signal.
+    """
+    refuse_common(faults)
+    drawn, memory = draw(scenario, seed), RunMemory()
+    about = About(scenario.name, MODE, seed, FLEET)
+    run = _Run(drawn, seed, None, memory, ())
+    with Interrupts() as interrupts:
+        verdict = run.play(FaultSchedule(faults), interrupts)
+    if interrupts.signal is not None:
+        raise KeyboardInterrupt
+    seen = memory.seen()
+    return UnrecordedRun(summary_of(drawn, seen, memory.events(), about, verdict, 0.0, run.faults_left), seen)
+
+
+def refuse_common(faults: Sequence[Fault]) -> None:
+    """Raise Refused for a fault of a process that a simulation does not have."""
+    common = next((fault for fault in faults if fault.target in COMMON), None)
+    if common is not None:
+        raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
+
+
 command = scenario_command(run, figures_by_default=False)
+
+
+class UnrecordedRun(NamedTuple):
+    """Run that left no files: its summary, and the arrays that it was computed from."""
+
+    summary: Summary
+    seen: RecordedRun
+
+
+class RunRecorder(Protocol):
+    """Receiver of all messages of a run."""
+
+    def record(self, t: float, key: str, message: Message) -> None: ...
+
+    def close(self) -> Recording: ...
 
 
 class _Run:
     """Team in the simulator; recorder and referee receive all published messages."""
 
-    def __init__(self, drawn: Scenario, seed: int, folder: Path, recorder: Recorder, drivers: Sequence[Node]) -> None:
+    def __init__(
+        self, drawn: Scenario, seed: int, journals: Path | None, recorder: RunRecorder, drivers: Sequence[Node]
+    ) -> None:
+        """`journals` is the folder of the journals; None: there are none, and the run says nothing of its progress."""
         self._scenario = drawn
         self._drivers = drivers
         self._seed = seed
         self._journals: dict[str, Journal] = {}
-        self._journal_folder = folder / JOURNALS
+        self._journal_folder = journals
         self._recorder = recorder
         self._referee = Referee(drawn)
         self._operator = Operator(FLEET, 1)
@@ -82,7 +130,7 @@ class _Run:
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
         self._simulator.reborn = self._journal
-        self._show_at = time.perf_counter() + SHOW_EVERY_S
+        self._show_at = inf if journals is None else time.perf_counter() + SHOW_EVERY_S
         self.faults_left: list[str] = []
         self.recording: Recording | None = None
 

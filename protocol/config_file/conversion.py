@@ -33,7 +33,7 @@ def convert(
 
     `where` is the key at which the document would stand in a whole file, such as `mission`.
     A mistaken value is replaced by its default, a required one by zero, so that rules can check the other values
-    (`mistake.apply_rules`).
+    (`mistake.apply_rules`). A field of type Any takes every value; its reader checks it.
     """
     converter = _Converter(number_max)
     return cast(S, converter.table(document, struct, where)), converter.mistakes
@@ -69,6 +69,8 @@ class _Converter:
 
     def _value(self, value: Any, kind: Any, name: str, field: FieldInfo | None = None) -> Any:
         """Return `value` as `kind`; after a mistake the default of its `field`, else zero."""
+        if kind is Any:
+            return value
         kind = _chosen(value, _given(kind))
         origin = get_origin(kind)
         right = self._right(value, kind, origin)

@@ -13,6 +13,7 @@ import pytest
 
 from lfa.deploy.completion import words
 from lfa.world.description.load import shipped
+from tests.deploy.campaign.test_docs_page import COMMANDS
 from tests.processes.test_readme_commands import ELSEWHERE, ON_A_FLEET
 from tests.rigs.lfa_runs import LFA
 from tests.test_citations import files
@@ -20,6 +21,7 @@ from tests.test_imports import ROOT
 
 PAGES = files(".md")
 SITE = ROOT / "deploy" / "docs"
+CAMPAIGNS = [" ".join(text.split()) for text in COMMANDS]
 TARGETS = set(" ".join(re.findall(r"^([a-z -]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)).split())
 OPTIONS = {row.command: {*row.options, "-v", "-f"} for row in words()}
 SCENARIOS = {*shipped(), "SCENARIO"}
@@ -45,6 +47,7 @@ RUN_HERE: dict[str, tuple[str, ...]] = {
     "lfa replay runs/law --robot 2": (),
 }  # fmt: skip
 TESTED: dict[str, str] = {
+    **dict.fromkeys(CAMPAIGNS, "tests/deploy/campaign/test_docs_page.py"),
     **dict.fromkeys(("lfa run leader_killed --out runs/real", "lfa run leader_killed"), "tests/processes/test_run.py"),
     "lfa sim leader_killed": "tests/deploy/run/test_simulate.py",
     "lfa fuzz --whole": "tests/deploy/fuzz/test_agent_simulation.py",

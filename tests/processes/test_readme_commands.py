@@ -25,6 +25,10 @@ ELSEWHERE = {
     "lfa run SCENARIO": "tests/processes/test_run.py",
     "lfa run paper_path1 --fault 'kill leader at 20 s'": "tests/processes/test_run.py",
     "lfa run paper_path1 --map-from RUN": "tests/deploy/analysis/paper/test_checks.py",
+    **dict.fromkeys(
+        ("lfa sim SCENARIO --seeds 1..100 --set a=1,2,3", "lfa campaign PLAN", "lfa campaign merge DIR..."),
+        "tests/deploy/campaign/test_docs_page.py",
+    ),
     "lfa forget 3": "tests/protocol/lease/test_forget.py",
     "lfa fuzz [--whole]": "tests/deploy/fuzz/test_agent_simulation.py",
     "lfa map RUN --out DIR": "tests/deploy/scenarios/test_explore.py",

@@ -1,0 +1,1 @@
+"""Commands `lfa campaign` and `lfa sim`."""
