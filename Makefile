@@ -104,9 +104,9 @@ mutants: $(STAMP)
 
 # Does the code still behave as before? The first call records two runs of processes and writes a table of hashes of
 # events and journal calls (15 scenarios, 3 seeds, fuzz seeds, the two runs replayed); later calls compare with it.
-# Begin anew: rm -r runs/same
+# A share: SAME='--only straight leases'. Begin anew: rm -r runs/same
 same: $(STAMP)
-	PATH="$(abspath $(BIN)):$$PATH" tests/same.sh runs/same
+	PATH="$(abspath $(BIN)):$$PATH" tests/same.sh runs/same $(SAME)
 
 # Tables from the code: a scenario's keys to the end of its page, the states and transitions of a lease into its page.
 pages: $(STAMP)

@@ -2,8 +2,9 @@
 
 `python -m tests.same --out before.table`, change the code, `python -m tests.same --against before.table`. It runs every
 shipped scenario in virtual time, plays fuzz seeds on leases alone and on whole agents, and, with `--runs DIR`, replays
-the recorded runs in DIR. Hashed is what robots say and decide and what a run comes to; left out is what may differ
-between two equal runs or with the names in the code: wall clock, paths, size and schemas of a recording.
+the recorded runs in DIR; `--only straight leases` does a share of it. Hashed is what robots say and decide and what a
+run comes to; left out is what may differ between two equal runs or with the names in the code: wall clock, paths, size
+and schemas of a recording.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from hashlib import sha256
 from pathlib import Path
@@ -32,15 +33,20 @@ from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.schedules import draw
 from lfa.deploy.process.worker_pool import workers
 from lfa.deploy.run.simulate import run
+from lfa.deploy.version import version_line
 from lfa.protocol.runtime.journal import read
 from lfa.world.description.load import load, shipped
 
-Task = tuple[Callable[..., "list[Row]"], tuple[Any, ...]]
+Task = tuple[str, Callable[..., "list[Row]"], tuple[Any, ...]]
+"""Name of what it is about, as in the second column of the table; a function and its arguments."""
 
 SEEDS = (1, 2, 3)
+LEASES, WHOLE = "leases", "whole"
+"""Names of the two kinds of fuzzing in the table."""
 LEASE_SEEDS = 60
 WHOLE_SEEDS = 20
 WHOLE_CHUNK = 5  # seeds that one worker plays at a time
+MADE_BY = "# made by "
 WALL_CLOCK = ("duration_s", "real_time_factor", "recording")
 """What of a summary depends on the machine, or on docstrings: the recording's size, for its schemas hold them."""
 
@@ -99,7 +105,7 @@ def _of_calls(path: Path) -> Digest:
 
 def fuzzed(whole: bool, first: int, beyond: int) -> list[Row]:
     """Play the seeds from `first` to before `beyond`; return a row for each."""
-    name = "whole" if whole else "leases"
+    name = WHOLE if whole else LEASES
     return [Row("fuzz", name, str(seed), "trace", str(_of_seed(whole, seed))) for seed in range(first, beyond)]
 
 
@@ -136,23 +142,31 @@ def replayed(folder: Path) -> list[Row]:
     return [Row("replay", folder.name, "-", what, digest) for what, digest in found.items()]
 
 
-def tasks(runs: Path | None) -> list[Task]:
-    """Return all there is to do, the longest first, so that no worker ends with a long one alone."""
+def tasks(runs: Path | None, only: Sequence[str]) -> list[Task]:
+    """Return all there is to do, the longest first, so that no worker ends with a long one alone.
+
+    `only`: names of scenarios, recorded runs and kinds of fuzzing; empty: all. Raises ValueError for an unknown name.
+    """
     folders = sorted(path.parent for path in runs.glob("*/events.jsonl")) if runs else []
     scenarios = sorted(shipped().items(), key=lambda item: -item[1].time_limit_s)
-    return [
-        *((simulated, (name, seed)) for name, _ in scenarios for seed in SEEDS),
-        *((replayed, (folder,)) for folder in folders),
-        *((fuzzed, (True, first, first + WHOLE_CHUNK)) for first in range(0, WHOLE_SEEDS, WHOLE_CHUNK)),
-        (fuzzed, (False, 0, LEASE_SEEDS)),
+    every: list[Task] = [
+        *((name, simulated, (name, seed)) for name, _ in scenarios for seed in SEEDS),
+        *((folder.name, replayed, (folder,)) for folder in folders),
+        *((WHOLE, fuzzed, (True, first, first + WHOLE_CHUNK)) for first in range(0, WHOLE_SEEDS, WHOLE_CHUNK)),
+        (LEASES, fuzzed, (False, 0, LEASE_SEEDS)),
     ]
+    names = sorted({name for name, _, _ in every})
+    for wanted in only:
+        if wanted not in names:
+            raise ValueError(f"--only {wanted}: must be one of {', '.join(names)}")
+    return [task for task in every if not only or task[0] in only]
 
 
-def rows(runs: Path | None, jobs: int) -> list[Row]:
+def rows(todo: Sequence[Task], jobs: int) -> list[Row]:
     """Do everything with `jobs` processes, telling how far it is; return the sorted table."""
     began, table = time.perf_counter(), list[Row]()
     with workers(jobs) as pool:
-        futures = {pool.submit(do, *arguments): (do, arguments) for do, arguments in tasks(runs)}
+        futures = {pool.submit(do, *arguments): (do, arguments) for _, do, arguments in todo}
         for number, future in enumerate(as_completed(futures), start=1):
             do, arguments = futures[future]
             table += future.result()
@@ -162,8 +176,17 @@ def rows(runs: Path | None, jobs: int) -> list[Row]:
 
 
 def text(table: list[Row]) -> str:
-    """Return the table as text, one row a line."""
-    return "".join(f"{r.kind:<7} {r.scenario:<15} {r.seed:<4} {r.what:<28} {r.hash}\n" for r in table)
+    """Return the table as text: the version of the code, then one row a line."""
+    return f"{MADE_BY}{version_line()}\n" + "".join(
+        f"{r.kind:<7} {r.scenario:<15} {r.seed:<4} {r.what:<28} {r.hash}\n" for r in table
+    )
+
+
+def read_table(path: Path) -> tuple[str, list[Row]]:
+    """Return the version that made the table at `path`, and its rows."""
+    lines = path.read_text().splitlines()
+    made_by = lines[0].removeprefix(MADE_BY) if lines[0].startswith(MADE_BY) else "an unnamed version"
+    return made_by, [Row(*line.split()) for line in lines if not line.startswith(MADE_BY)]
 
 
 def differences(before: list[Row], after: list[Row]) -> Iterator[str]:
@@ -175,21 +198,29 @@ def differences(before: list[Row], after: list[Row]) -> Iterator[str]:
 
 
 def main() -> int:
-    """Make the table, write or compare it; return 1 when it differs."""
+    """Make the table, write or compare it; return 1 when it differs, 2 for a wrong argument."""
     parser = argparse.ArgumentParser(prog="python -m tests.same", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--out", type=Path, help="write the table here")
     parser.add_argument("--against", type=Path, help="compare with this table, made with the same --runs")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once (2)")
     parser.add_argument("--runs", type=Path, help="a folder of recorded run folders to replay")
+    parser.add_argument("--only", nargs="*", default=(), help="scenarios, recorded runs, leases, whole (all)")
     given = parser.parse_args()
-    before = [Row(*line.split()) for line in given.against.read_text().splitlines()] if given.against else None
-    table = rows(given.runs, given.jobs)
+    try:
+        todo = tasks(given.runs, given.only)
+    except ValueError as error:
+        parser.error(str(error))
+    table = rows(todo, given.jobs)
     if given.out:
         given.out.write_text(text(table))
-    if before is None:
+    if not given.against:
         print(text(table), end="")
         return 0
-    differing = list(differences(before, table))
+    made_by, before = read_table(given.against)
+    names = {name for name, _, _ in todo}
+    differing = list(differences([row for row in before if row.scenario in names], table))
+    if differing:
+        print(f"what differs from the table of {made_by}, {len(differing)} of {len(table)} rows:")
     print("\n".join(differing) or f"same: {len(table)} rows")
     return 1 if differing else 0
 

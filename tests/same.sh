@@ -1,12 +1,14 @@
 #!/bin/sh
 # Two recorded runs of processes and a table of hashes in the folder given: made when they are missing, else compared.
+# Further arguments go to the table: --only straight leases.
 set -eu
 place=$1
+shift
 mkdir -p "$place"
 test -d "$place/killed" || lfa run paper_path1 --seed 1 --fault 'kill leader at 20 s' --out "$place/killed" --no-figures
 test -d "$place/straight" || lfa run straight --seed 1 --out "$place/straight" --no-figures
 if test -f "$place/table"; then
-    python -m tests.same --runs "$place" --against "$place/table"
+    python -m tests.same --runs "$place" --against "$place/table" "$@"
 else
-    python -m tests.same --runs "$place" --out "$place/table"
+    python -m tests.same --runs "$place" --out "$place/table" "$@"
 fi
