@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.protocol.lease.hunt import begin_of, on_page
 from tests.protocol.lease.planted import PLANTED, Bug
 
 PAGE = Path(__file__).parents[3] / "protocol" / "README.md"
@@ -27,6 +28,12 @@ def test_every_usual_bug_and_every_failed_wording_is_planted() -> None:
     where = [bug.where for bug in PLANTED]
     assert {w for w in where if w.startswith("bug ")} == {f"bug {n}" for n in range(1, USUAL_BUGS + 1)}
     assert where.count("wording") == WORDINGS
+
+
+def test_the_page_has_a_row_for_every_planted_bug_in_their_order() -> None:
+    """Else: make planted PLANTED=--write."""
+    rows = [row for row in on_page() if row.startswith(("| bug", "| mutant", "| wording", "| rule"))]
+    assert rows == [begin_of(bug) for bug in PLANTED]
 
 
 def test_every_rule_has_a_directed_test() -> None:
