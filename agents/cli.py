@@ -10,16 +10,16 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from lfa.agents.agent import Agent
 from lfa.agents.following.plugin import add_controller_file
 from lfa.protocol import clock, incarnations
-from lfa.protocol.config_file.mistake import apply_rules
+from lfa.protocol.config_file.mistake import FileError, RefusedFile, apply_rules
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.mission import Mission
-from lfa.protocol.mission_checks import MISSION_RULES, check_mission
+from lfa.protocol.mission_checks import MISSION_RULES
 from lfa.protocol.names import whole_number
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
@@ -103,30 +103,32 @@ def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None)
 
 
 def read_mission(path: Path) -> Mission:
-    """Return the mission of a JSON or TOML file. Raise `Refused` with the file, the key and what would be right."""
-    if path.suffix != ".json":
-        return _read_toml_mission(path)
-    try:
-        return check_mission(read_json(path, Mission))
-    except DamagedFile as error:
-        raise Refused(f"--mission {path}: {error}: {RIGHT_MISSION}") from None
-    except OSError as error:
-        raise Refused(f"--mission {path}: {error.strerror}: {RIGHT_MISSION}") from None
-    except Refused as refused:
-        raise Refused(f"--mission {path}: {refused}") from None
-
-
-def _read_toml_mission(path: Path) -> Mission:
+    """Return the mission of a JSON or TOML file. Raise `Refused` with every mistake: key, value, and what is right."""
     # Imported here: most agents receive their mission over Zenoh, and memory is short on a robot.
     from lfa.protocol.config_file.conversion import convert
     from lfa.protocol.config_file.toml_file import read_toml
 
-    file = read_toml(path, "the [mission] of a scenario in a file of its own, without that heading,").under(_MISSION)
-    mission, mistakes = convert(file.document, Mission, where=_MISSION)
+    right = "the [mission] of a scenario in a file of its own, without that heading,"
+    toml = None if path.suffix == ".json" else read_toml(path, right).under(_MISSION)
+    document = _read_json_mission(path) if toml is None else toml.document
+    mission, mistakes = convert(document, Mission, where=_MISSION)
     apply_rules(MISSION_RULES, mission, mistakes)
-    if mistakes:
-        raise file.refuse(mistakes)
+    if mistakes and toml is not None:
+        raise toml.refuse(mistakes)
+    if mistakes:  # of JSON no lines are known
+        raise RefusedFile(FileError(str(path), str(mistake), key=mistake.key) for mistake in mistakes)
     return mission
+
+
+def _read_json_mission(path: Path) -> dict[str, Any]:
+    from lfa.protocol.config_file.conversion import without_nulls
+
+    try:
+        return without_nulls(read_json(path, dict[str, Any]))
+    except DamagedFile as error:
+        raise Refused(f"--mission {path}: {error}: {RIGHT_MISSION}") from None
+    except OSError as error:
+        raise Refused(f"--mission {path}: {error.strerror}: {RIGHT_MISSION}") from None
 
 
 if __name__ == "__main__":

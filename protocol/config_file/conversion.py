@@ -13,10 +13,12 @@ from msgspec.structs import FieldInfo, fields
 
 from lfa.protocol.config_file.mistake import Mistake, shown, wrong
 from lfa.protocol.config_file.toml_lines import member
+from lfa.protocol.file_reading import DamagedFile
 
 S = TypeVar("S", bound=Struct)
 NUMBER_MAX = 1e9
 """Largest number in a file, unless its reader allows more. TOML also knows nan and inf, which no field admits."""
+DEPTH_MAX = 32
 OWN_NAME = "name"
 """Field at the top that holds the file's own name: no key of the file."""
 
@@ -37,6 +39,20 @@ def convert(
     """
     converter = _Converter(number_max)
     return cast(S, converter.table(document, struct, where)), converter.mistakes
+
+
+def without_nulls(document: dict[str, Any], depth_max: int = DEPTH_MAX) -> dict[str, Any]:
+    """Return a document of JSON without the keys that are null: they are not given, and TOML has no null.
+
+    Raises DamagedFile for tables nested more than `depth_max` deep, which no type has.
+    """
+    if depth_max == 0:
+        raise DamagedFile(f"nested more than {DEPTH_MAX} deep")
+    return {
+        key: without_nulls(value, depth_max - 1) if isinstance(value, dict) else value
+        for key, value in document.items()
+        if value is not None
+    }
 
 
 class _Converter:
