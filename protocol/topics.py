@@ -11,6 +11,7 @@ from typing import Literal
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import BadMessage, Message, decode
 from lfa.protocol.messages.consensus import LeaseNote
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
@@ -133,6 +134,16 @@ def address(key: str) -> Address | None:
     if parts[3] not in TOPIC and parts[3] != "alive":
         return None
     return Address(parts[1], parts[2], parts[3], parts[4] if len(parts) == 5 else None)
+
+
+def message_in(key: str, payload: bytes) -> Message | None:
+    """Return the message of the topic of `key` in `payload`; None for a foreign key and bytes that do not decode."""
+    where = address(key)
+    topic = TOPIC.get(where.topic) if where is not None else None
+    try:
+        return None if topic is None else decode(payload, topic.type)
+    except BadMessage:
+        return None
 
 
 def may_sign(where: Address, topic: Topic, sender: str) -> bool:

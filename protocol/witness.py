@@ -8,13 +8,12 @@ from lfa.protocol.incarnations import after
 from lfa.protocol.lease.effects import Effect, Send, StandAside
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
-from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import NO_TERM, LeaseNote, Member, Role
-from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import Ask, Level, MissionNote, Status
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID, WITNESS_NAME, robot_id_of, robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, Stop
+from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TO_ALL, TO_HELLO, alive_key, key
 
 ASK_S = 0.5
@@ -49,7 +48,7 @@ class Witness:
         self._lease: Lease | None = None
         self._ask_at = float("-inf")
         self._status_at = float("-inf")
-        self._seq: dict[str, int] = {}
+        self._outbox = Outbox(fleet, WITNESS_NAME, incarnation)
 
     @property
     def lease(self) -> Lease | None:
@@ -95,12 +94,12 @@ class Witness:
         if self._lease is None:
             if now >= self._ask_at:
                 self._ask_at = now + ASK_S
-                envelopes.append(self._envelope("ask", Ask(self._header("ask", now), "mission")))
+                envelopes.append(self._outbox.envelope("ask", Ask(self._outbox.header("ask", now), "mission")))
         else:
             envelopes += self._carry_out(self._lease.tick(now), now)
         if now >= self._status_at:
             self._status_at = now + STATUS_S
-            envelopes.append(self._envelope("status", self._status(now)))
+            envelopes.append(self._outbox.envelope("status", self._status(now)))
         return envelopes
 
     def next_deadline(self) -> float:
@@ -125,25 +124,17 @@ class Witness:
         envelopes: list[Envelope] = []
         for effect in effects:
             if isinstance(effect, Send):
-                note = LeaseNote(self._header("lease", now), effect.body)
-                envelopes.append(self._envelope("lease", note, effect.receiver))
+                note = LeaseNote(self._outbox.header("lease", now), effect.body)
+                envelopes.append(self._outbox.envelope("lease", note, effect.receiver))
             elif isinstance(effect, StandAside):
                 self.refusal = effect.reason
         return envelopes
 
     def _status(self, now: float) -> Status:
-        header = self._header("status", now)
+        header = self._outbox.header("status", now)
         if self._lease is None:
             return Status(header, Level.WARN, "waiting for a mission", Role.WAITING, NO_TERM, {})
         text = "no leader" if self._lease.leader is None else f"robot{self._lease.leader} leads"
         if self._lease.missing:
             text = f"waiting for {', '.join(robot_name(i) for i in self._lease.missing)}"
         return Status(header, Level.OK, text, Role.WAITING, self._lease.term, {})
-
-    def _header(self, topic: str, now: float) -> Header:
-        number = self._seq.get(topic, 0)
-        self._seq[topic] = number + 1
-        return Header(WITNESS_NAME, self.incarnation, number, now)
-
-    def _envelope(self, topic: str, message: Message, to: str | None = None) -> Envelope:
-        return Envelope(key(self._fleet, WITNESS_NAME, topic, to), message)

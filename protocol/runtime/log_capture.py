@@ -10,9 +10,9 @@ from typing import Any, TextIO
 
 import msgspec
 
-from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import Event
 from lfa.protocol.output import write_line
+from lfa.protocol.topics import message_in
 
 LINE_CHARACTERS_MAX = 1000
 EVENT_ENDING = "/event"
@@ -28,12 +28,9 @@ def line(event: Event, wall_ms: int) -> str:
     return " ".join((at, event.header.sender, event.kind, *data, *term))
 
 
-def tell(payload: bytes, wall_ms: int, stream: TextIO | None = None) -> None:
+def tell(key: str, payload: bytes, wall_ms: int, stream: TextIO | None = None) -> None:
     """Write the log line of the event in `payload` to `stream`, by default standard error; ignore other payloads."""
-    try:
-        event = decode(payload, Event)
-    except BadMessage:
-        return
+    event = message_in(key, payload)
     if isinstance(event, Event):
         write_line(line(event, wall_ms)[:LINE_CHARACTERS_MAX], sys.stderr if stream is None else stream)
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import Node
-from lfa.protocol.topics import TOPIC, address
+from lfa.protocol.topics import address
 from lfa.protocol.transport.bus import Inbox
+from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 NAMESAKE_LEASES = 1.75  # of the two that are waited: a process that waits for its mission publishes only once a second
@@ -53,7 +53,7 @@ def refuse_twin(bus: ZenohBus, fleet: str, lease_s: float, node: Node, dead: lis
     """
 
     def twins() -> list[int]:
-        return [life for life in bus.living(fleet, node.name) if life not in (node.incarnation, *dead)]
+        return [one for one in bus.living(fleet, node.name) if one not in (node.incarnation, *dead)]
 
     found = twins()
     if not found:
@@ -75,14 +75,8 @@ def _double(fleet: str, node: Node) -> Refused:
 def _speakers(inbox: Inbox) -> dict[int, float]:
     """Return the incarnations that sent a well-formed message, with the arrival time [s] of the last one."""
     heard: dict[int, float] = {}
-    for arrival in inbox.take():
+    for arrival, message in Decoder().messages(inbox.take()):
         where = address(arrival.key)
-        if where is None or where.topic not in TOPIC or not isinstance(arrival.payload, bytes):
-            continue
-        try:
-            message = decode(arrival.payload, TOPIC[where.topic].type)
-        except BadMessage:
-            continue
-        if message.header.sender == where.owner:
+        if where is not None and message.header.sender == where.owner:
             heard[message.header.incarnation] = arrival.at
     return heard

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import msgspec
 
-from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.node import Envelope, Local, Node, NodeObserver, Received
 from lfa.protocol.runtime.journal import Journal
-from lfa.protocol.topics import TOPIC, address, may_sign
+from lfa.protocol.topics import TOPIC, address, may_sign, message_in
 
 Sent = list[tuple[str, bytes]]
 
@@ -31,15 +31,9 @@ class NodeHost:
 
     def decoded(self, key: str, payload: bytes) -> Message | None:
         """Return the message in `payload`; if foreign, malformed or in another's name, count it and return None."""
-        where = address(key)
-        topic = TOPIC.get(where.topic) if where is not None else None
-        try:
-            if where is not None and topic is not None:
-                message = decode(payload, topic.type)
-                if may_sign(where, topic, message.header.sender):
-                    return message
-        except BadMessage:
-            pass
+        where, message = address(key), message_in(key, payload)
+        if where is not None and message is not None and may_sign(where, TOPIC[where.topic], message.header.sender):
+            return message
         self.undecodable += 1
         return None
 

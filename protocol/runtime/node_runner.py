@@ -18,7 +18,6 @@ from msgspec import Struct
 
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.team import OperatorNote
 from lfa.protocol.node import Local, Node, Stop, lacks_messages, reborn
 from lfa.protocol.output import write_line
@@ -33,6 +32,7 @@ from lfa.protocol.transport.bus import Arrival, Inbox, Tokens, Wake
 from lfa.protocol.transport.credentials import Credentials
 from lfa.protocol.transport.link_model import WEATHER, Reception
 from lfa.protocol.transport.links import Links
+from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import LINK_LEASE_MS, RouterAbsent
 
@@ -134,10 +134,7 @@ class _NodeRunner:
         return self._reception.take(max([now, *(arrival.at for arrival in arrivals)]))
 
     def _is_weather(self, arrival: Arrival) -> bool:
-        try:
-            note = decode(arrival.payload, OperatorNote) if isinstance(arrival.payload, bytes) else None
-        except BadMessage:
-            return False
+        note = Decoder().message(arrival)
         return isinstance(note, OperatorNote) and note.command == WEATHER and self._reception.air.obey(note.arguments)
 
     def tell(self, event: Local, now: float) -> None:
@@ -151,7 +148,7 @@ class _NodeRunner:
             self.bus.publish(to, payload)
         for to, payload in sent:
             if to.endswith(log_capture.EVENT_ENDING):
-                log_capture.tell(payload, clock.wall_ms())
+                log_capture.tell(to, payload, clock.wall_ms())
 
 
 def run(nodes: Sequence[Node], options: Options, floor: int) -> int:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Protocol
 
-from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.node import Envelope
-from lfa.protocol.topics import TOPIC, address
+from lfa.protocol.topics import message_in
 from lfa.protocol.transport.bus import Arrival
 
 
@@ -38,12 +38,8 @@ class Decoder:
 
     def message(self, arrival: Arrival) -> Message | None:
         """Return the message; None for a local event, a foreign key, and bytes that do not decode."""
-        where = address(arrival.key)
-        topic = TOPIC.get(where.topic) if where is not None else None
-        if topic is None or not isinstance(arrival.payload, bytes):
+        if not isinstance(arrival.payload, bytes):
             return None
-        try:
-            return decode(arrival.payload, topic.type)
-        except BadMessage:
-            self.undecodable += 1
-            return None
+        message = message_in(arrival.key, arrival.payload)
+        self.undecodable += message is None
+        return message

@@ -3,9 +3,14 @@
 import pytest
 
 from lfa.agents.agent import Agent
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Ask
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.names import robot_id_of, robot_name
-from lfa.protocol.topics import HARDWARE, TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches
+from lfa.protocol.topics import HARDWARE, TOPIC, TOPICS, TRUTH_OWNER, address, alive_key, key, matches, message_in
+from lfa.protocol.transport.bus import Arrival
+from lfa.protocol.transport.message_bus import Decoder
 
 
 def test_each_topic_is_named_once_and_has_its_own_type() -> None:
@@ -70,3 +75,13 @@ def test_names_and_ids_say_the_same() -> None:
 
 def test_a_strangers_name_is_no_id_whatever_its_digits() -> None:
     assert [robot_id_of(f"robot{digits}") for digits in ("9" * 5000, "9" * 19, "\u0663", "\u00b2")] == [None] * 4
+
+
+def test_what_is_no_message_of_its_keys_topic_is_dropped_and_counted() -> None:
+    ask = encode(Ask(Header("robot1", 1, 0, 0.0), "mission"))
+    arrivals = [Arrival(0.0, key, payload) for key, payload in (
+        ("lfa/f/robot1/ask", ask), ("lfa/f/robot1/ask", b"noise"), ("lfa/f/robot1/nothing", ask), ("elsewhere", ask),
+    )]  # fmt: skip
+    decoder = Decoder()
+    assert [message for _, message in decoder.messages(arrivals)] == [message_in("lfa/f/robot1/ask", ask)]
+    assert decoder.undecodable == 3

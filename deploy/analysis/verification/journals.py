@@ -26,7 +26,6 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import Timing, timing_of
-from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Member
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.mission import Mission
@@ -35,7 +34,7 @@ from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
 from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import Heading, Journal, JournalEntry, digest
 from lfa.protocol.runtime.node_host import NodeHost
-from lfa.protocol.topics import TOPIC, WORLD_NAME, address
+from lfa.protocol.topics import WORLD_NAME, address, message_in
 from lfa.protocol.witness import Witness
 
 _local_decoder = msgspec.msgpack.Decoder(Local)
@@ -201,7 +200,4 @@ def _message(entry: JournalEntry) -> Any:
     where = address(entry.key) if entry.kind == "message" else None
     if where is None or where.topic not in ("lease", "cmd_vel"):
         return None
-    try:
-        return decode(entry.payload, TOPIC[where.topic].type)
-    except BadMessage:
-        return None
+    return message_in(entry.key, entry.payload)

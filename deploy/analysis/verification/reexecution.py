@@ -14,13 +14,12 @@ from msgspec import Struct
 
 from lfa.agents.agent import Agent
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.codec import BadMessage, decode
 from lfa.protocol.mission import Mission
 from lfa.protocol.node import Local, Node
 from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, JournalEntry, digest
 from lfa.protocol.runtime.node_host import NodeHost, Sent
-from lfa.protocol.topics import TOPIC, address
+from lfa.protocol.topics import message_in
 from lfa.protocol.witness import Witness
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic
@@ -127,10 +126,5 @@ def _said(sent: Sent) -> list[str]:
     """Format the messages that the node publishes now: one text for each message."""
     texts = []
     for to, payload in sent:
-        where = address(to)
-        try:
-            said = repr(decode(payload, TOPIC[where.topic].type)) if where is not None else ""
-        except BadMessage as error:
-            said = str(error)
-        texts.append(f"{to}: {said}")
+        texts.append(f"{to}: {message_in(to, payload)!r}")
     return texts
