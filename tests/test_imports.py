@@ -38,7 +38,7 @@ ORDER = (
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
     "world/virtual_time", "world/simulator", "world/cli",
 
-    "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/recording",
+    "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/recording",
     "deploy/process", "deploy/campaign", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",
     "deploy/analysis/paper", "deploy/analysis/verification",
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",

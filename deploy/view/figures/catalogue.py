@@ -27,6 +27,9 @@ TERM_SHARE_MIN = 0.15  # share of the run's duration: a shorter bar has no room 
 FONT: dict[Any, Any] = {"font.size": 9.0, "axes.titlesize": 10.0, "axes.grid": True, "grid.alpha": 0.3,
         "legend.fontsize": 8.0, "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
         "svg.hashsalt": "lfa"}  # fmt: skip
+COLUMN_INCH = 3.4
+"""Width of a column of a two-column paper."""
+COLUMN_FONT: dict[Any, Any] = {"font.size": 6.0, "axes.titlesize": 6.5, "legend.fontsize": 5.0, "lines.linewidth": 0.8}
 Draw = Callable[[FigureBase, Run], None]
 
 
@@ -34,15 +37,25 @@ def png(figure: Figure) -> bytes:
     return _saved(figure, "png", dpi=120)
 
 
+def saved_as(figure: Figure, kind: str) -> bytes:
+    """Return a figure as a file of `kind`: png, svg or pdf."""
+    return png(figure) if kind == "png" else svg(figure) if kind == "svg" else pdf(figure)
+
+
+def pdf(figure: Figure) -> bytes:
+    return _saved(figure, "pdf", metadata={"CreationDate": None})
+
+
 def svg(figure: Figure) -> bytes:
     return _saved(figure, "svg", metadata={"Date": None})
 
 
-def drawn(name: str, run: Run) -> Figure:
-    """Draw and return the figure called `name` in FIGURES."""
+def drawn(name: str, run: Run, *, column: bool = False) -> Figure:
+    """Draw and return the figure called `name` in FIGURES, with `column` at the width of a column of a paper."""
     (width, height), draw = next((size, draw) for known, size, _, draw in FIGURES if known == name)
-    with _style():
-        figure = Figure(figsize=(width, height), layout="constrained")
+    with _style(), matplotlib.rc_context(COLUMN_FONT if column else {}):
+        size = (COLUMN_INCH, COLUMN_INCH * min(1.2, 1.3 * height / width)) if column else (width, height)
+        figure = Figure(figsize=size, layout="constrained")
         draw(figure, run)
     return figure
 
@@ -73,7 +86,7 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
     for failover in event_log.failovers(run.events, run.reigns):
         if failover.leader is not None and failover.first_command_ms is not None:
             axes.annotate(f"first command after {failover.first_command_ms:.0f} ms", (failover.at_s, failover.leader),
-                          xytext=(4, 14), textcoords="offset points", fontsize=8)  # fmt: skip
+                          xytext=(4, 14), textcoords="offset points", fontsize="small")  # fmt: skip
     finish(axes, run, "Who led", "robot")
     shown = [robot for robot in run.robots if len(run.robots) <= LEGEND_MAX or label(run, robot)]
     axes.set_yticks(shown)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import typer
@@ -13,19 +13,21 @@ FIGURES = "figures"
 
 def command(
     folder: Annotated[Path, typer.Argument(help="A run folder.")],
+    kind: Annotated[Literal["png", "svg", "pdf"], typer.Option("--format", help="Kind of the files.")] = "png",
+    column: Annotated[bool, typer.Option("--column", help="At the width of a paper's column (86 mm).")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the paths of the figures as JSON.")] = False,
 ) -> int:
     """Draw the figures of a run folder again."""
     from lfa.deploy.recording.mcap_reader import look_into
 
     look_into(folder)
-    drawn = [str(path) for path in draw(folder)]
+    drawn = [str(path) for path in draw(folder, kind, column=column)]
     print(msgspec.json.encode({"figures": drawn}).decode() if as_json else "\n".join(drawn))
     return 0
 
 
-def draw(folder: Path) -> list[Path]:
-    """Draw all figures of the run in `folder` and return their paths."""
+def draw(folder: Path, kind: str = "png", *, column: bool = False) -> list[Path]:
+    """Draw all figures of the run in `folder` as files of `kind`, and return their paths."""
     from lfa.deploy.analysis.run_data import Run
     from lfa.deploy.view.figures import catalogue
 
@@ -33,6 +35,6 @@ def draw(folder: Path) -> list[Path]:
     (folder / FIGURES).mkdir(exist_ok=True)
     paths = []
     for name, *_ in catalogue.FIGURES:
-        paths.append(folder / FIGURES / f"{name}.png")
-        paths[-1].write_bytes(catalogue.png(catalogue.drawn(name, run)))
+        paths.append(folder / FIGURES / f"{name}.{kind}")
+        paths[-1].write_bytes(catalogue.saved_as(catalogue.drawn(name, run, column=column), kind))
     return paths

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle, Polygon
 
 from lfa.deploy.analysis import tracking_errors
 from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.recording.mcap_reader import Array
 from lfa.deploy.view.figures.style import label, look
 from lfa.deploy.view.figures.time_panels import POINTS_MAX
 from lfa.world.description.terrain import patches_of
@@ -17,6 +18,8 @@ from lfa.world.description.terrain import patches_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+LABEL_M = 0.8
+"""Least distance [m] between two times on the map: nearer ones would be printed over each other."""
 STANCES = 7
 """Number of times at which the whole team is shown."""
 
@@ -27,8 +30,9 @@ def path_flow(figure: FigureBase, run: Run) -> None:
     for robot, rows in run.seen.truth.items():
         step = max(1, rows.shape[0] * len(run.seen.truth) // POINTS_MAX)
         axes.plot(rows[::step, 1], rows[::step, 2], label=label(run, robot), linewidth=1.3, **look(run, robot))
+    labels: list[Array] = []
     for t in np.linspace(0.0, run.seen.end_s, STANCES):
-        _stance(axes, run, float(t))
+        _stance(axes, run, float(t), labels)
     goal = run.scenario.mission.goal_m
     axes.plot(*goal, marker="*", markersize=14, color="black", linestyle="none", label="goal", zorder=5)
     axes.set(title=f"Path flow: {run.scenario.title}", xlabel="x in map [m]", ylabel="y in map [m]", aspect="equal")
@@ -62,8 +66,8 @@ def _ground(axes: Axes, run: Run) -> None:
             axes.add_patch(Circle((x, y), obstacle.radius_m or 0.0, facecolor="#AAAAAA", edgecolor="#444444", zorder=2))
 
 
-def _stance(axes: Axes, run: Run, t: float) -> None:
-    """Draw the pose of each robot at `t` [s], and a line to its predecessor."""
+def _stance(axes: Axes, run: Run, t: float, labels: list[Array]) -> None:
+    """Draw the pose of each robot at `t` [s], a line to its predecessor, and the time where none stands in `labels`."""
     at = {robot: rows[min(int(np.searchsorted(rows[:, 0], t)), rows.shape[0] - 1)]
           for robot, rows in run.seen.truth.items()}  # fmt: skip
     for robot, row in at.items():
@@ -76,6 +80,7 @@ def _stance(axes: Axes, run: Run, t: float) -> None:
         colour = look(run, robot)["color"]
         axes.plot(row[1], row[2], marker=(3, 0, float(np.degrees(row[3])) - 90.0), markersize=8, color=colour, zorder=4)
     lowest = min(at.values(), key=lambda row: float(row[2]), default=None)
-    if lowest is not None:
-        axes.annotate(f"{t:.0f} s", (lowest[1], lowest[2]), xytext=(0, -14), textcoords="offset points", fontsize=7.5,
-                      ha="center", color="#333333", zorder=5)  # fmt: skip
+    if lowest is not None and all(np.hypot(*(lowest[1:3] - there)) > LABEL_M for there in labels):
+        labels.append(lowest[1:3])
+        axes.annotate(f"{t:.0f} s", (lowest[1], lowest[2]), xytext=(0, -14), textcoords="offset points",
+                      fontsize="small", ha="center", color="#333333", zorder=5)  # fmt: skip

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from matplotlib import colormaps
-
 from lfa.deploy.analysis.run_data import Run
+from lfa.deploy.robot_colours import PALETTE, as_hex, robot_colour
 
-# Palette of Okabe and Ito.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+COLOURS = tuple(map(as_hex, PALETTE))
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
 LEGEND_MAX = 12
 """Maximum number of robots that a legend or an axis names."""
@@ -25,7 +23,7 @@ def look(run: Run, robot: int) -> dict[str, Any]:
     n = run.robots.index(robot) if robot in run.robots else 0
     if len(run.robots) <= len(COLOURS):
         return {"color": COLOURS[n], "linestyle": STYLES[n]}
-    return {"color": colormaps["viridis"](0.95 * n / (len(run.robots) - 1)), "linestyle": "-"}
+    return {"color": as_hex(robot_colour(n, len(run.robots))), "linestyle": "-"}
 
 
 def label(run: Run, robot: int) -> str | None:

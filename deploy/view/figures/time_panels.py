@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 POINTS_MAX = 8000  # sum over all lines of one panel
 STRIP = "#555555"
+TOGETHER_SHARE = 0.02
+"""Share of a run's duration within which marks share one text: nearer ones would be printed over each other."""
 
 
 def plot(axes: Axes, run: Run, of_robots: dict[int, tuple[Array, Array]]) -> None:
@@ -28,11 +30,11 @@ def plot(axes: Axes, run: Run, of_robots: dict[int, tuple[Array, Array]]) -> Non
 
 def finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True, legend: bool = True) -> None:
     """Add title, units, marks for faults, role switches and orientation requests, and a legend of labelled lines."""
-    for at_s, text, style in _marks(run):
+    for at_s, text, style in marks(run):
         axes.axvline(at_s, color="black", linewidth=0.8, linestyle=style)
         if legend:
             axes.annotate(text, (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -9),
-                          textcoords="offset points", fontsize=7.5, rotation=90, va="top")  # fmt: skip
+                          textcoords="offset points", fontsize="small", rotation=90, va="top")  # fmt: skip
     axes.set(title=title, ylabel=y_label, xlim=(0.0, max(run.seen.end_s, 1.0)))
     if last:
         axes.set_xlabel("time [s]")
@@ -51,10 +53,10 @@ def strip(axes: Axes, run: Run) -> None:
             spans, (place - 0.35, 0.7), facecolors=look(run, robot)["color"], edgecolor=STRIP, linewidth=0.4
         )
     axes.set(ylim=(len(shown) - 0.4, -0.6), xlim=(0.0, max(run.seen.end_s, 1.0)), xlabel="time [s]")
-    axes.set_yticks(range(len(shown)), [f"robot {robot}" for robot in shown], fontsize=7.5)
-    axes.set_title("avoiding", fontsize=8.0, loc="left", pad=2.0)
+    axes.set_yticks(range(len(shown)), [f"robot {robot}" for robot in shown], fontsize="small")
+    axes.set_title("avoiding", fontsize="small", loc="left", pad=2.0)
     axes.grid(visible=False, axis="y")
-    for at_s, _, style in _marks(run):
+    for at_s, _, style in marks(run):
         axes.axvline(at_s, color="black", linewidth=0.8, linestyle=style)
 
 
@@ -78,9 +80,16 @@ def _unwrapped(t: Array, y: Array) -> tuple[Array, Array]:
     return np.insert(t, over, t[over]), np.insert(y, over, np.nan)
 
 
-def _marks(run: Run) -> list[tuple[float, str, str]]:
-    """Return time [s], text and line style of each mark."""
+def marks(run: Run) -> list[tuple[float, str, str]]:
+    """Return time [s], text and line style of each mark, in time; what happens together shares one text."""
     found = [(fault.at_s, f"{fault.kind} {fault.target}", ":") for fault in event_log.faults(run.events)]
     found += [(reign.from_s, f"robot {reign.robot_id} leads", "-") for reign in run.reigns[1:]]
     asked = (line for line in event_log.of_kind(run.events, "formation") if event_log.asked_by_leader(line))
-    return found + [(float(line["t"]), f"to {line.get('side', '')}", "--") for line in asked]
+    found += [(float(line["t"]), f"to {line.get('side', '')}", "--") for line in asked]
+    together: list[tuple[float, str, str]] = []
+    for at_s, text, style in sorted(found):
+        if together and at_s - together[-1][0] < TOGETHER_SHARE * max(run.seen.end_s, 1.0):
+            together[-1] = (together[-1][0], f"{together[-1][1]}, {text}", together[-1][2])
+        else:
+            together.append((at_s, text, style))
+    return together

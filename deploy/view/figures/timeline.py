@@ -79,7 +79,7 @@ def _labels(
     axes: Axes, texts: Sequence[tuple[float, str]], lowest: float, end_s: float, weight: str = "normal"
 ) -> None:
     for (at_s, text), level in zip(texts, levels(texts, end_s / LETTERS_WIDE, LINES), strict=True):
-        axes.annotate(text, (at_s, lowest + LINE * level), xytext=(2, 0), textcoords="offset points", fontsize=7.5,
+        axes.annotate(text, (at_s, lowest + LINE * level), xytext=(2, 0), textcoords="offset points", fontsize="small",
                       weight=weight, zorder=4,
                       bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})  # fmt: skip
 

@@ -1,7 +1,8 @@
-"""`lfa report`: write one run, or two side by side, as a self-contained HTML page without network or scripts."""
+"""`lfa report`: write one run, or two side by side, as one HTML page that asks for nothing else."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,7 @@ import msgspec
 import typer
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import write_line
 
 REPORT = "report.html"
 
@@ -21,6 +23,7 @@ def command(
 ) -> int:
     folders = [folder] if other is None else [folder, other]
     path = out or folder / (REPORT if other is None else f"report-vs-{other.resolve().name}.html")
+    write_line("reading the recording and drawing the figures ...", sys.stderr)
     page = html(folders)
     try:
         path.write_text(page, encoding="utf-8")

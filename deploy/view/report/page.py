@@ -10,15 +10,17 @@ from pathlib import Path
 from lfa.deploy.analysis import summary
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.analysis.summary import RobotSummary, Summary
+from lfa.deploy.analysis.tracking_errors import SETTLED_M
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import SCENARIO
 from lfa.deploy.view.figures import catalogue
 from lfa.deploy.view.figures.catalogue import FIGURES
 from lfa.deploy.view.report import health
+from lfa.deploy.view.report.charts import charts_of
 from lfa.deploy.view.report.html import NONE, Cells, in_deg, in_mm, in_ms, in_s, short, table
 
-CSS = Path(__file__).with_name("report.css")
+HERE = Path(__file__).parent
 ROWS_MAX = 150
 
 
@@ -35,10 +37,16 @@ def of(runs: Sequence[Run]) -> str:
     two = ' class="two"' if len(runs) == 2 else ""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>lfa: {escape(title)}</title>'
-        f'<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
-        f"<style>{CSS.read_text(encoding='utf-8')}</style></head>"
-        f"<body{two}><nav>{links}</nav>{''.join(parts)}</body></html>\n"
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
+        f"<style>{_text('uplot/uPlot.min.css')}{_text('report.css')}</style></head>"
+        f"<body{two}><nav>{links}</nav>{''.join(parts)}"
+        f"<script>{_text('uplot/uPlot.iife.min.js')}</script><script>{_text('charts.js')}</script></body></html>\n"
     )
+
+
+def _text(name: str) -> str:
+    """Return a script or style sheet that lies beside this file: the page asks for nothing from elsewhere."""
+    return (HERE / name).read_text(encoding="utf-8")
 
 
 def _side_by_side(runs: Sequence[Run], sums: Sequence[Summary], section: Callable[[Run, Summary], str]) -> str:
@@ -53,12 +61,15 @@ def _head(run: Run, s: Summary) -> str:
     good = s.exit_code == 0
     badge = f'<span class="badge {"ok" if good else "bad"}">{"✓" if good else "✗"} {escape(s.outcome)}</span>'
     reason = "" if s.reason is None else f' <span class="soft">{escape(s.reason)}</span>'
-    worst = max((r.distance_error_rms_m for r in s.robots if r.distance_error_rms_m is not None), default=None)
+    settled = [r for r in s.robots if r.distance_error_rms_m is not None]
+    worst = max(settled, key=lambda r: r.distance_error_rms_m or 0.0, default=None)
     took = [f.first_command_ms for f in s.failovers if f.first_command_ms is not None]
     tiles = (
         ("duration", f"{s.sim_duration_s:.1f} s"),
         ("times real time", f"{s.real_time_factor:g}"),
-        ("largest rms distance error", in_mm(worst)),
+        ("largest rms distance error", NONE)
+        if worst is None
+        else (f"rms distance error of robot {worst.id}, the largest", in_mm(worst.distance_error_rms_m)),
         ("leaders", len(s.leaders)),
         ("slowest failover", f"{max(took):.0f} ms" if took else NONE),
         ("contacts", sum(r.contacts for r in s.robots)),
@@ -67,8 +78,18 @@ def _head(run: Run, s: Summary) -> str:
     about = f"{s.scenario}, {s.mode}, seed {s.seed}, {len(s.robots)} robots, in {run.folder.name}"
     return (
         f"<h1>{escape(run.scenario.title)}</h1><p class='soft'>{escape(about)}</p>"
-        f'<p>{badge}{reason}</p><div class="tiles">{shown}</div>{_assertions(s)}'
+        f'{_made(s)}<p>{badge}{reason}</p><div class="tiles">{shown}</div>{_assertions(s)}'
     )
+
+
+def _made(s: Summary) -> str:
+    """Return what made the run, where, and by which command."""
+    p = s.provenance
+    if p is None:
+        return ""
+    at = "" if p.commit is None else f" (commit {p.commit})"
+    text = f"lfa {p.version}{at}, Python {p.python}, {p.system}, on {p.host}"
+    return f"<p class='soft small'>{escape(text)}<br><code>{escape(p.command)}</code></p>"
 
 
 def _assertions(s: Summary) -> str:
@@ -81,8 +102,10 @@ def _robots(_run: Run, s: Summary) -> str:
     heads = ("robot", "at the end", "distance error rms", "largest", "orientation rms", "to body (paper)",
              "heading rms", "settled after", "contacts", "obstacles met")  # fmt: skip
     return table(heads, [_robot(r) for r in s.robots], text=(1, 9)) + (
-        "<p class='soft'>Rms values from when a follower had settled, with avoidance and formation changes left out; "
-        "the largest with nothing left out.</p>"
+        "<p class='soft'>All errors from when a follower had settled, that is, stays within "
+        f"{1000.0 * SETTLED_M:.0f} mm of its distance; rms values with avoidance and formation changes left out, the "
+        "largest with nothing left out. The curves below show everything; beside each name is the rms value of this "
+        "table. – : a leader, or a robot that never settled.</p>"
     )
 
 
@@ -94,10 +117,12 @@ def _robot(r: RobotSummary) -> Cells:
 
 
 def _figure(name: str) -> Callable[[Run, Summary], str]:
-    def draw(run: Run, _s: Summary) -> str:
+    def draw(run: Run, s: Summary) -> str:
         data = b64encode(catalogue.svg(catalogue.drawn(name, run))).decode()
         title = next(title for known, _, title, _ in FIGURES if known == name)
-        return f'<figure><img alt="{escape(title)}" src="data:image/svg+xml;base64,{data}"></figure>'
+        charts = charts_of(name, run, s)
+        drawn = ' class="drawn"' if charts else ""
+        return f'{charts}<figure{drawn}><img alt="{escape(title)}" src="data:image/svg+xml;base64,{data}"></figure>'
 
     return draw
 

@@ -18,6 +18,7 @@ import rerun as rr
 
 from lfa.deploy.client.team_status import told
 from lfa.deploy.client.term_count import TermCount
+from lfa.deploy.robot_colours import Colour, robot_colour
 from lfa.deploy.view.rerun import static_scene
 from lfa.protocol.geometry import wrap
 from lfa.protocol.mission import Mission
@@ -38,7 +39,6 @@ RADIO_S = 10.0
 LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
 PLANNED = (204, 121, 167)
 ROLE_COLOURS = {"leader": LEADS, "follower": FOLLOWS, "waiting": WAITS, "gone": GONE}
-PALETTE = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (90, 90, 90))
 ALARMS = ("fault", "contact", "failed", "died", "slowed")
 
 
@@ -61,6 +61,7 @@ class Scene:
         self._rows: dict[tuple[str, str], list[tuple[float, Any]]] = {}
         self._mission_known = False
         self._named = True
+        self._colours: dict[int, Colour] = {}
 
     # --- static entities -------------------------------------------------------------------------------------------
 
@@ -87,7 +88,7 @@ class Scene:
 
     def _dress(self, robot: int, n: int, of: int) -> None:
         """Set the static colours, widths and names of a robot's entities."""
-        colour = PALETTE[n] if of <= len(PALETTE) else _shade(n / (of - 1))
+        colour = self._colours[robot] = robot_colour(n, of)
         for series in ("errors/distance", "errors/bearing", "errors/heading", "speeds", "processes/lag", "radio"):
             self._always(f"{series}/robot{robot}", rr.SeriesLines(colors=colour, names=f"robot {robot}", widths=1.5))
         names, colours = list(ROLE_COLOURS), list(ROLE_COLOURS.values())
@@ -279,10 +280,3 @@ _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "strip": lambda rows: rr.LineStrips2D.columns(strips=rows),
     "scalar": lambda rows: rr.Scalars.columns(scalars=rows),
 }
-
-
-def _shade(part: float) -> tuple[int, int, int]:
-    """Return a colour from blue to yellow with growing lightness, distinguishable with any colour vision."""
-    dark, light = (40, 60, 140), (250, 220, 60)
-    red, green, blue = (round(a + part * (b - a)) for a, b in zip(dark, light, strict=True))
-    return red, green, blue

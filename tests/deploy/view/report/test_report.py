@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from lfa.deploy.run.simulate import run
 from lfa.deploy.view.figures.catalogue import FIGURES
 from lfa.deploy.view.figures.style import label
 from lfa.deploy.view.report import command, page
+from lfa.deploy.view.report.html import in_mm
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import load
 
@@ -57,8 +59,30 @@ def test_the_failover_and_the_fault_are_told(folder: Path) -> None:
 def test_the_page_asks_for_nothing_from_elsewhere(folder: Path) -> None:
     html = command.html([folder])
     assert not re.search(r'(src|href)="(?!data:|#)', html)
-    assert "<script" not in html
+    assert not re.search(r"<script[^>]*src", html)
     assert "url(" not in html
+    assert "The MIT License" in (page.HERE / "uplot" / "LICENSE").read_text()
+
+
+def test_tile_table_and_curve_say_the_same_of_an_error(folder: Path) -> None:
+    html = command.html([folder])
+    rms = {r.id: r.distance_error_rms_m for r in Run(folder).summary.robots if r.distance_error_rms_m is not None}
+    assert rms, "nobody settled: the claim is about nothing"
+    worst = max(rms, key=lambda robot: rms[robot])
+    assert f"<b>{in_mm(rms[worst])}</b>rms distance error of robot {worst}" in html
+    for robot, error_m in rms.items():
+        assert f"<td>{in_mm(error_m)}</td>" in html
+        assert f'"name":"robot {robot}, rms {in_mm(error_m)}"' in html
+
+
+def test_a_curve_keeps_its_spikes_and_its_holes(folder: Path) -> None:
+    run = Run(folder)
+    (packed, *_) = re.findall(r'<script type="application/json">(.*?)</script>', command.html([folder]))
+    for line, (robot, errors) in zip(json.loads(packed)["series"], run.errors.items(), strict=True):
+        assert line["name"].startswith(f"robot {robot}")
+        shown = [abs(y) for y in line["y"] if y is not None]
+        assert max(shown) == pytest.approx(1000.0 * float(abs(errors.distance).max()), rel=1e-3)
+        assert None in line["y"] or errors.t[0] < 0.05
 
 
 def test_two_runs_stand_side_by_side_and_are_subtracted(folder: Path, tmp_path: Path) -> None:
@@ -101,4 +125,5 @@ def test_a_browser_shows_it_without_a_complaint(folder: Path, tmp_path: Path) ->
     )
     assert shown.stdout.count("<img") == len(FIGURES)
     assert shown.stdout.count("<table") >= 5
+    assert shown.stdout.count('<div class="u-wrap"') == shown.stdout.count('class="chart"') == 5
     assert [line for line in shown.stderr.splitlines() if "CONSOLE" in line] == []
