@@ -120,7 +120,8 @@ NEEDS: dict[str, tuple[str, ...]] = {
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
-    "pyarrow": "campaign", "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove",
+    "pyarrow": "campaign", "submitit": "slurm", "distributed": "dask",
+    "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove",
 }  # fmt: skip
 """Modules outside the base install, each with the extra that installs it."""
 

@@ -45,7 +45,8 @@ ORDER = (
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/robot",
     "deploy/run", "deploy/simulate", "deploy/examples", "deploy/fuzz", "deploy/fleet/plan", "deploy/config",
     "deploy/fleet/security", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/bench/harness",
-    "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/commands", "deploy/bench/control_cases",
+    "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/engines", "deploy/campaign/commands",
+    "deploy/bench/control_cases",
     "deploy/bench", "deploy/cli", "deploy/completion",
 )  # fmt: skip
 """Rooms: a folder, or a file that lies directly in a package. Each imports only rooms that stand before it, so there is

@@ -63,20 +63,25 @@ class CampaignFolder:
         """Return the names of the items whose results are here; each file is read. Raises Refused for a damaged one."""
         return {result.name for result in self.results()}
 
+    def names_there(self) -> set[str]:
+        """Return the names of the result files; none is read."""
+        return {path.stem for path in (self.path / RESULTS).glob("*.json")}
+
     def results(self) -> list[StoredResult]:
         """Return all results that are here, in the order of the campaign. Raises Refused for one that is damaged."""
-        there = {path.stem for path in (self.path / RESULTS).glob("*.json")}
+        there = self.names_there()
         strange = there - set(self.campaign.names)
         if strange:
             raise Refused(f"{self._file(min(strange))}: no result of this campaign: must lie in another folder")
-        return [self._read(name) for name in self.campaign.names if name in there]
+        return [self.read(name) for name in self.campaign.names if name in there]
 
     def store(self, name: str, result: ItemResult) -> None:
         """Write the result of an item, in one step for every reader. Raises Refused when the disk does not take it."""
         stored = StoredResult(name, self.campaign.plan, self.campaign.lfa, result.complaint, result.data)
         _write(self._file(name), msgspec.json.encode(stored, order="deterministic") + b"\n")
 
-    def _read(self, name: str) -> StoredResult:
+    def read(self, name: str) -> StoredResult:
+        """Return one result. Raises Refused for one that is damaged or of another campaign."""
         path = self._file(name)
         try:
             found = read_json(path, StoredResult)

@@ -9,18 +9,30 @@ import typer
 
 from lfa.agents.following.plugin import add_controller_file
 from lfa.deploy.campaign.commands.merge import merge
-from lfa.deploy.campaign.commands.sweep import carry_out
-from lfa.deploy.campaign.shard import WHOLE, parse_shard
+from lfa.deploy.campaign.commands.sweep import Remote, carry_out, carry_out_on
+from lfa.deploy.campaign.engines.kubernetes import manifest
+from lfa.deploy.campaign.shard import SHARDS_MAX, WHOLE, parse_shard
 from lfa.deploy.campaign.sweep.plan import RUNS_MAX, read_plan
 from lfa.protocol.errors import Refused
 
 MERGE = "merge"
+LOCAL = "local"
+SHARES = 4
+MINUTES = 60
 
 
 def command(
     words: Annotated[list[str], typer.Argument(metavar="PLAN | merge DIR...", help="A plan, or folders to merge.")],
-    jobs: Annotated[int, typer.Option(help="Number of parallel processes.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of parallel processes, of each share.")] = 1,
     shard: Annotated[str | None, typer.Option(help="Do only this share of the runs: 3/16.")] = None,
+    on: Annotated[
+        str, typer.Option(help="Where: local, slurm, dask://HOST:PORT, or kubernetes (prints a Job).")
+    ] = LOCAL,
+    shards: Annotated[int, typer.Option(help="With --on: number of shares.")] = SHARES,
+    minutes: Annotated[int, typer.Option(help="With --on slurm: time limit of a share [min].")] = MINUTES,
+    slurm: Annotated[
+        list[str] | None, typer.Option(help="With --on slurm: an option of sbatch, partition=short. Repeatable.")
+    ] = None,
     controller: Annotated[
         list[str] | None, typer.Option(help="Load a controller that the plan names: FILE.py:Class. Repeatable.")
     ] = None,
@@ -35,7 +47,28 @@ def command(
         return merge([Path(word) for word in words[1:]], out, as_json)
     if len(words) != 1:
         raise Refused(f"lfa campaign {' '.join(words)}: must be one plan, or merge DIR...")
+    if on != LOCAL and shard is not None:
+        raise Refused(f"--on {on} with --shard {shard}: must be one of the two")
+    if not 1 <= shards <= SHARDS_MAX or jobs < 1 or minutes < 1:
+        raise Refused(f"--shards {shards} --jobs {jobs} --minutes {minutes}: each must be at least 1")
+    share = WHOLE if shard is None else parse_shard(shard)
     for own_code in controller or ():
         add_controller_file(own_code)
-    share = WHOLE if shard is None else parse_shard(shard)
-    return carry_out(read_plan(Path(words[0]), max_runs), out, share, jobs, as_json)
+    path = Path(words[0])
+    plan = read_plan(path, max_runs)
+    if on == LOCAL:
+        return carry_out(plan, out, share, jobs, as_json)
+    if on == "kubernetes":
+        print(manifest(path, shards, jobs), end="")
+        return 0
+    more = [word for own_code in controller or () for word in ("--controller", str(Path(own_code).absolute()))]
+    remote = Remote(on, shards, jobs, minutes, _pairs(slurm or ()), [*more, "--max-runs", str(max_runs)])
+    return carry_out_on(remote, path, plan, out, as_json)
+
+
+def _pairs(texts: list[str] | tuple[()]) -> dict[str, str]:
+    """Return options of sbatch by name. Raises Refused for a text without a value."""
+    for text in texts:
+        if not text.partition("=")[2]:
+            raise Refused(f"--slurm {text}: must be like partition=short")
+    return {key: value for key, _, value in (text.partition("=") for text in texts)}

@@ -1,0 +1,1 @@
+"""Engines of others that shares of a campaign run on: Slurm by submitit, Dask, Kubernetes."""
