@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lfa.agents.chain_place import ChainPlace
+from lfa.agents.stop_listener import StopListener
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.machine.lease import Lease
@@ -13,12 +14,15 @@ from lfa.protocol.outbox import Outbox
 class CommandPublisher:
     """Publisher of `cmd_vel` for robot `robot_id`."""
 
-    def __init__(self, robot_id: int, outbox: Outbox, team: TeamState, lease: Lease, place: ChainPlace) -> None:
+    def __init__(
+        self, robot_id: int, outbox: Outbox, team: TeamState, lease: Lease, place: ChainPlace, stop: StopListener
+    ) -> None:
         self._id = robot_id
         self._outbox = outbox
         self._team = team
         self._lease = lease
         self._place = place
+        self._stop = stop
 
     def publish(self, twist: Twist, now: float, *, as_leader: bool) -> None:
         """Publish `twist`. The gateway's stamp is read before the lease is checked (lease.md section 5)."""
@@ -32,4 +36,5 @@ class CommandPublisher:
         term = lease.term if as_leader else lease.config.version.term
         holder = self._id if as_leader else self._place.first
         header = self._outbox.header("cmd_vel", now)
-        self._outbox.publish("cmd_vel", CmdVel(header, twist, term, holder, as_leader, sensors.gateway))
+        cmd = CmdVel(header, twist, term, holder, as_leader, sensors.gateway, self._stop.known)
+        self._outbox.publish("cmd_vel", cmd)

@@ -17,6 +17,7 @@ from lfa.agents.command_publisher import CommandPublisher
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
+from lfa.agents.stop_listener import StopListener
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
 from lfa.agents.team_state import TeamState
@@ -28,13 +29,15 @@ from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
 from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, Sensors
-from lfa.protocol.messages.team import FormationNote, ObstacleNote, OperatorNote, PoseStamped, TableRow
+from lfa.protocol.messages.stop import StopOrder, StopReport
+from lfa.protocol.messages.team import Ask, FormationNote, ObstacleNote, OperatorNote, PoseStamped, TableRow
 from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import PeerDown, PeerUp, Stop, Vitals
 from lfa.protocol.outbox import Outbox
 
+HardwareMessage = Sensors | Localization | LaserScan | GroundProfile
 TeamMessage = PoseStamped | TableRow | ObstacleNote | FormationNote
 EASE_S = 2.0 * CONTROL_PERIOD_S
 """Lease time [s] left beyond which a grant may wait for the next control step: each voter of a round would wake the
@@ -70,7 +73,8 @@ class RobotCore:
         me = Member(robot_id, outbox.incarnation)
         self.lease = Lease(me, mission, timing_of(mission.profile), now, floor, observer)
         self._place = ChainPlace(robot_id, self.lease)
-        self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place)
+        self._stop_listener = StopListener(robot_id, mission.robots, outbox)
+        self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place, self._stop_listener)
         self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
         self._reports = Reports(outbox, len(mission.robots))
         self._attendance = Attendance(robot_id, mission.robots)
@@ -81,7 +85,8 @@ class RobotCore:
         self._slow_scans = False
         """Input of the robot's own hardware that was reported as lost; empty for none."""
         self._pending_release = False
-        self.interests = with_mission(outbox.fleet, outbox.name, None)
+        self._asks = not self._stop_listener.memory.certain
+        self.interests = with_mission(outbox.fleet, outbox.name, None, asks=self._asks)
         self._event("mission", now, {"version": mission.version, "robots": list(mission.robots)})
 
     @property
@@ -119,17 +124,8 @@ class RobotCore:
         """Process a message or a local event."""
         lease, navigator = self.lease, self.navigator
         match message:
-            case Sensors():
-                self._team.hear_sensors(message, now)
-                navigator.estimator.sensors(message, now)
-                self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
-                lease.told_of(message.agent)
-            case Localization():
-                navigator.estimator.localization(message, now)
-            case LaserScan():
-                navigator.see(message, now)
-            case GroundProfile():
-                navigator.update_ground(message, now)
+            case Sensors() | Localization() | LaserScan() | GroundProfile():
+                self._hear_hardware(message, now)
             case LeaseNote():
                 source = robot_id_of(message.header.sender)
                 if source is not None:
@@ -144,12 +140,31 @@ class RobotCore:
                     self._apply(lease.hint(peer, message.incarnation, isinstance(message, PeerUp), now), now)
             case OperatorNote():
                 self._obey(message, now)
+            case StopOrder() | StopReport() | Ask():
+                self._stop_listener.receive(message, now)
             case Vitals():
                 self._attendance.update(lease, self._team, now)
                 outside = self._attendance.text()
                 self._reports.status(message, navigator, self._team, lease, self._role(), outside, now)
             case Stop():
                 self._stop(now)
+
+    def _hear_hardware(self, message: HardwareMessage, now: float) -> None:
+        """Update the state from a message of the robot's own hardware."""
+        lease, navigator = self.lease, self.navigator
+        match message:
+            case Sensors():
+                self._team.hear_sensors(message, now)
+                self._stop_listener.hear_sensors(message)
+                navigator.estimator.sensors(message, now)
+                self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
+                lease.told_of(message.agent)
+            case Localization():
+                navigator.estimator.localization(message, now)
+            case LaserScan():
+                navigator.see(message, now)
+            case GroundProfile():
+                navigator.update_ground(message, now)
 
     def _hear_robot(self, robot: int, message: TeamMessage, now: float) -> None:
         """Update the state from a message of another robot."""
@@ -199,6 +214,7 @@ class RobotCore:
         except msgspec.ValidationError:
             return
         self._event("forget", now, {"robots": [member.id for member in lost]})
+        self._stop_listener.memory.forget(member.id for member in lost)
         self._apply(self.lease.request_forget(lost, now), now)
 
     def _stop(self, now: float) -> None:
@@ -241,9 +257,14 @@ class RobotCore:
         before = None if navigator.predecessor is None else navigator.predecessor.robot
         navigator.follow_robot(ahead, len(self._place.ids) - 1)
         if ahead != before:
-            self.interests = with_mission(self._outbox.fleet, self._outbox.name, ahead)
+            self._subscribe()
             role = Role.FOLLOWER if ahead is not None else Role.WAITING
             self._event("role", now, {"role": role.value, "predecessor": ahead}, self.lease.config.version.term)
+
+    def _subscribe(self) -> None:
+        ahead = None if self.navigator.predecessor is None else self.navigator.predecessor.robot
+        self._asks = not self._stop_listener.memory.certain
+        self.interests = with_mission(self._outbox.fleet, self._outbox.name, ahead, asks=self._asks)
 
     def _hand_over(self, now: float) -> None:
         self._commands.publish(STILL, now, as_leader=False)
@@ -256,13 +277,17 @@ class RobotCore:
         lease, navigator = self.lease, self.navigator
         self.defer_grants = lease.is_settled(now + EASE_S)
         self._watch_inputs(now)
+        self._stop_listener.step(now)
+        if self._asks == self._stop_listener.memory.certain:
+            self._subscribe()
         role = Role.WAITING if self._pending_release else self._role()
         known = navigator.estimator.pose_at(now)
         if known is None:
             self._control_without_pose(role, now)
             return
         pose, twist = known
-        command = navigator.drive(role, self._place.ids, pose, twist, now)
+        drives = Role.WAITING if self._stop_listener.stands else role
+        command = navigator.drive(drives, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
         told = navigator.published(twist)
         for kind, data in navigator.leading.drain():

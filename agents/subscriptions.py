@@ -11,9 +11,13 @@ def before_the_mission(fleet: str) -> frozenset[str]:
     return frozenset({f"lfa/{fleet}/*/mission", f"lfa/{fleet}/*/operator"})
 
 
-def with_mission(fleet: str, own: str, predecessor: int | None) -> frozenset[str]:
-    """Return the interests of robot `own`: the team, its own hardware, and the pose of the robot that it follows."""
-    others = {f"lfa/{fleet}/*/{topic}" for topic in ("table", "formation", "obstacles")}
+def with_mission(fleet: str, own: str, predecessor: int | None, *, asks: bool) -> frozenset[str]:
+    """Return the interests of robot `own`: the team, its own hardware, and the pose of the robot that it follows.
+
+    `asks`: it also hears what other agents answer about the fleet stop.
+    """
+    topics = ("table", "formation", "obstacles", "stop", "ask", *(("stop_known",) if asks else ()))
+    others = {f"lfa/{fleet}/*/{topic}" for topic in topics}
     lease = {f"lfa/{fleet}/*/lease/{to}" for to in (TO_ALL, TO_HELLO, own)} | {alive_key(fleet, "*", "*")}
     hardware = {key(fleet, own, topic) for topic in ("sensors", "localization", "scan", "ground")}
     pose = set() if predecessor is None else {f"lfa/{fleet}/{robot_name(predecessor)}/{TOPIC['pose'].name}"}

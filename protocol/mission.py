@@ -139,6 +139,9 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     leading: Leading = Leading()
     limits: Limits = Limits()
     radius_m: float = 0.15
+    operator_timeout_s: float | None = None
+    """Silence [s] of all operators (`lfa watch`, `lfa teleop`, a bridge) after which every robot stands, until one is
+    there again. None: a team needs no operator."""
     version: int = 1
 
     @property

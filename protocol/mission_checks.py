@@ -109,6 +109,7 @@ def _ranges(mission: Mission) -> Iterator[Mistake]:
         Range("mission.formation.separation_m", formation.separation_m, apart_m, 100.0, "mission.radius_m"),
         Range("mission.formation.angle_rad", formation.angle_rad, 0.0, pi / 2),
         Range("mission.formation.heading_filter_m", formation.heading_filter_m, 0.0, 100.0),
+        Range("mission.operator_timeout_s", mission.operator_timeout_s or 1.0, 0.5, 3600.0),
         Range("mission.continue_after_s", mission.continue_after_s, 2.0, 3600.0),
         Range("mission.following.delay_s", mission.following.delay_s or 0.0, 0.0, 0.8),
         Range("mission.limits.v_max_mps", limits.v_max_mps, 0.01, inf),

@@ -16,6 +16,7 @@ from lfa.protocol.messages.consensus import LeaseNote
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, Truth
+from lfa.protocol.messages.stop import StopOrder, StopReport, StopState
 from lfa.protocol.messages.team import (
     Ask,
     Event,
@@ -67,7 +68,7 @@ ANYONE = (*TEAM, "operator", "world")
 #         name            type             publishers             rate  state  wakes  priority      timeout
 TOPICS: tuple[Topic, ...] = (
     Topic("mission",      MissionNote,   ("operator", "world"), None, False, True,  "prompt",     None),
-    Topic("ask",          Ask,           TEAM,                  None, False, True,  "prompt",     None),
+    Topic("ask",          Ask,           (*TEAM, "operator"),   None, False, True,  "prompt",     None),
     Topic("pose",         PoseStamped,   ("agent",),            50.0, True,  False, "real_time",  0.5),
     Topic("table",        TableRow,      ("agent",),            2.0,  True,  False, "data",       3.0),
     Topic("tracking",     Tracking,      ("agent",),            25.0, True,  False, "background", 1.0),
@@ -77,6 +78,9 @@ TOPICS: tuple[Topic, ...] = (
     Topic("obstacles",    ObstacleNote,  ("agent",),            None, False, False, "data",       None),
     Topic("plan",         PlanNote,      ("agent",),            5.0,  False, False, "background", None),
     Topic("operator",     OperatorNote,  ("operator",),         None, False, True,  "prompt",     None),
+    Topic("stop",         StopOrder,     ("operator",),         None, False, True,  "real_time",  None),
+    Topic("stop_state",   StopState,     ("driver",),           None, False, True,  "real_time",  None),
+    Topic("stop_known",   StopReport,    ("agent",),            None, False, True,  "prompt",     None),
     Topic("status",       Status,        TEAM,                  1.0,  True,  False, "background", 3.0),
     Topic("event",        Event,         ANYONE,                None, False, False, "background", None),
     Topic("sensors",      Sensors,       ("driver",),           50.0, True,  False, "real_time",  0.2),

@@ -26,14 +26,14 @@ ORDER = (
     "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/clock",
     "protocol/incarnations",
     "protocol/names", "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages",
-    "protocol/node", "protocol/topics", "protocol/outbox", "protocol/lease", "protocol/lease/machine",
-    "protocol/witness", "protocol/transport", "protocol/runtime",
+    "protocol/node", "protocol/topics", "protocol/outbox", "protocol/fleet_stop", "protocol/lease",
+    "protocol/lease/machine", "protocol/witness", "protocol/transport", "protocol/runtime",
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
     "agents/leading", "agents/navigator", "agents/stuck_policy", "agents/telemetry", "agents/attendance",
-    "agents/chain_place", "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent",
-    "agents/cli",
+    "agents/chain_place", "agents/stop_listener", "agents/command_publisher", "agents/subscriptions",
+    "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
     "world/virtual_time", "world/simulator", "world/cli",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from math import atan2
 
+from lfa.protocol.fleet_stop.answers import StopAnswers
 from lfa.protocol.geometry import TAU, Pose2D, Twist, wrap
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope
 from lfa.protocol.outbox import Outbox
@@ -27,10 +29,17 @@ class RobotHardware:
     """Gateway and sensors between an agent and its simulated body. `now` is the world's monotonic time [s]."""
 
     def __init__(self, fleet: str, robot_id: int, scenario: Scenario, seed: int, incarnation: int, now: float) -> None:
-        noise = scenario.world.noise
+        noise, mission = scenario.world.noise, scenario.mission
         self.id = robot_id
         self.name = robot_name(robot_id)
-        self.gateway = Gateway(robot_id, incarnation, timing_of(scenario.mission.profile), now, scenario.mission.limits)
+        self.gateway = Gateway(
+            robot_id,
+            incarnation,
+            timing_of(mission.profile),
+            now,
+            mission.limits,
+            mission.operator_timeout_s,
+        )
         self.odometry = WheelOdometry(noise, seed, robot_id)
         self._localizer = Localizer(noise, seed, robot_id)
         self._range_noise = RangeNoise(noise, scenario.world.lidar, seed, robot_id)
@@ -38,6 +47,7 @@ class RobotHardware:
         self._lidar, self._ground = scenario.world.lidar, scenario.world.ground
         self._outbox = Outbox(fleet, WORLD_NAME, incarnation, self.name, first=1)
         self._gateway_outbox = Outbox(fleet, self.name, incarnation, first=1)
+        self._answers = StopAnswers(self._outbox)
         self._hung: dict[str, Twist] = {}
         """Parts that hang, and the twist at which the wheels were when each began to."""
         self._told: dict[str, tuple[Term, float]] = {}
@@ -74,6 +84,15 @@ class RobotHardware:
         note = LeaseNote(self._gateway_outbox.header("lease", now), self.gateway.fence(fence, now))
         return self._gateway_outbox.envelope("lease", note, TO_ALL)
 
+    def order(self, order: StopOrder, now: float) -> Envelope:
+        """Obey an operator's stop or resume, and return the answer."""
+        self.gateway.stop.order(order, now)
+        return self._answers.answer(self.gateway.stop, self.odometry.twist, now)
+
+    def come_to_rest(self, now: float) -> Envelope | None:
+        """Return the message that the wheels of this stopped robot rest, once after they have come to rest."""
+        return self._answers.at_rest(self.gateway.stop, self.odometry.twist, now)
+
     def sensors(self, stamp: float, now: float) -> Envelope:
         """Return the odometry as of `stamp`, with the gateway's stamp of `now`."""
         odometry, gateway = self.odometry, self.gateway
@@ -87,6 +106,8 @@ class RobotHardware:
             gateway.latched,
             sum(gateway.refused.values()),
             gateway.agent,
+            gateway.stop.known,
+            gateway.stop.holds(now),
         )
         odometry.redraw()
         return self._outbox.envelope("sensors", message)

@@ -17,6 +17,7 @@ from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, TrueObstacle, TrueRobot, Truth
+from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.messages.team import Ask, MissionNote, OperatorNote
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
@@ -116,7 +117,7 @@ class World:
         self._led: tuple[int, Term] | None = None
         """Robot and term of the leader command obeyed last, over all gateways; shows a return to an older term (I2)."""
         self.interests = frozenset(
-            {key(fleet, "*", "ask"), key(fleet, "*", "operator")}
+            {key(fleet, "*", topic) for topic in ("ask", "operator", "stop")}
             | {key(fleet, robot_name(robot_id), "cmd_vel") for robot_id in simulated}
             | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in simulated}
             | {alive_key(fleet, robot_name(robot_id), "*") for robot_id in simulated}
@@ -144,6 +145,8 @@ class World:
                 return self._command(received.key, message, now)
             case LeaseNote(body=Fence() as fence):
                 return self._fence(received.key, fence, now)
+            case StopOrder():
+                return [robot.order(message, now) for _, robot in self._simulated if not robot.hangs("driver")]
             case Sensors(twist=twist):
                 self._hear_real(received.key, None, twist, now)
             case Localization(pose_map=pose):
@@ -272,7 +275,9 @@ class World:
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
             sent.append(self._event("contact", None, data | {"t": self._step * self._dt_s}, stamp))
         if self._is_due(TOPIC["sensors"].rate_hz):
-            sent += [robot.sensors(stamp, now) for _, robot in simulated if not robot.hangs("driver")]
+            driven = [robot for _, robot in simulated if not robot.hangs("driver")]
+            sent += [robot.sensors(stamp, now) for robot in driven]
+            sent += [rests for robot in driven if (rests := robot.come_to_rest(now)) is not None]
         if self._is_due(TOPIC["localization"].rate_hz):
             fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated if not robot.hangs("localization"))
             sent += [fix for fix in fixes if fix is not None]

@@ -21,6 +21,7 @@ from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.consensus import GatewayStamp, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import NEVER_STOPPED
 from lfa.protocol.names import robot_name
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_host import NodeHost
@@ -81,7 +82,7 @@ def _command(scenario: Scenario, robot: int, number: int, now: float) -> bytes:
     turn = 0.3 if (number // 50 + robot) % 2 else -0.3
     first = scenario.mission.robots[0]
     header = Header(robot_name(robot), 1, number, now)
-    return encode(CmdVel(header, Twist(0.4, turn), TERM, first, robot == first, GatewayStamp(1, now)))
+    return encode(CmdVel(header, Twist(0.4, turn), TERM, first, robot == first, GatewayStamp(1, now), NEVER_STOPPED))
 
 
 def _real(scenario: Scenario) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from lfa.protocol.messages.consensus import Member
+from lfa.protocol.messages.stop import StopOrder, StopWord
 from lfa.protocol.messages.team import Ask, OperatorNote
 from lfa.protocol.node import Envelope
 from lfa.protocol.outbox import Outbox
@@ -22,6 +24,10 @@ class Operator:
 
     def command(self, command: str, now: float, **arguments: Any) -> Envelope:
         return self._outbox.envelope("operator", OperatorNote(self._outbox.header("operator", now), command, arguments))
+
+    def stop(self, word: StopWord | None, gateways: tuple[Member, ...], now: float) -> Envelope:
+        """Return an order to all gateways to stand or to go; without a `word` it only asks."""
+        return self._outbox.envelope("stop", StopOrder(self._outbox.header("stop", now), word, gateways))
 
     def ask(self, what: str, now: float) -> Envelope:
         """Return a request to publish `what`, such as the mission."""

@@ -14,12 +14,14 @@ from math import inf
 from typing import Any
 
 from lfa.deploy.robot.base import Base, Reading
+from lfa.protocol.fleet_stop.answers import StopAnswers
 from lfa.protocol.geometry import STILL
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, Sensors
+from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.messages.team import Ask, MissionNote
 from lfa.protocol.mission import Limits
 from lfa.protocol.names import robot_name
@@ -57,6 +59,7 @@ class Driver:
         self.interests = frozenset(
             {
                 key(fleet, "*", "mission"),
+                key(fleet, "*", "stop"),
                 key(fleet, robot_name(robot_id), "cmd_vel"),
                 key(fleet, "*", "lease", f"gateway{robot_id}"),
                 alive_key(fleet, robot_name(robot_id), "*"),
@@ -72,6 +75,9 @@ class Driver:
         self._outbox = Outbox(fleet, self.name, incarnation, first=1)
         self._hardware = Outbox(fleet, self.name, incarnation, robot_name(robot_id), first=1)
         self._gateway_outbox = Outbox(fleet, robot_name(robot_id), incarnation, first=1)
+        self._answers = StopAnswers(self._hardware)
+        self._twist = STILL
+        """Twist last measured."""
         self._led: Term | None = None
         self._told: dict[str, float] = {}
 
@@ -87,7 +93,12 @@ class Driver:
                     self.refusal = f"id {self._robot_id}: not in the mission, which has robots {list(mission.robots)}"
                     return []
                 self._gateway = Gateway(
-                    self._robot_id, self.incarnation, timing_of(mission.profile), now, mission.limits
+                    self._robot_id,
+                    self.incarnation,
+                    timing_of(mission.profile),
+                    now,
+                    mission.limits,
+                    mission.operator_timeout_s,
                 )
                 self._base = self._make_base(mission.limits, now)
                 self._next = now
@@ -96,6 +107,9 @@ class Driver:
             case LeaseNote(body=Fence() as fence) if gateway is not None:
                 note = LeaseNote(self._gateway_outbox.header("lease", now), gateway.fence(fence, now))
                 return [self._gateway_outbox.envelope("lease", note, TO_ALL)]
+            case StopOrder() as order if gateway is not None:
+                gateway.stop.order(order, now)
+                return [self._answers.answer(gateway.stop, self._twist, now)]
             case PeerUp(incarnation=incarnation) if gateway is not None:
                 self._cut_off = False
                 gateway.agent_up(incarnation, now)
@@ -137,6 +151,7 @@ class Driver:
                 self._base.drive(STILL, now)
 
     def _said(self, reading: Reading, gateway: Gateway, now: float) -> list[Envelope]:
+        self._twist = reading.twist
         sent: list[Message] = [
             Sensors(
                 self._hardware.header("sensors", now),
@@ -148,6 +163,8 @@ class Driver:
                 gateway.latched,
                 sum(gateway.refused.values()),
                 gateway.agent,
+                gateway.stop.known,
+                gateway.stop.holds(now),
             )
         ]
         topics = ["sensors"]
@@ -161,7 +178,9 @@ class Driver:
         if reading.contact is not None:
             sent.append(Contact(self._hardware.header("contact", now), reading.contact))
             topics.append("contact")
-        return [self._hardware.envelope(topic, message) for topic, message in zip(topics, sent, strict=True)]
+        said = [self._hardware.envelope(topic, message) for topic, message in zip(topics, sent, strict=True)]
+        rests = self._answers.at_rest(gateway.stop, self._twist, now)
+        return said if rests is None else [*said, rests]
 
     def _command(self, cmd: CmdVel, gateway: Gateway, now: float) -> list[Envelope]:
         """Pass `cmd` to the gateway; return an event for each new term led and, rate-limited, for refusals."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from math import isfinite
 
+from lfa.protocol.fleet_stop.latch import StopLatch
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.incarnations import is_later
 from lfa.protocol.lease.term_window import TermWindow
@@ -27,14 +28,25 @@ class Gateway:
     """Fence, stamp age check, deadman and latch of robot `robot_id`; `now` is the gateway's own monotonic time [s]."""
 
     def __init__(
-        self, robot_id: int, incarnation: int, timing: Timing, now: float, limits: Limits | None = None
+        self,
+        robot_id: int,
+        incarnation: int,
+        timing: Timing,
+        now: float,
+        limits: Limits | None = None,
+        operator_timeout_s: float | None = None,
     ) -> None:
-        """Create a gateway that is shut for `T_grant` (E13); `limits` are those of its drive, None without a drive."""
+        """Create a gateway that is shut for `T_grant` (E13); `limits` are those of its drive, None without a drive.
+
+        `operator_timeout_s`: as in the mission (E31).
+        """
         self.robot_id = robot_id
         self.incarnation = incarnation
         self.term_max: Term = NO_TERM
         self.refused: dict[str, int] = {}
         """Number of refused commands by reason."""
+        self.stop = StopLatch(robot_id, incarnation, operator_timeout_s)
+        """Fleet stop at this gateway: it obeys commands and knows their terms also while no wheel may turn."""
         self._window = TermWindow()
         self._deadman_s = timing.deadman_s
         self._limits = limits
@@ -67,6 +79,7 @@ class Gateway:
         if cmd.as_leader:
             self._latched = None
         self._twist, self._stamped_at = self._within_limits(cmd.twist), cmd.gateway.time
+        self.stop.hear_agent(cmd.stop)
         return None
 
     def _objection(self, cmd: CmdVel, now: float) -> str | None:
@@ -144,9 +157,12 @@ class Gateway:
         return GatewayStamp(self.incarnation, now)
 
     def twist(self, now: float) -> Twist:
-        """Return the velocity for the actuators: the last obeyed command, or a stop once the deadman has expired.
+        """Return the velocity for the actuators: the last obeyed command, or a stop once the deadman has expired, and
+        while the fleet is stopped (E28).
 
         The deadman counts from the time that the command echoes, not from its arrival: a delayed command could
         otherwise move the robot up to 2 D after its sender's lease, and T_grant allows for one D (I8).
         """
-        return self._twist if now - self._stamped_at <= self._deadman_s else STILL
+        if self.stop.holds(now) or now - self._stamped_at > self._deadman_s:
+            return STILL
+        return self._twist

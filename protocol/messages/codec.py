@@ -16,6 +16,7 @@ from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, Truth
+from lfa.protocol.messages.stop import StopOrder, StopReport, StopState
 from lfa.protocol.messages.team import (
     Ask,
     Event,
@@ -54,6 +55,9 @@ Message = (
     | HostStatus
     | HostOrder
     | LogLines
+    | StopOrder
+    | StopState
+    | StopReport
 )
 
 _encoder = msgspec.msgpack.Encoder()

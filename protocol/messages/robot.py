@@ -7,6 +7,7 @@ from msgspec import Struct
 from lfa.protocol.geometry import Number, Pose2D, Twist
 from lfa.protocol.messages.consensus import GatewayStamp, Term
 from lfa.protocol.messages.header import Count, Header, Step
+from lfa.protocol.messages.stop import UNCERTAIN, StopKnowledge
 
 
 class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
@@ -22,6 +23,10 @@ class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
     refused: int = 0
     agent: Count | None = None
     """Newest incarnation of the robot's agent that the gateway knows (E23); None before the first."""
+    stop: StopKnowledge = UNCERTAIN
+    """What the gateway knows of the fleet stop (E28)."""
+    stands: bool = False
+    """True while the gateway lets no wheel turn: stopped, not certain yet, or without an operator (E28, E31)."""
 
 
 class Localization(Struct, frozen=True, array_like=True, tag="localization"):
@@ -78,3 +83,5 @@ class CmdVel(Struct, frozen=True, array_like=True, tag="cmd_vel"):
     holder: Count
     as_leader: bool
     gateway: GatewayStamp
+    stop: StopKnowledge = UNCERTAIN
+    """What the agent knows of the fleet stop: a gateway that has restarted learns it from here (E30)."""

@@ -33,7 +33,9 @@ def test_of_what_the_world_says_an_agent_hears_its_own_sensors_and_the_mission_a
     owners = [TRUTH_OWNER, "world", *(robot_name(robot) for robot in (1, 2, 3, 4))]
     heard = {(owner, topic) for owner in owners for topic in of_world
              if any(matches(expression, key("f", owner, topic)) for expression in agent.interests)}  # fmt: skip
-    assert {topic for _, topic in heard} <= {"mission", "lease", *HARDWARE}
+    assert {topic for _, topic in heard} <= {"mission", "lease", "ask", *HARDWARE}, (
+        "ask: a driver asks for its mission as well"
+    )
     assert {owner for owner, topic in heard if topic in HARDWARE} == {"robot2"}
 
 

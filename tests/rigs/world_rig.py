@@ -12,6 +12,7 @@ from lfa.protocol.messages.consensus import GatewayStamp, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.stop import NEVER_STOPPED
 from lfa.protocol.messages.team import Event
 from lfa.protocol.node import Envelope, Received
 from lfa.world.description.load import draw, load
@@ -57,6 +58,7 @@ class Rig:
             holder=1,
             as_leader=as_leader,
             gateway=GatewayStamp(9, self.now),
+            stop=NEVER_STOPPED,
         )
         return self.hear(f"robot{robot_id}/cmd_vel", msgspec.structs.replace(cmd, **changes))
 

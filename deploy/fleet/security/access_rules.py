@@ -29,7 +29,7 @@ from lfa.protocol.topics import (
 
 FLOOD_RATIO, FLOOD_HZ_MIN = 10.0, 50.0
 """Rate limit of a topic: its ratio to the rate in the table, and its minimum [Hz]; the excess is dropped at ingress."""
-FLOOD_HZ = {"lease": 2000.0, "obstacles": 500.0, "ask": 50.0}
+FLOOD_HZ = {"lease": 2000.0, "obstacles": 500.0, "ask": 50.0, "stop_known": 100.0}
 """Rate limits [Hz] of topics published on events. Zenoh drops a message that follows the last one too soon, so a limit
 is also the minimum interval on a key: no agent publishes two of these at once. `event` has no limit: two at once are
 usual, and only operators read it."""

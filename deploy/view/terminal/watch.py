@@ -18,12 +18,15 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
+from lfa.deploy.client import stop_fleet
+from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.client.team_status import Board, RobotStatus
 from lfa.deploy.operate import fault, formation
 from lfa.deploy.terminal_text import cell, visible
-from lfa.protocol import clock
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
+from lfa.protocol.transport.message_bus import send
 
 if TYPE_CHECKING:
     from rich.console import Group, RenderableType
@@ -31,12 +34,15 @@ if TYPE_CHECKING:
 REFRESH_S = 1.0  # drawing takes some 9 ms: at 2 Hz it used a fifth of the total CPU budget
 FIRST_S = 1.3  # each process has published its status by then
 WIDTH_MIN, HEIGHT_MIN = 60, 12
-TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"})
+BEAT_S = 0.25
+"""Time [s] between two signs that an operator is there (E31)."""
+TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"}) | stop_fleet.TOPICS
 HEADS = ("robot", "role", "term", "ahead", "off mm", "turn °", "m/s", "age ms", "lag ms", "CPU %", "MiB", "state")
 SIDES = ("left", "right", "column", "zigzag")
 #        key   action
 DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
-HELP = "1-9 robot, k kill, s stop, c continue, x cut, h heal, f formation, q quit"
+STOPS = {" ": True, "r": False}
+HELP = "SPACE stop all, r resume; 1-9 robot, k kill, s stop, c continue, x cut, h heal, f formation, q quit"
 ROLE_STYLES = {"leader": "bold green", "follower": "", "waiting": "yellow", "silent": "bold red", "unheard": "dim"}
 
 
@@ -99,7 +105,7 @@ def _live(ear: Subscriber, board: Board) -> int:
         while True:
             _hear(ear, board)
             live.update(_screen(ear, board, hand, console.width, console.height), refresh=True)
-            for key in _keys(REFRESH_S):
+            for key in hand.await_keys():
                 if key == "q":
                     return 0
                 hand.press(key)
@@ -113,8 +119,19 @@ class KeyHandler:
         self.chosen: int | None = None
         self.said = "" if ear.fleet.team else "this fleet is not yours to command: keys other than q do nothing"
         self._side = 0
+        self._operator = Operator(ear.fleet.name, incarnations.drawn())
+
+    def await_keys(self) -> str:
+        """Return the keys pressed, after `REFRESH_S` at most; meanwhile the fleet hears that an operator is there."""
+        until, pressed = clock.now() + REFRESH_S, ""
+        while not pressed and clock.now() < until:
+            send(self._ear.bus, self._operator.stop(None, (), clock.now()))
+            pressed = _keys(BEAT_S)
+        return pressed
 
     def press(self, key: str) -> None:
+        if key in STOPS:
+            self._stop(stand=STOPS[key])
         if not self._ear.fleet.team:
             return
         if key.isdecimal():
@@ -126,6 +143,12 @@ class KeyHandler:
             self.said = f"formation {SIDES[self._side]} asked for"
         elif key in DEEDS:
             self._do(DEEDS[key])
+
+    def _stop(self, *, stand: bool) -> None:
+        try:
+            self.said = "; ".join(stop_fleet.told(stop_fleet.stop_fleet(self._ear, stand=stand), stand=stand))
+        except Refused as refused:
+            self.said = str(refused)
 
     def _do(self, deed: str) -> None:
         if self.chosen is None and deed != "heal":

@@ -16,6 +16,7 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, Fenced, LeaseNote, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel, LaserScan, Localization, Sensors
+from lfa.protocol.messages.stop import NEVER_STOPPED
 from lfa.protocol.messages.team import Ask, Event, MissionNote
 from lfa.protocol.mission import Leading, Limits, Mission
 from lfa.protocol.node import PeerDown, Received, RouterLost, Stop
@@ -59,7 +60,7 @@ class Bench:
             if twist is not None:
                 stamp = self.last(Sensors).gateway
                 header = Header("robot2", 1, 1, self.now)
-                self.hear("lfa/f/robot2/cmd_vel", CmdVel(header, twist, term, 1, as_leader, stamp))
+                self.hear("lfa/f/robot2/cmd_vel", CmdVel(header, twist, term, 1, as_leader, stamp, NEVER_STOPPED))
         return self
 
     def all(self, kind: type) -> list[Message]:
@@ -159,7 +160,7 @@ def test_each_term_in_which_it_leads_is_one_event() -> None:
         stamp, term = bench.last(Sensors).gateway, Term(n, 2, 1)
         for _ in range(3):
             header = Header("robot2", 1, 1, bench.now)
-            bench.hear("lfa/f/robot2/cmd_vel", CmdVel(header, GO, term, 2, True, stamp))
+            bench.hear("lfa/f/robot2/cmd_vel", CmdVel(header, GO, term, 2, True, stamp, NEVER_STOPPED))
     events = [m for m in bench.all(Event) if isinstance(m, Event) and m.kind == "leader_command"]
     assert [(event.term, event.data) for event in events] == [(Term(n, 2, 1), {"robot": 2}) for n in (5, 6)]
 

@@ -10,6 +10,7 @@ from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Fence, GatewayStamp, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import NEVER_STOPPED
 from lfa.protocol.mission import Limits
 
 STD = timing_of("std")
@@ -37,7 +38,7 @@ def command(
     twist: Twist = GO,
 ) -> CmdVel:
     stamp = GatewayStamp(gateway, at)
-    return CmdVel(Header("robot1", life, seq, 0.0), twist, Term(n, issuer, 1), holder, as_leader, stamp)
+    return CmdVel(Header("robot1", life, seq, 0.0), twist, Term(n, issuer, 1), holder, as_leader, stamp, NEVER_STOPPED)
 
 
 def test_e12_a_fresh_command_of_the_newest_term_moves_the_robot() -> None:

@@ -18,7 +18,12 @@ from lfa.deploy.fleet.security import authority
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol import clock
+from lfa.protocol.messages.codec import encode
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.stop import StopOrder, StopWord
+from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.credentials import credentials
+from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
 from tests.rigs.lfa_runs import LFA, eventually
 from tests.rigs.secured_fleet import free_port
@@ -92,6 +97,24 @@ def test_the_operators_commands_show_the_operators_certificate(home: Home) -> No
     assert {row["process"] for row in told["processes"]} == {"router", "world", "robot1", "robot2"}
     heard = json.loads(home.lfa("topic", "list", "pose", "--fleet", FLEET, "--seconds", "1", "--json").stdout)
     assert {rate["channel"] for rate in heard} == {"robot1/pose", "robot2/pose"}
+
+
+def test_e28_only_the_operators_certificate_stops_a_secured_fleet(home: Home) -> None:
+    bus = ZenohBus(
+        home.socket("b"), Inbox(), credentials=credentials(home.state("b") / "keys", "robot2", clock.wall_ms())
+    )
+    forged = StopOrder(Header("operator", 1, 1, 0.0), StopWord(9, True))
+    for _ in range(5):
+        bus.publish(f"lfa/{FLEET}/operator/stop", encode(forged))
+        clock.sleep(0.05)
+    bus.close()
+    refused = home.lfa("resume", "--fleet", FLEET)
+    assert (refused.returncode, refused.stdout) == (2, ""), "the forged stop stopped somebody"
+    assert refused.stderr == "lfa: resume: none of the 2 robots that answer is stopped\n"
+    for word in ("stop", "resume"):
+        done = home.lfa(word, "--fleet", FLEET, "--json")
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert json.loads(done.stdout)["done"] == [1, 2]
 
 
 def test_a_revoked_robot_is_let_in_by_no_router_and_the_rest_goes_on(home: Home) -> None:

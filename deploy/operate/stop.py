@@ -1,0 +1,33 @@
+"""`lfa stop`: every robot stands, now, until `lfa resume`; says who has not stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from lfa.deploy.client.session import find, listen
+from lfa.deploy.client.stop_fleet import TOPICS, stop_fleet, told
+
+
+def command(
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+) -> int:
+    """Stop every robot at its gateway; return 0 if all stand, 1 if some have not answered. Raises Refused."""
+    return say(fleet, connect, keys, as_json, stand=True)
+
+
+def say(fleet: str | None, connect: str | None, keys: Path | None, as_json: bool, *, stand: bool) -> int:
+    """Say stop or resume to a fleet, print what became of it, and return the exit code. Raises Refused."""
+    with listen(find(fleet, connect, keys), TOPICS) as ear:
+        outcome = stop_fleet(ear, stand=stand)
+    if as_json:
+        print(msgspec.json.encode(outcome).decode())
+    else:
+        print("\n".join(told(outcome, stand=stand)))
+    return 0 if outcome.complete else 1

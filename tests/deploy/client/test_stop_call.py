@@ -1,0 +1,142 @@
+"""The operator's side of a stop and a resume (E29): epochs are counted up without a clock, and nobody is left out."""
+
+from __future__ import annotations
+
+import pytest
+
+from lfa.deploy.client.stop_call import ANSWER_S, KNOWN_S, REPEAT_S, Said, StopCall
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.consensus import Member
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.stop import StopKnowledge, StopState, StopWord
+
+
+class Gateway:
+    """The answers of one gateway."""
+
+    def __init__(self, incarnation: int = 9) -> None:
+        self._incarnation = incarnation
+        self._seq = 0
+
+    def state(
+        self, epoch: int, stand: bool, *, at_rest: bool = True, certain: bool = True, kept: bool = True
+    ) -> StopState:
+        self._seq += 1
+        header = Header("world", self._incarnation, self._seq, 0.0)
+        return StopState(header, StopKnowledge(StopWord(epoch, stand), certain), at_rest, kept)
+
+
+def called(stand: bool, robots: int = 2) -> tuple[StopCall, list[Gateway]]:
+    call = StopCall(stand, 0.0)
+    call.name(tuple(range(1, robots + 1)))
+    return call, [Gateway() for _ in range(robots)]
+
+
+def test_a_stop_is_said_at_once_and_repeated() -> None:
+    call, _ = called(True)
+    assert call.said(0.0) == Said(StopWord(1, True), ())
+    assert call.said(0.5 * REPEAT_S) is None
+    assert call.said(REPEAT_S) == Said(StopWord(1, True), ())
+
+
+def test_a_stop_counts_up_from_the_resume_that_an_answer_tells_of() -> None:
+    call, (one, _) = called(True)
+    call.said(0.0)
+    call.hear(1, one.state(6, False), 0.001)
+    assert call.said(0.001) == Said(StopWord(7, True), (Member(1, 9),))
+
+
+def test_a_stop_that_holds_already_is_the_same_stop() -> None:
+    call, gateways = called(True)
+    for robot, gateway in enumerate(gateways, start=1):
+        call.hear(robot, gateway.state(5, True), 0.001)
+    outcome = call.outcome(0.001)
+    assert outcome is not None and outcome.complete and outcome.epoch == 5
+
+
+def test_who_has_not_answered_within_a_second_is_named() -> None:
+    call, (one, _) = called(True)
+    call.hear(1, one.state(1, True), 0.1)
+    assert call.outcome(ANSWER_S - 0.01) is None
+    outcome = call.outcome(ANSWER_S)
+    assert outcome is not None and not outcome.complete
+    assert (outcome.done, outcome.silent) == ((1,), (2,))
+
+
+def test_a_robot_whose_wheels_still_turn_is_waited_for_and_then_named() -> None:
+    call, gateways = called(True, robots=1)
+    call.hear(1, gateways[0].state(1, True, at_rest=False), 0.1)
+    assert call.outcome(2.0) is None
+    outcome = call.outcome(5.0)
+    assert outcome is not None and outcome.moving == (1,) and not outcome.complete
+
+
+def test_a_restarted_gateway_that_forgot_its_stop_counts_no_more() -> None:
+    call, (one, two) = called(True)
+    call.hear(1, one.state(1, True), 0.1)
+    call.hear(2, two.state(1, True, at_rest=False), 0.1)
+    call.hear(1, Gateway(10).state(0, False, certain=False), 0.2)
+    outcome = call.outcome(ANSWER_S)
+    assert outcome is not None and outcome.silent == (1,)
+
+
+def test_a_resume_asks_first_and_is_one_more_than_the_newest_stop() -> None:
+    call, (one, two) = called(False)
+    assert call.said(0.0) == Said(None, ())
+    call.hear(1, one.state(3, True), 0.01)
+    assert call.said(REPEAT_S) == Said(None, (Member(1, 9),))
+    call.hear(2, two.state(5, True), 0.04)
+    assert call.said(2 * REPEAT_S) == Said(StopWord(6, False), (Member(1, 9), Member(2, 9)))
+    call.hear(1, one.state(6, False), 0.07)
+    call.hear(2, two.state(6, False), 0.07)
+    outcome = call.outcome(0.07)
+    assert outcome is not None and outcome.complete and outcome.done == (1, 2)
+
+
+def test_a_resume_goes_without_those_that_do_not_answer_and_names_them() -> None:
+    call, (one, _) = called(False)
+    call.hear(1, one.state(3, True), 0.01)
+    call.said(0.02)
+    assert call.said(KNOWN_S) == Said(StopWord(4, False), (Member(1, 9),))
+    call.hear(1, one.state(4, False), KNOWN_S)
+    outcome = call.outcome(ANSWER_S)
+    assert outcome is not None and (outcome.done, outcome.silent) == ((1,), (2,))
+
+
+def test_a_resume_without_a_stop_is_refused() -> None:
+    call, gateways = called(False)
+    for robot, gateway in enumerate(gateways, start=1):
+        call.hear(robot, gateway.state(2, False), 0.01)
+    with pytest.raises(Refused, match="none of the 2 robots that answer is stopped"):
+        call.said(0.02)
+
+
+def test_a_resume_that_nobody_answers_is_refused() -> None:
+    call, _ = called(False)
+    call.said(0.0)
+    with pytest.raises(Refused, match="no gateway answers"):
+        call.said(KNOWN_S)
+
+
+def test_a_resume_lets_a_restarted_gateway_go_that_nobody_could_tell() -> None:
+    call, gateways = called(False, robots=1)
+    call.hear(1, gateways[0].state(0, False, certain=False), 0.01)
+    assert call.said(0.02) == Said(StopWord(1, False), (Member(1, 9),))
+
+
+def test_a_stop_said_after_a_resume_wins_over_it() -> None:
+    call, gateways = called(False, robots=1)
+    call.hear(1, gateways[0].state(3, True), 0.01)
+    call.said(0.02)
+    call.hear(1, gateways[0].state(5, True), 0.03)
+    outcome = call.outcome(0.03)
+    assert outcome is not None and outcome.overruled and not outcome.complete
+
+
+def test_an_overtaken_answer_changes_nothing() -> None:
+    call, gateways = called(True, robots=1)
+    old, new = gateways[0].state(0, False), gateways[0].state(1, True)
+    call.hear(1, new, 0.01)
+    call.hear(1, old, 0.02)
+    outcome = call.outcome(0.02)
+    assert outcome is not None and outcome.complete
