@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lfa.deploy.analysis import summary as summaries
 from lfa.deploy.analysis import tracking_errors
+from lfa.deploy.analysis.summary import Summary, read
 from lfa.deploy.analysis.tracking_errors import Mask, TrackingErrors
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.event_log import Line
@@ -31,8 +31,8 @@ class Run:
         self.events: list[Line] = event_log.lines(folder)
 
     @cached_property
-    def summary(self) -> summaries.Summary:
-        return summaries.read(self.folder)
+    def summary(self) -> Summary:
+        return read(self.folder)
 
     @property
     def truth(self) -> dict[int, Array]:

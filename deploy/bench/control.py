@@ -6,7 +6,7 @@ from itertools import chain
 from pathlib import Path
 
 from lfa.deploy.bench.control_cases import agents, string_stability, table
-from lfa.deploy.bench.control_cases import figures as control_figures
+from lfa.deploy.bench.control_cases.figures import draw
 from lfa.deploy.bench.harness.rows import Case, measured, select, show
 
 
@@ -25,5 +25,5 @@ def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, 
     computed = [case for case in chosen if case not in live]
     alone = [case for case in chosen if case in live]
     if figures is not None:
-        control_figures.draw(Path(figures))
+        draw(Path(figures))
     return show(chain(measured(computed, jobs, rows), measured(alone, 1, rows)), as_json)

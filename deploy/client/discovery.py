@@ -7,8 +7,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from lfa.deploy.process import identity as processes
-from lfa.deploy.process.identity import Identity
+from lfa.deploy.process.identity import Identity, own_processes
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import whole_number
 from lfa.protocol.transport.zenoh_config import default_endpoint
@@ -31,7 +30,7 @@ class Running(Struct, frozen=True):
 
 def agents() -> list[Running]:
     """Return this user's agents that run on this machine."""
-    found = (_agent(identity) for identity in processes.own_processes())
+    found = (_agent(identity) for identity in own_processes())
     return [agent for agent in found if agent is not None]
 
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import FleetView, Seen, await_first_status, find, sight
+from lfa.deploy.fleet.fleet_view import FleetView, Seen, await_first_status, find, open_view
 from lfa.deploy.fleet.host import host
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import parts
@@ -76,7 +76,7 @@ def _by_word(seen: Seen) -> tuple[list[str], list[str]]:
         host.stop(own)
         return [own.host], []
     try:
-        with sight(seen) as view:
+        with open_view(seen) as view:
             await_first_status(view, HEAR_S)
             far = [name for name in view.names if own is None or name != own.host]
             wrong = [f"host {name}: is not heard, and may run on" for name in far if name not in view.hosts]

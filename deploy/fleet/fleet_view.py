@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen
-from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import ISSUED
@@ -48,9 +48,9 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
     if file is not None:
         plan = load(file)
         own = next((part for part in here() if part.fleet == plan.name), None)
-        far = ",".join(parts.door(plan, name) for name in plan.hosts)
+        far = ",".join(host_plan.door(plan, name) for name in plan.hosts)
         endpoint = connect or (own.endpoint if own is not None else far)
-        own_keys = _keys(own) or (parts.store(plan) / ISSUED if (parts.store(plan) / ISSUED).is_dir() else None)
+        own_keys = _keys(own) or (host_plan.store(plan) / ISSUED if (host_plan.store(plan) / ISSUED).is_dir() else None)
         return Seen(plan.name, endpoint, tuple(plan.hosts), own, plan, own_keys)
     own_all = [part for part in here() if fleet in (None, part.fleet)]
     if connect is not None:
@@ -67,7 +67,7 @@ def find(file: Path | None, fleet: str | None, connect: str | None) -> Seen:
 
 
 def _keys(part: HostPlan | None) -> Path | None:
-    return part.folder / parts.KEYS if part is not None and part.keyed else None
+    return part.folder / host_plan.KEYS if part is not None and part.keyed else None
 
 
 def here() -> list[HostPlan]:
@@ -77,7 +77,7 @@ def here() -> list[HostPlan]:
         words = identity.arguments
         if "lfa.deploy.fleet.host.supervisor" in words[:-1]:
             try:
-                found.append(parts.read(Path(words[-1])))
+                found.append(host_plan.read(Path(words[-1])))
             except Refused:
                 continue
     return found
@@ -168,7 +168,7 @@ class FleetView:
 
 
 @contextmanager
-def sight(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[FleetView]:
+def open_view(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[FleetView]:
     """Open a session and provide a view of the fleet. Raises Refused when no router answers."""
     with listen(FleetAddress(seen.name, seen.endpoint, (), seen.keys), topics) as ear:
         yield FleetView(ear, seen)
@@ -180,4 +180,4 @@ def await_first_status(view: FleetView, within_s: float) -> None:
     view.say_until(order, lambda: bool(view.names) and all(view.obeyed(order, n) for n in view.names), within_s)
 
 
-__all__ = ["FleetView", "LogLines", "Seen", "await_first_status", "find", "here", "sight"]
+__all__ = ["FleetView", "LogLines", "Seen", "await_first_status", "find", "here", "open_view"]

@@ -7,7 +7,7 @@ import socket
 
 from lfa.deploy.fleet.doctor import Diagnosis, judged, router_diagnosis
 from lfa.deploy.fleet.host.host import Found
-from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.hosts import CLOCK_S_MAX, ask
@@ -22,7 +22,7 @@ KNOCK_S = 3.0
 
 async def examine(plan: FleetPlan) -> list[Diagnosis]:
     """Check all machines of `plan` concurrently. Starts nothing except a short listener at the router's port."""
-    shares = parts.parts(plan, "", "")
+    shares = host_plan.parts(plan, "", "")
     each = await asyncio.gather(*(_examine(name, plan, shares[name]) for name in plan.hosts))
     return [finding for found in each for finding in found]
 
@@ -73,7 +73,7 @@ async def _place(name: str, shell: Shell, plan: FleetPlan, part: HostPlan) -> li
         found.append(Diagnosis(name, "certificate", False, state.certificate))
     if part.port == 0 or machine.local:
         return found
-    where, known = parts.endpoint(plan, name), operator(plan)
+    where, known = host_plan.endpoint(plan, name), operator(plan)
     open_ = await (asyncio.to_thread(answers, where, known) if state.run else _knock(shell, machine, part))
     right = "reachable from here: a firewall, or a router that is not up?"
     return [*found, judged(name, "port", open_, where, right)]

@@ -9,7 +9,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
 from lfa.deploy.fleet.host.log_tail import FOLLOW_S
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.terminal_text import visible
@@ -38,7 +38,7 @@ def command(
         process, file = "", Path(process)
     target = f"robot{process}" if process.isdecimal() else process
     seen = find(file, fleet, connect)
-    with sight(seen, frozenset({"*/host", "*/log"})) as view, Interrupts() as interrupts:
+    with open_view(seen, frozenset({"*/host", "*/log"})) as view, Interrupts() as interrupts:
         await_first_status(view, HEAR_S)
         places = _places(view, target)
         printed_at = clock.now()

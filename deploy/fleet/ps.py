@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
 from lfa.deploy.terminal_text import cell, visible
 from lfa.protocol import clock
 from lfa.protocol.names import robot_id_of
@@ -30,7 +30,7 @@ def command(
 ) -> int:
     """Run `lfa ps`; return 1 when a host is silent or a process does not run."""
     seen = find(file, fleet, connect)
-    with sight(seen, frozenset({"*/host", "*/status"})) as view:
+    with open_view(seen, frozenset({"*/host", "*/status"})) as view:
         began = clock.now()
         await_first_status(view, HEAR_S)
         while clock.now() < began + STATUS_S and not _all_have_spoken(view):

@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.fleet import ProcessReport
@@ -27,7 +27,7 @@ def command(
 ) -> int:
     name = f"robot{process}" if process.isdecimal() else process
     seen = find(file, fleet, connect)
-    with sight(seen) as view:
+    with open_view(seen) as view:
         await_first_status(view, HEAR_S)
         place = host or _place(view, name)
         before = _report(view, place, name)

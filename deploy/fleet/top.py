@@ -11,8 +11,8 @@ import msgspec
 import typer
 
 from lfa.deploy.client.team_status import Board
-from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, sight
-from lfa.deploy.fleet.ps import rows as processes
+from lfa.deploy.fleet import ps
+from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.terminal_text import cell
 from lfa.protocol import clock
@@ -43,7 +43,7 @@ def command(
     import rich.table  # noqa: F401
 
     board = Board()
-    with sight(seen) as view:
+    with open_view(seen) as view:
         await_first_status(view, HEAR_S)
         _hear_for(view, board, FIRST_S)
         if as_json:
@@ -83,7 +83,7 @@ def _facts(view: FleetView, board: Board) -> dict[str, Any]:
         "fleet": view.seen.name,
         "leader": leader,
         "silent": silent,
-        "processes": processes(view),
+        "processes": ps.rows(view),
         "robots": [msgspec.to_builtins(row) for row in board.rows(now)],
     }
 

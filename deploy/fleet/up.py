@@ -17,7 +17,7 @@ import msgspec
 import typer
 from msgspec.structs import replace
 
-from lfa.deploy.fleet import fleet_view as sights
+from lfa.deploy.fleet import fleet_view
 from lfa.deploy.fleet.fleet_view import Seen
 from lfa.deploy.fleet.health import Health
 from lfa.deploy.fleet.host.host import Found
@@ -138,14 +138,14 @@ def _await_health(
     plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float
 ) -> dict[str, Any]:
     """Observe the fleet until it has been healthy for HEALTHY_S; return its chain and hosts. Raises NotUp."""
-    own = next((part for part in sights.here() if part.fleet == plan.name), None)
+    own = next((part for part in fleet_view.here() if part.fleet == plan.name), None)
     endpoints = [own.socket] if own is not None else []
     endpoints += [end for part in shares.values() for end in part.others[:1]]
     seen = Seen(plan.name, ",".join(dict.fromkeys(endpoints)), tuple(plan.hosts), own, plan, store(plan) / ISSUED)
     health = Health(plan.scenario.mission.robots, tuple(plan.hosts))
     until, well_since, shown = clock.now() + wait_s, None, ""
     try:
-        with sights.sight(seen) as view:
+        with fleet_view.open_view(seen) as view:
             while True:
                 for at, message in view.hear():
                     health.see(at, message)

@@ -18,8 +18,7 @@ from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
-from lfa.deploy.process import identity as processes
-from lfa.deploy.process.identity import Identity
+from lfa.deploy.process.identity import Identity, own_processes, send_signal
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
@@ -60,7 +59,7 @@ def command(
         operator = Operator(team[0].fleet, incarnations.drawn())
         send(bus, operator.event("fault", clock.now(), deed=deed, robot=whom))
         clock.sleep(SENT_S)
-        done = processes.send(identity, SIGNALS[deed])
+        done = send_signal(identity, SIGNALS[deed])
     finally:
         bus.close()
     name = f"robot {whom}" if isinstance(whom, int) else whom
@@ -127,7 +126,7 @@ def _whom(target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox) -> 
     if target not in COMMON:
         victim = _victim(target, team, bus, inbox)
         return victim.robot, victim.identity
-    found = [identity for identity in processes.own_processes() if _is_common(target, identity.arguments, team[0])]
+    found = [identity for identity in own_processes() if _is_common(target, identity.arguments, team[0])]
     if not found:
         raise Refused(f"{target}: no such process of yours serves fleet {team[0].fleet} here")
     return target, found[0]

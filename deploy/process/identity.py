@@ -46,7 +46,7 @@ def cpu_s(identity: Identity) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def send(identity: Identity, number: signal.Signals) -> bool:
+def send_signal(identity: Identity, number: signal.Signals) -> bool:
     """Signal exactly that process; return False when it has ended."""
     try:
         handle = os.pidfd_open(identity.pid)

@@ -11,8 +11,7 @@ from typing import IO
 
 from msgspec import Struct
 
-from lfa.deploy.process import identity as processes
-from lfa.deploy.process.identity import Identity
+from lfa.deploy.process.identity import Identity, identify, send_signal, start
 from lfa.deploy.recording.run_folder import LOGS
 from lfa.protocol import clock
 
@@ -57,7 +56,7 @@ class ProcessGroup:
         death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
         with self._open_log(row.name) as log:
-            self._children[row.name] = processes.start(row.arguments, log, death, stdin, row.command_prefix)
+            self._children[row.name] = start(row.arguments, log, death, stdin, row.command_prefix)
 
     def runs(self, name: str) -> bool:
         child = self._children.get(name)
@@ -95,7 +94,7 @@ class ProcessGroup:
     def signal(self, name: str, number: signal.Signals) -> bool:
         """Signal `name` after checking that it is still the started process; return False when it has ended."""
         identity = self.identity(name)
-        return identity is not None and processes.send(identity, number)
+        return identity is not None and send_signal(identity, number)
 
     def write_line(self, name: str, line: bytes) -> None:
         """Write a line to the standard input of `name` and close it; no effect if the process has ended."""
@@ -136,7 +135,7 @@ class ProcessGroup:
 
     def identity(self, name: str) -> Identity | None:
         """Return the identity of `name`, None while it does not run. A child keeps its pid until it is waited for."""
-        return processes.identify(self._children[name].pid) if self.runs(name) else None
+        return identify(self._children[name].pid) if self.runs(name) else None
 
     def _open_log(self, name: str) -> IO[bytes]:
         try:

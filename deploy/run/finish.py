@@ -14,9 +14,8 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.analysis import assertions
-from lfa.deploy.analysis import summary as summaries
 from lfa.deploy.analysis.summarize import summarize
-from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.analysis.summary import Summary, read, write
 from lfa.deploy.analysis.summary_table import text
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
@@ -45,7 +44,7 @@ def verdict_of(interrupts: Interrupts) -> Verdict | None:
 
 def reread(folder: Path, ended_by: signal.Signals | None) -> Ended:
     """Return a finished run whose summary the recorder process has written."""
-    return Ended(folder, summaries.read(folder), ended_by)
+    return Ended(folder, read(folder), ended_by)
 
 
 def finish(
@@ -61,7 +60,7 @@ def finish(
     summary = summarize(folder, about, verdict, duration_s, faults_left)
     summary.recording = recording
     summary.warnings = [] if recording is None else recording.losses()
-    summaries.write(folder, summary)
+    write(folder, summary)
     return Ended(folder, summary, ended_by)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from lfa.deploy.fleet.host.host import ANSWER
 from lfa.deploy.fleet.host.ledger import living
-from lfa.deploy.process.identity import send
+from lfa.deploy.process.identity import send_signal
 from tests.rigs.machines import Machines, machines, why_not
 from tests.rigs.network_namespaces import PORT
 
@@ -142,7 +142,7 @@ def test_doctor_names_a_router_that_is_missing(six: Machines) -> None:
     assert fleet.lfa("up", str(fleet.write(TOP))).returncode == 0
     try:
         router = next(one for one in fleet.processes("b") if "lfa.deploy.fleet.host.router" in one.arguments)
-        assert send(router, signal.SIGSTOP)
+        assert send_signal(router, signal.SIGSTOP)
         looked = fleet.lfa("doctor", "--json", str(fleet.fleet_file))
     finally:
         fleet.lfa("down", str(fleet.fleet_file))

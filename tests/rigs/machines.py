@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
@@ -141,7 +141,7 @@ class Machines:
         return str(venv / "bin/python")
 
     def part(self, name: str) -> HostPlan:
-        return parts.read(self.state(name) / parts.PART)
+        return host_plan.read(self.state(name) / host_plan.PART)
 
     def processes(self, name: str) -> list[Identity]:
         """Return the processes of the fleet on that machine, found by its state folder in the command line."""
@@ -183,13 +183,13 @@ class Machines:
         at = clock.now()
         found = self.processes(name)
         for one in sorted(found, key=lambda one: "lfa.deploy.fleet.host.supervisor" not in one.arguments):
-            identity.send(one, signal.SIGKILL)
+            identity.send_signal(one, signal.SIGKILL)
         return at
 
     def kill_router(self, name: str) -> float:
         at = clock.now()
         router = next(one for one in self.processes(name) if "lfa.deploy.fleet.host.router" in one.arguments)
-        assert identity.send(router, signal.SIGKILL)
+        assert identity.send_signal(router, signal.SIGKILL)
         return at
 
     def host(self, name: str) -> int:

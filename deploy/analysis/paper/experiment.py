@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from functools import cached_property
 from math import nan
 
-from lfa.deploy.analysis import episodes as spikes
+from lfa.deploy.analysis import episodes
 from lfa.deploy.analysis.episodes import Episode, Spike
 from lfa.deploy.analysis.paper.criteria import Measured
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.recording import event_log
 
-BASELINE_M = spikes.BASE_M
+BASELINE_M = episodes.BASE_M
 REST_MPS = 0.01
 STRAIGHT_RADPS = 0.05
 
@@ -29,15 +29,15 @@ class Subject:
 
     @cached_property
     def episodes(self) -> list[Episode]:
-        return spikes.episodes(self.run)
+        return episodes.episodes(self.run)
 
     @cached_property
     def distance(self) -> list[Spike]:
-        return spikes.distance_spikes(self.run)
+        return episodes.distance_spikes(self.run)
 
     @cached_property
     def bearing(self) -> list[Spike]:
-        return spikes.bearing_spikes(self.run)
+        return episodes.bearing_spikes(self.run)
 
     def alive(self) -> list[int]:
         """Return the followers in the last chain that have tracking errors."""
@@ -62,14 +62,14 @@ def duration_s(s: Subject, spike: Spike) -> float:
     earlier one, for example of a robot that is stuck for long, did not start the spike and counts from the spike's
     start. The time after the end of the spike never counts.
     """
-    avoided = [one for one in spikes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
-    began = [(one, one.from_s if one.from_s >= spike.from_s - spikes.FELT_S else spike.from_s) for one in avoided]
+    avoided = [one for one in episodes.causes(s.run, spike, s.episodes) if one.kind == "avoidance"]
+    began = [(one, one.from_s if one.from_s >= spike.from_s - episodes.FELT_S else spike.from_s) for one in avoided]
     spans = [(from_s, min(one.until_s, spike.until_s)) for one, from_s in began]
-    return sum(until_s - from_s for from_s, until_s in spikes.merged(span for span in spans if span[0] < span[1]))
+    return sum(until_s - from_s for from_s, until_s in episodes.merged(span for span in spans if span[0] < span[1]))
 
 
 def explained(s: Subject, found: Sequence[Spike]) -> Measured:
-    strays = [spike for spike in found if not spikes.causes(s.run, spike, s.episodes)]
+    strays = [spike for spike in found if not episodes.causes(s.run, spike, s.episodes)]
     return Measured(share(len(found) - len(strays), len(found)), where(strays))
 
 

@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Iterator, Sequence
 
 from lfa.deploy.bench.harness.team import Team
-from lfa.deploy.process import identity as processes
+from lfa.deploy.process import identity
 from lfa.protocol import clock
 
 
@@ -35,6 +35,6 @@ def pause(team: Team, duration_s: float) -> None:
 
 def cpu_s(process: subprocess.Popen[bytes]) -> float:
     """Return the processor time [s] that a running process has used."""
-    identity = processes.identify(process.pid)
-    assert identity is not None, "it has ended"
-    return processes.cpu_s(identity)
+    own = identity.identify(process.pid)
+    assert own is not None, "it has ended"
+    return identity.cpu_s(own)

@@ -21,10 +21,10 @@ from msgspec import Struct
 
 from lfa.deploy.fleet.host.ledger import Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.router import LISTENS
-from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import unpack
-from lfa.deploy.process import identity as processes
+from lfa.deploy.process.identity import Identity, identify, send_signal
 from lfa.deploy.process.process_group import ROUTER_NAME
 from lfa.deploy.recording.run_folder import LOGS, SCENARIO
 from lfa.protocol import clock
@@ -68,7 +68,7 @@ def check(part: HostPlan) -> Found:
     running = living(part.folder)
     found = Found(version("lfa"), clock.wall_ms())
     if running is not None:
-        return _running(found, running, parts.read(part.folder / parts.PART))
+        return _running(found, running, host_plan.read(part.folder / host_plan.PART))
     path = socket_path(part.socket)
     if path is None or len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
         raise Refused(f"state = {part.state}: too long for a socket in it: at most {UNIX_PATH_BYTES_MAX} bytes")
@@ -88,7 +88,7 @@ def _running(found: Found, running: Ledger, own: HostPlan) -> Found:
     with contextlib.suppress(Refused):
         known = own.known_as(f"{HOST_PREFIX}{own.host}")
     try:
-        for path in sorted((own.folder / parts.KEYS).glob("*.pem")) if own.keyed else ():
+        for path in sorted((own.folder / host_plan.KEYS).glob("*.pem")) if own.keyed else ():
             check_valid(path, found.wall_ms)
     except Refused as refused:
         expired = str(refused)
@@ -106,9 +106,9 @@ def start(part: HostPlan) -> Found:
         part.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         part.run_folder.mkdir(exist_ok=True, mode=0o700)
         (part.run_folder / SCENARIO).write_text(part.scenario, encoding="utf-8")
-        path = part.folder / parts.PART
+        path = part.folder / host_plan.PART
         if part.keyed:
-            unpack(part.folder / parts.KEYS, part.bundle)
+            unpack(part.folder / host_plan.KEYS, part.bundle)
         path.write_bytes(msgspec.json.encode(msgspec.structs.replace(part, bundle={})))
     except OSError as error:
         raise Refused(f"{part.folder}: {error.strerror}: must be a folder to write to") from None
@@ -126,10 +126,10 @@ def stop(part: HostPlan) -> Found:
         sweep(part.folder)
         return Found(version("lfa"), clock.wall_ms())
     everybody = (running.supervisor, *running.children)
-    processes.send(running.supervisor, signal.SIGTERM)
+    send_signal(running.supervisor, signal.SIGTERM)
     _wait_gone(everybody, STOP_S)
     for identity in everybody:
-        processes.send(identity, signal.SIGKILL)
+        send_signal(identity, signal.SIGKILL)
     left = _wait_gone(everybody, 1.0)
     if left:
         raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
@@ -137,10 +137,10 @@ def stop(part: HostPlan) -> Found:
     return Found(version("lfa"), clock.wall_ms(), run=running.run, digest=running.digest)
 
 
-def _wait_gone(everybody: tuple[processes.Identity, ...], within_s: float) -> list[processes.Identity]:
+def _wait_gone(everybody: tuple[Identity, ...], within_s: float) -> list[Identity]:
     until = clock.now() + within_s
     while True:
-        left = [identity for identity in everybody if processes.identify(identity.pid) == identity]
+        left = [identity for identity in everybody if identify(identity.pid) == identity]
         if not left or clock.now() > until:
             return left
         clock.sleep(POLL_S)
@@ -247,13 +247,13 @@ def _echo(part: HostPlan) -> None:
 def rekey(part: HostPlan) -> Found:
     """Install new keys and rules on a running machine and restart its router with them. Raises Refused."""
     running = living(part.folder)
-    if running is None or not (own := parts.read(part.folder / parts.PART)).keyed:
+    if running is None or not (own := host_plan.read(part.folder / host_plan.PART)).keyed:
         return Found(version("lfa"), clock.wall_ms())
-    unpack(part.folder / parts.KEYS, part.bundle)
+    unpack(part.folder / host_plan.KEYS, part.bundle)
     log = own.run_folder / LOGS / f"{ROUTER_NAME}.log"
     before = log.read_text(errors="replace").count(LISTENS)
     for router in (child for child in running.children if "lfa.deploy.fleet.host.router" in child.arguments):
-        processes.send(router, signal.SIGHUP)
+        send_signal(router, signal.SIGHUP)
     until = clock.now() + READY_S
     while log.read_text(errors="replace").count(LISTENS) == before:
         if clock.now() > until:

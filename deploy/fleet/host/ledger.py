@@ -46,7 +46,7 @@ def end_orphans(folder: Path) -> list[str]:
     written = ledger(folder)
     if written is None or living(folder) is not None:
         return []
-    return [" ".join(child.arguments) for child in written.children if identity.send(child, signal.SIGKILL)]
+    return [" ".join(child.arguments) for child in written.children if identity.send_signal(child, signal.SIGKILL)]
 
 
 def sweep(folder: Path) -> None:

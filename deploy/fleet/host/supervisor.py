@@ -20,7 +20,7 @@ import msgspec
 
 from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.log_tail import Tail
-from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
@@ -79,7 +79,7 @@ class Supervisor:
         self._processes = ProcessGroup(part.run_folder)
         self._managed = {
             row.name: _ManagedProcess(row, RestartBackoff(ROUTER if row.name == ROUTER_NAME else part.restart))
-            for row in parts.rows(part)
+            for row in host_plan.rows(part)
         }
         self._outbox = Outbox(part.fleet, self._me, incarnations.drawn(), first=1)
         self._obeyed = (0, 0)
@@ -297,7 +297,7 @@ class Supervisor:
 def main() -> None:
     """Run the supervisor. Exit codes: 0 ended in order, 2 refused."""
     try:
-        part = parts.read(Path(sys.argv[1]))
+        part = host_plan.read(Path(sys.argv[1]))
         if living(part.folder) is not None:
             raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
         for orphan in end_orphans(part.folder):

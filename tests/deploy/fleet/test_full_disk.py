@@ -52,7 +52,7 @@ def _restarted(home: Path, name: str, before: int) -> bool:
 
 def _kill(home: Path, name: str) -> None:
     process = identify(_rows(home)[name]["pid"])
-    assert process is not None and identity.send(process, signal.SIGKILL)
+    assert process is not None and identity.send_signal(process, signal.SIGKILL)
 
 
 def _supervisor(disk: Path) -> Identity:
@@ -85,5 +85,5 @@ def test_a_full_disk_ends_nobody() -> None:
             _lfa(home, "down", str(file))
             left = [one for one in own_processes() if str(home) in str(one)]
             for one in left:
-                identity.send(one, signal.SIGKILL)
+                identity.send_signal(one, signal.SIGKILL)
         assert left == []

@@ -17,7 +17,7 @@ import msgspec
 import pytest
 
 from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, living
-from lfa.deploy.fleet.plan import host_plan as parts
+from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity, identify, own_processes
 from tests.rigs.lfa_runs import LFA, eventually
@@ -75,7 +75,7 @@ def home() -> Iterator[Home]:
         yield made
     finally:
         for one in made.processes():
-            identity.send(one, signal.SIGKILL)
+            identity.send_signal(one, signal.SIGKILL)
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -114,7 +114,7 @@ def test_logs_go_on_with_what_comes_until_ctrl_c(up: Home) -> None:
 
 def test_what_is_killed_is_started_again_and_ps_tells_why_it_ended(up: Home) -> None:
     robot = up.process("lfa.agents.cli", "2")
-    assert identity.send(robot, signal.SIGKILL)
+    assert identity.send_signal(robot, signal.SIGKILL)
     eventually(
         lambda: any("lfa.agents.cli" in one.arguments and one != robot for one in _of(up, "2")), "not started again"
     )
@@ -156,7 +156,7 @@ def test_up_again_starts_nothing_and_another_file_is_refused(up: Home) -> None:
 def test_a_killed_supervisor_takes_its_processes_with_it_and_up_starts_anew(up: Home) -> None:
     everybody = up.processes()
     book = living(up.state)
-    assert book is not None and identity.send(book.supervisor, signal.SIGKILL)
+    assert book is not None and identity.send_signal(book.supervisor, signal.SIGKILL)
     eventually(lambda: all(identify(one.pid) != one for one in everybody), "something outlives its supervisor")
     done = up.lfa("up", str(up.file))
     assert done.returncode == 0, done.stderr
@@ -165,7 +165,7 @@ def test_a_killed_supervisor_takes_its_processes_with_it_and_up_starts_anew(up: 
 def test_orphans_of_an_earlier_life_are_ended_and_nobody_else(up: Home) -> None:
     """The ledger names a process that has gone on without its supervisor, and a number that is somebody else's now."""
     up.lfa("down", str(up.file))
-    part = parts.read(up.state / parts.PART)
+    part = host_plan.read(up.state / host_plan.PART)
     orphan, stranger = (subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) for _ in range(2))
     try:
         lost, other = identify(orphan.pid), identify(stranger.pid)
@@ -185,7 +185,7 @@ def test_orphans_of_an_earlier_life_are_ended_and_nobody_else(up: Home) -> None:
 def test_down_needs_no_router(up: Home) -> None:
     """Stopped, it answers nobody: the supervisor hears a signal instead."""
     everybody = up.processes()
-    assert identity.send(up.process("lfa.deploy.fleet.host.router"), signal.SIGSTOP)
+    assert identity.send_signal(up.process("lfa.deploy.fleet.host.router"), signal.SIGSTOP)
     done = up.lfa("down", "--fleet", FLEET)
     assert done.returncode == 0, done.stderr
     assert [one for one in everybody if identify(one.pid) == one] == []

@@ -76,7 +76,7 @@ def home() -> Iterator[Home]:
         made.lfa("down", str(made.file))
         for one in own_processes():
             if any(str(made.folder) in word for word in one.arguments):
-                identity.send(one, signal.SIGKILL)
+                identity.send_signal(one, signal.SIGKILL)
         shutil.rmtree(made.folder, ignore_errors=True)
 
 
