@@ -11,6 +11,7 @@ import numpy as np
 
 from lfa.deploy.analysis.causes.fact import Fact, called
 from lfa.deploy.analysis.episodes import stretches
+from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.event_log import Line
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
@@ -48,7 +49,9 @@ def facts(seen: RecordedRun, events: Sequence[Line], robots: Sequence[int]) -> l
 def leader_changes(lines: Sequence[Line]) -> Iterator[Fact]:
     """Yield the first leader and each change of leader, by the commands that gateways obeyed."""
     leader: int | None = None
-    for line in event_log.of_kind(lines, "leader_command"):
+    commands = list(event_log.of_kind(lines, "leader_command"))
+    terms = TermCount(line["term"][0] for line in commands)
+    for line in commands:
         robot = line["robot"]
         if robot == leader:
             continue
@@ -57,7 +60,7 @@ def leader_changes(lines: Sequence[Line]) -> Iterator[Fact]:
             yield Fact(line["t"], "takeover", robot_name(robot), f"{new} led, the first one")
         else:
             old = robot_name(leader)
-            text = f"{new} led instead of {called(old)} (term {line['term'][0]})"
+            text = f"{new} led instead of {called(old)} (term {terms.number(line['term'][0])})"
             yield Fact(line["t"], "leader change", robot_name(robot), text, other=old)
         leader = robot
 
