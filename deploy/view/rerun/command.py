@@ -23,7 +23,17 @@ if TYPE_CHECKING:
     import rerun
 
     from lfa.world.description.scenario import Scenario
-from lfa.deploy.view.rerun.viewer import check_free_port, has_display, need_rerun, run_viewer
+from lfa.deploy.view.rerun.screenshot import LAYOUT_AT_END
+from lfa.deploy.view.rerun.viewer import (
+    await_end,
+    check_free_port,
+    data_address,
+    end,
+    has_display,
+    need_rerun,
+    run_viewer,
+    serve,
+)
 
 RRD = "recording.rrd"
 PICTURE = "view.png"
@@ -59,7 +69,7 @@ def command(
         return 0
     print(rrd, flush=True)
     if serve_web:
-        return run_viewer(str(rrd), "--web-viewer", "--port", str(port), "--web-viewer-port", str(web_port))
+        return await_end(serve(web_port, port, str(rrd)))
     return run_viewer(str(rrd))
 
 
@@ -88,7 +98,9 @@ def converted(folder: Path) -> Path:
         for owner, topic, lasted_s, message in messages(folder, TOPICS):
             scene.see(lasted_s, owner, topic, message)
         scene.flush()
-        stream.send_blueprint(layout(scenario, len(scenario.mission.robots), lasted_s=lasted_s))
+        robots = len(scenario.mission.robots)
+        layout(scenario, robots, lasted_s=lasted_s).save(APPLICATION, rrd.with_suffix(LAYOUT_AT_END))
+        stream.send_blueprint(layout(scenario, robots, lasted_s=lasted_s, plays=True))
         stream.disconnect()
         return unfinished.rename(rrd)
     finally:
@@ -116,15 +128,18 @@ def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: i
             print(take(rrd, screenshot, None))
         return 0
     if serve_web:
-        data = stream.serve_grpc(grpc_port=port, default_blueprint=plan)
-        rr.serve_web_viewer(web_port=web_port, open_browser=has_display(), connect_to=data)
-        print(f"http://127.0.0.1:{web_port}?url={data}", flush=True)
+        child = serve(web_port, port)
+        try:
+            stream.connect_grpc(data_address(port), default_blueprint=plan)
+            _draw(fleet, stream, scenario, None)
+        finally:
+            end(child)
     elif has_display():
         rr.spawn(port=port, connect=False)
-        stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy", default_blueprint=plan)
+        stream.connect_grpc(data_address(port), default_blueprint=plan)
+        _draw(fleet, stream, scenario, None)
     else:
         raise Refused("no display here: say --serve-web, or --screenshot FILE")
-    _draw(fleet, stream, scenario, None)
     return 0
 
 

@@ -9,12 +9,19 @@ from lfa.deploy.view.rerun.scene import NAMED_MAX, TIMELINE
 from lfa.world.description.load import Scenario, starts_of
 
 MARGIN_M = 1.0
+GRID_M, GRID = 1.0, (225, 225, 225)
+HALF_VIEW = 0.5
+"""Half of what the view shows, upwards, of a plane at distance 1; and its width for each unit of its height."""
+ASPECT = 1.5
 LIVE_S = 60.0
 
 
-def layout(scenario: Scenario | None, robots: int, *, lasted_s: float | None = None) -> rrb.Blueprint:
+def layout(
+    scenario: Scenario | None, robots: int, *, lasted_s: float | None = None, plays: bool = False
+) -> rrb.Blueprint:
     """Return a blueprint that shows all of a recording of `lasted_s` [s], or the last minute of a running fleet (None).
 
+    It `plays` from the start, or shows the end, for a fleet the newest.
     Without a scenario the viewer chooses the bounds of the world.
     """
     few = robots <= NAMED_MAX
@@ -24,11 +31,12 @@ def layout(scenario: Scenario | None, robots: int, *, lasted_s: float | None = N
     def plot(origin: str, name: str, y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
         return rrb.TimeSeriesView(origin=origin, name=name, axis_x=axis, axis_y=y, plot_legend=legend)
 
-    world = rrb.Spatial2DView(
+    world = rrb.Spatial3DView(
         origin="world",
-        name="World [m] (y is drawn upwards, shown negative)",
+        name="World from above: x to the right, y up, a line each metre",
         background=[255, 255, 255],
-        visual_bounds=_bounds(scenario),
+        line_grid=rrb.LineGrid3D(visible=True, spacing=GRID_M, plane=rr.components.Plane3D.XY, color=GRID),
+        eye_controls=_from_above(scenario),
     )
     lease = rrb.StateTimelineView(
         origin="lease" if few else "lease/leader", name="Leader, term and roles", time_view=axis
@@ -55,7 +63,7 @@ def layout(scenario: Scenario | None, robots: int, *, lasted_s: float | None = N
         rrb.Horizontal(left, right, column_shares=[3, 2]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing" if plays else "following"),
     )
 
 
@@ -67,8 +75,8 @@ def _shown(lasted_s: float | None) -> rr.TimeRange:
     return rr.TimeRange(start=ends(seconds=0.0), end=ends(seconds=max(lasted_s, 1.0)))
 
 
-def _bounds(scenario: Scenario | None) -> rrb.VisualBounds2D | None:
-    """Return bounds around start poses, route, obstacles and walls; None without a scenario."""
+def _from_above(scenario: Scenario | None) -> rrb.EyeControls3D | None:
+    """Return an eye above start poses, route, obstacles and walls, with y up; None without a scenario."""
     if scenario is None:
         return None
     world, route = scenario.world, scenario.mission.leading.route_m
@@ -76,4 +84,8 @@ def _bounds(scenario: Scenario | None) -> rrb.VisualBounds2D | None:
     points += [end for x1, y1, x2, y2 in world.walls_m for end in ((x1, y1), (x2, y2))]
     low_x, high_x = min(x for x, _ in points) - MARGIN_M, max(x for x, _ in points) + MARGIN_M
     low_y, high_y = min(y for _, y in points) - MARGIN_M, max(y for _, y in points) + MARGIN_M
-    return rrb.VisualBounds2D(x_range=[low_x, high_x], y_range=[-high_y, -low_y])
+    x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+    height_m = 0.5 * max(high_y - low_y, (high_x - low_x) / ASPECT) / HALF_VIEW
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital, position=(x, y, height_m), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0)
+    )

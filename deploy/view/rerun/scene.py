@@ -1,9 +1,9 @@
 """Conversion of a fleet's messages to rerun entities; the same code serves a running fleet and a recording.
 
-Rerun's 2-D views have y downwards: everything in `map` is drawn at (x, -y), so that left is left. Rows are collected
-per entity and sent together by `flush`. Entities: `world/robotN` (pose, with its body and its scan below), `slots`,
-`links` and `trails` of each robot, `map` and `planned` of the leader on unknown ground, `errors`, `speeds`, `lease`,
-`radio`, `processes` and `log`.
+Everything is drawn in `map`, on the floor of a 3-D view that is seen from above: a 2-D view of rerun has y downwards.
+Rows are collected per entity and sent together by `flush`. Entities: `world/robotN` (pose, with its body, role and scan
+below), `slots`, `links` and `trails` of each robot, `map` and `planned` of the leader on unknown ground, `errors`,
+`speeds`, `lease`, `radio`, `processes` and `log`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from lfa.deploy.client.team_status import told
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.robot_colours import Colour, robot_colour
 from lfa.deploy.view.rerun import static_scene
+from lfa.deploy.view.rerun.static_scene import flat
 from lfa.protocol.geometry import wrap
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_id_of
@@ -32,8 +33,13 @@ TRAIL_STEP_M, TRAIL_POINTS_MAX = 0.15, 150
 SPEED_EVERY = 5
 NAMED_MAX = 10  # more names than this would hide the robots
 SOFT, GHOST = (150, 150, 150), (190, 190, 190)
-OUTLINE = rr.components.Radius.ui_points(1.6)
+BODY_M = 0.1
+"""Height [m] of a robot's disc."""
+DOT = rr.components.Radius.ui_points(4.5)
+"""A robot is never drawn smaller, however far the view is zoomed out."""
+OUTLINE = rr.components.Radius.ui_points(1.8)
 """Line width of a robot's outline, visible at any zoom."""
+ROUTE, TRAIL = rr.components.Radius.ui_points(1.0), rr.components.Radius.ui_points(1.3)
 RADIO_S = 10.0
 """Time window [s] of the share of lost rows."""
 LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
@@ -62,6 +68,7 @@ class Scene:
         self._mission_known = False
         self._named = True
         self._colours: dict[int, Colour] = {}
+        self._placed: set[int] = set()
 
     # --- static entities -------------------------------------------------------------------------------------------
 
@@ -79,10 +86,14 @@ class Scene:
             return
         self._mission_known, self._radius_m = True, float(mission.radius_m)
         self._named = len(mission.robots) <= NAMED_MAX
-        route = [(float(x), -float(y)) for x, y in mission.leading.route_m]
+        route = [(float(x), float(y)) for x, y in mission.leading.route_m]
         if mission.leading.motion != "explore":  # an exploring leader's route is drawn as `planned`
-            self._always("world/route", rr.LineStrips2D([[(0.0, 0.0), *route]], colors=SOFT, radii=0.015))
-        self._always("world/goal", rr.Points2D([route[-1]], colors=LEADS, radii=0.15, labels=["goal"]))
+            self._always("world/route", rr.LineStrips3D([flat([(0.0, 0.0), *route])], colors=SOFT, radii=ROUTE))
+        if route[:-1]:
+            names = [f"{n}" for n in range(1, len(route))] if len(route) <= NAMED_MAX else None
+            points = rr.Points3D(flat(route[:-1]), colors=SOFT, radii=0.08, labels=names)
+            self._always("world/way-points", points)
+        self._always("world/goal", rr.Points3D(flat(route[-1:]), colors=LEADS, radii=0.15, labels=["goal"]))
         for n, robot in enumerate(mission.robots):
             self._dress(robot, n, len(mission.robots))
 
@@ -93,10 +104,10 @@ class Scene:
             self._always(f"{series}/robot{robot}", rr.SeriesLines(colors=colour, names=f"robot {robot}", widths=1.5))
         names, colours = list(ROLE_COLOURS), list(ROLE_COLOURS.values())
         self._always(f"lease/robot{robot}", rr.StateConfiguration(values=names, colors=colours))
-        self._always(f"world/trails/robot{robot}", rr.LineStrips2D.from_fields(colors=colour, radii=0.015))
-        self._always(f"world/slots/robot{robot}", rr.Points2D.from_fields(colors=GHOST, radii=0.11))
-        self._always(f"world/links/robot{robot}", rr.LineStrips2D.from_fields(colors=SOFT, radii=0.012))
-        self._always(f"world/robot{robot}/scan", rr.Points2D.from_fields(colors=colour, radii=0.03))
+        self._always(f"world/trails/robot{robot}", rr.LineStrips3D.from_fields(colors=colour, radii=TRAIL))
+        self._always(f"world/slots/robot{robot}", rr.Points3D.from_fields(colors=GHOST, radii=0.08))
+        self._always(f"world/links/robot{robot}", rr.LineStrips3D.from_fields(colors=SOFT, radii=TRAIL))
+        self._always(f"world/robot{robot}/scan", rr.Points3D.from_fields(colors=colour, radii=0.03))
 
     # --- messages --------------------------------------------------------------------------------------------------
 
@@ -144,7 +155,10 @@ class Scene:
         if robot not in self._roles:
             self._role(t, robot, str(message.role))
         self._row("transform", f"world/robot{robot}", t, (x, y, theta))
-        self._trail(t, robot, x, -y)
+        if robot not in self._placed:  # before its first pose it would be drawn at the origin
+            self._placed.add(robot)
+            self._body(t, robot, self._roles[robot])
+        self._trail(t, robot, x, y)
         if self._every(f"speed{robot}", SPEED_EVERY):
             self._row("scalar", f"speeds/robot{robot}", t, float(message.twist.linear_x))
 
@@ -153,16 +167,16 @@ class Scene:
         if not trail or hypot(x - trail[-1][0], y - trail[-1][1]) >= TRAIL_STEP_M:
             trail.append((x, y))
             if len(trail) > 1:
-                self._row("strip", f"world/trails/robot{robot}", t, list(trail))
+                self._row("strip", f"world/trails/robot{robot}", t, flat(trail, 0.01))
 
     def _tracking(self, t: float, robot: int, message: Any) -> None:
         slot = message.slot_map
-        self._row("points", f"world/slots/robot{robot}", t, np.array([[float(slot.x), -float(slot.y)]]))
+        self._row("points", f"world/slots/robot{robot}", t, np.array([[float(slot.x), float(slot.y), 0.01]]))
         own, ahead = self._where.get(robot), self._where.get(message.predecessor)
         if own is None or ahead is None:
             return
         dx, dy = own[0] - ahead[0], own[1] - ahead[1]
-        self._row("strip", f"world/links/robot{robot}", t, [(own[0], -own[1]), (ahead[0], -ahead[1])])
+        self._row("strip", f"world/links/robot{robot}", t, flat([own[:2], ahead[:2]], 0.02))
         bearing = wrap(atan2(dy, dx) - float(message.chi) - float(message.phi))
         self._row("scalar", f"errors/distance/robot{robot}", t, hypot(dx, dy) - float(message.separation_m))
         self._angle(f"errors/bearing/robot{robot}", t, bearing)
@@ -178,7 +192,7 @@ class Scene:
         ranges = np.array(message.ranges_m, dtype=object).astype(np.float32)
         hit = np.flatnonzero(np.isfinite(ranges))
         angles = float(message.angle_min) + float(message.angle_increment) * hit
-        points = np.stack([ranges[hit] * np.cos(angles), -ranges[hit] * np.sin(angles)], axis=1)
+        points = np.stack([ranges[hit] * np.cos(angles), ranges[hit] * np.sin(angles), 0.0 * ranges[hit]], axis=1)
         self._row("points", f"world/robot{robot}/scan", t, points)
 
     def _status(self, t: float, robot: int, counters: dict[str, Any]) -> None:
@@ -201,10 +215,10 @@ class Scene:
             self._planner = owner
         cell_m, cells = float(message.cell_m), message.cells
         x, y = (float(value) for value in message.corner_map)
-        route = [(float(px), -float(py)) for px, py in message.route_map]
-        self._say(t, "world/planned", rr.LineStrips2D([route], colors=PLANNED, radii=0.03))
+        route = [(float(px), float(py)) for px, py in message.route_map]
+        self._say(t, "world/planned", rr.LineStrips3D([flat(route, 0.01)], colors=PLANNED, radii=0.03))
         entity = f"world/map/tiles/{owner}/{x:.1f}_{y:.1f}"
-        self._say(t, entity, static_scene.placed((x, y), cell_m, len(cells) // message.columns))
+        self._say(t, entity, static_scene.placed((x, y), cell_m))
         self._say(t, entity, static_scene.tile(message.columns, cells))
 
     def _event(self, t: float, owner: str, message: Any) -> None:
@@ -227,15 +241,23 @@ class Scene:
         if role != "follower":
             for entity in (f"world/slots/robot{robot}", f"world/links/robot{robot}"):
                 self._say(t, entity, rr.Clear(recursive=False))
-        r, colour = self._radius_m, ROLE_COLOURS.get(role, WAITS)
-        circle = static_scene.circle(r)
-        nose = [(-0.5 * r, 0.7 * r), (r, 0.0), (-0.5 * r, -0.7 * r), (-0.5 * r, 0.7 * r)]
-        body = rr.LineStrips2D([[*circle, circle[0]], nose], colors=colour, radii=OUTLINE)
-        self._say(t, f"world/robot{robot}/body", body)
-        if self._named:
-            name = rr.Points2D([(0.0, 0.0)], colors=colour, radii=0.04, labels=[str(robot)])
-            self._say(t, f"world/robot{robot}/name", name)
+        if robot in self._placed:
+            self._body(t, robot, role)
         self._say(t, f"lease/robot{robot}", rr.StateChange(state=role))
+
+    def _body(self, t: float, robot: int, role: str) -> None:
+        """Draw a robot as a disc in its own colour with a white nose, and its role as a ring around it."""
+        r, colour = self._radius_m, self._colours.get(robot, WAITS) if role != "gone" else WAITS
+        ring = static_scene.circle(1.3 * r)
+        nose = [(-0.4 * r, 0.6 * r), (0.8 * r, 0.0), (-0.4 * r, -0.6 * r), (-0.4 * r, 0.6 * r)]
+        disc = rr.Cylinders3D(lengths=BODY_M, radii=r, colors=colour, fill_mode=rr.components.FillMode.Solid)
+        self._say(t, f"world/robot{robot}/body", disc)
+        lines = [flat([*ring, ring[0]], BODY_M), flat(nose, BODY_M)]
+        colours = [ROLE_COLOURS.get(role, WAITS), (255, 255, 255)]
+        self._say(t, f"world/robot{robot}/role", rr.LineStrips3D(lines, colors=colours, radii=OUTLINE))
+        if self._named:
+            name = rr.Points3D([(0.0, 0.0, BODY_M)], colors=colour, radii=DOT, labels=[f"{robot} {role}"])
+            self._say(t, f"world/robot{robot}/name", name)
 
     def _lead(self, t: float, robot: int, term: int) -> None:
         leader = f"robot {robot}, term {self._terms.number(term)}"
@@ -263,20 +285,20 @@ class Scene:
 
 def _transforms(rows: Sequence[tuple[float, float, float]]) -> Any:
     poses = np.array(rows)
-    half = -0.5 * poses[:, 2]
+    half = 0.5 * poses[:, 2]
     zero = np.zeros_like(half)
-    translation = np.stack([poses[:, 0], -poses[:, 1], zero], axis=1)
+    translation = np.stack([poses[:, 0], poses[:, 1], zero], axis=1)
     quaternion = np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1)
     return rr.Transform3D.columns(translation=translation, quaternion=quaternion)
 
 
 def _points(rows: Sequence[Any]) -> Any:
-    return rr.Points2D.columns(positions=np.concatenate(rows)).partition([len(row) for row in rows])
+    return rr.Points3D.columns(positions=np.concatenate(rows)).partition([len(row) for row in rows])
 
 
 _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "transform": _transforms,
     "points": _points,
-    "strip": lambda rows: rr.LineStrips2D.columns(strips=rows),
+    "strip": lambda rows: rr.LineStrips3D.columns(strips=rows),
     "scalar": lambda rows: rr.Scalars.columns(scalars=rows),
 }

@@ -21,6 +21,8 @@ SIZE, SCALE = "1600x1000", "2"
 SCREEN = "6600x4200x24"
 """Size and depth of the virtual screen: so large that the pointer, at its centre, is outside the window: no tooltip."""
 SHOT_S_MAX = 120.0
+LAYOUT_AT_END = ".rbl"
+"""Suffix of the layout that shows the end of a recording, for a picture; the recording's own layout plays it."""
 
 
 def take(rrd: Path, picture: Path, folder: Path | None) -> str:
@@ -45,7 +47,9 @@ def _by_viewer(rrd: Path, picture: Path) -> str | None:
         if display is None:
             return "no display, and no Xvfb on the PATH"
         picture.unlink(missing_ok=True)
-        command = [viewer_path(), str(rrd), "--screenshot-to", str(picture), "--window-size", SIZE, "--port", "auto"]
+        at_end = rrd.with_suffix(LAYOUT_AT_END)
+        files = [str(rrd), *([str(at_end)] if at_end.is_file() else [])]
+        command = [viewer_path(), *files, "--screenshot-to", str(picture), "--window-size", SIZE, "--port", "auto"]
         try:
             subprocess.run(
                 command,

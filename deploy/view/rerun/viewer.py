@@ -3,33 +3,63 @@
 from __future__ import annotations
 
 import os
-import signal
 import socket
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from lfa.protocol.errors import Refused
 
-if TYPE_CHECKING:
-    pass
+LOCAL = ("--bind", "127.0.0.1")
+"""Viewers and their data are for this machine only."""
+END_S_MAX = 3.0
 
 
 def run_viewer(*arguments: str) -> int:
     """Run the viewer as a child process until it is closed; Ctrl-C and SIGTERM end child and parent."""
-    child = subprocess.Popen(["rerun", *arguments], executable=viewer_path(), env=quiet())
+    return await_end(subprocess.Popen([viewer_path(), *arguments], env=quiet()))
+
+
+def await_end(child: subprocess.Popen[bytes]) -> int:
+    """Wait until a viewer is closed and return its exit code; Ctrl-C and SIGTERM end child and parent."""
     try:
         return child.wait()
-    except (KeyboardInterrupt, SystemExit):
-        child.send_signal(signal.SIGTERM)
+    finally:
+        if child.poll() is None:
+            end(child)
+
+
+def serve(web_port: int, port: int, *files: str) -> subprocess.Popen[bytes]:
+    """Start a viewer for browsers of this machine, and print its address; it shows `files`, or what comes at `port`."""
+    ports = ("--port", str(port), "--web-viewer-port", str(web_port))
+    child = subprocess.Popen([viewer_path(), *files, "--serve-web", *LOCAL, *ports], env=quiet())
+    address = f"http://127.0.0.1:{web_port}/?url={quote(data_address(port), safe='')}"
+    print(f"open {address}\nCtrl-C ends it", flush=True)
+    return child
+
+
+def data_address(port: int) -> str:
+    """Return the address at which a viewer on this machine takes data."""
+    return f"rerun+http://127.0.0.1:{port}/proxy"
+
+
+def end(child: subprocess.Popen[bytes]) -> None:
+    """End a viewer, and wait until it is gone."""
+    child.terminate()
+    try:
+        child.wait(END_S_MAX)
+    except subprocess.TimeoutExpired:
+        child.kill()
         child.wait()
-        raise
 
 
 def viewer_path() -> str:
-    """Return the path of the rerun binary installed with the SDK."""
-    return str(Path(sys.executable).with_name("rerun"))
+    """Return the path of the rerun binary installed with the SDK: its script would leave the binary behind."""
+    spec = find_spec("rerun_cli")
+    binary = Path(spec.origin).with_name("rerun") if spec is not None and spec.origin is not None else None
+    return str(binary if binary is not None and binary.is_file() else Path(sys.executable).with_name("rerun"))
 
 
 def quiet() -> dict[str, str]:
@@ -49,6 +79,7 @@ def need_rerun() -> None:
 
 def check_free_port(port: int, option: str) -> None:
     with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a viewer that has just ended takes no port
         try:
             probe.bind(("127.0.0.1", port))
         except (OSError, OverflowError):
