@@ -35,7 +35,8 @@ ORDER = (
     "agents/chain_place", "agents/stop_listener", "agents/command_publisher", "agents/subscriptions",
     "agents/robot_core", "agents/agent", "agents/cli",
 
-    "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/world", "world/checkpoint",
+    "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/time_grid",
+    "world/saved_state", "world/world", "world/checkpoint",
     "world/virtual_time", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/recording",

@@ -20,7 +20,8 @@ from lfa.protocol.geometry import Pose2D
 from lfa.protocol.node import Envelope, Received
 from lfa.protocol.output import replace_file, write_line
 from lfa.world.description.scenario import STATE, Obstacle, Scenario
-from lfa.world.world import Memory, World
+from lfa.world.saved_state import Memory
+from lfa.world.world import World
 
 EVERY_S = 0.1
 AGAIN_S = 5.0

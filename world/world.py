@@ -7,10 +7,9 @@ the tick comes. A delay too long to catch up with slows the world down instead, 
 
 from __future__ import annotations
 
-from math import floor, inf
+from math import inf
 
 import msgspec
-from msgspec import Struct
 
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.lease.gateway import Gateway
@@ -27,32 +26,10 @@ from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
 from lfa.world.robot_hardware import PARTS, RobotHardware
+from lfa.world.saved_state import Memory, Remembered
 from lfa.world.sensors.ground_sensor import Profiler
 from lfa.world.sensors.lidar import Scanner
-
-CATCH_UP_STEPS_MAX = 20
-"""Largest number of steps in one tick; after a longer pause the world's time has stood still for the rest."""
-ROUNDING = 1e-6
-"""Tolerance, as a fraction of a step, by which a tick may come early."""
-
-
-class Remembered(Struct, frozen=True):
-    """Saved state of one robot at rest: the pose of its body, and its odometry."""
-
-    id: int
-    pose: Pose2D
-    pose_odom: Pose2D
-    odometer_m: float
-
-
-class Memory(Struct, frozen=True):
-    """Saved state of a world, which outlives its process (`checkpoint.py`)."""
-
-    step: int
-    """Index of the next point of the time grid."""
-    robots: tuple[Remembered, ...]
-    things: dict[int, Pose2D]
-    """Poses in `map` of obstacles that are not fixed, by their index in the scenario."""
+from lfa.world.time_grid import TimeGrid
 
 
 class World:
@@ -77,8 +54,6 @@ class World:
         self.finished = False
         self.refusal: str | None = None
         self.defer_hellos = self.defer_grants = False
-        self.slowed_s = 0.0
-        """Total time [s] for which the world's time has stood still because ticks came too late."""
         self.started_with = {
             "kind": "world",
             "scenario": msgspec.to_builtins(scenario),
@@ -104,14 +79,9 @@ class World:
         self._driven: dict[int, tuple[Twist, float]] = {}
         """Twist last reported by each real robot, and when [s], by its index."""
         self._cut_off = False
-        self._dt_s = 1.0 / scenario.world.physics_hz
-        self._step = 0 if memory is None else memory.step
-        """Index of the next point of the time grid."""
-        self._first = self._step
-        self._begun = False
+        self._time = TimeGrid(scenario.world.physics_hz, 0 if memory is None else memory.step, start_at)
         self._remembered = {} if memory is None else {robot.id: robot for robot in memory.robots}
-        self._t0 = -inf if start_at is None else start_at - self._step * self._dt_s
-        self._bodies.advance(self._step)
+        self._bodies.advance(self._time.step)
         self._outbox = Outbox(fleet, WORLD_NAME, incarnation, first=1)
         self._truths = Outbox(fleet, WORLD_NAME, incarnation, TRUTH_OWNER, first=1)
         self._led: tuple[int, Term] | None = None
@@ -125,14 +95,17 @@ class World:
         )
 
     @property
+    def slowed_s(self) -> float:
+        """Total time [s] for which the world's time has stood still because ticks came too late."""
+        return self._time.slowed_s
+
+    @property
     def gateways(self) -> dict[int, Gateway]:
         """Gateway of each robot by its id; empty before the first call."""
         return {robot.id: robot.gateway for robot in self._robots}
 
     def next_deadline(self) -> float:
-        if self.finished:
-            return inf
-        return self._t0 + self._step * self._dt_s
+        return inf if self.finished else self._time.next_point
 
     def receive(self, received: Received) -> list[Envelope]:
         """Process a message: commands, fences and asks take effect at once, on bodies from the next step on."""
@@ -172,22 +145,16 @@ class World:
             return []
         sent: list[Envelope] = []
         self._switch_on(now)
-        if not self._begun and now >= self.next_deadline():
-            self._begun = True
-            self._t0 = now - self._step * self._dt_s
+        if self._time.begin(now):
             sent.append(self._mission(now))
-        due = floor((now - self._t0) / self._dt_s + ROUNDING) - self._step + 1
-        if due > CATCH_UP_STEPS_MAX:
-            stood_still_s = (due - CATCH_UP_STEPS_MAX) * self._dt_s
-            self._t0 += stood_still_s
-            self.slowed_s += stood_still_s
-            news: dict[str, object] = {"stood_still_s": stood_still_s, "t": self._step * self._dt_s}
+        count, stood_still_s = self._time.due(now)
+        if stood_still_s > 0.0:
+            news: dict[str, object] = {"stood_still_s": stood_still_s, "t": self._time.elapsed_s}
             sent.append(self._event("slowed", None, news, now))
-        for _ in range(min(due, CATCH_UP_STEPS_MAX)):
-            stamp = self._t0 + self._step * self._dt_s
-            touches = self._move(now) if self._step > self._first else []
-            sent += self._speak(stamp, now, touches)
-            self._step += 1
+        for _ in range(count):
+            touches = [] if self._time.is_first else self._move(now)
+            sent += self._speak(self._time.next_point, now, touches)
+            self._time.step += 1
         return sent
 
     def memory(self) -> Memory:
@@ -196,7 +163,7 @@ class World:
             Remembered(robot.id, pose, robot.odometry.pose_odom, robot.odometry.odometer_m)
             for robot, pose in zip(self._robots, self._bodies.poses, strict=True)
         )
-        return Memory(self._step, robots, self._bodies.moved())
+        return Memory(self._time.step, robots, self._bodies.moved())
 
     def _switch_on(self, now: float) -> None:
         """Create the robots' hardware at the first call: the gateways' time starts at `now`."""
@@ -227,7 +194,7 @@ class World:
             if self._led == (place, cmd.term):
                 return []
             self._led = (place, cmd.term)
-        return [self._event(kind, cmd.term, data | {"t": self._time_of(now)}, now)]
+        return [self._event(kind, cmd.term, data | {"t": self._time.time_of(now)}, now)]
 
     def _fence(self, at_key: str, fence: Fence, now: float) -> list[Envelope]:
         where = address(at_key)
@@ -258,7 +225,7 @@ class World:
             wanted[place] = twist if now - at <= (TOPIC["sensors"].timeout_s or 0.0) else STILL
         touches = self._bodies.step(wanted)
         for robot, wheels in zip(self._robots, self._bodies.wheels, strict=True):
-            robot.odometry.turn(wheels, self._dt_s)
+            robot.odometry.turn(wheels, self._time.dt_s)
         return touches
 
     def _speak(self, stamp: float, now: float, touches: list[Touch]) -> list[Envelope]:
@@ -273,33 +240,32 @@ class World:
             if not robot.hangs("driver"):
                 sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
-            sent.append(self._event("contact", None, data | {"t": self._step * self._dt_s}, stamp))
-        if self._is_due(TOPIC["sensors"].rate_hz):
+            sent.append(self._event("contact", None, data | {"t": self._time.elapsed_s}, stamp))
+        if self._samples(TOPIC["sensors"].rate_hz):
             driven = [robot for _, robot in simulated if not robot.hangs("driver")]
             sent += [robot.sensors(stamp, now) for robot in driven]
             sent += [rests for robot in driven if (rests := robot.come_to_rest(now)) is not None]
-        if self._is_due(TOPIC["localization"].rate_hz):
+        if self._samples(TOPIC["localization"].rate_hz):
             fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated if not robot.hangs("localization"))
             sent += [fix for fix in fixes if fix is not None]
-        if self._is_due(self._scenario.world.lidar.rate_hz):
+        if self._samples(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, self._bodies.moved())
             sent += [robot.scan(stamp, ranges[n]) for n, robot in simulated if not robot.hangs("scanner")]
-        if not self._profiler.flat and self._is_due(TOPIC["ground"].rate_hz):
+        if not self._profiler.flat and self._samples(TOPIC["ground"].rate_hz):
             heights = self._profiler.profile(poses, self._bodies.standing_m())
             seeing = [(n, robot) for n, robot in simulated if not robot.hangs("driver")]
             sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in seeing]
-        if self._is_due(TOPIC["truth"].rate_hz):
+        if self._samples(TOPIC["truth"].rate_hz):
             sent.append(self._truth(stamp))
-        if self._is_due(TOPIC["clock"].rate_hz):
-            clock = Clock(self._truths.header("clock", stamp), self._step * self._dt_s)
+        if self._samples(TOPIC["clock"].rate_hz):
+            clock = Clock(self._truths.header("clock", stamp), self._time.elapsed_s)
             sent.append(self._truths.envelope("clock", clock))
         return sent
 
-    def _is_due(self, rate_hz: float | None) -> bool:
-        """Return True if a sample point at `rate_hz` lies in the step that ends now."""
+    def _samples(self, rate_hz: float | None) -> bool:
+        """Return True if a message of a topic with this rate is due at this point of the time grid."""
         assert rate_hz is not None
-        part = rate_hz * self._dt_s
-        return floor(self._step * part + ROUNDING) > floor((self._step - 1) * part + ROUNDING)
+        return self._time.samples(rate_hz)
 
     def _truth(self, stamp: float) -> Envelope:
         robots = tuple(
@@ -307,7 +273,7 @@ class World:
             for robot, pose, twist in zip(self._robots, self._bodies.poses, self._bodies.twists, strict=True)
         )
         obstacles = tuple(TrueObstacle(n, pose.x, pose.y) for n, pose in self._bodies.moved().items())
-        truth = Truth(self._truths.header("truth", stamp), self._step * self._dt_s, robots, obstacles)
+        truth = Truth(self._truths.header("truth", stamp), self._time.elapsed_s, robots, obstacles)
         return self._truths.envelope("truth", truth)
 
     def _mission(self, now: float) -> Envelope:
@@ -316,9 +282,6 @@ class World:
 
     def _event(self, kind: str, term: Term | None, data: dict[str, object], stamp: float) -> Envelope:
         return self._outbox.event_envelope(kind, stamp, term, data)
-
-    def _time_of(self, now: float) -> float:
-        return now - self._t0 if self._begun else self._step * self._dt_s
 
 
 def _gateway_name(robot_id: int) -> str:

@@ -12,7 +12,8 @@ from lfa.protocol.geometry import Twist, along_arc, distance
 from lfa.protocol.messages.robot import GroundProfile, LaserScan, Sensors
 from lfa.protocol.messages.simulation import Clock, Truth
 from lfa.world.description.load import load
-from lfa.world.world import CATCH_UP_STEPS_MAX, World
+from lfa.world.time_grid import CATCH_UP_STEPS_MAX
+from lfa.world.world import World
 from tests.rigs.world_rig import FAR_BUMP, FLEET, MOVER, NOISE, T0, Rig, events, of
 
 

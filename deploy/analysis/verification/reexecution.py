@@ -24,7 +24,8 @@ from lfa.protocol.witness import Witness
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.physics.rigid_bodies import Physics
-from lfa.world.world import Memory, World
+from lfa.world.saved_state import Memory
+from lfa.world.world import World
 
 BODIES: dict[str, type[Physics] | type[Kinematic]] = {"Physics": Physics, "Kinematic": Kinematic}
 _local_decoder = msgspec.msgpack.Decoder(Local)
