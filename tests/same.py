@@ -22,7 +22,6 @@ from unittest.mock import patch
 
 import msgspec
 
-from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.analysis.verification.reexecution import compare
 from lfa.deploy.analysis.verification.replay import journals
@@ -47,8 +46,8 @@ LEASE_SEEDS = 60
 WHOLE_SEEDS = 20
 WHOLE_CHUNK = 5  # seeds that one worker plays at a time
 MADE_BY = "# made by "
-WALL_CLOCK = ("duration_s", "real_time_factor", "recording")
-"""What of a summary depends on the machine, or on docstrings: the recording's size, for its schemas hold them."""
+NO_BEHAVIOUR = ("duration_s", "real_time_factor", "recording", "provenance")
+"""What of a summary depends on machine, commit, or docstrings: the recording's size, for its schemas hold them."""
 
 
 class Row(NamedTuple):
@@ -84,15 +83,17 @@ def simulated(name: str, seed: int) -> list[Row]:
         folder = Path(place) / "run"
         ended = run(scenario, seed, folder, parse_all(scenario.mission, scenario.faults, ()))
         kept = journals(folder, "all")
-        found = {"events.jsonl": Digest((folder / "events.jsonl").read_bytes()), "summary": _of_summary(ended.summary)}
+        found = {
+            "events.jsonl": Digest((folder / "events.jsonl").read_bytes()),
+            "summary": _of_summary(msgspec.to_builtins(ended.summary)),
+        }
         found["headings"] = Digest(*(read(path)[0] for path in kept))
         found |= {path.name: _of_calls(path) for path in kept}
     return [Row("sim", name, str(seed), what, str(digest)) for what, digest in found.items()]
 
 
-def _of_summary(summary: Summary) -> Digest:
-    facts = msgspec.to_builtins(summary)
-    return Digest({name: value for name, value in facts.items() if name not in WALL_CLOCK})
+def _of_summary(facts: dict[str, Any]) -> Digest:
+    return Digest({name: value for name, value in facts.items() if name not in NO_BEHAVIOUR})
 
 
 def _of_calls(path: Path) -> Digest:
