@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from lfa.deploy.analysis.summary import Summary
 from tests import same
 from tests.same import LEASES, NO_BEHAVIOUR, Row, differences, read_table, tasks, text
 
@@ -31,7 +32,7 @@ def test_another_hash_and_a_row_too_few_are_told() -> None:
 def test_what_no_behaviour_is_changes_no_hash() -> None:
     """A summary names the commit that made it: two commits that behave alike have one hash."""
     for name in NO_BEHAVIOUR:
-        assert name in {field.name for field in msgspec.structs.fields(same.Summary)}
+        assert name in {field.name for field in msgspec.structs.fields(Summary)}
     facts = {"outcome": "goal_reached", "provenance": "one", "duration_s": 1.0}
     assert str(same._of_summary(facts)) == str(same._of_summary(facts | {"provenance": "other", "duration_s": 2.0}))
     assert str(same._of_summary(facts)) != str(same._of_summary(facts | {"outcome": "stuck"}))
