@@ -18,10 +18,12 @@ from math import hypot
 from pathlib import Path
 
 import msgspec
-from msgspec import Struct
+from msgspec import Struct, to_builtins
 
-from lfa.deploy.bench.harness.rows import Case, Quantity, measured, select, show
+from lfa.deploy.bench.harness.kept import Keep, measured_or_kept
+from lfa.deploy.bench.harness.rows import Case, CasePart, Quantity, many, select, show
 from lfa.deploy.bench.motion import complaint
+from lfa.deploy.campaign.items import name_of
 from lfa.protocol.errors import Refused
 
 FOUND_IN = Path("shared") / "data" / "barn" / "worlds.json"
@@ -87,31 +89,38 @@ TEAMS = (
 )
 
 
-def run(as_json: bool, rows: str = "*", jobs: int = 1, seeds: int | None = None, worlds: str | None = None) -> int:
+def run(
+    as_json: bool,
+    rows: str = "*",
+    jobs: int = 1,
+    seeds: int | None = None,
+    worlds: str | None = None,
+    keep: Keep | None = None,
+) -> int:
     """Print the rows whose names match the glob `rows`, over the first `seeds` worlds; return 0 if all hold, else 1."""
     field = read(_file() if worlds is None else Path(worlds))
     chosen = field.worlds[: seeds or len(field.worlds)]
-    return show(measured(select([case(team, field, chosen) for team in TEAMS], rows), jobs, rows), as_json)
+    return show(
+        measured_or_kept("barn", select([case(team, field, chosen) for team in TEAMS], rows), jobs, rows, keep), as_json
+    )
 
 
 def case(team: BarnTeam, field: BarnWorlds, worlds: Sequence[BarnWorld]) -> Case:
     """Return the case of one team over `worlds`."""
     good = Quantity(f"good of {len(worlds)}", "runs", float(int(team.good_share * len(worlds))), "at least")
     contacts = Quantity("contacts", "runs", 0.0)
-    score = (Quantity("score", "", SCORE_BAR, "at least"),) if team.scored else ()
-    return Case(f"barn/{team.name}", (good, contacts, *score), partial(results, team, field, worlds))
+    score = (Quantity("score", "", SCORE_BAR, "at least", over="mean"),) if team.scored else ()
+    parts = [
+        CasePart([world.index, name_of(to_builtins(world))], partial(result, team, field, world)) for world in worlds
+    ]
+    return many(f"barn/{team.name}", (good, contacts, *score), parts)
 
 
-def results(team: BarnTeam, field: BarnWorlds, worlds: Sequence[BarnWorld]) -> list[float]:
-    """Return the numbers of good runs and of runs with a contact, and where it is scored the mean score."""
-    scores, touched, good = list[float](), 0, 0
-    for world in worlds:
-        score, wrong, contact = outcome(team, field, world)
-        good += wrong is None
-        touched += contact
-        scores.append(score)
-        print(f"barn/{team.name} {world.index}: {wrong or 'ok'}, score {score:.3f}", file=sys.stderr, flush=True)
-    return [float(good), float(touched)] + ([sum(scores) / len(scores)] if team.scored else [])
+def result(team: BarnTeam, field: BarnWorlds, world: BarnWorld) -> list[float]:
+    """Return whether the run was good and whether it had a contact (0 or 1), and where it is scored the score."""
+    score, wrong, contact = outcome(team, field, world)
+    print(f"barn/{team.name} {world.index}: {wrong or 'ok'}, score {score:.3f}", file=sys.stderr, flush=True)
+    return [float(wrong is None), float(contact)] + ([score] if team.scored else [])
 
 
 def outcome(team: BarnTeam, field: BarnWorlds, world: BarnWorld) -> tuple[float, str | None, bool]:

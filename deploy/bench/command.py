@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from importlib import import_module
 from inspect import signature
+from pathlib import Path
 from pkgutil import iter_modules
 from typing import Annotated, Any
 
 import typer
 
 import lfa.deploy.bench
+from lfa.deploy.bench.harness.kept import Keep
+from lfa.deploy.campaign.shard import WHOLE, parse_shard
 from lfa.protocol.errors import Refused
 
 
@@ -30,6 +33,10 @@ def command(
     full: Annotated[bool, typer.Option("--full", help="Run many more rounds, and report the p99.")] = False,
     minutes: Annotated[float | None, typer.Option(help="Duration of a measurement [min].")] = None,
     worlds: Annotated[str | None, typer.Option(help="File of BARN worlds (barn).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Keep the results here; a second start measures only what is missing.")
+    ] = None,
+    shard: Annotated[str | None, typer.Option(help="With --out: measure only this share, 3/16.")] = None,
     seeds: Annotated[
         int | None, typer.Option(help="Number of runs of each scenario, from seed 1; of pairs on each map.")
     ] = None,
@@ -41,10 +48,14 @@ def command(
     run = import_module(f"lfa.deploy.bench.{name}").run
     given: dict[str, Any] = {"rows": rows, "jobs": jobs, "processes": processes or None, "figures": figures}
     given |= {"kills": kills, "full": full or None, "minutes": minutes, "seeds": seeds, "worlds": worlds}
+    if shard is not None and out is None:
+        raise Refused(f"--shard {shard}: must go with --out, the folder of the results")
+    if out is not None:
+        given["keep"] = Keep(out, WHOLE if shard is None else parse_shard(shard))
     given = {option: value for option, value in given.items() if value is not None}
     for option in given:
         if option not in signature(run).parameters:
-            raise Refused(f"lfa bench {name} takes no --{option}")
+            raise Refused(f"lfa bench {name} takes no --{'out' if option == 'keep' else option}")
     if jobs is not None and jobs < 1:
         raise Refused(f"--jobs {jobs}: must be at least 1")
     if kills is not None and kills < 1:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lfa.deploy.bench.control_cases import agents, string_stability, table
 from lfa.deploy.bench.control_cases.figures import draw
+from lfa.deploy.bench.harness.kept import Keep, measured_or_kept
 from lfa.deploy.bench.harness.rows import Case, measured, select, show
 
 
@@ -15,7 +16,14 @@ def cases() -> list[Case]:
     return [*string_stability.cases(), *agents.cases(), *table.cases()]
 
 
-def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, figures: str | None = None) -> int:
+def run(
+    as_json: bool,
+    rows: str = "*",
+    jobs: int = 2,
+    processes: bool = False,
+    figures: str | None = None,
+    keep: Keep | None = None,
+) -> int:
     """Print the rows whose names match the glob `rows`; return 0 if all hold, else 1. `figures` is an output folder.
 
     `processes` adds real runs, one after the other and after the computations, whose load would distort them.
@@ -26,4 +34,4 @@ def run(as_json: bool, rows: str = "*", jobs: int = 2, processes: bool = False, 
     alone = [case for case in chosen if case in live]
     if figures is not None:
         draw(Path(figures))
-    return show(chain(measured(computed, jobs, rows), measured(alone, 1, rows)), as_json)
+    return show(chain(measured_or_kept("control", computed, jobs, rows, keep), measured(alone, 1, rows)), as_json)

@@ -13,7 +13,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from functools import partial
+from functools import cache, partial
 from math import ceil, hypot
 from pathlib import Path
 from random import Random
@@ -21,7 +21,8 @@ from random import Random
 from msgspec import Struct
 
 from lfa.deploy.analysis.summary import Summary
-from lfa.deploy.bench.harness.rows import Case, Quantity, measured, select, show
+from lfa.deploy.bench.harness.kept import Keep, measured_or_kept
+from lfa.deploy.bench.harness.rows import Case, CasePart, Quantity, many, select, show
 from lfa.protocol.errors import Refused
 
 SEEDS = 3
@@ -59,13 +60,14 @@ def cases(seeds: int | None) -> list[Case]:
 
     of_each = seeds or SEEDS
     all_good = Quantity("good", "runs", float(of_each), "at least")
-    runs = [Case(f"scenario/{name}", (all_good,), partial(scenario_good, name, of_each)) for name in shipped()]
+    runs = [many(f"scenario/{name}", (all_good,), seeds_of(name, of_each)) for name in shipped()]
     return runs + [_unknown(ground, seeds or ground.pairs) for ground in GROUNDS if map_of(ground) is not None]
 
 
 def _unknown(ground: BenchMap, count: int) -> Case:
     good = Quantity(f"good of {count}", "runs", float(ceil(GOOD_SHARE * count)), "at least")
-    return Case(f"unknown/{ground.name}", (good,), partial(pairs_good, ground, count))
+    parts = [CasePart(number, partial(pair_good, ground, count, number)) for number in range(1, count + 1)]
+    return many(f"unknown/{ground.name}", (good,), parts)
 
 
 def map_of(ground: BenchMap) -> Path | None:
@@ -78,26 +80,34 @@ def map_of(ground: BenchMap) -> Path | None:
     return next((path for up in above if (path := up / FOUND_IN / f"{ground.name}.yaml").is_file()), None)
 
 
-def run(as_json: bool, rows: str = "scenario/*", jobs: int = 1, seeds: int | None = None) -> int:
+def run(
+    as_json: bool, rows: str = "scenario/*", jobs: int = 1, seeds: int | None = None, keep: Keep | None = None
+) -> int:
     """Print the rows whose names match the glob `rows`; return 0 if all hold, else 1."""
     for ground in GROUNDS:
         if map_of(ground) is None and fnmatchcase(f"unknown/{ground.name}", rows.rsplit("/good", 1)[0]):
             where = f"{FOUND_IN / ground.name}.yaml"
             print(f"unknown/{ground.name} is left out: no {where} beside the checkout or above it", file=sys.stderr)
-    return show(measured(select(cases(seeds), rows), jobs, rows), as_json)
+    return show(measured_or_kept("motion", select(cases(seeds), rows), jobs, rows, keep), as_json)
 
 
-def scenario_good(name: str, seeds: int) -> tuple[float]:
-    """Return the number of good runs of the scenario, over seeds 1 to `seeds`."""
-    return (float(sum(_good(name, seed, ()) for seed in range(1, seeds + 1))),)
+def seeds_of(name: str, seeds: int) -> list[CasePart]:
+    """Return a part for each of the seeds 1 to `seeds` of the scenario."""
+    return [CasePart(seed, partial(run_good, name, seed)) for seed in range(1, seeds + 1)]
 
 
-def pairs_good(ground: BenchMap, count: int) -> tuple[float]:
-    """Return the number of good runs over `count` random pairs on the map."""
-    drawn = enumerate(pairs(ground, count), start=1)
-    return (float(sum(_good("explore", number, sets, ground.robots) for number, sets in drawn)),)
+def run_good(name: str, seed: int) -> tuple[float]:
+    """Return 1 if the run of the scenario is good, else 0."""
+    return (float(_good(name, seed, ())),)
 
 
+def pair_good(ground: BenchMap, count: int, number: int) -> tuple[float]:
+    """Return 1 if the run on the `number`-th of `count` random pairs is good, else 0; the map may have fewer pairs."""
+    drawn = pairs(ground, count)
+    return (float(number <= len(drawn) and _good("explore", number, drawn[number - 1], ground.robots)),)
+
+
+@cache
 def pairs(ground: BenchMap, count: int) -> list[tuple[str, ...]]:
     """Return up to `count` random pairs in free space, each as arguments of `--set`.
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -19,8 +20,12 @@ from lfa.deploy.analysis.paper import across_seeds
 from lfa.deploy.analysis.paper.across_seeds import Kept
 from lfa.deploy.analysis.paper.checks import PATHS
 from lfa.deploy.analysis.paper.criteria import Finding
+from lfa.deploy.bench.harness.kept import Keep
+from lfa.deploy.campaign.items import Item, ItemResult, name_of
+from lfa.deploy.campaign.work import campaign_of, do_share
 from lfa.deploy.process.worker_pool import workers
 
+KIND = "bench paper"
 SEEDS = 20
 
 
@@ -38,18 +43,27 @@ class PaperRow(Struct, frozen=True):
     ok: bool
 
 
-def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1) -> int:
-    """Print the rows; return 0 if every property holds for every seed, else 1."""
-    rows = _rows(seeds, jobs)
+class PaperRun(Struct, frozen=True):
+    """Findings on one run, and what is kept of it and of its iteration 2."""
+
+    scenario: str
+    seed: int
+    findings: tuple[Finding, ...]
+    kept: tuple[Kept, ...]
+
+
+def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1, keep: Keep | None = None) -> int:
+    """Print the rows; return 0 if every property holds for every seed, else 1. `keep` holds the runs' results."""
+    rows = rows_of(_runs(seeds, jobs) if keep is None else _kept(seeds, jobs, keep))
     if as_json:
         print(msgspec.json.encode({"rows": rows}).decode())
     else:
-        print("\n".join(map(_line, rows)))
+        print("\n".join(map(line, rows)))
         print(f"{len(rows)} rows, {sum(not row.ok for row in rows)} below the bar")
     return 0 if all(row.ok for row in rows) else 1
 
 
-def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
+def one(scenario: str, seed: int) -> PaperRun:
     """Simulate one run and its iteration 2; return the findings on the first and the kept data of both.
 
     The run folders are removed.
@@ -65,24 +79,52 @@ def one(scenario: str, seed: int) -> tuple[str, int, list[Finding], list[Kept]]:
         first = Run(simulate(chosen, seed, folder / "first").folder)
         known, _ = rebuild_scenario(scenario, (), None, seed, first.folder)
         second = Run(simulate(known, seed, folder / "second").folder)
-        return scenario, seed, of_run(first), [across_seeds.keep(first), across_seeds.keep(second)]
+        keep = (across_seeds.keep(first), across_seeds.keep(second))
+        return PaperRun(scenario, seed, tuple(of_run(first)), keep)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _rows(seeds: int, jobs: int) -> list[PaperRow]:
-    kept: list[Kept] = []
-    found: dict[str, dict[str, list[Finding]]] = {path: {} for path in PATHS}
+def _runs(seeds: int, jobs: int) -> Iterator[PaperRun]:
+    """Yield the runs of both paths as they end."""
     with workers(jobs) as pool:
         waiting = [pool.submit(one, path, seed) for seed in range(1, seeds + 1) for path in PATHS]
         for number, future in enumerate(waiting, start=1):
-            scenario, seed, findings, of_it = future.result()
-            kept += of_it
-            for finding in findings:
-                found[scenario].setdefault(f"{finding.figure} {finding.name}", []).append(finding)
-            failed = [f"{f.name} = {f.value:g} ({f.note})" for f in findings if f.status == "fails"]
-            told = f"fails: {'; '.join(failed)}" if failed else "ok"
-            print(f"{number} of {len(waiting)}: {scenario}, seed {seed}: {told}", file=sys.stderr, flush=True)
+            done = future.result()
+            print(f"{number} of {len(waiting)}: {_told(done)}", file=sys.stderr, flush=True)
+            yield done
+
+
+def _kept(seeds: int, jobs: int, keep: Keep) -> list[PaperRun]:
+    """Do the share of the runs that `keep` names; return all whose results are there."""
+    names = [(path, seed) for seed in range(1, seeds + 1) for path in PATHS]
+    items = [Item(name_of([KIND, *name]), f"{name[0]}, seed {name[1]}", partial(_done, *name)) for name in names]
+    kept, _ = do_share(keep.out, campaign_of(KIND, f"lfa {KIND}", items), items, keep.shard, jobs)
+    return [msgspec.convert(result.data, PaperRun) for result in kept.results()]
+
+
+def _done(scenario: str, seed: int) -> ItemResult:
+    done = one(scenario, seed)
+    return ItemResult(msgspec.to_builtins(done), "; ".join(_failures(done)))
+
+
+def _failures(done: PaperRun) -> list[str]:
+    return [f"{f.name} = {f.value:g} ({f.note})" for f in done.findings if f.status == "fails"]
+
+
+def _told(done: PaperRun) -> str:
+    failed = _failures(done)
+    return f"{done.scenario}, seed {done.seed}: {'fails: ' + '; '.join(failed) if failed else 'ok'}"
+
+
+def rows_of(runs: Iterable[PaperRun]) -> list[PaperRow]:
+    """Return the rows over all runs, and those that compare the two paths."""
+    kept: list[Kept] = []
+    found: dict[str, dict[str, list[Finding]]] = {path: {} for path in PATHS}
+    for done in runs:
+        kept += done.kept
+        for finding in done.findings:
+            found[done.scenario].setdefault(f"{finding.figure} {finding.name}", []).append(finding)
     rows = [_row(f"{path} {name}", several) for path in PATHS for name, several in found[path].items()]
     return rows + [_row(f"both {finding.figure} {finding.name}", [finding]) for finding in across_seeds.across(kept)]
 
@@ -103,7 +145,7 @@ def _badness(finding: Finding) -> float:
     return abs(off) if rule == "=" else off if rule.startswith("<") else -off
 
 
-def _line(row: PaperRow) -> str:
+def line(row: PaperRow) -> str:
     value = "-" if row.value is None else f"{row.value:.4g}"
     mark = "ok" if row.ok else "BELOW THE BAR"
     return f"{row.name:<64}{value:>10} {row.unit:<4} bar {row.bar:<11} {row.holds:>3} of {row.of:<3} {mark}"

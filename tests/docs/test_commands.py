@@ -47,6 +47,14 @@ RUN_HERE: dict[str, tuple[str, ...]] = {
     "lfa replay runs/law --robot 2": (),
 }  # fmt: skip
 TESTED: dict[str, str] = {
+    **dict.fromkeys(
+        (
+            "lfa fuzz --seeds 100000 --shard 3/16 --out runs/fuzz",
+            "lfa bench motion --shard 1/2 --out runs/motion",
+            "lfa verify RUN... --shard 1/2 --out runs/checked",
+        ),
+        "tests/deploy/campaign/test_searches.py",
+    ),
     **dict.fromkeys(CAMPAIGNS, "tests/deploy/campaign/test_docs_page.py"),
     **dict.fromkeys(("lfa run leader_killed --out runs/real", "lfa run leader_killed"), "tests/processes/test_run.py"),
     "lfa sim leader_killed": "tests/deploy/run/test_simulate.py",

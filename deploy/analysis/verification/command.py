@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +20,8 @@ from lfa.deploy.analysis.summary import SUMMARY
 from lfa.deploy.analysis.verification.checker import Violation
 from lfa.deploy.analysis.verification.journals import verify
 from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.analysis.verification.shares import check_share
+from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
 from lfa.deploy.scenario_loading import load_controller_of_run
 from lfa.protocol.errors import Refused
 
@@ -50,9 +53,18 @@ def command(
     controller: Annotated[
         str | None, typer.Option(help="FILE.py:Class of the runs' controller, if it is not installed.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Keep the findings here; a second start checks only what is missing.")
+    ] = None,
+    shard: Annotated[str | None, typer.Option(help="With --out: check only this share of the runs, 3/16.")] = None,
+    jobs: Annotated[int, typer.Option(help="With --out: number of parallel processes.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print all findings as JSON.")] = False,
 ) -> int:
     """Check the run folders and print the findings; exit code 1 for a broken invariant or a failed property."""
+    if out is None and (shard is not None or jobs != 1):
+        raise Refused("--shard and --jobs: must go with --out, the folder of the findings")
+    if out is not None:
+        return _kept(folders, controller, out, WHOLE if shard is None else parse_shard(shard), jobs, as_json)
     checked: list[Checked] = []
     kept: list[Kept] = []
     for folder in folders:
@@ -62,6 +74,32 @@ def command(
         kept += [of_it] if of_it.scenario in PATHS else []
         if not as_json:
             _print(one)
+    return _end(checked, kept, as_json)
+
+
+def _kept(folders: list[Path], controller: str | None, out: Path, shard: Shard, jobs: int, as_json: bool) -> int:
+    """Check a share of the runs, with the findings kept in `out`; print those of all that are done."""
+    for folder in folders:
+        load_controller_of_run(folder, controller)
+    done = check_share(folders, partial(_checked, controller), out, shard, jobs)
+    checked = [msgspec.convert(one, Checked) for one in done]
+    kept = [keep for one in done if (keep := msgspec.convert(one["kept"], Kept)).scenario in PATHS]
+    if not as_json:
+        for one in checked:
+            _print(one)
+    return _end(checked, kept, as_json)
+
+
+def _checked(controller: str | None, folder: Path) -> tuple[Checked, Kept, str]:
+    """Check a run in a process of its own; return also what fails in it."""
+    load_controller_of_run(folder, controller)
+    one, of_it = check(folder)
+    broken = [f"{violation.name} at {violation.at:.3f} s: {violation.text}" for violation in one.broken]
+    return one, of_it, "; ".join(broken + [finding.name for finding in one.shapes if finding.status == "fails"])
+
+
+def _end(checked: list[Checked], kept: list[Kept], as_json: bool) -> int:
+    """Print the comparisons of several runs, or everything as JSON; return the exit code."""
     compared = tuple(across_seeds.across(kept)) if kept else ()
     verdict = VerifyReport(not any(map(_faulty, checked)) and not _fails(compared), tuple(checked), compared)
     if as_json:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
+from functools import partial
 from math import isfinite
-from typing import Literal
+from typing import Any, Literal
 
 from msgspec import Struct, structs
 
@@ -31,6 +32,15 @@ class Quantity(Struct, frozen=True):
     unit: str
     bar: float | None = None
     rule: Rule = "at most"
+    over: Literal["sum", "mean"] = "sum"
+    """Value of a case in several parts, from those of its parts."""
+
+
+class CasePart(Struct, frozen=True):
+    """Part of a case that can be measured alone, with the facts that tell it from others in a kept result."""
+
+    facts: Any
+    measure: Callable[[], Sequence[float]]
 
 
 class Case(Struct, frozen=True):
@@ -39,10 +49,27 @@ class Case(Struct, frozen=True):
     name: str
     quantities: tuple[Quantity, ...]
     measure: Callable[[], Sequence[float]]
+    parts: tuple[CasePart, ...] = ()
+    """Parts whose values make the case's; empty: it is measured as a whole."""
 
     def row_names(self) -> list[str]:
         """Return the names of the case's rows, one per quantity."""
         return [f"{self.name}/{quantity.name}" for quantity in self.quantities]
+
+
+def many(name: str, quantities: tuple[Quantity, ...], parts: Sequence[CasePart]) -> Case:
+    """Return a case of several parts, such as one for each seed."""
+    return Case(name, quantities, partial(_measure_all, quantities, tuple(parts)), tuple(parts))
+
+
+def _measure_all(quantities: Sequence[Quantity], parts: Sequence[CasePart]) -> list[float]:
+    return combined(quantities, [part.measure() for part in parts])
+
+
+def combined(quantities: Sequence[Quantity], values: Sequence[Sequence[float]]) -> list[float]:
+    """Return the values of a case from those of its parts, of which there is at least one."""
+    columns = zip(quantities, zip(*values, strict=True), strict=True)
+    return [sum(column) / (len(column) if quantity.over == "mean" else 1) for quantity, column in columns]
 
 
 class BenchRow(Struct, frozen=True):

@@ -17,7 +17,13 @@ from lfa.protocol.output import write_line
 
 MERGED = "merged"
 WORST = "worst"
-REPORTS = {"sweep": "lfa.deploy.campaign.merge.sweep"}
+REPORTS = {
+    "sweep": "lfa.deploy.campaign.merge.sweep",
+    "fuzz": "lfa.deploy.campaign.merge.fuzz",
+    "bench": "lfa.deploy.campaign.merge.bench",
+    "bench paper": "lfa.deploy.campaign.merge.findings",
+    "verify": "lfa.deploy.campaign.merge.findings",
+}
 """Module of each kind of campaign, with a function `report`."""
 
 

@@ -9,9 +9,10 @@ import sys
 import pytest
 
 from lfa.deploy.analysis.verification.safety import OneBond
-from lfa.deploy.fuzz.command import Tally, parse_seeds, shrink, so_far
+from lfa.deploy.fuzz.command import parse_seeds, so_far
 from lfa.deploy.fuzz.fault_injector import play
 from lfa.deploy.fuzz.schedules import ScheduledFault, draw, without
+from lfa.deploy.fuzz.search import Tally, shrink
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.membership import first_config
 from lfa.protocol.lease.timing import timing_of
