@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
-from lfa.agents.avoidance.moving_obstacle import Crossing, before
+from lfa.agents.avoidance.moving_obstacle import Crossing, before, shadow
 from lfa.agents.avoidance.safety import safe, sharing
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.following.factory import follower_of, predecessor_of
@@ -196,7 +196,7 @@ class Navigator:
         points = self._obstacles.points(pose)
         self.leading.work(role is Role.LEADER, pose, self._mates, now)
         moving = self._obstacles.moving(pose, now)
-        still = resting(points, pose, moving) if self._crossing.patient else points
+        still = resting(points, pose, moving) if self._crossing.patient else points + shadow(moving, pose)
         if role is Role.LEADER:
             wanted = self._lead(chain, still, pose, now)
         elif role is Role.FOLLOWER:

@@ -29,6 +29,8 @@ STEP_S = 0.25
 SLOW_SHARE = 0.4
 WAIT_S_MAX = 5.0
 """Maximum waiting time [s]; afterwards a moving obstacle is driven around like a stationary one."""
+SOON_S = 2.0
+"""Time [s] ahead within which what comes on is given way to again, however long it was waited for."""
 HOLD_S = 1.0
 """Time [s] after the last conflict before a robot may choose a less careful action."""
 WORTH_M = 0.1
@@ -37,6 +39,9 @@ BODY_M = 0.05
 """Clearance [m] to what stands that an evasion keeps beside the body."""
 ROOM_S = 1.2
 """Time [s] for which an evasion has to be free of what stands."""
+SHADOW_S, SHADOW_STEPS, SHADOW_M_MAX = 8.0, 3, 1.2
+"""Time [s] ahead for which a detour keeps out of the way of what moves slowly, the number of places on it, and the way
+[m] up to which it counts as slow."""
 AWAY_M = 0.08
 """Clearance [m] that is left when a robot drives towards what moves; nearer, it drives away from it or stands."""
 
@@ -99,6 +104,8 @@ class Crossing:
         if self._waiting_since is None:
             self._waiting_since = now
         self._impatient = now - self._waiting_since > WAIT_S_MAX
+        if self._impatient and _closest(moving, pose, wanted, SOON_S) < self._radius_m + AWAY_M:
+            self._impatient, self._waiting_since = False, now  # what was waited for comes on
         if self._impatient:
             self.decision = None
             return wanted
@@ -181,6 +188,24 @@ def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: fl
             if apart < first:
                 least = min(least, apart - feature.radius_m)
     return least
+
+
+def shadow(moving: Sequence[Feature], pose: Pose2D) -> list[Point]:
+    """Return, in `base_link`, points of the places to which what moves slowly comes next: a detour leads behind it."""
+    c, s, points = cos(pose.theta), sin(pose.theta), list[Point]()
+    for feature in moving:
+        speed = hypot(feature.vx, feature.vy)
+        if speed * SHADOW_S > SHADOW_M_MAX:
+            continue
+        for n in range(1, SHADOW_STEPS + 1):
+            x, y = feature.at(SHADOW_S * n / SHADOW_STEPS)
+            reach = feature.radius_m / max(speed, 1e-6)
+            for left in (-1.0, 0.0, 1.0):
+                side = reach * (1.0 - abs(left))
+                dx = x + side * feature.vx - left * reach * feature.vy - pose.x
+                dy = y + side * feature.vy + left * reach * feature.vx - pose.y
+                points.append((c * dx + s * dy, c * dy - s * dx))
+    return points
 
 
 def before(moving: Sequence[Feature], pose: Pose2D, within_s: float) -> list[Point]:

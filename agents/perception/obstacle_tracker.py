@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import hypot, inf, sqrt
 from typing import Literal
 
@@ -32,6 +33,13 @@ MOVING_MPS = 0.12
 ANCHOR_S = 1.0
 """Minimum time [s] over which the mean speed must reach `MOVING_MPS`, as the present one must, for a moving
 obstacle."""
+SLOW_MPS, SLOW_M, SLOW_S, ANCHORS_MAX = 0.02, 0.1, 3.0, 7
+"""Mean speed [m/s] of the slowest motion that is told, the way [m] that it must have come, more than errors explain,
+the minimum time [s] of that, and the number of anchors that are kept for it."""
+SLOW_RADII = 0.6
+"""Way that a slow motion must have come, in radii of the obstacle: as a robot drives round it, another part is seen."""
+STEADY_SHARE = 0.25
+"""Least speed between two anchors, as a share of the mean: a pose that is corrected is no motion."""
 EDGE_M = 0.1
 """Distance [m] to the sensor's range limit within which an obstacle counts as partly visible: its centre would seem to
 move."""
@@ -71,6 +79,8 @@ class _Track(Struct):
     vx: float = 0.0
     vy: float = 0.0
     moves: bool = False
+    slow: Point | None = None
+    """Mean velocity [m/s] of a motion that is too slow for the filter; None for another."""
 
     def places(self) -> tuple[Point, ...]:
         return ((self.x, self.y), *self.ends)
@@ -81,11 +91,27 @@ class _Track(Struct):
 
         A moving obstacle that passes another one can lose an end to it as well: for a moving one the centre is enough.
         """
-        at, before = self.anchors[0]
+        at, before = self.anchors[-2] if len(self.anchors) > 1 else self.anchors[0]
         lasted = self.seen_at - at
         far = [hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)]
         far_m = far[0] if self.moves else min(far)
         return lasted >= ANCHOR_S and far_m > MOVING_MPS * lasted and hypot(self.vx, self.vy) > MOVING_MPS
+
+    def slow_velocity(self) -> Point | None:
+        """Return the mean velocity of all of it over the anchors, when it creeps in one direction; None otherwise."""
+        at, before = self.anchors[0]
+        lasted = self.seen_at - at
+        if lasted < SLOW_S:
+            return None
+        far = [hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)]
+        if min(far) < max(SLOW_M, SLOW_MPS * lasted, SLOW_RADII * self.radius_m):
+            return None
+        vx, vy = (self.x - before[0][0]) / lasted, (self.y - before[0][1]) / lasted
+        least = STEADY_SHARE * (vx * vx + vy * vy)
+        for (at, (a, *_)), (until, (b, *_)) in pairwise(self.anchors):
+            if (b[0] - a[0]) * vx + (b[1] - a[1]) * vy < least * (until - at):
+                return None
+        return vx, vy
 
 
 class Tracker:
@@ -171,8 +197,10 @@ class Tracker:
         best.radius_m = 0.7 * best.radius_m + 0.3 * radius_m
         best.seen_at, best.ends = now, ends
         if now - best.anchors[-1][0] >= ANCHOR_S:
-            best.anchors = [best.anchors[-1], (now, best.places())]
-        best.moves = best.has_moved()
+            best.anchors = [*best.anchors[1 - ANCHORS_MAX :], (now, best.places())]
+        moved = best.has_moved()
+        best.slow = None if moved else best.slow_velocity()
+        best.moves = moved or best.slow is not None
         return best
 
 
@@ -247,5 +275,5 @@ def _feature(track: _Track, now: float) -> Feature:
     dt = now - track.seen_at
     if not track.moves:
         return Feature("stationary", track.x, track.y, track.radius_m)
-    x, y = track.x + track.vx * dt, track.y + track.vy * dt
-    return Feature("moving", x, y, track.radius_m, track.vx, track.vy)
+    vx, vy = track.slow or (track.vx, track.vy)
+    return Feature("moving", track.x + vx * dt, track.y + vy * dt, track.radius_m, vx, vy)

@@ -1,6 +1,8 @@
 """What moves across the way is given way to, for a bounded time."""
 
-from lfa.agents.avoidance.moving_obstacle import HOLD_S, WAIT_S_MAX, Crossing
+import pytest
+
+from lfa.agents.avoidance.moving_obstacle import HOLD_S, WAIT_S_MAX, Crossing, shadow
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
@@ -53,9 +55,25 @@ def test_after_the_longest_wait_the_robot_goes_on() -> None:
     crossing = Crossing()
     now = 0.0
     while now <= WAIT_S_MAX:
-        crossing.give_way(crosser(0.8, -0.3, 0.0, 0.15), Pose2D(), AHEAD, now)
+        crossing.give_way(crosser(1.5, -0.9, 0.0, 0.15), Pose2D(), AHEAD, now)
         now += 0.02
-    assert crossing.give_way(crosser(0.8, -0.3, 0.0, 0.15), Pose2D(), AHEAD, now) == AHEAD
+    assert crossing.give_way(crosser(1.5, -0.9, 0.0, 0.15), Pose2D(), AHEAD, now) == AHEAD
+
+
+def test_what_was_waited_for_and_comes_on_is_given_way_to_again() -> None:
+    crossing = Crossing()
+    for n in range(300):
+        crossing.give_way(crosser(1.5, -0.9, 0.0, 0.15), Pose2D(), AHEAD, 0.02 * n)
+    assert not crossing.patient
+    assert crossing.give_way(crosser(0.8, -0.3, 0.0, 0.15), Pose2D(), AHEAD, 6.02).linear_x < AHEAD.linear_x
+    assert crossing.patient
+
+
+def test_what_moves_slowly_has_a_shadow_ahead_of_it_and_none_behind() -> None:
+    points = shadow(crosser(2.0, 0.0, 0.0, -0.1), Pose2D())
+    assert min(y for _, y in points) == pytest.approx(-0.8 - 0.25)
+    assert max(y for _, y in points) < 0.0
+    assert shadow(crosser(2.0, 0.0, 0.0, -0.4), Pose2D()) == [], "what is fast has passed by then"
 
 
 def test_no_slower_crosser_is_touched_whenever_it_comes() -> None:

@@ -42,6 +42,22 @@ def test_a_thing_that_moves_is_told_with_its_velocity(speed: float) -> None:
     assert feature.vy == pytest.approx(speed, abs=0.05)
 
 
+@pytest.mark.parametrize("speed", [0.03, 0.05, 0.1])
+def test_what_creeps_is_told_with_its_mean_velocity(speed: float) -> None:
+    positions = [(1.5, -0.3 + speed * 0.1 * n) for n in range(60)]
+    [feature] = seen(positions, [(0.0, 0.0)] * 60).moving(5.9)
+    assert feature.vx == pytest.approx(0.0, abs=0.02)
+    assert feature.vy == pytest.approx(speed, abs=0.02)
+
+
+def test_what_stands_does_not_creep_for_a_pose_that_is_corrected_once() -> None:
+    positions = [(1.5, 0.0 if n < 30 else 0.14) for n in range(90)]
+    tracker = Tracker()
+    for n, place in enumerate(positions):
+        tracker.update(arc(*place, 0.25, (0.0, 0.0)), (0.0, 0.0), [], 0.5, 0.1 * n)
+        assert n < 36 or tracker.moving(0.1 * n) == [], f"after {0.1 * n:.1f} s"
+
+
 def test_what_is_wide_is_a_wall() -> None:
     tracker = Tracker()
     tracker.update([(1.5, -1.0 + 0.1 * n) for n in range(21)], (0.0, 0.0), [], 0.5, 0.0)
