@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.installed-docs
 PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tests
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted why mutants coverage same pages pictures docs clean setup
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz model planted why mutants coverage same pages pictures docs clean setup test-driving
 
 COMPUTE := 'not processes and not hosts and not campaign'
 TEAMS := 'processes and not hosts and not campaign and not wheel'
@@ -65,6 +65,10 @@ test-hosts-short: $(STAMP)
 # Such machines under drawn faults, round after round: LFA_ROUNDS of them (default 100, some 10 minutes).
 test-campaign: $(STAMP)
 	$(BIN)/pytest -m campaign -rs -s tests/hosts
+
+# Every situation of shared/cases in which a team has to come through, in virtual time: some five minutes.
+test-driving: $(STAMP)
+	$(BIN)/pytest -m 'campaign or not campaign' -rs tests/deploy/scenarios/test_driving_cases.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -19,10 +19,12 @@ from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.following.factory import follower_of, predecessor_of
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import Formation
+from lfa.agents.leading.free_slot import FreeSlot
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
 from lfa.agents.leading.narrow_gap import narrow_gap_m
 from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.localization.estimator import Estimator
+from lfa.agents.perception.obstacle import ON_THE_MAP
 from lfa.agents.perception.obstacle_model import ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, without
@@ -38,6 +40,7 @@ from lfa.protocol.mission import Mission
 
 if TYPE_CHECKING:
     from lfa.agents.exploration.explorer import Explore
+    from lfa.agents.leading.way_back import WayBack
 
 CATCH_UP_PER_S = 0.8
 DT_MIN_S = 0.002
@@ -48,11 +51,15 @@ SLOT_AHEAD_S, SLOT_AHEAD_SHARE = 2.0, 0.4
 this distance: farther ahead the predecessor would block the way."""
 ON_TRACE_M = 0.3
 """Distance [m] to its place on a trace below which a follower makes no detour: its predecessor's path is better."""
+BESIDE_SLOT_SHARE = 0.45
+"""Distance of a place beside a slot that is taken, as a share of k^d, at most; it still counts as in its slot."""
 FRESH_S = 0.5
 BEFORE_S = 0.5
 """Time [s] ahead for which the robot brakes before what comes towards it."""
 ROUND_TRAP = Decision("plan_round", inf, 0.0, "wall", "no local way leads on", "angle")
 """Decision of a leader whose detour leads nowhere, for the log."""
+WAY_BACK = Decision("plan_round", inf, 0.0, "wall", "the slot is out of reach of a detour", "angle")
+"""Decision of a follower that plans its way back to its slot."""
 
 
 class Navigator:
@@ -73,6 +80,9 @@ class Navigator:
         self.scan_age = ScanAge()
         self._detour = Detour(mission.radius_m, mission.limits)
         self._crossing = Crossing(mission.radius_m)
+        self._free_slot = FreeSlot(mission.radius_m)
+        self._way_back: WayBack | None = None
+        """Way back to the slot; None before this follower has lost it for the first time."""
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
         self._back_up_path = BackUp()
         self._role = Role.WAITING
@@ -119,6 +129,11 @@ class Navigator:
     def last(self) -> Twist:
         return self._last
 
+    @property
+    def _catches_up(self) -> bool:
+        """True on a planned way back to the slot."""
+        return self._way_back is not None and self._way_back.way is not None
+
     def published(self, measured: Twist) -> Twist:
         """Return the twist to publish: the command, which the wheels follow next, so that no delay is added.
 
@@ -134,6 +149,8 @@ class Navigator:
             mates = self._mates(now)
             self._obstacles.see(scan, known[0], mates, now)
             self.leading.see(scan, known[0], known[1], mates)
+            if self._way_back is not None:
+                self._way_back.see(scan, known[0], known[1], mates)
 
     def update_ground(self, profile: GroundProfile, now: float) -> None:
         """Update the ground map with a profile of the floor ahead."""
@@ -235,6 +252,8 @@ class Navigator:
     def _change(self, role: Role, pose: Pose2D, twist: Twist, now: float) -> None:
         self._role = role
         self._detour.decision = self._crossing.decision = None
+        if self._way_back is not None:
+            self._way_back.end()
         self._stuck_monitor.begin(leading=role is Role.LEADER)
         omega_max = self._mission.limits.omega_max_radps
         self._detour.omega_max_radps = min(LEADER_OMEGA_MAX_RADPS, omega_max) if role is Role.LEADER else omega_max
@@ -253,7 +272,9 @@ class Navigator:
         action = None if decision is None else decision.action
         leads = role is Role.LEADER and self.leading.under_way
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
-        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not self.leading.rounding)
+        self._stuck_monitor.watch(
+            pose, wanted, action, lost, now, leads=leads, again=not (self.leading.rounding or self._catches_up)
+        )
 
     def _mates(self, now: float) -> list[Pose2D]:
         """Return the known poses of the team-mates: the predecessor's from its pose messages, the others' from the
@@ -289,6 +310,29 @@ class Navigator:
         around = self._steer(around_these, self.leading.target(pose), wanted, speed, pose, now)
         return wanted if around is None else around
 
+    def _catch_up(self, slot: Point, points: list[Point], pose: Pose2D, now: float) -> Twist | None:
+        """Return the twist of a planned way back to `slot` in `map`; None while the follower needs none."""
+        decision = self._detour.decision
+        hindered = self.stuck is not None or (decision is not None and decision.kind in ON_THE_MAP)
+        if self._way_back is None:
+            if not hindered:
+                return None
+            # Imported here: only a follower that meets an obstacle pays the memory.
+            from lfa.agents.leading.way_back import WayBack
+
+            self._way_back = WayBack(self._mission)
+        way = self._way_back
+        was_back = way.way is not None
+        explore = self.leading.explore
+        way.watch(slot, pose, hindered, None if explore is None else explore.mapping, now)
+        twist = way.steer(points, pose, slot, self._mates, self._last, now)
+        if twist is not None:
+            self._detour.decision = WAY_BACK
+        elif was_back:
+            self._detour.decision = None
+            self.follower.rejoin(pose, self._last)
+        return twist
+
     def _steer(
         self, points: list[Point], target: Point, wanted: Twist, speed: float, pose: Pose2D, now: float
     ) -> Twist | None:
@@ -319,6 +363,14 @@ class Navigator:
         if self.formation.trace and self.follower.readout.error_m < ON_TRACE_M:
             return wanted
         slot_map = self.follower.readout.slot_map
+        back = self._catch_up((slot_map.x, slot_map.y), points, pose, now)
+        if back is not None:
+            return back
+        within_m = BESIDE_SLOT_SHARE * slot.separation_m
+        beside = self._free_slot.steer((slot_map.x, slot_map.y), points, pose, sighting.twist.linear_x, within_m, now)
+        if beside is not None:
+            self._detour.decision = None
+            return beside
         speed = abs(sighting.twist.linear_x) + CATCH_UP_PER_S * hypot(slot_map.x - pose.x, slot_map.y - pose.y)
         speed = min(self._mission.limits.v_max_mps, speed)
         # The target is the slot's future place: in the slot itself its direction is undefined.

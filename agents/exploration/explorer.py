@@ -27,13 +27,16 @@ GIVE_UP_SEARCHES = 3
 class Explore:
     """Map and planner of one robot with one goal. `route` is in `map`; empty while there is none."""
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, mapping: Mapping | None = None) -> None:
+        """Create map and planner; with `mapping` the map is one that is kept elsewhere."""
         self._mission = mission
-        self.mapping: Mapping | None = None
+        self.mapping = mapping
         self.planner: Planner | None = None
         self._failures = 0
         self._tiles: Tiles | None = None
         self._goal = mission.leading.route_m[0]
+        if mapping is not None:
+            self._plan(mapping)
 
     def aim(self, goal: Point) -> None:
         """Plan to `goal` from now on: the next way-point of the mission."""
@@ -41,6 +44,12 @@ class Explore:
             self._goal, self._failures = goal, 0
             if self.mapping is not None:
                 self._plan(self.mapping)
+
+    def chase(self, goal: Point) -> None:
+        """Plan to `goal`, which moves on, with the present route until there is a new one."""
+        self._goal = goal
+        if self.planner is not None:
+            self.planner.goal = goal
 
     def shown(self, pose: Pose2D) -> Shown | None:
         """Return a tile of the map for views (agents/exploration/map_tiles.py); None if nothing is new."""

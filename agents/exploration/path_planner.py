@@ -34,6 +34,8 @@ ROOMY = 60
 """Cost of a step up to which a robot has room to spare."""
 BARRED_M, BARRED_S = 0.15, 60.0
 """Radius [m] around a place where the body did not fit, and time [s] for which no route leads through it."""
+MOVED_M = 0.4
+"""Distance [m] of the goal from the end of the route above which a new one is searched."""
 CHECK_S = 0.2
 """Period [s] of the check whether the map still agrees with the route."""
 
@@ -45,7 +47,8 @@ class Planner:
 
     def __init__(self, grid: Grid, goal: Point, radius_m: float, keepout: Sequence[Box] = ()) -> None:
         self._grid = grid
-        self._goal = goal
+        self.goal = goal
+        """Goal in `map`; where it moves on, the present route holds until a new one is found."""
         self._prices = prices_of(radius_m)
         self._apart_m = 2.0 * radius_m + MATE_GAP_M
         self._keepout = [run for box in keepout for run in runs_of(grid, box)]
@@ -71,11 +74,12 @@ class Planner:
             blocked = not self.route or self.blocked_m(here) is not None
             conflict = self._conflict(here, mates) and now - self._begun_at >= CONFLICT_S
             due = now - self._begun_at >= (RENEW_S if self.route else RETRY_S)
-            if not ((blocked and self.route) or conflict or due):
+            moved = self._goal_moved() and now - self._begun_at >= RETRY_S
+            if not ((blocked and self.route) or conflict or moved or due):
                 return False
             self._begun_at = now
             self._barred = [(place, until) for place, until in self._barred if now < until]
-            self._search = self._plan(tuple(mates), blocked or conflict)
+            self._search = self._plan(tuple(mates), blocked or conflict or moved)
         number = self.number
         while cells > 0:
             looked = next(self._search, None)
@@ -85,6 +89,10 @@ class Planner:
                 break
             cells -= looked
         return self.number != number
+
+    def _goal_moved(self) -> bool:
+        end = self.route[-1] if self.route else self.goal
+        return hypot(end[0] - self.goal[0], end[1] - self.goal[1]) > MOVED_M
 
     def free(self, point: Point) -> bool:
         """Return whether a robot has room to spare at `point`, as far as the map shows."""
@@ -125,7 +133,7 @@ class Planner:
     def _plan(self, mates: tuple[Pose2D, ...], needed: bool) -> Iterator[int]:
         """Search, then turn the cells into a route; set `route` or `unreachable`."""
         footing = self._footing(mates)
-        goal, start = footing.settled(self._goal), footing.settled(self._pose)
+        goal, start = footing.settled(self.goal), footing.settled(self._pose)
         if goal is None:
             self._fail("no robot can stand at the goal", needed)
             return
@@ -155,7 +163,7 @@ class Planner:
         for looked, so_far in straightened(footing, cells):
             yield looked
             points = so_far
-        points = [self._pose, *points[1:], self._goal] if len(points) > 2 else [self._pose, self._goal]
+        points = [self._pose, *points[1:], self.goal] if len(points) > 2 else [self._pose, self.goal]
         for rounder in smoothed(footing, points):
             yield len(rounder) * 4
             points = rounder

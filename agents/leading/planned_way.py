@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from lfa.agents.avoidance.arc_planner import ArcPlanner
 from lfa.agents.exploration.explorer import Explore
+from lfa.agents.exploration.occupancy_grid import Mapping
 from lfa.agents.leading.path_follower import ALONE_RADPS, PathFollower
 from lfa.agents.perception.scan import Point
 from lfa.protocol.geometry import STILL, Pose2D, Twist
@@ -23,10 +24,11 @@ BLOCKED_S = 1.0
 class PlannedWay:
     """Planned way of one robot to one goal: that of its mission, or the point at which it returns to its route."""
 
-    def __init__(self, mission: Mission, goal: Point | None = None) -> None:
+    def __init__(self, mission: Mission, goal: Point | None = None, mapping: Mapping | None = None) -> None:
+        """Create a way; with `mapping` it plans on that map, which another part of the robot keeps."""
         route_m = mission.leading.route_m if goal is None else (goal,)
         leading = replace(mission.leading, motion="explore", route_m=route_m)
-        self.explore = Explore(replace(mission, leading=leading))
+        self.explore = Explore(replace(mission, leading=leading), mapping)
         self.lead = PathFollower(leading, mission.limits, mission.radius_m)
         self._radius_m, self._omega_max_radps = mission.radius_m, mission.limits.omega_max_radps
         self._arcs = ArcPlanner(mission.radius_m, mission.limits)
@@ -40,6 +42,11 @@ class PlannedWay:
     def aim(self, goal: Point) -> None:
         """Lead to another goal in `map` [m] from now on."""
         self.explore.aim(goal)
+        self.lead.end_at(goal)
+
+    def chase(self, goal: Point) -> None:
+        """Lead to a goal in `map` [m] that moves on: the present route holds until a new one is found."""
+        self.explore.chase(goal)
         self.lead.end_at(goal)
 
     def follow(self, points: list[Point], pose: Pose2D, wanted: Twist, now: float, *, alone: bool) -> Twist:

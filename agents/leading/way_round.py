@@ -14,6 +14,7 @@ from math import hypot
 from lfa.agents.avoidance.decision import Decision
 from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.leading.planned_way import PlannedWay
+from lfa.agents.perception.obstacle import ON_THE_MAP
 from lfa.agents.perception.scan import Point
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.team import Slot
@@ -23,7 +24,6 @@ PATIENCE_S, WON_M = 6.0, 0.8
 """Time [s] of a detour that wins less than this progress [m], after which a way round is planned."""
 BACK_S = 1.0
 """Time [s] for which a detour backs off before a way round is planned."""
-ON_THE_MAP = ("wall", "stationary", "moving")
 AHEAD_M, AHEAD_M_MAX = 1.5, 24.0
 """Distance [m] ahead on the route of the first place to return to; doubled where the return was into the next trap."""
 FREE_M, STEP_M = 0.8, 0.4

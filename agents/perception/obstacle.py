@@ -7,6 +7,8 @@ from typing import Literal
 from msgspec import Struct
 
 Class = Literal["stationary", "moving", "wall", "pothole", "bump", "ditch"]
+ON_THE_MAP: tuple[Class, ...] = ("wall", "stationary", "moving")
+"""Classes that the laser scanner shows, so that a planner on a map leads round them."""
 
 
 class BlockingObstacle(Struct, frozen=True):

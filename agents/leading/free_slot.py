@@ -1,0 +1,80 @@
+"""Free place beside a slot on which something stands, for a follower whose predecessor is at rest.
+
+A detour leads round an obstacle and back to its target; to a target inside of the obstacle it would lead for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, hypot
+
+from lfa.agents.leading.free_place import FreePlace
+from lfa.agents.perception.scan import Point
+from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
+
+RESTS_MPS = 0.01
+HIDDEN_S, HIDDEN_M = 5.0, 0.5
+"""Time [s] for which a surface must be seen before the slot, at most this far [m] from it, until the slot counts as
+inside of the thing: only the near side of an obstacle is seen."""
+MOVED_M = 0.15
+"""Motion [m] of the slot after which a follower that stands beside it drives again."""
+THERE_M, BESIDE_M = 0.05, 0.05
+TURN_GAIN, IN_PLACE_RAD, TURN_RADPS = 2.0, 0.6, 0.8
+SPEED_GAIN_PER_S, SPEED_MPS = 0.8, 0.25
+
+
+class FreeSlot:
+    """Place of one follower at rest, where its slot is taken."""
+
+    def __init__(self, radius_m: float) -> None:
+        self._free_place = FreePlace(radius_m)
+        self._hidden_since: float | None = None
+        self._stands_for: Point | None = None
+        """Slot in `map` beside which the robot stands; None while it drives."""
+
+    def steer(
+        self, slot: Point, points: Sequence[Point], pose: Pose2D, ahead_mps: float, within_m: float, now: float
+    ) -> Twist | None:
+        """Return the twist to the free place nearest to `slot` (in `map`), still once there; None where the slot is
+        free, no place within `within_m` of it is, or the predecessor drives at `ahead_mps`. `points` are in
+        `base_link`.
+        """
+        if abs(ahead_mps) > RESTS_MPS:
+            self._stands_for = self._hidden_since = None
+            self._free_place.reset()
+            return None
+        if self._stands_for is not None:
+            if hypot(slot[0] - self._stands_for[0], slot[1] - self._stands_for[1]) < MOVED_M:
+                return STILL
+            self._stands_for = None
+        center = in_base(pose, slot)
+        if not _hidden(center, points):
+            self._hidden_since = None
+        elif self._hidden_since is None:
+            self._hidden_since = now
+        elif now - self._hidden_since >= HIDDEN_S:
+            points = [*points, center]
+        place = self._free_place.look(slot, points, pose, now)
+        if place is None or hypot(place[0] - slot[0], place[1] - slot[1]) > within_m:
+            return None
+        x, y = in_base(pose, place)
+        apart_m, bearing = hypot(x, y), atan2(y, x)
+        if apart_m < THERE_M:
+            self._stands_for = slot
+            return STILL
+        if abs(bearing) > IN_PLACE_RAD:
+            return Twist(0.0, TURN_RADPS if bearing > 0.0 else -TURN_RADPS)
+        return Twist(min(SPEED_MPS, SPEED_GAIN_PER_S * apart_m), TURN_GAIN * bearing)
+
+
+def _hidden(place: Point, points: Sequence[Point]) -> bool:
+    """Return whether `place` lies close behind a surface, as seen from the robot."""
+    x, y = place
+    far_m = hypot(x, y)
+    if far_m < THERE_M:
+        return False
+    for px, py in points:
+        along, across = (x * px + y * py) / far_m, (x * py - y * px) / far_m
+        if 0.0 < far_m - along < HIDDEN_M and abs(across) < BESIDE_M and along > 0.0:
+            return True
+    return False
