@@ -1,13 +1,15 @@
 """Evaluation of a scenario's `[assert]` table against the results of a run: one assertion for each given key.
 
 A bound on an event that never happened (a failover, a contact) holds. A bound on an error fails when the run has no
-value for it: a follower that never settled has not kept its distance.
+value for it: a follower that never settled has not kept its distance. A run that reaches its goal may leave nobody
+behind, unless the scenario allows it or a fault holds the robot.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 from math import inf
 from pathlib import Path
@@ -17,6 +19,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from lfa.deploy.analysis.tracking_errors import TrackingErrors
+from lfa.deploy.recording.event_log import FaultDone
 from lfa.deploy.recording.mcap_reader import RecordedRun
 from lfa.protocol.errors import Refused
 from lfa.world.description.scenario import Assert
@@ -24,6 +27,9 @@ from lfa.world.description.scenario import Assert
 if TYPE_CHECKING:
     from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.analysis.summary import Assertion
+
+ENDED_BY = {"continue": "stop", "heal": "cut", "resume": "hang"}
+"""Fault actions that end another one: for the robots that they name, or for all."""
 
 
 def judge(wanted: Assert, summary: Summary, seen: RecordedRun, followed: Iterable[TrackingErrors]) -> list[Assertion]:
@@ -46,14 +52,36 @@ def judge(wanted: Assert, summary: Summary, seen: RecordedRun, followed: Iterabl
         ("contacts_max", wanted.contacts_max, sum(robot.contacts for robot in summary.robots), ""),
         ("duration_max_s", wanted.duration_max_s, summary.sim_duration_s, "s"),
         ("leaders_max", wanted.leaders_max, len(summary.leaders), ""),
-        ("left_behind_max", wanted.left_behind_max, len(summary.left_behind), ""),
     )
     judged = [_at_most(name, found, bound, unit) for name, bound, found, unit in table if bound is not None]
+    if wanted.left_behind_max is not None or (wanted.goal_reached and summary.outcome == "goal_reached"):
+        judged.append(_left_behind(summary, wanted.left_behind_max or 0))
     if wanted.separation_min_m is not None:
         nearest = separation_min_m(seen)
         text = f"{nearest:.3f} m, at least {wanted.separation_min_m:g} m wanted"
         judged.append(Assertion("separation_min_m", nearest >= wanted.separation_min_m, text))
     return judged
+
+
+def _left_behind(summary: Summary, bound: int) -> Assertion:
+    """Judge how many robots were left behind, without those that a fault kept from coming."""
+    held = held_by_faults(summary.faults)
+    left = [robot for robot in summary.left_behind if robot not in held]
+    names = f" (robot {', '.join(map(str, left))})" if left else ""
+    return Assertion("left_behind_max", len(left) <= bound, f"{len(left)}{names}, at most {bound} wanted")
+
+
+def held_by_faults(faults: Sequence[FaultDone]) -> set[int]:
+    """Return the robots that a fault still froze, cut off or deprived of a part when the run ended."""
+    held: dict[str, set[int]] = {"stop": set(), "cut": set(), "hang": set()}
+    for fault in faults:
+        robots = {int(word) for word in re.findall(r"\d+", str(fault.target))}
+        if fault.kind in held:
+            held[fault.kind] |= robots
+        elif fault.kind in ENDED_BY:
+            ended = held[ENDED_BY[fault.kind]]
+            ended -= robots or set(ended)
+    return set().union(*held.values())
 
 
 def separation_min_m(seen: RecordedRun) -> float:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
-from lfa.deploy.analysis import tracking_errors
+from lfa.deploy.analysis import clearance, tracking_errors
 from lfa.deploy.analysis.assertions import judge
 from lfa.deploy.analysis.summary import Assertion, RobotSummary, Summary
 from lfa.deploy.analysis.tracking_errors import TrackingErrors
@@ -40,6 +41,8 @@ def summary_of(
 ) -> Summary:
     """Return the summary of a run of `scenario` (as drawn) from its arrays and its event log."""
     robots = [_robot(robot, seen, events) for robot in scenario.mission.robots]
+    for robot in robots:
+        _fill_way(robot, seen, scenario)
     chain = event_log.last_chain(events)
     reigns = event_log.reigns(events)
     violations = event_log.terms_that_went_back(events)
@@ -53,6 +56,7 @@ def summary_of(
         duration_s=round(duration_s, 3),
         sim_duration_s=round(seen.end_s, 3),
         real_time_factor=round(seen.end_s / duration_s, 2) if duration_s > 0.0 else 0.0,
+        arrived_at_s=next((line["t"] for line in reversed(events) if line["kind"] == "goal"), None),
         robots=robots,
         left_behind=[robot.id for robot in robots if robot.alive and _left_behind(robot, chain)],
         leaders=reigns,
@@ -91,6 +95,16 @@ def _robot(robot: int, seen: RecordedRun, events: Sequence[Line]) -> RobotSummar
     if followed is not None and not broken:  # a robot that was not controlled has kept no distance
         _fill_errors(summary, followed)
     return summary
+
+
+def _fill_way(summary: RobotSummary, seen: RecordedRun, scenario: Scenario) -> None:
+    """Fill in the way driven and the clearance kept; a run without ground truth has neither."""
+    rows = seen.truth.get(summary.id)
+    if rows is None:
+        return
+    summary.way_m, summary.mean_speed_mps = clearance.way_m(rows), clearance.mean_speed_mps(rows)
+    least_m = clearance.least_clearance_m(summary.id, seen, scenario)
+    summary.least_clearance_m = least_m if isfinite(least_m) else None
 
 
 def _left_behind(robot: RobotSummary, chain: Sequence[int]) -> bool:

@@ -46,6 +46,12 @@ class RobotSummary(Struct, kw_only=True):
     contacts: int
     obstacles_met: dict[str, int]
     orientation_requests: int
+    way_m: float | None = None
+    """Way driven [m]; None for a robot that was not seen."""
+    mean_speed_mps: float | None = None
+    """Mean speed [m/s] from its start to its last motion; None for a robot that did not drive."""
+    least_clearance_m: float | None = None
+    """Least distance [m] from its body to a wall, an obstacle or another robot's body; None in an empty world."""
 
 
 class Summary(Struct, kw_only=True):
@@ -61,6 +67,8 @@ class Summary(Struct, kw_only=True):
     """Wall-clock duration [s] of the run itself."""
     sim_duration_s: float
     real_time_factor: float
+    arrived_at_s: float | None = None
+    """Time [s] at which the leader arrived at the goal; None when none did."""
     robots: list[RobotSummary]
     left_behind: list[int] = []
     """Robots alive at the end, but not in the chain or with a distance error above `LEFT_BEHIND_M`."""
@@ -80,7 +88,7 @@ class Summary(Struct, kw_only=True):
     def exit_code(self) -> int:
         """Return 0 if the run ended at the goal or the time limit with all assertions ok, else 1.
 
-        Reaching the goal is an assertion by default.
+        Reaching the goal with nobody left behind is an assertion by default.
         """
         return 0 if self.outcome in ENDED_WELL and all(a.ok for a in self.assertions) else 1
 

@@ -23,6 +23,9 @@ HEADINGS = (
     "heading rms",
     "settled",
     "contacts",
+    "way",
+    "mean speed",
+    "clearance",
     "met",
 )
 
@@ -37,7 +40,8 @@ def text(summary: Summary, folder: Path | None, *, verbose: bool = False) -> str
     return "\n".join(
         [
             f"{summary.scenario}, {summary.mode}, seed {summary.seed}: {summary.outcome}{reason}",
-            f"  {summary.sim_duration_s:.1f} s in {summary.duration_s:.1f} s, {summary.real_time_factor:g} x real time",
+            f"  {summary.sim_duration_s:.1f} s in {summary.duration_s:.1f} s, {summary.real_time_factor:g} x real time"
+            f"{'' if summary.arrived_at_s is None else f'; the leader arrived at {summary.arrived_at_s:.1f} s'}",
             *(f"  {line}" for line in _aligned(rows)),
             *(f"  {line}" for line in _notes(summary)),
             *(f"  {line}" for line in _leaders(summary, verbose)),
@@ -98,6 +102,9 @@ def _row(robot: RobotSummary, *, left_behind: bool) -> tuple[str, ...]:
         _scaled(robot.heading_error_rms_rad, 57.2958, "deg"),
         _scaled(robot.settled_after_s, 1.0, "s"),
         str(robot.contacts),
+        _scaled(robot.way_m, 1.0, "m"),
+        _scaled(robot.mean_speed_mps, 1.0, "m/s"),
+        _scaled(robot.least_clearance_m, 100.0, "cm"),
         met or "-",
     )
 

@@ -155,6 +155,7 @@ class Assert(Struct, frozen=True, forbid_unknown_fields=True):
     duration_max_s: float | None = None
     leaders_max: int | None = None
     left_behind_max: int | None = None
+    """Largest number of robots left behind; 0 for a run that reaches its goal, where it is not given."""
 
 
 class Scenario(Struct, frozen=True, forbid_unknown_fields=True):

@@ -7,9 +7,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from lfa.deploy.analysis.assertions import junit
+from lfa.deploy.analysis.assertions import held_by_faults, junit
 from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.faults.script import parse_all
+from lfa.deploy.recording.event_log import FaultDone
 from lfa.deploy.run.simulate import run
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import load
@@ -51,6 +52,36 @@ def test_bounds_that_hold_let_the_run_pass(tmp_path: Path) -> None:
     assert summary.exit_code == 0
 
 
+FAR = "world.starts=[[0.0,0.0,0.0],[-0.8,0.0,0.0],[-1.6,0.0,0.0],[-1.6,9.0,0.0]]"
+WALLED = "world.walls_m=[[-4.0,7.0,1.0,7.0],[1.0,7.0,1.0,11.0],[1.0,11.0,-4.0,11.0],[-4.0,11.0,-4.0,7.0]]"
+
+
+def test_a_run_that_leaves_a_robot_behind_fails_unless_the_scenario_allows_it(tmp_path: Path) -> None:
+    alone = (FAR, WALLED, "mission.cold_start=majority", "time_limit_s=90.0")
+    summary = _summary(tmp_path / "run", *alone, fault="heal at 1 s")
+    assert summary.outcome == "goal_reached"
+    (judged,) = [one for one in summary.assertions if one.name == "left_behind_max"]
+    assert (judged.ok, judged.text, summary.exit_code) == (False, "1 (robot 4), at most 0 wanted", 1)
+    allowed = _summary(tmp_path / "allowed", *alone, "assert.left_behind_max=1", fault="heal at 1 s")
+    assert allowed.left_behind == [4]
+    assert allowed.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("faults", "held"),
+    [
+        (["stop 2"], {2}),
+        (["stop 2", "continue 2"], set()),
+        (["cut 1-2", "hang scanner 3"], {1, 2, 3}),
+        (["cut 1", "cut 2", "heal "], set()),
+        (["hang scanner 3", "resume scanner 3", "kill 4"], set()),
+    ],
+)
+def test_who_is_still_held_by_a_fault_is_not_left_behind(faults: list[str], held: set[int]) -> None:
+    done = [FaultDone(1.0, *fault.split(" ", 1)) for fault in faults]
+    assert held_by_faults(done) == held
+
+
 def test_bounds_that_do_not_hold_fail_it_one_by_one(tmp_path: Path) -> None:
     bounds = {key: broken for key, _, broken in FOUND if broken is not None}
     summary = _summary(tmp_path / "run", *(f"assert.{key}={broken}" for key, broken in bounds.items()))
@@ -69,7 +100,7 @@ def test_junit_tells_what_failed_and_by_how_much(tmp_path: Path) -> None:
     path = tmp_path / "lfa.xml"
     junit(path, _summary(tmp_path / "run", "assert.separation_min_m=5.0"))
     suite = ElementTree.parse(path).getroot()
-    assert (suite.get("tests"), suite.get("failures")) == ("4", "1")
+    assert (suite.get("tests"), suite.get("failures")) == ("5", "1")
     failures = {case.get("name"): failure.get("message") for case in suite for failure in case.iter("failure")}
     assert "at least 5 m wanted" in str(failures["separation_min_m"])
 

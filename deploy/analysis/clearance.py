@@ -1,0 +1,80 @@
+"""Way driven, mean speed and least clearance of each robot, from the ground truth of a run."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
+from lfa.world.description.load import Scenario
+from lfa.world.description.scenario import Obstacle
+
+EVERY = 3
+"""Step in ground truth records between two checks: a robot moves 6 cm at most in that time."""
+STARTED_M = 0.05
+"""Way [m] after which a robot counts as started: its mean speed counts from there to its last motion."""
+
+
+def way_m(rows: Array) -> float:
+    """Return the way [m] that a robot has driven."""
+    return float(np.hypot(*np.diff(rows[:, 1:3], axis=0).T).sum())
+
+
+def mean_speed_mps(rows: Array) -> float | None:
+    """Return the mean speed [m/s] from a robot's start to its last motion; None for one that did not drive."""
+    driven = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rows[:, 1:3], axis=0).T))])
+    if driven[-1] < 2.0 * STARTED_M:
+        return None
+    first, last = np.searchsorted(driven, STARTED_M), np.searchsorted(driven, driven[-1] - 1e-3)
+    lasted_s = float(rows[last, 0] - rows[first, 0])
+    return float(driven[last] - driven[first]) / lasted_s if lasted_s > 0.0 else None
+
+
+def least_clearance_m(robot: int, seen: RecordedRun, scenario: Scenario) -> float:
+    """Return the least distance [m] from a robot's body to a wall, an obstacle or another robot's body; negative where
+    they overlapped, inf in an empty world.
+    """
+    return min(to_things_m(robot, seen, scenario), _to_mates_m(robot, seen, 2.0 * scenario.mission.radius_m))
+
+
+def to_things_m(robot: int, seen: RecordedRun, scenario: Scenario) -> float:
+    """Return the least distance [m] from a robot's body to a wall or an obstacle, as of `least_clearance_m`."""
+    rows, world = seen.truth[robot][::EVERY], scenario.world
+    gaps = [
+        _to_obstacle(rows, obstacle, seen.obstacles.get(index)) for index, obstacle in enumerate(world.obstacles)
+    ] + [_to_segment(rows[:, 1], rows[:, 2], *wall) for wall in world.walls_m]
+    return min((float(gap.min()) for gap in gaps), default=inf) - scenario.mission.radius_m
+
+
+def _to_mates_m(robot: int, seen: RecordedRun, touching_m: float) -> float:
+    """Return the least distance [m] to another robot's body; robots that started in one place count once apart."""
+    own, least = seen.truth[robot], inf
+    for other, rows in seen.truth.items():
+        n = min(own.shape[0], rows.shape[0])
+        apart = np.hypot(own[:n, 1] - rows[:n, 1], own[:n, 2] - rows[:n, 2])
+        clear = np.flatnonzero(apart >= touching_m)
+        if other != robot and clear.size:
+            least = min(least, float(apart[clear[0] :].min()) - touching_m)
+    return least
+
+
+def _to_obstacle(rows: Array, obstacle: Obstacle, moved: Array | None) -> Array:
+    """Return the distances [m] of the robot's centre from an obstacle's surface; 0 inside a polygon."""
+    x, y = rows[:, 1] - obstacle.center_m[0], rows[:, 2] - obstacle.center_m[1]
+    if moved is not None:
+        x = rows[:, 1] - np.interp(rows[:, 0], moved[:, 0], moved[:, 1])
+        y = rows[:, 2] - np.interp(rows[:, 0], moved[:, 0], moved[:, 2])
+    if obstacle.radius_m is not None:
+        return np.asarray(np.hypot(x, y) - obstacle.radius_m)
+    corners = obstacle.corners_m or ()
+    ring = list(pairwise((*corners, corners[0])))
+    inside = np.all([(bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0 for (ax, ay), (bx, by) in ring], axis=0)
+    return np.where(inside, 0.0, np.min([_to_segment(x, y, *a, *b) for a, b in ring], axis=0))
+
+
+def _to_segment(x: Array, y: Array, x1: float, y1: float, x2: float, y2: float) -> Array:
+    dx, dy = x2 - x1, y2 - y1
+    along = np.clip(((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy), 0.0, 1.0)
+    return np.asarray(np.hypot(x - x1 - along * dx, y - y1 - along * dy))

@@ -1,0 +1,67 @@
+"""Way, mean speed and least clearance of a robot, from the ground truth alone."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+import pytest
+
+from lfa.deploy.analysis.clearance import EVERY, least_clearance_m, mean_speed_mps, way_m
+from lfa.deploy.recording.mcap_reader import Array, RecordedRun
+from lfa.world.description.load import Scenario, load
+
+SQUARE = "[[-0.5,-0.5],[0.5,-0.5],[0.5,0.5],[-0.5,0.5]]"
+
+
+def straight(y: float = 0.0, rest: int = 0) -> Array:
+    """Rows of a robot that drives from x = 0 to 3 m at 0.5 m/s, then rests."""
+    x = np.concatenate([np.arange(0.0, 3.001, 0.01), np.full(rest, 3.0)])
+    t = 0.02 * np.arange(x.size)
+    zeros = np.zeros(x.size)
+    return np.column_stack([t, x, np.full(x.size, y), zeros, zeros, zeros])
+
+
+def seen(**truth: Array) -> RecordedRun:
+    return RecordedRun(dict(enumerate(truth.values(), start=1)), {}, {}, {})
+
+
+def world(*things: str) -> Scenario:
+    return load("straight", [f"world.{thing}" for thing in things], robots=2)
+
+
+def test_way_and_mean_speed_leave_out_the_rest_before_and_after() -> None:
+    rows = straight(rest=500)
+    assert way_m(rows) == pytest.approx(3.0)
+    assert mean_speed_mps(rows) == pytest.approx(0.5, rel=0.01)
+    assert mean_speed_mps(rows[-100:]) is None, "it did not drive"
+
+
+@pytest.mark.parametrize(
+    ("thing", "gap_m"),
+    [
+        ("obstacles=[{center_m=[1.5,0.9], radius_m=0.3}]", 0.6),
+        (f"obstacles=[{{center_m=[1.5,-1.2], corners_m={SQUARE}}}]", 0.7),
+        ("walls_m=[[-1.0,0.4,9.0,0.4]]", 0.4),
+    ],
+)
+def test_the_least_clearance_is_from_the_body_to_the_nearest_surface(thing: str, gap_m: float) -> None:
+    scenario = world(thing)
+    body_m = scenario.mission.radius_m
+    assert least_clearance_m(1, seen(own=straight()), scenario) == pytest.approx(gap_m - body_m, abs=0.01)
+
+
+def test_another_robot_counts_once_they_have_been_apart() -> None:
+    scenario = world()
+    behind = straight()
+    behind[:, 1] -= np.minimum(0.8, 2.0 * behind[:, 1])  # both started in one place
+    run = seen(own=straight(), mate=behind)
+    assert least_clearance_m(1, run, scenario) == pytest.approx(0.0, abs=0.02 * EVERY)
+    assert least_clearance_m(1, seen(own=straight()), scenario) == inf
+
+
+def test_a_moving_obstacle_counts_where_it_was_at_that_time() -> None:
+    scenario = world("obstacles=[{center_m=[3.0,2.0], radius_m=0.2, velocity_mps=[0.0,-0.25]}]")
+    t = np.arange(0.0, 6.0, 0.1)
+    run = RecordedRun({1: straight()}, {}, {}, {0: np.column_stack([t, np.full(t.size, 3.0), 2.0 - 0.25 * t])})
+    assert least_clearance_m(1, run, scenario) == pytest.approx(0.5 - 0.2 - scenario.mission.radius_m, abs=0.03)
