@@ -37,6 +37,10 @@ NOISE_M = 0.02
 """Error [m] by which a scan reading may be too short: four standard deviations of the scanner in the paper's worlds."""
 REACH_M = 1.6
 HEADWAY_S = 0.8
+OWN_SHARE = 0.5
+"""Weight of the turn off the robot's own direction: half-way round an obstacle, its target lies on the other side."""
+SETTLE_S = 0.25
+"""Time [s] from the begin of a detour in which its side is open: the first scans may show a part of the obstacle."""
 KEEP_SIDE_RAD = 0.6
 """Angle [rad] by which a direction on the other side must be nearer before the detour changes sides."""
 CLEAR_S = 0.4
@@ -207,10 +211,14 @@ class Detour:
         return None
 
     def _chosen_side(self, openings: Openings, towards: float, now: float) -> float:
-        """Return the side that needs less turning. The present side gets a bonus and is held for a while."""
-        left = inf if openings.left is None else abs(wrap(openings.left - towards))
-        right = inf if openings.right is None else abs(wrap(openings.right - towards))
+        """Return the side that needs less turning, off the target's direction and off the robot's own. The present side
+        gets a bonus and is held for a while, once the first scans have settled which one is nearer.
+        """
+        left, right = _turning(openings.left, towards), _turning(openings.right, towards)
         if left == right == inf:
+            return self._side
+        if now - self._since < SETTLE_S:
+            self._side = 1.0 if left <= right else -1.0
             return self._side
         side = 1.0 if left + KEEP_SIDE_RAD * (self._side < 0.0) <= right + KEEP_SIDE_RAD * (self._side > 0.0) else -1.0
         held = now - self._side_at < HOLD_S and (left if self._side > 0.0 else right) < inf
@@ -256,3 +264,8 @@ class Detour:
         """
         free_m = free_along(points, AHEAD, self._radius_m + margin_m)
         return sqrt(self._limits.a_max_mps2 * max(0.0, free_m - 0.1))
+
+
+def _turning(opening: float | None, towards: float) -> float:
+    """Return what a direction costs in turning [rad], off `towards` and off the robot's own; inf without one."""
+    return inf if opening is None else abs(wrap(opening - towards)) + OWN_SHARE * abs(opening)

@@ -15,7 +15,8 @@ BODIES, ROOM_M = 2.0, 0.6
 
 
 def narrow_gap_m(points: Sequence[Point], route: Callable[[float], Point], radius_m: float) -> float | None:
-    """Return the width [m] of the narrowest gap ahead that only a column passes; None when there is none.
+    """Return the width [m] of the narrowest gap ahead that only a column passes; None when there is none. What no body
+    passes is no gap: the route leads through an obstacle there, and a detour round it.
 
     `points` are in `base_link`, and so is `route(s)`, the point `s` [m] ahead on the route.
     """
@@ -31,6 +32,6 @@ def narrow_gap_m(points: Sequence[Point], route: Callable[[float], Point], radiu
                     left = aside
                 elif right < aside < 0.0:
                     right = aside
-        if left < BESIDE_M and right > -BESIDE_M and left - right < narrowest:
+        if left < BESIDE_M and right > -BESIDE_M and 2.0 * radius_m <= left - right < narrowest:
             found = narrowest = left - right
     return found

@@ -63,6 +63,30 @@ def test_the_nearer_side_is_taken() -> None:
     assert "right" in drive(circle(3.0, 0.2, 0.3), (6.0, 0.0))[2]
 
 
+def sides(begun: Detour, things: list[tuple[list[tuple[float, float]], tuple[float, float], float]]) -> list[str]:
+    """Actions of a detour that sees points, a target in `base_link` and a time, one after the other."""
+    found = []
+    for points, target, now in things:
+        begun.steer(points, target, Twist(0.5, 0.0), 0.5, now)
+        found.append("" if begun.decision is None else "left" if begun._side > 0.0 else "right")
+    return found
+
+
+def test_the_side_is_open_until_the_scans_have_shown_the_whole_obstacle() -> None:
+    part, whole = [(0.75, -0.02)], circle(0.95, 0.15, 0.3)
+    seen = [(part, (2.0, 0.0), 0.0), (whole, (2.0, 0.0), 0.1), (whole, (2.0, 0.0), 0.5)]
+    assert sides(Detour(RADIUS_M, LIMITS), seen)[-1] == "right", "the obstacle lies to the left"
+
+
+def test_half_way_round_an_obstacle_its_side_is_kept() -> None:
+    """The robot has turned to the left of it: its target lies behind, nearer on the right."""
+    detour, ahead = Detour(RADIUS_M, LIMITS), circle(0.95, -0.05, 0.3)
+    sides(detour, [(ahead, (2.0, 0.0), 0.02 * n) for n in range(60)])
+    assert detour._side == 1.0
+    turned = circle(0.34, -0.56, 0.3)
+    assert sides(detour, [(turned, (0.1, -0.75), 1.2 + 0.02 * n) for n in range(10)]) == ["left"] * 10
+
+
 def test_a_wall_is_passed_at_its_end() -> None:
     pose, least, _ = drive(wall(3.0, -0.4, 1.5), (6.0, 0.0))
     assert hypot(pose.x - 6.0, pose.y) < 0.06

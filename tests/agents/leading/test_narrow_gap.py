@@ -30,5 +30,9 @@ def test_two_obstacles_one_behind_the_other_are_none() -> None:
     assert narrow_gap_m(wall(1.0, 1.0, 0.3) + wall(2.2, -1.0, 0.3), ahead, RADIUS_M) is None
 
 
+def test_an_obstacle_on_the_route_is_none() -> None:
+    assert narrow_gap_m(wall(1.5, 1.0, 0.0) + wall(1.5, -1.0, 0.05), ahead, RADIUS_M) is None, "no body passes it"
+
+
 def test_a_gap_behind_the_robot_is_none() -> None:
     assert narrow_gap_m(wall(-0.5, 1.0, 0.3) + wall(-0.5, -1.0, 0.3), ahead, RADIUS_M) is None

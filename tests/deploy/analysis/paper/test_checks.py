@@ -128,9 +128,8 @@ def test_the_papers_second_path_shows_what_its_figures_must(second_path: Path) -
 def test_a_follower_goes_round_what_is_in_its_way_and_does_not_turn_round_before_it(second_path: Path) -> None:
     followers = [e for e in event_log.of_kind(event_log.lines(second_path), "decision") if e["robot"] != 1]
     assert "u_turn" not in {e["action"] for e in followers}, "reproduce: lfa sim paper_path2 --seed 1"
-    # The bends of a route that passes its way-points within 0.15 m swing the slots farther: 0.81 m with this seed.
     peaks = {spike.peak: spike for spike in Subject(Run(second_path)).distance}
-    assert max(peaks) < 0.9, f"{peaks[max(peaks)]}; reproduce: lfa sim paper_path2 --seed 1, then lfa plot RUN"
+    assert max(peaks) < 0.8, f"{peaks[max(peaks)]}; reproduce: lfa sim paper_path2 --seed 1, then lfa plot RUN"
 
 
 def test_what_the_robots_met_is_where_it_stands(second_path: Path) -> None:
