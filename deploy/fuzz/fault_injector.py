@@ -15,6 +15,7 @@ from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
+from lfa.deploy.fuzz.stops import StopTraffic
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Mission
@@ -224,6 +225,10 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
     checkers = [checker(simulation.timing) for checker in _checkers(schedule)]
     simulation.listen(checkers)
     faults = Faults(simulation, schedule)
+    if isinstance(simulation, LeaseSimulation):
+        traffic = StopTraffic(simulation, simulation.mission.robots, schedule.seed)
+        traffic.begin(schedule.stops)
+        simulation.listen([*checkers, traffic.observer])
     simulation.start_all()
     simulation.run(DURATION_S)
     for checker in checkers:

@@ -8,6 +8,7 @@ from typing import Any
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.gateways import GatewaySimulation
 from lfa.deploy.fuzz.network import told
+from lfa.protocol.fleet_stop.memory import StopMemory
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
 from lfa.protocol.lease.machine.lease import Lease, Observed
@@ -45,8 +46,9 @@ Call = Callable[..., list[Effect]]
 class Process:
     """One incarnation of one robot's (or the witness's) lease, with its own clock."""
 
-    def __init__(self, member: Member, lease: Lease, clock: LocalClock) -> None:
+    def __init__(self, member: Member, lease: Lease, clock: LocalClock, robots: tuple[int, ...]) -> None:
         self.member = member
+        self.stop = StopMemory(member.id, robots)
         self.id = member.id
         self.lease = lease
         self.clock = clock
@@ -236,6 +238,7 @@ class Hosts(GatewaySimulation):
         if stamp is None or not lease.may_command(local):
             return
         gateway = self.gateways[process.id].gateway
+        process.stop.hear_gateway(gateway.stop.known)
         self.carry_out(process, lease.gateway_term(gateway.term_max, local, gateway.latched))
         if not lease.may_command(local):
             return
@@ -266,8 +269,9 @@ class Hosts(GatewaySimulation):
             return
         gateway, lease = host.gateway, process.lease
         lease.told_of(gateway.agent)
+        process.stop.hear_gateway(gateway.stop.known)
         self.carry_out(process, lease.gateway_term(gateway.term_max, process.clock.local(self.now), gateway.latched))
 
     def _drawn(self, process: Process, term: Term, holder: int, as_leader: bool, stamp: GatewayStamp) -> CmdVel:
         header = Header(robot_name(process.id), process.member.incarnation, 0, process.clock.local(self.now))
-        return CmdVel(header, FORWARD, term, holder, as_leader, stamp)
+        return CmdVel(header, FORWARD, term, holder, as_leader, stamp, process.stop.known)

@@ -76,7 +76,7 @@ class LeaseSimulation(Hosts):
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         mission = mission or self.mission
         lease = Lease(member, mission, timing_of(mission.profile), clock.local(self.now), floor, self.observed)
-        process = Process(member, lease, clock)
+        process = Process(member, lease, clock, self.mission.robots)
         self.processes[robot_id] = process
         if self.trace is not None:
             self.trace(self.now, robot_id, f"starts, incarnation {member.incarnation}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence, Set
 from random import Random
 
-from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
+from lfa.deploy.analysis.verification.checker import Arguments, Checker, CheckerGroup
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
 from lfa.protocol.names import WITNESS_ID, robot_name
@@ -48,6 +48,10 @@ class Network(VirtualTime):
     def listen(self, checkers: Sequence[Checker]) -> None:
         """Notify these checkers, and only these, of all events from now on."""
         self._report = CheckerGroup(checkers).report
+
+    def report(self, fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None:
+        """Notify the checkers of a fact that another part of the simulation has observed."""
+        self._report(fact, *arguments)
 
     # --- cuts --------------------------------------------------------------------------------------------------
 

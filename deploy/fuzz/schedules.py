@@ -19,6 +19,8 @@ FAULTS_UNTIL_S = 4.0
 DURATION_S = 8.0
 WARM_UP_S = 0.6
 FAULTS_MEAN = 30
+STOPS_MAX = 20
+"""Maximum number of an operator's calls in a schedule, which follow on each other and overlap."""
 CALM_SHARE = 0.05
 """Fraction of schedules without a fault, in which no leader may step down (L5)."""
 SINGLE_SHARE = 0.05
@@ -53,6 +55,8 @@ class Schedule(Struct, frozen=True):
     rates: dict[int, float]
     faults: tuple[ScheduledFault, ...]
     radio: Radio
+    stops: tuple[ScheduledFault, ...]
+    """Calls of operators, each at a host: `stop`, `resume`; and the `replay` of an earlier word to a robot."""
     revive_all: bool
     """True if every dead process restarts at the end of the faults; else only as many as a quorum needs."""
 
@@ -114,7 +118,17 @@ def draw(seed: int) -> Schedule:
         rates={i: _rate(random) for i in (*ids, 0, *(-i for i in ids))},
         faults=tuple(sorted(faults, key=_when)),
         radio=radio,
+        stops=_stops(Random(f"operator-{seed}"), ids),
         revive_all=random.random() < 0.5,
+    )
+
+
+def _stops(random: Random, ids: tuple[int, ...]) -> tuple[ScheduledFault, ...]:
+    """Return the calls of operators, at hosts among `ids`; stops, resumes and replays come in any order."""
+    times = sorted(random.uniform(WARM_UP_S, FAULTS_UNTIL_S) for _ in range(random.randint(0, STOPS_MAX)))
+    return tuple(
+        ScheduledFault(at, random.choices(("stop", "resume", "replay"), (0.4, 0.3, 0.3))[0], (random.choice(ids),))
+        for at in times
     )
 
 

@@ -14,6 +14,7 @@ from msgspec import Struct
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Grant, Member, Promise, Propose, Term
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import StopWord
 
 Arguments = TypeVarTuple("Arguments")
 
@@ -93,6 +94,18 @@ class Checker:
 
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
         """Record that the gateway of `robot_id` accepted `cmd`, whose stamp is `age` [s] old by the gateway's clock."""
+
+    def stop_acknowledged(self, at: float, robot_id: int, word: StopWord) -> None:
+        """Record that the gateway of `robot_id` acknowledged a stop that its agent knows too (E28, E30)."""
+
+    def stop_forgotten(self, at: float, robot_id: int) -> None:
+        """Record that neither gateway nor agent of `robot_id` knows what it acknowledged: both have restarted."""
+
+    def resume_said(self, at: float, word: StopWord) -> None:
+        """Record that an operator said this resume for the first time or again."""
+
+    def turns(self, at: float, robot_id: int) -> None:
+        """Record that wheels of `robot_id` turn, by the twist that its gateway lets through."""
 
 
 class Report(Protocol):

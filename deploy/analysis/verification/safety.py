@@ -6,6 +6,7 @@ L1-L4 are in `liveness.py`, L5-L7 in `leadership.py`.
 from __future__ import annotations
 
 from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, WithFences, shown
+from lfa.deploy.analysis.verification.fleet_stop import StopHolds
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
 from lfa.protocol.messages.consensus import Config, Electorate, Grant, Member, Promise, Propose, Term, Version
@@ -276,4 +277,5 @@ SAFETY: tuple[type[Checker], ...] = (
     NoAmnesiacVote,
     Residual,
     OneAgreement,
+    StopHolds,
 )

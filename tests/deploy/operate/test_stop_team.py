@@ -70,7 +70,7 @@ class Stopped:
         return all(told[-1][1] > 0.1 for told in self.speeds.values())
 
 
-def test_e27_from_the_word_to_the_last_wheel_takes_no_longer_than_braking() -> None:
+def test_e28_from_the_word_to_the_last_wheel_takes_no_longer_than_braking() -> None:
     scene = Stopped()
     said_at, speed = scene.team.now, max(told[-1][1] for told in scene.speeds.values())
     outcome = scene.stop()
@@ -119,7 +119,7 @@ def test_i10_agents_that_restart_stay_stopped_because_their_gateways_know() -> N
     assert scene.run(4.0).moved_since(said_at + 1.5) == set()
 
 
-def test_e29_a_robot_that_forgot_everything_asks_the_others() -> None:
+def test_e30_a_robot_that_forgot_everything_asks_the_others() -> None:
     """The world restarts, and with it all gateways, while robot 4's agent restarts too."""
     scene = Stopped()
     said_at = scene.team.now

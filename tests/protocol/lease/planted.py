@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from tests.protocol.lease import plants_of_stops as stops
 from tests.protocol.lease import plants_of_team as team
 from tests.protocol.lease import plants_of_time as time
 from tests.protocol.lease.plants_of_time import Plant
@@ -128,5 +129,19 @@ PLANTED: tuple[Bug, ...] = (
         "incarnations::test_e24_a_follower_whose_gateway_saw_a_higher_term_makes_its_leader_raise_its_own", (2,)),
     Bug("rule E27", "declared again after events only", time.declared_again_after_events_only,
         "lost_declarations::test_e27_l2_a_host_that_comes_back_joins_though_routers_lost_its_declarations", (4,)),
+    Bug("rule E28", "a stop is not held", stops.stop_is_not_held,
+        "stop_latch::test_e28_a_stop_holds_until_a_later_resume"),
+    Bug("rule E29", "late and replayed words of a stop are believed", stops.replayed_words_are_believed,
+        "stop_latch::test_e29_late_and_replayed_words_are_void"),
+    Bug("rule E30", "a gateway that starts may go", stops.gateway_that_starts_may_go,
+        "stop_latch::test_e30_a_gateway_that_starts_stands_until_its_agent_tells_it_what_holds"),
+    Bug("rule E30", "an agent that starts knows what holds", stops.agent_that_starts_knows_all,
+        "stop_memory::test_e30_its_own_gateway_makes_it_certain"),
+    Bug("rule E30", "any resume lets a gateway go that has just started", stops.any_resume_lets_a_started_gateway_go,
+        "stop_latch::test_e30_a_replayed_resume_lets_no_gateway_go_that_has_just_started"),
+    Bug("rule E30", "an agent lifts a stop", stops.agent_lifts_a_stop,
+        "stop_latch::test_e30_an_agent_may_stop_its_gateway_and_lifts_no_stop"),
+    Bug("rule E31", "a replayed order shows that an operator is there", stops.replayed_order_is_a_sign_of_life,
+        "stop_latch::test_e31_a_replayed_order_is_no_sign_of_an_operator"),
 )
 # fmt: on

@@ -99,7 +99,7 @@ def test_the_operators_commands_show_the_operators_certificate(home: Home) -> No
     assert {rate["channel"] for rate in heard} == {"robot1/pose", "robot2/pose"}
 
 
-def test_e28_only_the_operators_certificate_stops_a_secured_fleet(home: Home) -> None:
+def test_e29_only_the_operators_certificate_stops_a_secured_fleet(home: Home) -> None:
     bus = ZenohBus(
         home.socket("b"), Inbox(), credentials=credentials(home.state("b") / "keys", "robot2", clock.wall_ms())
     )

@@ -24,7 +24,7 @@ def going(operator_timeout_s: float | None = None) -> StopLatch:
     return latch
 
 
-def test_e27_a_stop_holds_until_a_later_resume() -> None:
+def test_e28_a_stop_holds_until_a_later_resume() -> None:
     latch = going()
     assert not latch.holds(0.0)
     latch.order(order(StopWord(1, True)), 0.0)
@@ -33,7 +33,7 @@ def test_e27_a_stop_holds_until_a_later_resume() -> None:
     assert not latch.holds(1.0)
 
 
-def test_e28_late_and_replayed_words_are_void() -> None:
+def test_e29_late_and_replayed_words_are_void() -> None:
     latch = going()
     latch.order(order(StopWord(3, True)), 0.0)
     latch.order(order(StopWord(2, False), 2), 0.0)
@@ -43,7 +43,7 @@ def test_e28_late_and_replayed_words_are_void() -> None:
     assert not latch.holds(0.0), "a replayed stop"
 
 
-def test_e28_of_a_stop_and_a_resume_of_one_epoch_the_stop_holds_in_any_order() -> None:
+def test_e29_of_a_stop_and_a_resume_of_one_epoch_the_stop_holds_in_any_order() -> None:
     for words in ((True, False), (False, True)):
         latch = going()
         for seq, stand in enumerate(words):
@@ -51,7 +51,7 @@ def test_e28_of_a_stop_and_a_resume_of_one_epoch_the_stop_holds_in_any_order() -
         assert latch.holds(0.0)
 
 
-def test_e29_a_gateway_that_starts_stands_until_its_agent_tells_it_what_holds() -> None:
+def test_e30_a_gateway_that_starts_stands_until_its_agent_tells_it_what_holds() -> None:
     for known, stands in ((NEVER_STOPPED, False), (StopKnowledge(StopWord(4, True), True), True)):
         latch = started()
         assert latch.holds(0.0)
@@ -59,13 +59,13 @@ def test_e29_a_gateway_that_starts_stands_until_its_agent_tells_it_what_holds() 
         assert latch.holds(0.0) is stands
 
 
-def test_e29_an_agent_that_is_not_certain_lets_nothing_go() -> None:
+def test_e30_an_agent_that_is_not_certain_lets_nothing_go() -> None:
     latch = started()
     latch.hear_agent(StopKnowledge(StopWord(4, False), False))
     assert latch.holds(0.0)
 
 
-def test_e29_a_replayed_resume_lets_no_gateway_go_that_has_just_started() -> None:
+def test_e30_a_replayed_resume_lets_no_gateway_go_that_has_just_started() -> None:
     latch = started()
     latch.order(order(StopWord(4, False), 1, Member(3, 8), Member(2, 9)), 0.0)
     assert latch.holds(0.0), "it names another incarnation, and another robot"
@@ -73,7 +73,7 @@ def test_e29_a_replayed_resume_lets_no_gateway_go_that_has_just_started() -> Non
     assert not latch.holds(0.0)
 
 
-def test_e29_an_agent_may_stop_its_gateway_and_lifts_no_stop() -> None:
+def test_e30_an_agent_may_stop_its_gateway_and_lifts_no_stop() -> None:
     latch = going()
     latch.hear_agent(StopKnowledge(StopWord(1, True), True))
     assert latch.holds(0.0), "the gateway has missed the order"
@@ -89,7 +89,7 @@ def test_a_word_is_kept_once_the_agent_says_it_too() -> None:
     assert latch.kept
 
 
-def test_e30_without_an_operator_it_stands_and_goes_on_when_one_is_there_again() -> None:
+def test_e31_without_an_operator_it_stands_and_goes_on_when_one_is_there_again() -> None:
     latch = going(operator_timeout_s=1.0)
     assert latch.holds(0.0), "none has been heard yet"
     latch.order(order(None, 1), 10.0)
@@ -98,7 +98,7 @@ def test_e30_without_an_operator_it_stands_and_goes_on_when_one_is_there_again()
     assert not latch.holds(12.5)
 
 
-def test_e30_a_replayed_order_is_no_sign_of_an_operator() -> None:
+def test_e31_a_replayed_order_is_no_sign_of_an_operator() -> None:
     latch = going(operator_timeout_s=1.0)
     latch.order(order(None, 5), 10.0)
     latch.order(order(None, 5), 12.0)

@@ -9,7 +9,7 @@ from lfa.protocol.messages.stop import NEVER_STOPPED, UNCERTAIN, StopKnowledge, 
 STOPPED = StopKnowledge(StopWord(3, True), True)
 
 
-def test_e29_its_own_gateway_makes_it_certain() -> None:
+def test_e30_its_own_gateway_makes_it_certain() -> None:
     memory = StopMemory(1, (1, 2, 3, 4))
     memory.hear_gateway(UNCERTAIN)
     assert not memory.certain
@@ -17,7 +17,7 @@ def test_e29_its_own_gateway_makes_it_certain() -> None:
     assert memory.known == STOPPED
 
 
-def test_e29_more_than_half_of_a_team_that_has_started_lets_it_go() -> None:
+def test_e30_more_than_half_of_a_team_that_has_started_lets_it_go() -> None:
     memory = StopMemory(1, (1, 2, 3, 4))
     memory.hear_agent(2, UNCERTAIN)
     assert not memory.certain, "2 of 4"
@@ -29,7 +29,7 @@ def test_e29_more_than_half_of_a_team_that_has_started_lets_it_go() -> None:
     assert memory.known == NEVER_STOPPED
 
 
-def test_e29_one_of_them_that_knows_of_a_stop_is_enough_to_stand() -> None:
+def test_e30_one_of_them_that_knows_of_a_stop_is_enough_to_stand() -> None:
     memory = StopMemory(1, (1, 2, 3, 4))
     memory.hear_agent(2, STOPPED)
     memory.hear_agent(3, UNCERTAIN)

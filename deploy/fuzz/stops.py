@@ -1,0 +1,182 @@
+"""Operators who stop and resume the team of a fuzz schedule, and the words of the fleet stop between its processes.
+
+Its messages have a random generator of their own: a schedule of the leases is the same with and without stops. Words
+come late, twice, or again long after; operators sit at a host, and share its cuts.
+"""
+
+from __future__ import annotations
+
+from random import Random
+
+from lfa.deploy.analysis.verification.checker import Checker
+from lfa.deploy.client.stop_call import StopCall
+from lfa.deploy.fuzz.lease_processes import Hosts, Process
+from lfa.deploy.fuzz.network import place
+from lfa.deploy.fuzz.schedules import ScheduledFault
+from lfa.protocol.errors import Refused
+from lfa.protocol.fleet_stop.memory import ASK_S
+from lfa.protocol.geometry import STILL
+from lfa.protocol.lease.timing import Timing
+from lfa.protocol.messages.consensus import Member
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import NO_STOP, StopKnowledge, StopOrder, StopState, StopWord
+from lfa.protocol.topics import OPERATOR_NAME
+from lfa.protocol.transport.link_model import LinkModel
+
+STEP_S = 0.01
+LOCAL_S = 0.0003
+
+
+class StopTraffic:
+    """Stops of one simulation; `begin` schedules them."""
+
+    def __init__(self, team: Hosts, robots: tuple[int, ...], seed: int) -> None:
+        self._team = team
+        self._robots = robots
+        self._random = Random(f"stops-{seed}")
+        self._air = LinkModel(team.air.radio, self._random)
+        self._said: list[StopOrder] = []
+        self._acknowledged: dict[int, StopWord] = {}
+        """Greatest stop that each robot's gateway has acknowledged, as kept by its agent too."""
+        self._answers = 0
+
+    @property
+    def observer(self) -> Checker:
+        """Observer of the simulation, to be told of its facts as a checker is."""
+        return _Observer(self._team.timing, self)
+
+    def begin(self, calls: tuple[ScheduledFault, ...]) -> None:
+        """Schedule the calls of operators, the replays of their words, and the questions of agents."""
+        self._team.at(0.0, self._ask_all)
+        for number, call in enumerate(calls, start=1):
+            if call.kind == "replay":
+                self._team.at(call.at, self._replay, call.targets[0])
+            else:
+                self._team.at(call.at, self._call, call.kind == "stop", call.targets[0], number)
+
+    # --- operators ---------------------------------------------------------------------------------------------
+
+    def _call(self, stand: bool, host: int, number: int) -> None:
+        call = StopCall(stand, self._team.now)
+        call.name(self._robots)
+        self._step(call, host, number, 1)
+
+    def _step(self, call: StopCall, host: int, number: int, seq: int) -> None:
+        now = self._team.now
+        try:
+            said = call.said(now)
+        except Refused:
+            return
+        if said is not None:
+            order = StopOrder(Header(OPERATOR_NAME, number, seq, now), said.word, said.gateways)
+            self._said.append(order)
+            if said.word is not None and not said.word.stand:
+                self._team.report(Checker.resume_said, now, said.word)
+            for robot in self._robots:
+                self._send(order, robot, host, call)
+        if call.outcome(now) is None:
+            self._team.at(now + STEP_S, self._step, call, host, number, seq + 1)
+
+    def _send(self, order: StopOrder, robot: int, host: int, call: StopCall | None) -> None:
+        for delay_s in self._delays(host, self._team.host_of_gateway(robot)):
+            self._team.at(self._team.now + delay_s, self._at_gateway, order, robot, host, call)
+        for delay_s in self._delays(host, robot):
+            self._team.at(self._team.now + delay_s, self._at_process, order, robot)
+
+    def _replay(self, robot: int) -> None:
+        """Deliver each word of before once more to one robot, in any order."""
+        words = {order.word: order for order in self._said}
+        for order in self._random.sample(list(words.values()), len(words)):
+            self._send(order, robot, robot, None)
+
+    def _delays(self, here: int, there: int) -> list[float]:
+        if here == there:
+            return [LOCAL_S]
+        self._air.radio, self._air.cuts = self._team.air.radio, self._team.air.cuts
+        return self._air.delays(place(here), place(there))
+
+    # --- gateways and processes --------------------------------------------------------------------------------
+
+    def _at_gateway(self, order: StopOrder, robot: int, host: int, call: StopCall | None) -> None:
+        running = self._team.gateways.get(robot)
+        if running is None or not running.alive:
+            return
+        gateway, local = running.gateway, running.clock.local(self._team.now)
+        gateway.stop.order(order, local)
+        self._answers += 1
+        header = Header(f"driver{robot}", gateway.incarnation, self._answers, local)
+        state = StopState(header, gateway.stop.known, gateway.twist(local) == STILL, gateway.stop.kept)
+        if state.known.word.stand and state.kept:
+            self._acknowledged[robot] = max(self._acknowledged.get(robot, NO_STOP), state.known.word)
+            self._team.report(Checker.stop_acknowledged, self._team.now, robot, state.known.word)
+        if call is not None:
+            for delay_s in self._delays(self._team.host_of_gateway(robot), host):
+                self._team.at(self._team.now + delay_s, self._answered, call, robot, state)
+        self.check_wheels(robot)
+
+    def _answered(self, call: StopCall, robot: int, state: StopState) -> None:
+        call.hear(robot, state, self._team.now)
+
+    def _at_process(self, order: StopOrder, robot: int) -> None:
+        process = self._team.processes.get(robot)
+        if process is not None and process.alive and not process.paused:
+            process.stop.order(order)
+
+    def check_wheels(self, robot: int) -> None:
+        """Report it if the wheels of a robot turn, after its gateway has obeyed a command or an order."""
+        running = self._team.gateways[robot]
+        if running.gateway.twist(running.clock.local(self._team.now)) != STILL:
+            self._team.report(Checker.turns, self._team.now, robot)
+
+    def started(self, robot: int) -> None:
+        """Report that a robot has forgotten what it acknowledged: agent and gateway, before one has told the other."""
+        word = self._acknowledged.get(robot)
+        process, running = self._team.processes.get(robot), self._team.gateways.get(robot)
+        told = process is not None and process.alive and process.stop.known.word >= (word or NO_STOP)
+        known = running.gateway.stop.known if running is not None and running.alive else None
+        if word is not None and not told and not (known is not None and known.certain and known.word >= word):
+            del self._acknowledged[robot]
+            self._team.report(Checker.stop_forgotten, self._team.now, robot)
+
+    def _ask_all(self) -> None:
+        self._team.at(self._team.now + ASK_S / 2.0, self._ask_all)
+        for process in list(self._team.processes.values()):
+            if process.id in self._robots and process.alive and not process.paused:
+                self._ask(process)
+
+    def _ask(self, process: Process) -> None:
+        """Let the agent of `process` ask the others, if it is due (E30)."""
+        if not process.stop.ask_due(process.clock.local(self._team.now)):
+            return
+        for other in self._robots:
+            for delay_s in self._delays(process.id, other) if other != process.id else ():
+                self._team.at(self._team.now + delay_s, self._asked, process.member, other)
+
+    def _asked(self, asker: Member, robot: int) -> None:
+        process = self._team.processes.get(robot)
+        if process is not None and process.alive and not process.paused:
+            for delay_s in self._delays(robot, asker.id):
+                self._team.at(self._team.now + delay_s, self._told, asker, robot, process.stop.known)
+
+    def _told(self, asker: Member, robot: int, known: StopKnowledge) -> None:
+        process = self._team.processes[asker.id]
+        if process.member == asker and process.alive and not process.paused:
+            process.stop.hear_agent(robot, known)
+
+
+class _Observer(Checker):
+    """Observer that tells a `StopTraffic` of obeyed commands and of starts."""
+
+    def __init__(self, timing: Timing, traffic: StopTraffic) -> None:
+        super().__init__(timing)
+        self._traffic = traffic
+
+    def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
+        self._traffic.check_wheels(robot_id)
+
+    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
+        self._traffic.started(robot_id)
+
+    def lives(self, at: float, who: Member) -> None:
+        self._traffic.started(who.id)
