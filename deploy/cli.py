@@ -68,6 +68,8 @@ COMMANDS = (
     Command("view", "lfa.deploy.view.rerun.command",
           "Show a recording or a running fleet in rerun, in a browser, or as a picture.",
           "lfa view runs/paper_path1-20260101-120000 --screenshot run.png"),
+    Command("web", "lfa.deploy.web.command", "Open a page on a team: click a robot dead, watch the next one lead.",
+          "lfa web leader_killed --seed 7"),
     Command("record", "lfa.deploy.fleet.record", "Record a running fleet.",
           "lfa record --seconds 60"),
     Command("topic", "lfa.deploy.view.terminal.topic", "Inspect the topics of a running fleet: list, echo, hz.",
@@ -119,13 +121,14 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "run": RUNS, "sim": RUNS, "verify": RUNS, "map": RUNS, "record": RECORDINGS, "plot": (*RECORDINGS, "matplotlib"),
     "report": (*RECORDINGS, "matplotlib"), "view": (*RECORDINGS, "rerun"), "bag": (*ROS, "mcap"), "ros": ROS,
     "foxglove": (*ROS, "foxglove"), "up": ("cryptography",), "keys": ("cryptography",), "top": ("rich",),
+    "web": (*RUNS, "websockets"),
 }  # fmt: skip
 """Modules outside the base install without which a command can do nothing."""
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
     "pyarrow": "campaign", "submitit": "slurm", "distributed": "dask",
-    "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove",
+    "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove", "websockets": "web",
 }  # fmt: skip
 """Modules outside the base install, each with the extra that installs it."""
 

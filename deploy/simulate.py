@@ -45,7 +45,7 @@ class Result(Run):
 def run(
     scenario: str | Scenario,
     *,
-    seed: int = 0,
+    seed: int | None = None,
     set: Sequence[str] = (),
     robots: int | None = None,
     faults: Sequence[str] = (),
@@ -54,9 +54,10 @@ def run(
 ) -> Result:
     """Run `scenario` (shipped name, file, or loaded) in virtual time, as `lfa sim` does, and return its result.
 
-    `set` (texts `a.b=value`) and `robots` (team size) override a scenario that is given by name. The run folder is
-    `out`, or a new one in `runs/`. `drivers` has the hardware of robots that the world does not simulate, by id: each
-    is driven through a `Driver`. Raises Refused for a scenario that no world can be built from.
+    `seed` is the scenario's own by default. `set` (texts `a.b=value`) and `robots` (team size) override a scenario that
+    is given by name. The run folder is `out`, or a new one in `runs/`. `drivers` has the hardware of robots that the
+    world does not simulate, by id: each is driven through a `Driver`. Raises Refused for a scenario that no world can
+    be built from.
     """
     chosen = load(scenario, set, robots) if isinstance(scenario, str) else scenario
     hardware = drivers or {}
@@ -64,7 +65,8 @@ def run(
         world = replace(chosen.world, real_robots=tuple(sorted(hardware)))
         chosen = replace(chosen, world=world, mission=replace(chosen.mission, cold_start="full_house"))
     nodes = [Driver(simulate.FLEET, robot, 1, make_base) for robot, make_base in hardware.items()]
-    ended = simulate.run(chosen, seed, out, parse_all(chosen.mission, chosen.faults, faults), nodes)
+    drawn_with = chosen.seed if seed is None else seed
+    ended = simulate.run(chosen, drawn_with, out, parse_all(chosen.mission, chosen.faults, faults), nodes)
     return Result(ended.folder)
 
 

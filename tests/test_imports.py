@@ -35,8 +35,8 @@ ORDER = (
     "agents/chain_place", "agents/stop_listener", "agents/command_publisher", "agents/subscriptions",
     "agents/robot_core", "agents/agent", "agents/cli",
 
-    "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/time_grid",
-    "world/saved_state", "world/world", "world/checkpoint",
+    "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",
+    "world/time_grid", "world/saved_state", "world/world", "world/checkpoint",
     "world/virtual_time", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/recording",
@@ -45,7 +45,8 @@ ORDER = (
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal", "deploy/robot",
     "deploy/run", "deploy/simulate", "deploy/examples", "deploy/fuzz", "deploy/fleet/plan", "deploy/config",
-    "deploy/fleet/security", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/bench/harness",
+    "deploy/fleet/security", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet", "deploy/web",
+    "deploy/bench/harness",
     "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/engines", "deploy/campaign/commands",
     "deploy/bench/control_cases",
     "deploy/bench", "deploy/cli", "deploy/completion",

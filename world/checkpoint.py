@@ -40,7 +40,10 @@ def read(run: Path) -> Memory:
 
 
 def resumed(scenario: Scenario, memory: Memory) -> Scenario:
-    """Return the drawn `scenario` with bodies at the poses in `memory`. Raises Refused for another team."""
+    """Return the drawn `scenario` with bodies at the poses in `memory`, and with the obstacles set down meanwhile.
+
+    Raises Refused for another team.
+    """
     robots = scenario.mission.robots
     if set(robots) != {robot.id for robot in memory.robots}:
         ids = sorted(robot.id for robot in memory.robots)
@@ -51,7 +54,7 @@ def resumed(scenario: Scenario, memory: Memory) -> Scenario:
         obstacle if obstacle.mass_kg is None or n not in memory.things else _put(obstacle, memory.things[n])
         for n, obstacle in enumerate(scenario.world.obstacles)
     )
-    return replace(scenario, world=replace(scenario.world, starts=starts, obstacles=obstacles))
+    return replace(scenario, world=replace(scenario.world, starts=starts, obstacles=(*obstacles, *memory.added)))
 
 
 def _put(obstacle: Obstacle, pose: Pose2D) -> Obstacle:

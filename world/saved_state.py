@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from lfa.protocol.geometry import Pose2D
+from lfa.world.description.scenario import Obstacle
 
 
 class Remembered(Struct, frozen=True):
@@ -24,3 +25,5 @@ class Memory(Struct, frozen=True):
     robots: tuple[Remembered, ...]
     things: dict[int, Pose2D]
     """Poses in `map` of obstacles that are not fixed, by their index in the scenario."""
+    added: tuple[Obstacle, ...] = ()
+    """Obstacles set down during the run: a next incarnation has them in its scenario (`checkpoint.resumed`)."""

@@ -11,6 +11,8 @@ from random import Random
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.names import robot_name
 from lfa.protocol.node import (
     Local,
     Node,
@@ -234,6 +236,8 @@ class Simulator(VirtualTime):
         message = sender.host.decoded(key, payload)
         if message is None:
             return
+        if isinstance(message, Truth):
+            self.air.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
         for tap in self.taps:
             tap(self.now, key, payload, message)
         routes = self._routes.get(key)

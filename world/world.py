@@ -22,6 +22,7 @@ from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
+from lfa.world.added_obstacles import AddedObstacles
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
@@ -79,6 +80,7 @@ class World:
         self._driven: dict[int, tuple[Twist, float]] = {}
         """Twist last reported by each real robot, and when [s], by its index."""
         self._cut_off = False
+        self._added = AddedObstacles(scenario, () if memory is None else memory.added)
         self._time = TimeGrid(scenario.world.physics_hz, 0 if memory is None else memory.step, start_at)
         self._remembered = {} if memory is None else {robot.id: robot for robot in memory.robots}
         self._bodies.advance(self._time.step)
@@ -133,6 +135,8 @@ class World:
                 self._robots[self._place[name]].gateway.agent_down(incarnation, now)
             case OperatorNote(command="hang" | "resume" as command, arguments=arguments):
                 self._hang(command, arguments, now)
+            case OperatorNote(command="obstacle", arguments=arguments):
+                return self._set_down(arguments, now)
             case RouterLost():
                 self._cut_off = True
             case Stop():
@@ -163,7 +167,7 @@ class World:
             Remembered(robot.id, pose, robot.odometry.pose_odom, robot.odometry.odometer_m)
             for robot, pose in zip(self._robots, self._bodies.poses, strict=True)
         )
-        return Memory(self._time.step, robots, self._bodies.moved())
+        return Memory(self._time.step, robots, self._bodies.moved(), self._added.all)
 
     def _switch_on(self, now: float) -> None:
         """Create the robots' hardware at the first call: the gateways' time starts at `now`."""
@@ -208,6 +212,17 @@ class World:
         for _, robot in self._simulated:
             if robot.id == robot_id and part in PARTS:
                 robot.hang(str(part), now) if command == "hang" else robot.resume(str(part))
+
+    def _set_down(self, arguments: dict[str, object], now: float) -> list[Envelope]:
+        """Add an obstacle during the run, and tell so; one on top of a robot is told as refused."""
+        taken = self._added.take(arguments, self._bodies.poses)
+        if taken is None:
+            return []
+        data, obstacle = taken
+        if obstacle is not None:
+            self._bodies.set_down(data["index"], obstacle)
+            self._scanner.set_down(obstacle)
+        return [self._event("obstacle", None, data | {"t": self._time.time_of(now)}, now)]
 
     def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None, now: float) -> None:
         where = address(at_key)

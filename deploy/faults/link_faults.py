@@ -1,5 +1,5 @@
 """Parsing of the faults that an operator's message orders: links that a cut disables, the share of messages that is
-lost, the part of a robot that hangs. Sides are comma-separated ids;
+lost, the reach of the radio, the part of a robot that hangs, a formation, an obstacle. Sides are comma-separated ids;
 `w` is the world with its witness, which runs on no robot.
 
     3       robot 3 from all others          1-2      1 and 2 from each other
@@ -10,16 +10,20 @@ lost, the part of a robot that hangs. Sides are comma-separated ids;
 from __future__ import annotations
 
 import re
-from typing import Any
+from math import isfinite
+from typing import Any, get_args
 
 from lfa.deploy.client.operator import Operator
 from lfa.protocol.errors import Refused
+from lfa.protocol.mission import Side
 from lfa.protocol.names import robot_name, whole_number
 from lfa.protocol.node import Envelope
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import WEATHER, Link
+from lfa.world.description.scenario import PLACE_M_MAX, RADIUS_M_MAX, RADIUS_M_MIN
 
 WORLD_WORD = "w"
+RANGE_M_MAX = 1e4
 PART = re.compile(r"(?P<part>driver|localization|scanner) *(?P<robot>\d+)", re.ASCII)
 SIDES = re.compile(r"(?P<one>[\dw,]+)(?:(?P<way>[->])(?P<other>[\dw,]+))?", re.ASCII)
 
@@ -48,7 +52,7 @@ def _side(text: str, robots: tuple[int, ...], right: str) -> list[str]:
 
 
 def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, dict[str, Any]]:
-    """Return the operator's command and its arguments for `cut`, `heal`, `loss`, `handover`, `hang` and `resume`.
+    """Return the operator's command and its arguments for each of `script.ORDERS`.
 
     Raises Refused.
     """
@@ -60,8 +64,14 @@ def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, d
             return WEATHER, {"mend": links(text, robots)} if text else {"heal": True}
         case "loss":
             return WEATHER, {"radio": {"loss": _share(text)}} if text else {"fair": True}
+        case "range":
+            return WEATHER, {"radio": {"range_m": _range_m(text)}}
         case "hang" | "resume":
             return deed, _part(deed, text, robots)
+        case "formation":
+            return deed, {"side": _side_of_team(text)}
+        case "obstacle":
+            return deed, _obstacle(text)
         case _:
             return deed, {}
 
@@ -79,6 +89,36 @@ def _part(deed: str, text: str, robots: tuple[int, ...]) -> dict[str, Any]:
         ids = ", ".join(map(str, robots))
         raise Refused(f"{deed} {text!r}: must be driver, localization or scanner of a robot of {ids}, such as driver 2")
     return {"part": match["part"], "robot": robot}
+
+
+def _range_m(text: str) -> float:
+    (metres,) = _numbers(text, 1) or (-1.0,)
+    if not 0.0 <= metres <= RANGE_M_MAX:
+        raise Refused(f"range {text!r}: must be metres from 0 (no limit) to {RANGE_M_MAX:g}, such as 5")
+    return metres
+
+
+def _side_of_team(text: str) -> str:
+    if text not in get_args(Side):
+        raise Refused(f"formation {text!r}: must be one of {', '.join(get_args(Side))}")
+    return text
+
+
+def _obstacle(text: str) -> dict[str, Any]:
+    x, y, radius_m = _numbers(text, 3) or (0.0, 0.0, -1.0)
+    if not (abs(x) <= PLACE_M_MAX and abs(y) <= PLACE_M_MAX and RADIUS_M_MIN <= radius_m <= RADIUS_M_MAX):
+        sizes = f"a radius from {RADIUS_M_MIN:g} to {RADIUS_M_MAX:g} m"
+        raise Refused(f"obstacle {text!r}: must be x, y and {sizes}, such as 5,1.5,0.3")
+    return {"x": x, "y": y, "radius_m": radius_m}
+
+
+def _numbers(text: str, count: int) -> tuple[float, ...] | None:
+    """Return the comma-separated finite numbers in `text`, or None if there are not `count` of them."""
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        return None
+    return numbers if len(numbers) == count and all(map(isfinite, numbers)) else None
 
 
 def _share(text: str) -> float:

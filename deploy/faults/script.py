@@ -19,8 +19,9 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.names import whole_number
 
 FaultAction = Literal[
-    "kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "handover", "hang", "resume"
-]
+    "kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "range", "handover", "hang", "resume",
+    "formation", "obstacle",
+]  # fmt: skip
 
 #            action        effect
 DEEDS: dict[str, str] = {
@@ -32,9 +33,12 @@ DEEDS: dict[str, str] = {
     "cut":       "no radio between sides: 3, or 1-2, or 1,2-3,w, or one way 1>2 (w: the world with its witness)",
     "heal":      "ends a cut, or all cuts and all loss",
     "loss":      "every receiver loses this share of messages: 0.2; without a share: the initial value",
+    "range":     "messages reach robots up to this distance [m]: 5; 0: any distance (only in virtual time)",
     "handover":  "the leader hands its lease to the next in the chain",
     "hang":      "a part of a simulated robot hangs: driver 2 (its wheels go on), localization 2 or scanner 2",
     "resume":    "ends a hang of the same part",
+    "formation": "the leader orders it, as lfa formation does: left, right, column or zigzag",
+    "obstacle":  "a round obstacle is set down: its x, y and radius [m] as 5,1.5,0.3; not where a robot stands",
 }  # fmt: skip
 
 SIGNALS: dict[str, signal.Signals] = {
@@ -44,7 +48,7 @@ SIGNALS: dict[str, signal.Signals] = {
     "terminate": signal.SIGTERM,
 }
 
-ORDERS = ("cut", "heal", "loss", "handover", "hang", "resume")
+ORDERS = ("cut", "heal", "loss", "range", "handover", "hang", "resume", "formation", "obstacle")
 """Fault actions sent as an operator's message to all, not as a signal to one process."""
 LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "loss", "hang": "resume"}
 """Fault actions that may have a duration, and the action that ends each."""
@@ -52,6 +56,8 @@ LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "l
 LEADER = "leader"
 RESTART: FaultAction = "restart"
 """Fault action carried out by the launcher; in a fleet that already runs, an operator's message requests it."""
+SIMULATED = ("range",)
+"""Fault actions that only the simulator executes: a live receiver does not know how far away its senders are."""
 COMMON = ("router", "world")
 """Processes besides robots that can be killed, stopped and continued, where the fleet runs as processes."""
 TIME_S_MAX = 1e6
@@ -75,10 +81,17 @@ class Fault(Struct, frozen=True):
     target: int | str
     at_s: float
     for_s: float | None = None
+    undoes: bool = False
+    """True for the action that ends a lasting fault: among those due at one time it comes after the written ones."""
 
     def __str__(self) -> str:
-        lasting = "" if self.for_s is None else f" for {self.for_s:g} s"
-        return " ".join(word for word in (self.deed, str(self.target), f"at {self.at_s:g} s{lasting}") if word)
+        lasting = "" if self.for_s is None else f" for {_plain(self.for_s)} s"
+        return " ".join(word for word in (self.deed, str(self.target), f"at {_plain(self.at_s)} s{lasting}") if word)
+
+
+def _plain(seconds: float) -> str:
+    """Return a time to the microsecond without an exponent, which the grammar does not know."""
+    return f"{seconds:.6f}".rstrip("0").rstrip(".")
 
 
 def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
@@ -110,7 +123,12 @@ class FaultSchedule:
     """Pending faults, in the order of their times."""
 
     def __init__(self, faults: Sequence[Fault]) -> None:
-        self.pending = sorted(faults, key=_at_s)
+        self.pending = sorted(faults, key=_place)
+
+    def add(self, fault: Fault) -> None:
+        """Add a fault while the schedule runs: it takes the place that it has in a schedule written beforehand."""
+        self.pending.append(fault)
+        self.pending.sort(key=_place)
 
     def due(self, now: float, leader: int | None) -> list[tuple[FaultAction, int | str]]:
         """Return the actions and targets due at world time `now` [s]; a fault on the leader waits until one exists."""
@@ -124,13 +142,12 @@ class FaultSchedule:
             deeds.append((fault.deed, victim))
             if fault.for_s is not None:
                 undone = "" if fault.deed == "loss" else victim
-                self.pending.append(Fault(LASTING[fault.deed], undone, now + fault.for_s))
-                self.pending.sort(key=_at_s)
+                self.add(Fault(LASTING[fault.deed], undone, now + fault.for_s, undoes=True))
         return deeds
 
 
-def _at_s(fault: Fault) -> float:
-    return fault.at_s
+def _place(fault: Fault) -> tuple[float, bool]:
+    return fault.at_s, fault.undoes
 
 
 def _ordered(deed: str, word: str, text: str, mission: Mission, where: str) -> int | str:

@@ -17,7 +17,7 @@ from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agent
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS
+from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS, SIMULATED
 from lfa.deploy.process.identity import Identity, own_processes, send_signal
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
@@ -36,17 +36,20 @@ SENT_S = 0.05  # delay [s] so that the event about a fault leaves before the fau
 
 
 def command(
-    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(DEEDS)}.")],
+    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(deed for deed in DEEDS if deed not in SIMULATED)}.")],
     target: Annotated[
         str,
-        typer.Argument(help="A robot's id, leader, world, router; for cut: 3, 1-2, 1,2-3,w or 1>2; for loss: a share."),
+        typer.Argument(
+            help="A robot's id, leader, world, router; for cut: 3, 1-2, 1,2-3,w or 1>2; for loss: a share; "
+            "for obstacle: x,y,radius; for formation: a side."
+        ),
     ] = "",
     fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Inject a fault into a fleet that runs on this machine. Raises Refused."""
-    if deed not in DEEDS:
-        raise Refused(f"{deed!r}: must be one of {', '.join(DEEDS)}")
+    if deed not in DEEDS or deed in SIMULATED:
+        raise Refused(f"{deed!r}: must be one of {', '.join(deed for deed in DEEDS if deed not in SIMULATED)}")
     team = one_fleet(agents(), fleet)
     inbox = Inbox()
     bus = _bus(team[0], inbox)

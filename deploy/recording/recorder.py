@@ -111,7 +111,7 @@ class Recorder:
         self._unwritten = 0
         self._refused = ""
         """Why the disk took no message at the last attempt; empty: it took all."""
-        self._said = SaidAgain()
+        self._lines = EventLines()
         self._events = AppendedFile(folder / EVENTS, fresh=True)
         reason = self._next_file()
         if reason:
@@ -130,8 +130,7 @@ class Recorder:
         body = mcap_channels.encode(message)
         self._writer.add_message(channel, stamp_ns, body, stamp_ns, message.header.seq)
         self._messages += 1
-        line = event_line(t, message) if isinstance(message, Event) else b""
-        line += b"".join(event_line(t, event) for event in self._said.late(key, message))
+        line = self._lines.lines(t, key, message)
         if line:
             self._events.append(line)
         self._caps.spend(key, len(body) + len(line))
@@ -200,6 +199,18 @@ class Recorder:
             schema = self._writer.register_schema(f"lfa.{kind.__name__}", "jsonschema", mcap_channels.schema(kind))
             self._schemas[kind] = schema
         return self._writer.register_channel("/" + key.split("/", 2)[2], "json", schema)
+
+
+class EventLines:
+    """Lines of events.jsonl that the messages of a run make, those of events that nobody heard included."""
+
+    def __init__(self) -> None:
+        self._said = SaidAgain()
+
+    def lines(self, t: float, key: str, message: Message) -> bytes:
+        """Return the lines that `message`, sent on `key` at `t` [s], adds."""
+        line = event_line(t, message) if isinstance(message, Event) else b""
+        return line + b"".join(event_line(t, event) for event in self._said.late(key, message))
 
 
 def event_line(t: float, event: Event) -> bytes:

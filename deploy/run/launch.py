@@ -16,7 +16,7 @@ import msgspec
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.script import Fault
+from lfa.deploy.faults.script import SIMULATED, Fault
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
@@ -33,6 +33,7 @@ from lfa.deploy.run.recorder_process import RecorderTask, RunResult
 from lfa.deploy.run.restarted_processes import RestartedProcesses
 from lfa.deploy.run.termination import Referee
 from lfa.protocol import clock, incarnations
+from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.names import robot_name
@@ -54,7 +55,11 @@ RECORDER_S_MAX = 30.0  # to read the recording and write the summary
 
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
-    """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out`."""
+    """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out` or fault."""
+    simulated = next((fault for fault in faults if fault.deed in SIMULATED), None)
+    if simulated is not None or scenario.radio.range_m > 0.0:
+        what = "radio.range_m" if simulated is None else f"fault '{simulated}'"
+        raise Refused(f"{what}: only in lfa sim, a live receiver does not know how far away its senders are")
     drawn = draw(scenario, seed)
     folder = make(out, drawn)
     about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}", provenance())

@@ -17,14 +17,14 @@ from lfa.world.description.load import Scenario
 def rebuild_scenario(
     scenario: str, overrides: Sequence[str], robots: int | None, seed: int | None, map_from: Path | None
 ) -> tuple[Scenario, int]:
-    """Return the scenario and the seed (0 by default); with `map_from`, prepare the paper's iteration 2.
+    """Return the scenario and the seed (the scenario's by default); with `map_from`, prepare the paper's iteration 2.
 
     Iteration 2 is the world of the earlier run in that folder (with its seed, unless another is given), with the
     obstacles that its robots met as known obstacles of the team. Raises Refused with one line.
     """
     chosen = load_scenario(scenario, overrides, robots)
     if map_from is None:
-        return chosen, seed or 0
+        return chosen, chosen.seed if seed is None else seed
     from lfa.deploy.analysis import summary  # both read recordings: numpy
     from lfa.deploy.analysis.known_obstacles import known_obstacles
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 ScenarioName = Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")]
-Seed = Annotated[int | None, typer.Option(help="Seed of noise, places, starts, delays and losses; default 0.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of all that is drawn; default the scenario's.")]
 Overrides = Annotated[list[str] | None, typer.Option("--set", help="Override a field: world.lidar.beams=90.")]
 Controller = Annotated[
     str | None, typer.Option(help="Controller of the followers: an installed one by name, or yours: FILE.py:Class.")

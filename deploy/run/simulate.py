@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.summarize import summary_of
@@ -19,7 +19,7 @@ from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.mcap_reader import RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.provenance import provenance
-from lfa.deploy.recording.recorder import Recorder, Recording
+from lfa.deploy.recording.recorder import Recorder
 from lfa.deploy.recording.run_folder import JOURNALS, About, make
 from lfa.deploy.recording.run_memory import RunMemory
 from lfa.deploy.run.command import scenario_command
@@ -33,7 +33,7 @@ from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.link_model import WEATHER, Radio
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.description.load import Scenario, draw
@@ -60,12 +60,14 @@ def run(
     folder = make(out, drawn)
     about = About(scenario.name, MODE, seed, FLEET, provenance())
     recorder = Recorder(folder, about.metadata())
-    run = _Run(drawn, seed, folder / JOURNALS, recorder, drivers)
+    run = SimulatedRun(drawn, seed, faults, recorder.record, folder / JOURNALS, drivers)
     started = time.perf_counter()
     with Interrupts() as interrupts:
-        verdict = run.play(FaultSchedule(faults), interrupts)
+        run.advance(inf, lambda: interrupts.signal is not None)
+        verdict = run.close(verdict_of(interrupts))
+    recording = recorder.close()
     duration_s = time.perf_counter() - started
-    return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, run.recording)
+    return finish(folder, about, verdict, duration_s, run.faults_left, interrupts.signal, recording)
 
 
 def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> UnrecordedRun:
@@ -77,9 +79,10 @@ def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Unre
     refuse_common(faults)
     drawn, memory = draw(scenario, seed), RunMemory()
     about = About(scenario.name, MODE, seed, FLEET)
-    run = _Run(drawn, seed, None, memory, ())
+    run = SimulatedRun(drawn, seed, faults, memory.record, None)
     with Interrupts() as interrupts:
-        verdict = run.play(FaultSchedule(faults), interrupts)
+        run.advance(inf, lambda: interrupts.signal is not None)
+        verdict = run.close(verdict_of(interrupts))
     if interrupts.signal is not None:
         raise KeyboardInterrupt
     seen = memory.seen()
@@ -103,72 +106,106 @@ class UnrecordedRun(NamedTuple):
     seen: RecordedRun
 
 
-class RunRecorder(Protocol):
-    """Receiver of all messages of a run."""
+class SimulatedRun:
+    """Team of a drawn scenario in the simulator, advanced step by step; `record` gets all messages with their times.
 
-    def record(self, t: float, key: str, message: Message) -> None: ...
-
-    def close(self) -> Recording: ...
-
-
-class _Run:
-    """Team in the simulator; recorder and referee receive all published messages."""
+    The same faults at the same times give the same messages, whether they are given at the start or added on the way,
+    and however the time in between is cut into calls of `advance`.
+    """
 
     def __init__(
-        self, drawn: Scenario, seed: int, journals: Path | None, recorder: RunRecorder, drivers: Sequence[Node]
+        self,
+        drawn: Scenario,
+        seed: int,
+        faults: Sequence[Fault],
+        record: Callable[[float, str, Message], None],
+        journals: Path | None,
+        drivers: Sequence[Node] = (),
     ) -> None:
-        """`journals` is the folder of the journals; None: there are none, and the run says nothing of its progress."""
+        """Start the team. `journals` is the folder of the journals; None: there are none, and the run says nothing
+        about its progress.
+        """
         self._scenario = drawn
-        self._drivers = drivers
-        self._seed = seed
         self._journals: dict[str, Journal] = {}
         self._journal_folder = journals
-        self._recorder = recorder
+        self._record = record
         self._referee = Referee(drawn)
+        self._schedule = FaultSchedule(faults)
+        self._check_at = 0.0
+        """Time [s] of the next look at the schedule: the same however the calls of `advance` fall."""
         self._operator = Operator(FLEET, 1)
         self._lives: dict[str, int] = {}
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
         self._simulator.reborn = self._journal
         self._show_at = inf if journals is None else time.perf_counter() + SHOW_EVERY_S
-        self.faults_left: list[str] = []
-        self.recording: Recording | None = None
-
-    def play(self, schedule: FaultSchedule, interrupts: Interrupts) -> Verdict:
-        """Start the team, run to the end, close the recording and the journals; return the verdict."""
-        self._say("start", scenario=self._scenario.name, seed=self._seed)
-        self._add(World(FLEET, self._scenario, self._seed, self._next_life(WORLD_NAME), start_at=0.0))
-        if self._scenario.mission.witness:
+        self._say("start", scenario=drawn.name, seed=seed)
+        self._add(World(FLEET, drawn, seed, self._next_life(WORLD_NAME), start_at=0.0))
+        if drawn.mission.witness:
             self._add(Witness(FLEET, 1, 1))
-        for driver in self._drivers:
+        for driver in drivers:
             heading = Heading(JOURNAL_VERSION, driver.name, driver.incarnation, driver.incarnation, {})
             self._simulator.add(driver, Journal(None, heading))
-        for robot_id in self._scenario.mission.robots:
+        for robot_id in drawn.mission.robots:
             self._add(self._agent(robot_id))
         self._flush()
-        verdict = self._until_over(schedule, interrupts)
-        self.faults_left = [str(fault) for fault in schedule.pending]
+
+    @property
+    def now(self) -> float:
+        """Virtual time [s] since the start."""
+        return self._simulator.now
+
+    @property
+    def leader(self) -> int | None:
+        return self._referee.leader
+
+    @property
+    def radio(self) -> Radio:
+        """Present link conditions."""
+        return self._simulator.air.radio
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Outcome, once the run is over."""
+        if self._referee.verdict is None and self.now >= self._scenario.time_limit_s + SILENCE_S_MAX:
+            return Verdict("aborted", "the world fell silent")
+        return self._referee.verdict
+
+    @property
+    def faults_left(self) -> list[str]:
+        return [str(fault) for fault in self._schedule.pending]
+
+    def add_fault(self, fault: Fault) -> None:
+        """Schedule a fault later than `now`."""
+        self._schedule.add(fault)
+        if self._schedule.pending[0] is fault:
+            self._check_at = fault.at_s
+
+    def advance(self, until: float, over: Callable[[], bool] = lambda: False) -> None:
+        """Go on to virtual time `until` [s], to the verdict, or until `over()`."""
+        referee, simulator = self._referee, self._simulator
+        until = min(until, self._scenario.time_limit_s + SILENCE_S_MAX)
+        while self.verdict is None and simulator.now < until and not over():
+            if simulator.now >= self._check_at:
+                self._do_due()
+            simulator.run(
+                min(until, self._check_at), over=lambda: self._shown() or referee.verdict is not None or over()
+            )
+
+    def close(self, instead: Verdict | None = None) -> Verdict:
+        """End the run with its verdict, or `instead`; close the journals."""
+        verdict = instead or self.verdict or Verdict("interrupted")
         self._say("end", outcome=verdict.outcome, reason=verdict.reason)
-        self.recording = self._recorder.close()
         for journal in self._journals.values():
             journal.close()
         return verdict
 
-    def _until_over(self, schedule: FaultSchedule, interrupts: Interrupts) -> Verdict:
-        simulator, referee = self._simulator, self._referee
-        silent_at = self._scenario.time_limit_s + SILENCE_S_MAX
-        while simulator.now < silent_at:
-            for deed, victim in schedule.due(simulator.now, referee.leader):
-                self._do(deed, victim)
-            next_s = schedule.pending[0].at_s if schedule.pending else silent_at
-            until = max(next_s, simulator.now + LEADER_WAIT_S)
-            simulator.run(
-                until, over=lambda: self._shown() or referee.verdict is not None or interrupts.signal is not None
-            )
-            verdict = verdict_of(interrupts) or referee.verdict
-            if verdict is not None:
-                return verdict
-        return Verdict("aborted", "the world fell silent")
+    def _do_due(self) -> None:
+        now = self._simulator.now
+        for deed, victim in self._schedule.due(now, self._referee.leader):
+            self._do(deed, victim)
+        next_s = self._schedule.pending[0].at_s if self._schedule.pending else inf
+        self._check_at = next_s if next_s > now else now + LEADER_WAIT_S
 
     def _shown(self) -> bool:
         """Show the progress from time to time; return False, so that it stands beside conditions of an end."""
@@ -209,18 +246,18 @@ class _Run:
         said = note(self._operator, now, deed, target, self._scenario.mission.robots)
         if isinstance(said.message, OperatorNote) and said.message.command == WEATHER:
             self._simulator.air.obey(said.message.arguments)
-            self._recorder.record(now, said.key, said.message)
+            self._record(now, said.key, said.message)
         else:
             send(self._simulator, said)
 
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
-        self._recorder.record(now, key, message)
+        self._record(now, key, message)
         self._referee.see(message)
 
     def _say(self, kind: str, **data: object) -> None:
         now = self._simulator.now
         event = self._operator.event(kind, now, **data)
-        self._recorder.record(now, event.key, event.message)
+        self._record(now, event.key, event.message)
 
     def _add(self, node: Node) -> None:
         self._simulator.add(node, self._journal(node))

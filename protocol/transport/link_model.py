@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Mapping
+from math import dist
 from random import Random
 from typing import Any
 
@@ -48,6 +49,8 @@ class Radio(Struct, frozen=True, forbid_unknown_fields=True):
     """Mean [s] of the additional delay."""
     reorder: float = 0.0
     """Probability that a message is held back for up to 0.15 s, so that later ones overtake it."""
+    range_m: float = 0.0
+    """Distance [m] up to which robots hear each other, 0: any; only in virtual time, where their places are known."""
 
     @property
     def prompt_s(self) -> float:
@@ -94,11 +97,13 @@ class LinkModel:
         self._fair = radio
         self._random = random
         self._fading: dict[tuple[str, str], bool] = {}
+        self.places: dict[str, tuple[float, float]] = {}
+        """Positions x, y [m] of the robots, where they are known: only then the range has an effect."""
 
     def delays(self, sender: str, receiver: str) -> list[float]:
         """Return the delays [s] of a message from `sender` to `receiver`: empty if lost, two if duplicated."""
         radio = self.radio
-        if (sender, receiver) in self.cuts:
+        if (sender, receiver) in self.cuts or (radio.range_m > 0.0 and self._out_of_range(sender, receiver)):
             return []
         if radio.loss > 0.0 and self._lost(sender, receiver):
             return []
@@ -139,6 +144,11 @@ class LinkModel:
     def orders(self) -> dict[str, Any]:
         """Arguments of `obey` that give another model these link conditions."""
         return {"cut": sorted(self.cuts), "radio": structs.asdict(self.radio)}
+
+    def _out_of_range(self, sender: str, receiver: str) -> bool:
+        """Return True if both are robots at known places that are farther apart than the radio reaches."""
+        here, there = self.places.get(sender), self.places.get(receiver)
+        return here is not None and there is not None and dist(here, there) > self.radio.range_m
 
     def _lost(self, sender: str, receiver: str) -> bool:
         """Step Gilbert's channel of a link and return True if the message is lost.

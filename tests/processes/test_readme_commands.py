@@ -35,6 +35,8 @@ ELSEWHERE = {
     "lfa view RUN": "tests/deploy/view/rerun/test_view.py",
     "lfa view": "tests/deploy/view/test_bad_input.py",
     "lfa metrics": "tests/processes/test_metrics.py",
+    "lfa web": "tests/deploy/web/test_page.py",
+    "lfa web SCENARIO": "tests/deploy/web/test_server.py",
     "lfa record": "tests/processes/test_looking.py",
     "lfa bench control --jobs 2": "tests/deploy/bench/test_control.py",
     "lfa-driver --id 3": "tests/processes/test_driver.py",

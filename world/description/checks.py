@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from difflib import get_close_matches
 from math import atan2, hypot, pi
@@ -28,6 +29,12 @@ def _robots(scenario: Scenario) -> Iterator[Mistake]:
     cold_start = scenario.mission.cold_start
     if world.real_robots and cold_start != "full_house":
         yield wrong("mission.cold_start", cold_start, "full_house with world.real_robots", "world.real_robots")
+
+
+def _saved_from(scenario: Scenario) -> Iterator[Mistake]:
+    """Require a name that can be part of a file's: the run folder is called after it."""
+    if scenario.saved_from and not re.fullmatch(r"[\w-][\w.-]{0,63}", scenario.saved_from, re.ASCII):
+        yield wrong("saved_from", scenario.saved_from, "up to 64 letters, digits, '-', '_' and '.'")
 
 
 def _restarts(scenario: Scenario) -> Iterator[Mistake]:
@@ -96,6 +103,7 @@ def _ranges(scenario: Scenario) -> Iterator[Mistake]:
         Range("radio.tail", radio.tail, 0.0, 1.0),
         Range("radio.tail_mean_s", radio.tail_mean_s, 1e-4, 10.0),
         Range("radio.reorder", radio.reorder, 0.0, 1.0),
+        Range("radio.range_m", radio.range_m, 0.0, 1e4),
     ))  # fmt: skip
 
 
@@ -161,5 +169,5 @@ def _convex(corners_m: tuple[Point, ...]) -> bool:
 
 
 SCENARIO_RULES: tuple[Rule[Scenario], ...] = tuple(
-    Rule(check) for check in (_robots, _ranges, _obstacles, _terrain, _assertions, _restarts, _walls)
+    Rule(check) for check in (_saved_from, _robots, _ranges, _obstacles, _terrain, _assertions, _restarts, _walls)
 )

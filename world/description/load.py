@@ -91,9 +91,9 @@ def load(
     if robots is not None:
         _renumber(file.document, robots)
     scenario, mistakes = convert(file.document, Scenario)
-    scenario = replace(scenario, name=path.stem)
     apply_rules(MISSION_RULES, scenario.mission, mistakes)
     apply_rules((*SCENARIO_RULES, *rules), scenario, mistakes)
+    scenario = replace(scenario, name=scenario.saved_from or path.stem)
     scenario = _on_map(scenario, path.parent, mistakes)
     apply_rules((COURSE_RULE,), scenario, mistakes)
     if mistakes:

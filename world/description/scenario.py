@@ -18,6 +18,8 @@ from lfa.world.description.terrain import Bump, Ditch, Pothole
 Point = tuple[float, float]
 SPEED_MPS_MIN, SPEED_MPS_MAX = 0.001, 10.0
 """Least and greatest speed [m/s] of a moving obstacle."""
+RADIUS_M_MIN, RADIUS_M_MAX, PLACE_M_MAX = 0.05, 5.0, 1e4
+"""Least and greatest radius [m], and farthest place [m] along each axis, of an obstacle set down during a run."""
 STATE = "state.json"
 """Name of the world's checkpoint in the run folder (`checkpoint.py`)."""
 
@@ -173,7 +175,11 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     asserted: Assert = field(default=Assert(), name="assert")
     """Assertions of the table `[assert]`, checked by `lfa run` and `lfa sim`."""
     name: str = ""
-    """Name of the scenario, set by `load` from the file's name."""
+    """Name of the scenario, set by `load`: `saved_from`, else the file's name."""
+    seed: int = 0
+    """Seed of a run for which the command line gives none."""
+    saved_from: str = ""
+    """Name of the scenario that this file is a saved session of (`lfa web`): its runs bear that name."""
 
 
 Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted"]

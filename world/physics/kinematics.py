@@ -14,7 +14,7 @@ from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.mission import Limits
 from lfa.world.description.obstacle_motion import way_of
 from lfa.world.description.placement import starts_of
-from lfa.world.description.scenario import Scenario
+from lfa.world.description.scenario import Obstacle, Scenario
 
 
 class Touch(Struct, frozen=True, gc=False):
@@ -82,6 +82,9 @@ class Kinematic:
     def place(self, n: int, pose: Pose2D) -> None:
         """Set the pose of robot `n`, a real one that reports its pose."""
         self.poses[n] = pose
+
+    def set_down(self, n: int, obstacle: Obstacle) -> None:
+        """Add nothing: in this model robots drive through obstacles."""
 
     def moved(self) -> dict[int, Pose2D]:
         """Return the pose in `map` of each moving obstacle, by its index in the scenario's list."""

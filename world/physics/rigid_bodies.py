@@ -112,6 +112,10 @@ class Physics:
         body.position, body.angle = (pose.x, pose.y), pose.theta
         self._space.reindex_shapes_for_body(body)
 
+    def set_down(self, n: int, obstacle: Obstacle) -> None:
+        """Add a fixed obstacle under index `n` of the scenario's list."""
+        self._add_obstacle(n, obstacle)
+
     def moved(self) -> dict[int, Pose2D]:
         """Return the pose in `map` of each obstacle that is not fixed, by its index in the scenario's list."""
         poses = {n: Pose2D(*body.position, 0.0) for n, body, _ in self._moving}

@@ -36,10 +36,20 @@ class Scanner:
         self._lidar = scenario.world.lidar
         self._radius_m = scenario.mission.radius_m
         self._obstacles = scenario.world.obstacles
+        self._walls_m = scenario.world.walls_m
+        self._fix()
+
+    def set_down(self, obstacle: Obstacle) -> None:
+        """Add a fixed obstacle at the end of the scenario's list."""
+        self._obstacles = (*self._obstacles, obstacle)
+        self._fix()
+
+    def _fix(self) -> None:
+        """Outline the walls and the fixed obstacles once, for all scans."""
         fixed = [o for o in self._obstacles if o.mass_kg is None and not o.moves]
         circles, segments = outline((obstacle, Pose2D(*obstacle.center_m)) for obstacle in fixed)
         self._circles = np.array(circles, dtype=float).reshape(-1, 3)
-        self._segments = np.array([*scenario.world.walls_m, *segments], dtype=float).reshape(-1, 4)
+        self._segments = np.array([*self._walls_m, *segments], dtype=float).reshape(-1, 4)
 
     def scan(self, robots: Sequence[Pose2D], moved: Mapping[int, Pose2D]) -> Floats:
         """Return the exact ranges [m], shape (robots, beams); `moved` holds the obstacles that are not fixed.

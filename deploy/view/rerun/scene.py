@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from lfa.deploy.client.radio_loss import RadioLoss
 from lfa.deploy.client.team_status import told
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.robot_colours import Colour, robot_colour
@@ -40,8 +41,6 @@ DOT = rr.components.Radius.ui_points(4.5)
 OUTLINE = rr.components.Radius.ui_points(1.8)
 """Line width of a robot's outline, visible at any zoom."""
 ROUTE, TRAIL = rr.components.Radius.ui_points(1.0), rr.components.Radius.ui_points(1.3)
-RADIO_S = 10.0
-"""Time window [s] of the share of lost rows."""
 LEADS, FOLLOWS, WAITS, GONE = (230, 159, 0), (0, 114, 178), (130, 130, 130), (200, 60, 40)
 PLANNED = (204, 121, 167)
 ROLE_COLOURS = {"leader": LEADS, "follower": FOLLOWS, "waiting": WAITS, "gone": GONE}
@@ -63,7 +62,7 @@ class Scene:
         self._terms = TermCount()
         self._planner = ""
         self._angles: dict[str, float] = {}
-        self._heard: dict[int, deque[tuple[float, float, float]]] = {}
+        self._radio = RadioLoss()
         self._rows: dict[tuple[str, str], list[tuple[float, Any]]] = {}
         self._mission_known = False
         self._named = True
@@ -197,16 +196,9 @@ class Scene:
 
     def _status(self, t: float, robot: int, counters: dict[str, Any]) -> None:
         self._row("scalar", f"processes/lag/robot{robot}", t, float(counters.get("loop_lag_ms", 0.0)))
-        heard, lost = float(counters.get("rows_heard", 0.0)), float(counters.get("rows_lost", 0.0))
-        past = self._heard.setdefault(robot, deque())
-        if past and heard < past[-1][1]:  # the process was restarted
-            past.clear()
-        past.append((t, heard, lost))
-        while t - past[0][0] > RADIO_S:
-            past.popleft()
-        came, missed = heard - past[0][1], lost - past[0][2]
-        if came + missed > 0.0:
-            self._row("scalar", f"radio/robot{robot}", t, 100.0 * missed / (came + missed))
+        share = self._radio.share(t, robot, counters)
+        if share is not None:
+            self._row("scalar", f"radio/robot{robot}", t, 100.0 * share)
 
     def _plan(self, t: float, owner: str, message: Any) -> None:
         """Draw the leader's route and one tile of its map; the tiles of an earlier leader are cleared."""

@@ -32,6 +32,9 @@ MISSION = Mission()
         ("hang driver 2 at 9 s", Fault("hang", "driver 2", 9.0)),
         ("hang localization  3 at 9 s for 2 s", Fault("hang", "localization 3", 9.0, 2.0)),
         ("resume scanner 1 at 9 s", Fault("resume", "scanner 1", 9.0)),
+        ("formation column at 9 s", Fault("formation", "column", 9.0)),
+        ("obstacle -5,1.5,0.3 at 12345.67 s", Fault("obstacle", "-5,1.5,0.3", 12345.67)),
+        ("range 2.5 at 0.01 s", Fault("range", "2.5", 0.01)),
     ],
 )
 def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
@@ -45,6 +48,9 @@ def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
         "", "kill", "kill leader", "kill leader at noon", "kill leader at -1 s", "kill leader at 20", "kill 5 at 1 s",
         "kill 0 at 1 s", "hug leader at 20 s", "kill 2 at 1 s for 3 s", "restart leader at 2 s",
         "cut at 1 s", "cut 5 at 1 s", "cut 1,2-2 at 1 s", "cut 1>w>2 at 1 s", "loss 2 at 1 s", "loss some at 1 s",
+        "formation at 1 s", "formation up at 1 s", "range at 1 s", "range -1 at 1 s", "range far at 1 s",
+        "obstacle 1,2 at 1 s", "obstacle 1,2,0.01 at 1 s", "obstacle 1,2,9 at 1 s", "obstacle 99999,0,1 at 1 s",
+        "obstacle 1,2,3,4 at 1 s", "formation column at 1 s for 2 s",
         "handover 2 at 1 s", "heal at 1 s for 2 s", "cut leader-2 at 1 s", "kill 1,2 at 1 s", "kill at 1 s",
         "kill leader at 1 s or so", "kill \u0662 at 1 s", "kill leader at 1e3 s", f"kill {'9' * 5000} at 1 s",
         f"kill leader at {'9' * 400} s", f"cut {'9' * 5000} at 1 s",
@@ -80,6 +86,14 @@ def test_who_is_stopped_for_a_while_is_woken_even_if_another_leads_by_then() -> 
     assert schedule.due(1.0, 1) == [("stop", 1)]
     assert schedule.due(2.9, 2) == []
     assert schedule.due(3.0, 2) == [("continue", 1)]
+
+
+def test_a_fault_added_on_the_way_has_the_place_that_it_has_in_a_schedule_written_beforehand() -> None:
+    first, added = parse("stop 2 at 1 s for 2 s", MISSION), parse("kill 2 at 3 s", MISSION)
+    beforehand, on_the_way = FaultSchedule([first, added]), FaultSchedule([first])
+    assert beforehand.due(1.0, 1) == on_the_way.due(1.0, 1) == [("stop", 2)]
+    on_the_way.add(added)
+    assert beforehand.due(3.0, 1) == on_the_way.due(3.0, 1) == [("kill", 2), ("continue", 2)]
 
 
 def test_a_cut_for_a_while_heals_only_itself() -> None:

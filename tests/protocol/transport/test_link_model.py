@@ -158,3 +158,11 @@ def test_so_many_messages_wait_and_no_more() -> None:
     for _ in range(WAITING_MAX):
         reception.put(Arrival(1.0, "lfa/f/robot1/table", b""))
     assert len(reception.take(3.0)) == WAITING_MAX
+
+
+def test_robots_farther_apart_than_the_range_do_not_hear_each_other() -> None:
+    air = LinkModel(Radio(range_m=5.0), Random(1))
+    air.places = {"robot1": (0.0, 0.0), "robot2": (4.9, 0.0), "robot3": (0.0, 5.1)}
+    assert [len(air.delays("robot1", other)) for other in ("robot2", "robot3", "world")] == [1, 0, 1]
+    air.obey({"radio": {"range_m": 0.0}})
+    assert len(air.delays("robot1", "robot3")) == 1

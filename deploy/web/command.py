@@ -1,0 +1,87 @@
+"""`lfa web`: one page in a browser, on a team in virtual time, a running fleet, or a recording."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import ssl
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lfa.deploy.fleet.host.router import host_credentials
+from lfa.deploy.web.engine import Engine
+from lfa.deploy.web.lessons import LESSONS
+from lfa.deploy.web.server import PageServer, PageTokens, is_loopback
+from lfa.deploy.web.share import Setting, setting_of
+from lfa.deploy.web.virtual import VirtualEngine
+from lfa.protocol.errors import Refused
+
+PORT = 8642
+HOST = "127.0.0.1"
+
+
+def command(
+    what: Annotated[
+        str | None, typer.Argument(metavar="[SCENARIO | LINK]", help="Default: the lesson of the killed leader.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of noise, places and losses; default the scenario's.")] = None,
+    robots: Annotated[int | None, typer.Option(help="Number of robots, instead of the scenario's.")] = None,
+    overrides: Annotated[list[str] | None, typer.Option("--set", help="Override a field of the scenario.")] = None,
+    port: Annotated[int, typer.Option(help="Port of the page; 0: any free one.")] = PORT,
+    listen: Annotated[str, typer.Option(help="Address to listen on; one for others needs --keys.")] = HOST,
+    keys: Annotated[Path | None, typer.Option(help="Keys of this machine, from lfa keys.")] = None,
+) -> int:
+    """Serve the page until Ctrl-C. Raises Refused."""
+    if not 0 <= port <= 65535:
+        raise Refused(f"--port {port}: must be from 0 to 65535")
+    secure = _secured(listen, keys)
+    engine, fragment = _virtual(what, seed, robots, tuple(overrides or ()))
+    return serve_engine(engine, fragment, listen, port, secure)
+
+
+def serve_engine(
+    engine: Engine, fragment: str, listen: str, port: int, secure: ssl.SSLContext | None, clip: bytes = b""
+) -> int:
+    """Print the addresses of the page and serve it until Ctrl-C; `fragment` stands after the `#` of the address."""
+    tokens = PageTokens(secrets.token_urlsafe(18), secrets.token_urlsafe(18))
+
+    def ready() -> None:
+        base = f"http{'s' if secure else ''}://{f'[{listen}]' if ':' in listen else listen}:{server.port}/"
+        print(f"to operate: {base}?token={tokens.operator}{f'#{fragment}' if fragment else ''}")
+        print(f"to look:    {base}?token={tokens.viewer}", flush=True)
+
+    server = PageServer(engine, tokens, clip)
+    try:
+        with suppress(KeyboardInterrupt, asyncio.CancelledError):
+            asyncio.run(server.run(listen, port, secure, ready))
+    finally:
+        engine.close()
+    return 0
+
+
+def _virtual(what: str | None, seed: int | None, robots: int | None, overrides: tuple[str, ...]) -> tuple[Engine, str]:
+    """Return the engine of a scenario, of a link, or of the first lesson. Raises Refused."""
+    if what is None and seed is None and robots is None and not overrides:
+        lesson = LESSONS[0]
+        return VirtualEngine(lesson.setting, lesson), ""
+    if what is not None and "#" in what:
+        setting = setting_of(what)
+    else:
+        setting = Setting(what or LESSONS[0].setting.scenario, seed, robots, overrides)
+    return VirtualEngine(setting, allowed=setting.scenario), ""
+
+
+def _secured(listen: str, keys: Path | None) -> ssl.SSLContext | None:
+    """Return the TLS context of this machine in the fleet; None on this machine's own addresses. Raises Refused."""
+    if keys is None:
+        if not is_loopback(listen):
+            raise Refused(f"--listen {listen}: must come with --keys, so that nobody reads the token on its way")
+        return None
+    known = host_credentials(keys)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_3
+    context.load_cert_chain(known.certificate, known.key)
+    return context

@@ -1,0 +1,111 @@
+"""A session of the page is a scenario: saved or shared, it runs again byte for byte."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from lfa.deploy.faults.script import parse_all
+from lfa.deploy.run import simulate
+from lfa.deploy.scenario_loading import load_scenario
+from lfa.deploy.web.share import Setting, fragment_of, setting_of
+from lfa.deploy.web.virtual import VirtualEngine
+from lfa.protocol.errors import Refused
+
+SHORT = ("faults=['stop 3 at 2 s for 1.5 s']", "time_limit_s=6.5")
+CLICKS = {
+    0.4: ["loss 0.3"],
+    1.1: ["obstacle 2.5,0.1,0.3", "formation column"],
+    2.2: ["kill leader"],
+    3.4: ["loss 0", "cut 4"],
+    4.1: ["heal 4", "range 2.5", "restart 1"],
+    5.0: ["range 0", "hang scanner 2"],
+}
+"""What is clicked once so much virtual time [s] has passed."""
+
+
+def clicked(setting: Setting, clicks: dict[float, list[str]]) -> VirtualEngine:
+    """A session to the end of its run, played in uneven pieces."""
+    engine, chance = VirtualEngine(setting), Random(1)
+    left = dict(clicks)
+    engine.obey({"do": "speed", "value": 1000})
+    while not engine.over:
+        for at_s in [at_s for at_s in left if engine.now >= at_s]:
+            for text in left.pop(at_s):
+                engine.obey({"do": "fault", "text": text})
+        if chance.random() < 0.5:
+            engine.obey({"do": "step"})
+        else:
+            engine.obey({"do": "play"})
+            engine.advance()
+            engine.obey({"do": "pause"})
+    assert not left
+    return engine
+
+
+def test_a_saved_session_runs_to_the_same_events_byte_for_byte(tmp_path: Path) -> None:
+    engine = clicked(Setting("leader_killed", seed=5, overrides=SHORT), CLICKS)
+    answer = engine.obey({"do": "save"})
+    (tmp_path / "saved.toml").write_text(answer["saved"])
+    saved = load_scenario(str(tmp_path / "saved.toml"))
+    simulate.run(saved, saved.seed, tmp_path / "run", parse_all(saved.mission, saved.faults, ()))
+    again = (tmp_path / "run" / "events.jsonl").read_bytes()
+    assert again == engine.events[0], f"lfa sim {tmp_path / 'saved.toml'}"
+    assert all(word in again for word in (b'"deed":"obstacle"', b'"deed":"range"', b'"deed":"kill"', b'"index":0'))
+
+
+def test_a_shared_link_is_the_run() -> None:
+    engine = clicked(
+        Setting("leader_killed", seed=5, overrides=(SHORT[0], "time_limit_s=3.0")),
+        {0.5: ["kill 2"], 1.0: ["obstacle 3,-2,0.4"]},
+    )
+    again = VirtualEngine(setting_of(f"http://127.0.0.1:1/?token=x#{engine.state()['link']}"))
+    again.obey({"do": "speed", "value": 1000})
+    while not again.over:
+        again.obey({"do": "play"})
+        again.advance()
+    assert again.events == engine.events
+
+
+def test_a_setting_comes_back_from_its_link() -> None:
+    setting = Setting("straight", -3, 6, ("world.lidar.beams=90",), ("cut 1>2 at 3.1 s", "kill 2 at 9 s"))
+    assert setting_of(f"#{fragment_of(setting)}") == setting
+
+
+@pytest.mark.parametrize(
+    "link", ["#", "#run=", "#seed=1", "#run=a&run=b", "#run=a&token=b", "#run=a&seed=x", "#" + "x" * 30_000]
+)
+def test_a_link_that_is_none_is_refused_in_one_line(link: str) -> None:
+    with pytest.raises(Refused) as refused:
+        VirtualEngine(setting_of(link))
+    assert "\n" not in str(refused.value)
+
+
+ENGINE_REFUSES = [
+    ({"do": "fault", "text": "kill 9"}, "no robot '9'"),
+    ({"do": "fault", "text": "restart 2"}, "robot 2 runs"),
+    ({"do": "fault", "text": "obstacle 0,0,0.3"}, "robot 1 stands there"),
+    ({"do": "fault", "text": "obstacle 3,0,nan"}, "must be x, y and"),
+    ({"do": "fault", "text": "kill world"}, "only in lfa run"),
+    ({"do": "fault", "text": "kill 1 at 3 s"}, "must be like"),
+    ({"do": "fault", "text": ""}, "must be like"),
+    ({"do": "open", "link": "#run=/etc/passwd"}, "must be a shipped one"),
+    ({"do": "open", "link": "#run=leader_killed&fault=hug+1+at+3+s"}, "must be like"),
+    ({"do": "open", "link": "#run=leader_killed&set=world.map%3D/etc/passwd"}, "a link names no files"),
+    ({"do": "lesson", "key": "x"}, "must be one of"),
+    ({"do": "fly"}, "no such order"),
+    ({}, "no such order"),
+]
+
+
+@pytest.mark.parametrize(("order", "why"), ENGINE_REFUSES)
+def test_a_bad_order_is_refused_in_one_line_and_the_run_goes_on(order: dict[str, object], why: str) -> None:
+    engine = VirtualEngine(Setting("leader_killed"))
+    with pytest.raises(Refused) as refused:
+        engine.obey(order)
+    assert why in str(refused.value)
+    number, before = engine.number, engine.now
+    engine.obey({"do": "step"})
+    assert engine.number == number and engine.now > before and engine.state()["faults"] == ["kill leader at 8 s"]
