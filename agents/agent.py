@@ -94,6 +94,13 @@ class Agent:
         return self._stopped if self._core is None else self._core.finished
 
     @property
+    def waits_for(self) -> str | None:
+        """What this robot waits for before it can take part: its mission, or robots of its team (E18)."""
+        if self._core is None:
+            return f"the mission, which lfa-world publishes in fleet {self._outbox.fleet}"
+        return ", ".join(map(robot_name, self._core.lease.missing)) or None
+
+    @property
     def reborn(self) -> Agent | None:
         """Return this robot's agent under a later number, once it is told of a later incarnation of its name (E23)."""
         newest = None if self._core is None else self._core.superseded_by

@@ -130,6 +130,12 @@ def lacks_messages(node: Node) -> bool:
     return lacks
 
 
+def waits_for(node: Node) -> str | None:
+    """Return what a node waits for before it can take part, as text for its terminal; None when it takes part."""
+    missing: str | None = getattr(node, "waits_for", None)
+    return missing
+
+
 def reborn(node: Node) -> Node | None:
     """Return the node to run in the place of this one, under a later number, once others know a later one (E23).
 

@@ -79,7 +79,11 @@ def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox
     fleet, robots = team[0].fleet, tuple(sorted(agent.robot for agent in team))
     try:
         if deed in ("cut", "heal", "loss") and not all("--faults" in agent.identity.arguments for agent in team):
-            raise Refused(f"fleet {fleet} does not obey weather: its processes were started without --faults")
+            without = ", ".join(str(agent.robot) for agent in team if "--faults" not in agent.identity.arguments)
+            raise Refused(
+                f"{deed}: the links of a fleet are changed only where its processes allow it: start lfa-world "
+                f"and each lfa-agent with --faults (robots without: {without})"
+            )
         whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
         operator = Operator(fleet, incarnations.drawn())
         said = note(operator, clock.now(), deed, whom, robots)
@@ -110,7 +114,10 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
                 send(bus, operator.command(RESTART, now, robot=robot))
                 again = now + ORDER_EVERY_S
             if now > until:
-                raise Refused(f"robot {robot} of {fleet}: runs already, or no lfa run is there that starts it again")
+                raise Refused(
+                    f"robot {robot} of {fleet}: runs already, or was started by hand: then start it again "
+                    f"as before, lfa-agent --role follower --id {robot}, with the same options"
+                )
             clock.sleep(SENT_S)
     finally:
         bus.close()

@@ -19,7 +19,7 @@ from msgspec import Struct
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.team import OperatorNote
-from lfa.protocol.node import Local, Node, Stop, lacks_messages, reborn
+from lfa.protocol.node import Local, Node, Stop, lacks_messages, reborn, waits_for
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
@@ -152,7 +152,7 @@ class _NodeRunner:
 
 
 def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
-    """Run `nodes` in this process until all are finished; return the exit code 0.
+    """Run `nodes` in this process until all are finished; return the exit code: 0, or 130 after Ctrl-C.
 
     Waits for a router without a time limit. Raises Refused (exit code 2) if a node cannot take part, or if its name
     already runs in the fleet.
@@ -161,19 +161,24 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     wake = Wake()
     stop = _on_signals(wake)
     seats: list[_NodeRunner] = []
+    name = nodes[0].name
     try:
         for node in nodes:
             inbox = Inbox(wake, defer_hellos=node.defer_hellos)
             bus = connect(options, inbox, stop)
             if bus is None:
-                return 0
+                write_line(f"{name}: ended, {stop.why}, before a router was there", sys.stdout)
+                return stop.code
             try:
                 seats.append(_joined(node, bus, inbox, options, floor))
             except Refused:
                 bus.close()
                 raise
         settle()
-        return _loop(seats, wake, stop, Notify(options.notify), lambda seat, node: _reborn(seat, node, options, floor))
+        write_line(f"{name}: ready, in fleet {options.fleet} at {options.endpoint}", sys.stdout)
+        _loop(seats, wake, stop, Notify(options.notify), lambda seat, node: _reborn(seat, node, options, floor))
+        write_line(f"{name}: ended, {stop.why}", sys.stdout)
+        return stop.code
     finally:
         for seat in seats:
             seat.bus.close()
@@ -229,11 +234,12 @@ def _loop(
     stop: _StopRequest,
     notify: Notify,
     replaced: Callable[[_NodeRunner, Node], _NodeRunner],
-) -> int:
+) -> None:
     began = now = clock.now()
     notify.ready()
     stop_by = None
     vitals = VitalSigns(now)
+    waited_for = None
     while True:
         deadline = min([seat.next_deadline() for seat in seats])
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
@@ -245,6 +251,7 @@ def _loop(
                 seats[place] = replaced(seat, later)
         if vitals.due(now):
             notify.alive()
+            waited_for = _say_waits(seats[0].node, waited_for)
             for seat in seats:
                 seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable, seat.tick_p99_s()), now)
         if stop.told and stop_by is None:
@@ -252,7 +259,15 @@ def _loop(
             for seat in seats:
                 seat.tell(Stop(), now)
         if _is_over(seats) or (stop_by is not None and now > stop_by):
-            return 0
+            return
+
+
+def _say_waits(node: Node, before: str | None) -> str | None:
+    """Write what `node` waits for when that is something else than `before`, and return it."""
+    missing = waits_for(node)
+    if missing != before:
+        write_line(f"{node.name}: {'waits for ' + missing if missing else 'all are there'}", sys.stdout)
+    return missing
 
 
 def _is_over(seats: Sequence[_NodeRunner]) -> bool:
@@ -271,13 +286,24 @@ class _StopRequest:
     def __init__(self, wake: Wake) -> None:
         self.wake = wake
         self.told = False
+        self.signal: signal.Signals | None = None
+
+    @property
+    def why(self) -> str:
+        """Reason of the end, as text."""
+        return "finished" if self.signal is None else "by Ctrl-C" if self.code else f"by {self.signal.name}"
+
+    @property
+    def code(self) -> int:
+        """Exit code: 130 after Ctrl-C, as of every program; 0 after SIGTERM, which a supervisor sends."""
+        return 130 if self.signal is signal.SIGINT else 0
 
 
 def _on_signals(wake: Wake) -> _StopRequest:
     stop = _StopRequest(wake)
 
-    def order(_signum: int, _frame: FrameType | None) -> None:
-        stop.told = True
+    def order(signum: int, _frame: FrameType | None) -> None:
+        stop.told, stop.signal = True, signal.Signals(signum)
         wake.set()
 
     signal.signal(signal.SIGTERM, order)

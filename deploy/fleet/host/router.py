@@ -54,8 +54,8 @@ def command(
     endpoints = listen or [default_endpoint(), DEFAULT_TLS if secure else DEFAULT_TCP]
 
     close = open_router(endpoints, connect or (), LINK_LEASES_MS[link], _known(keys), secure)
-    write_line(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}", sys.stdout)
-    while signal.sigwait(ENDING | {signal.SIGHUP}) not in ENDING:
+    write_line(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}: ready", sys.stdout)
+    while (came := signal.sigwait(ENDING | {signal.SIGHUP})) not in ENDING:
         try:
             _known(keys)
         except Refused as refused:
@@ -64,7 +64,9 @@ def command(
         close()
         os.execv(sys.executable, sys.orig_argv)  # frees the QUIC port, which a closed session keeps
     close()
-    return 0
+    by_hand = came == signal.SIGINT
+    write_line(f"router ended, by {'Ctrl-C' if by_hand else signal.Signals(came).name}", sys.stdout)
+    return 130 if by_hand else 0
 
 
 def _known(keys: Path | None) -> Credentials | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -10,11 +11,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import quote
 
+from lfa.deploy.process import parent_death
+from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
 LOCAL = ("--bind", "127.0.0.1")
 """Viewers and their data are for this machine only."""
-END_S_MAX = 3.0
+START_S_MAX, END_S_MAX = 15.0, 3.0
 
 
 def run_viewer(*arguments: str) -> int:
@@ -34,10 +37,19 @@ def await_end(child: subprocess.Popen[bytes]) -> int:
 def serve(web_port: int, port: int, *files: str) -> subprocess.Popen[bytes]:
     """Start a viewer for browsers of this machine, and print its address; it shows `files`, or what comes at `port`."""
     ports = ("--port", str(port), "--web-viewer-port", str(web_port))
-    child = subprocess.Popen([viewer_path(), *files, "--serve-web", *LOCAL, *ports], env=quiet())
-    address = f"http://127.0.0.1:{web_port}/?url={quote(data_address(port), safe='')}"
-    print(f"open {address}\nCtrl-C ends it", flush=True)
+    tied = [sys.executable, parent_death.__file__, str(os.getpid()), str(int(signal.SIGTERM))]
+    child = subprocess.Popen([*tied, viewer_path(), *files, "--serve-web", *LOCAL, *ports], env=quiet())
+    until = clock.now() + START_S_MAX
+    while child.poll() is None and clock.now() < until and not _answers(web_port):
+        clock.sleep(0.05)
+    print(f"http://127.0.0.1:{web_port}?url={quote(data_address(port), safe='')}", flush=True)
+    print("open this address in a browser of this machine; Ctrl-C ends it", file=sys.stderr, flush=True)
     return child
+
+
+def _answers(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def data_address(port: int) -> str:
