@@ -129,7 +129,7 @@ pictures: $(STAMP)
 docs: $(STAMP) $(DOCS_STAMP)
 	rm -rf build/pages build/site
 	mkdir -p build/pages
-	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.css' -o -path '*/examples/*.py' \
+	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.css' -o -path '*/examples/*.py' -o -name 'grafana.json' \
 	    | tar cf - -T - | tar xf - -C build/pages
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --config-file deploy/docs/mkdocs.yml
 	LFA_SITE=build/site $(BIN)/pytest tests/docs/test_site.py

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,18 @@ def dead_links(page: Path) -> list[str]:
     return found
 
 
+def not_on_site(page: Path) -> list[str]:
+    """Links of a page to files that `make docs` does not copy to where it builds the site."""
+    target = (ROOT / "Makefile").read_text().partition("\ndocs:")[2].partition("\n\n")[0]
+    copied = re.findall(r"-(?:name|path) '([^']+)'", target)
+    paths = [path for path, _ in LINK.findall(_prose(page)) if path and not re.match(r"\w+:", path)]
+    return [
+        path
+        for path in paths
+        if not any(fnmatch(str((page.parent / path).resolve()), f"*{pattern}") for pattern in copied)
+    ]
+
+
 def _places(page: Path, quoted: str) -> list[Path]:
     """The quoted file: from the root, or beside the page, or else every file whose path ends so."""
     near = [path for path in (ROOT / quoted, page.parent / quoted) if path.is_file()]
@@ -55,6 +68,18 @@ def gone(page: Path) -> list[str]:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
     assert dead_links(page) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_of_a_page_leads_to_a_file_of_the_site(page: Path) -> None:
+    """Else `make docs`, which is strict, ends: its target copies some kinds of files only."""
+    assert not_on_site(page) == []
+
+
+def test_a_planted_link_to_a_file_that_is_not_copied_is_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("[a](page.md) [b](https://zenoh.io) [c](data.csv)\n")
+    assert not_on_site(page) == ["data.csv"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
