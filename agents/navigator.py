@@ -10,7 +10,7 @@ from functools import partial
 from math import cos, hypot, inf, pi, sin
 from typing import TYPE_CHECKING
 
-from lfa.agents.avoidance.decision import Decision
+from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
 from lfa.agents.avoidance.moving_obstacle import Crossing, before, shadow
@@ -56,9 +56,9 @@ BESIDE_SLOT_SHARE = 0.45
 FRESH_S = 0.5
 BEFORE_S = 0.5
 """Time [s] ahead for which the robot brakes before what comes towards it."""
-ROUND_TRAP = Decision("plan_round", inf, 0.0, "wall", "no local way leads on", "angle")
+ROUND_TRAP = Decision(Action.PLAN_ROUND, inf, 0.0, "wall", "no local way leads on", "angle")
 """Decision of a leader whose detour leads nowhere, for the log."""
-WAY_BACK = Decision("plan_round", inf, 0.0, "wall", "the slot is out of reach of a detour", "angle")
+WAY_BACK = Decision(Action.PLAN_ROUND, inf, 0.0, "wall", "the slot is out of reach of a detour", "angle")
 """Decision of a follower that plans its way back to its slot."""
 
 
@@ -345,7 +345,9 @@ class Navigator:
         """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out."""
         twist = self._back_up_path.step(points, pose, self._mission.radius_m)
         if twist is not None:
-            self._detour.decision = Decision("back" if twist.linear_x else "blocked", inf, pi, "wall", "out of a trap")
+            self._detour.decision = Decision(
+                Action.BACK if twist.linear_x else Action.BLOCKED, inf, pi, "wall", "out of a trap"
+            )
             return twist
         self._stuck_monitor.out()
         self._detour.decision = None

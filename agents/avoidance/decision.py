@@ -7,6 +7,7 @@ an environment strategy the angle; both end in a new trajectory (the paper's sec
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import StrEnum
 from math import inf
 from typing import Literal
 
@@ -15,6 +16,28 @@ from msgspec import Struct
 from lfa.agents.perception.obstacle import Class
 
 Updates = Literal["speed and position", "angle"]
+
+
+class Action(StrEnum):
+    """Action of a decision: a row of the table names one, and a behaviour carries it out."""
+
+    CONTINUE = "continue"
+    GIVE_WAY = "give_way"
+    ASIDE = "aside"
+    """Past the obstacle, at the side that is open: `LEFT` or `RIGHT`."""
+    LEFT = "left"
+    RIGHT = "right"
+    U_TURN = "u_turn"
+    BACK = "back"
+    CREEP = "creep"
+    BLOCKED = "blocked"
+    PLAN_ROUND = "plan_round"
+    """Along a way that is planned on a map."""
+    SLOW = "slow"
+    WAIT = "wait"
+    AHEAD = "ahead"
+    OVERCOME = "overcome"
+    CLIMB = "climb"
 
 
 class Situation(Struct, frozen=True):
@@ -46,7 +69,7 @@ class DecisionRow(Struct, frozen=True):
     kind: Class
     name: str
     holds: Callable[[Situation], bool]
-    action: str
+    action: Action
     updates: Updates
 
 
@@ -67,30 +90,34 @@ def _behind(s: Situation) -> bool:
     return s.rear_m >= s.swing_m
 
 
+def _hidden_and_behind(s: Situation) -> bool:
+    return not _known(s) and _behind(s)
+
+
 def _turns(s: Situation) -> bool:
     return s.range_m > s.swing_m
 
 
 # class, condition, predicate, action, updated quantity
 TABLE: tuple[DecisionRow, ...] = (
-    DecisionRow("moving", "it keeps its distance", lambda s: s.closest_m >= 0.6, "continue", MOTION),
-    DecisionRow("moving", "it comes too near", lambda s: s.closest_m < 0.6, "give_way", MOTION),
-    DecisionRow("wall", "a side is free", lambda s: _turns(s) and _beside(s), "aside", ANGLE),
-    DecisionRow("wall", "both sides barred", lambda s: _turns(s) and _behind(s), "u_turn", ANGLE),
-    DecisionRow("wall", "too near to turn", lambda s: not _turns(s) and s.back_m >= s.swing_m, "back", ANGLE),
-    DecisionRow("ditch", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
-    DecisionRow("ditch", "a side is free", _beside, "aside", ANGLE),
-    DecisionRow("ditch", "both sides barred", _behind, "u_turn", ANGLE),
-    DecisionRow("pothole", "narrow or shallow enough", lambda s: _known(s) and s.crossable, "overcome", ANGLE),
-    DecisionRow("pothole", "too large, a side is free", lambda s: _known(s) and _beside(s), "aside", ANGLE),
-    DecisionRow("pothole", "its end is not in sight", _behind, "u_turn", ANGLE),
-    DecisionRow("stationary", "a side is free", lambda s: _known(s) and _beside(s), "aside", MOTION),
-    DecisionRow("stationary", "both sides barred", lambda s: _known(s) and _behind(s), "u_turn", MOTION),
-    DecisionRow("stationary", "its end is not in sight", lambda s: not _known(s) and not s.crept, "creep", MOTION),
-    DecisionRow("stationary", "its end stays out of sight", lambda s: not _known(s) and _behind(s), "u_turn", MOTION),
-    DecisionRow("bump", "low enough", lambda s: _known(s) and s.crossable, "climb", ANGLE),
-    DecisionRow("bump", "too high, a side is free", _beside, "aside", ANGLE),
-    DecisionRow("bump", "too high, both sides barred", _behind, "u_turn", ANGLE),
+    DecisionRow("moving", "it keeps its distance", lambda s: s.closest_m >= 0.6, Action.CONTINUE, MOTION),
+    DecisionRow("moving", "it comes too near", lambda s: s.closest_m < 0.6, Action.GIVE_WAY, MOTION),
+    DecisionRow("wall", "a side is free", lambda s: _turns(s) and _beside(s), Action.ASIDE, ANGLE),
+    DecisionRow("wall", "both sides barred", lambda s: _turns(s) and _behind(s), Action.U_TURN, ANGLE),
+    DecisionRow("wall", "too near to turn", lambda s: not _turns(s) and s.back_m >= s.swing_m, Action.BACK, ANGLE),
+    DecisionRow("ditch", "narrow or shallow enough", lambda s: _known(s) and s.crossable, Action.OVERCOME, ANGLE),
+    DecisionRow("ditch", "a side is free", _beside, Action.ASIDE, ANGLE),
+    DecisionRow("ditch", "both sides barred", _behind, Action.U_TURN, ANGLE),
+    DecisionRow("pothole", "narrow or shallow enough", lambda s: _known(s) and s.crossable, Action.OVERCOME, ANGLE),
+    DecisionRow("pothole", "too large, a side is free", lambda s: _known(s) and _beside(s), Action.ASIDE, ANGLE),
+    DecisionRow("pothole", "its end is not in sight", _behind, Action.U_TURN, ANGLE),
+    DecisionRow("stationary", "a side is free", lambda s: _known(s) and _beside(s), Action.ASIDE, MOTION),
+    DecisionRow("stationary", "both sides barred", lambda s: _known(s) and _behind(s), Action.U_TURN, MOTION),
+    DecisionRow("stationary", "its end is not in sight", lambda s: not _known(s) and not s.crept, Action.CREEP, MOTION),
+    DecisionRow("stationary", "its end stays out of sight", _hidden_and_behind, Action.U_TURN, MOTION),
+    DecisionRow("bump", "low enough", lambda s: _known(s) and s.crossable, Action.CLIMB, ANGLE),
+    DecisionRow("bump", "too high, a side is free", _beside, Action.ASIDE, ANGLE),
+    DecisionRow("bump", "too high, both sides barred", _behind, Action.U_TURN, ANGLE),
 )  # fmt: skip
 
 
@@ -102,9 +129,7 @@ def decide(situation: Situation) -> DecisionRow | None:
 class Decision(Struct, frozen=True):
     """Present action of a detour, with the values that decided it, for the log."""
 
-    action: str
-    """Action: `left`, `right`, `u_turn`, `back`, `creep`, `blocked`, `plan_round`; for a moving obstacle `slow`,
-    `wait`, `back`, `ahead`, `left`, `right`; on the ground `overcome`, `climb`."""
+    action: Action
     free_m: float
     """Free distance [m] along the wanted motion."""
     bearing: float

@@ -13,7 +13,7 @@ from math import atan2, cos, hypot, inf, pi, sqrt
 from msgspec.structs import replace
 
 from lfa.agents.avoidance import safety
-from lfa.agents.avoidance.decision import Decision, DecisionRow, Situation, decide
+from lfa.agents.avoidance.decision import Action, Decision, DecisionRow, Situation, decide
 from lfa.agents.avoidance.openings import (
     ALL_STEPS,
     ASIDE_STEPS,
@@ -100,7 +100,7 @@ class Detour:
             self._since, self._clear_since = now, None
             self._side, self._crept_s = 0.0, 0.0
             self._thing = thing(inf if blocked_m is None else blocked_m)
-        elif self.decision.action == "creep" and blocked_m is not None:
+        elif self.decision.action is Action.CREEP and blocked_m is not None:
             self._thing = thing(blocked_m)  # creeping is meant to show more of it
         elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
@@ -144,28 +144,28 @@ class Detour:
         row = self._row(points, openings, free_m)
         side = self._chosen_side(openings, towards, now)
         twist = STILL
-        action, bearing = "blocked" if row is None else row.action, towards
+        action, bearing = Action.BLOCKED if row is None else row.action, towards
         match action:
-            case "aside":
+            case Action.ASIDE:
                 bearing = (openings.left if side > 0.0 else openings.right) or 0.0
-                action = "left" if side > 0.0 else "right"
+                action = Action.LEFT if side > 0.0 else Action.RIGHT
                 twist = self._towards(points, bearing, speed_mps)
-            case "u_turn" if openings.rear is not None:
+            case Action.U_TURN if openings.rear is not None:
                 bearing = openings.rear
                 twist = self._towards(points, bearing, speed_mps)
-            case "back":
+            case Action.BACK:
                 bearing, twist = pi, BACK
-            case "creep":
+            case Action.CREEP:
                 bearing = 0.0
                 twist = Twist(CREEP_MPS, 0.0) if free_m > CREEP_FREE_M else STILL
                 self._crept_s += CONTROL_PERIOD_S
             case _:
-                action = "blocked"
-        if action == "blocked":
+                action = Action.BLOCKED
+        if action is Action.BLOCKED:
             self._open_since = None
         elif self._barred_lately(now):
-            action, twist = "blocked", STILL
-        self._say(action, free_m, bearing, row if action != "blocked" else None, now)
+            action, twist = Action.BLOCKED, STILL
+        self._say(action, free_m, bearing, row if action is not Action.BLOCKED else None, now)
         return twist
 
     def _row(self, points: Sequence[Point], openings: Openings, free_m: float) -> DecisionRow | None:
@@ -228,19 +228,19 @@ class Detour:
 
     def _barred_lately(self, now: float) -> bool:
         """Return whether the robot was blocked and no opening has lasted long enough to be more than noise."""
-        if self.decision is None or self.decision.action != "blocked":
+        if self.decision is None or self.decision.action is not Action.BLOCKED:
             self._open_since = None
             return False
         if self._open_since is None:
             self._open_since = now
         return now - self._open_since < CLEAR_S
 
-    def _say(self, action: str, free_m: float, bearing: float, row: DecisionRow | None, now: float) -> None:
+    def _say(self, action: Action, free_m: float, bearing: float, row: DecisionRow | None, now: float) -> None:
         """Record the decision for the log. Its action keeps its name for a while, unless the robot is or was
         blocked.
         """
         before = self.decision
-        held = before is not None and now - self._acted_at < HOLD_S and "blocked" not in (action, before.action)
+        held = before is not None and now - self._acted_at < HOLD_S and Action.BLOCKED not in (action, before.action)
         if before is not None and (held or action == before.action):
             self.decision = replace(before, free_m=free_m, bearing=bearing)
             return

@@ -13,7 +13,7 @@ from math import cos, hypot, inf, sin
 
 from msgspec import Struct
 
-from lfa.agents.avoidance.decision import Decision, Situation, decide
+from lfa.agents.avoidance.decision import Action, Decision, Situation, decide
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
@@ -49,26 +49,28 @@ AWAY_M = 0.08
 class Evasion(Struct, frozen=True):
     """Motion out of the way: a bend of `turn_rad` [rad], then straight on, at `v_mps` [m/s]."""
 
-    name: str
+    action: Action
     v_mps: float
     omega_radps: float = 0.0
     turn_rad: float = 0.0
 
 
 EVASIONS = (
-    Evasion("wait", 0.0),
-    Evasion("right", 0.35, -0.9, 1.0),
-    Evasion("left", 0.35, 0.9, 1.0),
-    Evasion("right", 0.25, -1.2, 1.5),
-    Evasion("left", 0.25, 1.2, 1.5),
-    Evasion("ahead", 0.25),
-    Evasion("back", -0.25),
+    Evasion(Action.WAIT, 0.0),
+    Evasion(Action.RIGHT, 0.35, -0.9, 1.0),
+    Evasion(Action.LEFT, 0.35, 0.9, 1.0),
+    Evasion(Action.RIGHT, 0.25, -1.2, 1.5),
+    Evasion(Action.LEFT, 0.25, 1.2, 1.5),
+    Evasion(Action.AHEAD, 0.25),
+    Evasion(Action.BACK, -0.25),
 )
 """Of two that keep the same distance the first is taken: to the right first, as two that meet both do."""
 DRIVEN_M = 0.3
 """Clearance [m] that backing off must keep beyond the others: what comes after a robot that backs off drives it on."""
-SLOW = Evasion("slow", 0.0)
-CARE = {"slow": 0, "wait": 1, "ahead": 2, "back": 2, "left": 2, "right": 2}
+SLOW = Evasion(Action.SLOW, 0.0)
+CARE = {Action.SLOW: 0, Action.WAIT: 1}
+"""How much more an action does than to slow down; the others do most."""
+MOST_CARE = 2
 
 
 class Crossing:
@@ -110,14 +112,14 @@ class Crossing:
             self.decision = None
             return wanted
         evasion = SLOW if near >= CLEARANCE_M else self._less(moving, pose, wanted, points)
-        if self.decision is None or CARE[evasion.name] >= CARE[self.decision.action] or now >= self._held_until:
+        if self.decision is None or _care(evasion.action) >= _care(self.decision.action) or now >= self._held_until:
             row = decide(Situation("moving", near, closest_m=min(near, self._near)))
             named = ("", "") if row is None else (row.name, row.updates)
-            self.decision = Decision(evasion.name, near, 0.0, "moving", *named)
+            self.decision = Decision(evasion.action, near, 0.0, "moving", *named)
             self._held_until = now + HOLD_S if near < CLEARANCE_M else self._held_until
             if evasion != self._evasion:
                 self._evasion, self._heading = evasion, wrap(pose.theta + evasion.turn_rad * _side(evasion))
-        if self._evasion.name not in ("wait", "back"):
+        if self._evasion.action not in (Action.WAIT, Action.BACK):
             self._waiting_since = now  # a robot that drives on or makes room does not wait
         return _done(self._present(pose), wanted)
 
@@ -127,7 +129,7 @@ class Crossing:
         if not evasion.turn_rad:
             return evasion
         left_rad = max(0.0, _side(evasion) * wrap(self._heading - pose.theta))
-        return Evasion(evasion.name, evasion.v_mps, evasion.omega_radps if left_rad > 0.0 else 0.0, left_rad)
+        return Evasion(evasion.action, evasion.v_mps, evasion.omega_radps if left_rad > 0.0 else 0.0, left_rad)
 
     def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, points: Sequence[Point]) -> Evasion:
         """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
@@ -147,7 +149,11 @@ class Crossing:
             kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
             if kept > most:
                 best, most = evasion, kept
-        return self._evasion if under_way and best.name == self._evasion.name else best
+        return self._evasion if under_way and best.action is self._evasion.action else best
+
+
+def _care(action: Action) -> int:
+    return CARE.get(action, MOST_CARE)
 
 
 def _side(evasion: Evasion) -> float:
@@ -157,7 +163,7 @@ def _side(evasion: Evasion) -> float:
 def _done(evasion: Evasion, wanted: Twist) -> Twist:
     if evasion is SLOW:
         return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
-    v = max(wanted.linear_x, evasion.v_mps) if evasion.name == "ahead" else evasion.v_mps
+    v = max(wanted.linear_x, evasion.v_mps) if evasion.action is Action.AHEAD else evasion.v_mps
     return Twist(v, evasion.omega_radps)
 
 

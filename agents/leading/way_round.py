@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot
 
-from lfa.agents.avoidance.decision import Decision
+from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.leading.planned_way import PlannedWay
 from lfa.agents.perception.obstacle import ON_THE_MAP
@@ -66,7 +66,7 @@ class WayRound:
         progress_m = self._lead.progress_m
         if self._detour is None or progress_m - self._detour[1] >= WON_M:
             self._detour = now, progress_m
-        if decision.action != "back":
+        if decision.action is not Action.BACK:
             self._backs_since = None
         elif self._backs_since is None:
             self._backs_since = now

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from math import floor, hypot
 
+from lfa.agents.avoidance.decision import Action
 from lfa.protocol.geometry import Pose2D, Twist, distance
 
 STILL_S, STILL_M = 3.0, 0.10
@@ -54,7 +55,7 @@ class StuckMonitor:
         self,
         pose: Pose2D,
         wanted: Twist,
-        action: str | None,
+        action: Action | None,
         lost: str | None,
         now: float,
         *,
@@ -130,7 +131,7 @@ class StuckConditions:
         """Create the conditions. Without `again`, U-turns and coming back (S3) do not count: an explorer does both."""
         self._again = again
         self._moved: deque[tuple[float, float, float]] = deque()
-        self._action: str | None = None
+        self._action: Action | None = None
         self._since = 0.0
         self._turns: deque[float] = deque(maxlen=TURNS)
         self._cell: tuple[int, int] | None = None
@@ -141,18 +142,18 @@ class StuckConditions:
     def reset(self) -> None:
         self.__init__(again=self._again)  # type: ignore[misc]
 
-    def watch(self, pose: Pose2D, wanted: Twist, action: str | None, lost: str | None, now: float) -> str | None:
+    def watch(self, pose: Pose2D, wanted: Twist, action: Action | None, lost: str | None, now: float) -> str | None:
         """Return the reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before
         limits, `lost` the reason of S5 while an input that it needs is missing.
         """
         self._note(pose, action, now)
         if lost is not None:
             return lost
-        if action == "wait" and now - self._since > WAITING_S:
+        if action is Action.WAIT and now - self._since > WAITING_S:
             return "S4: waited too long for what moves"
-        if action == "blocked" and now - self._since > BLOCKED_S:
+        if action is Action.BLOCKED and now - self._since > BLOCKED_S:
             return "S2: blocked on all sides"
-        if action == "back" and now - self._since > BACK_S:
+        if action is Action.BACK and now - self._since > BACK_S:
             return "S3: backs off without end"
         if self._again and len(self._turns) == TURNS and now - self._turns[0] <= TURNS_S:
             return "S3: turned round again and again"
@@ -160,10 +161,10 @@ class StuckConditions:
             return COMES_BACK
         return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
 
-    def _note(self, pose: Pose2D, action: str | None, now: float) -> None:
+    def _note(self, pose: Pose2D, action: Action | None, now: float) -> None:
         if action != self._action:
             self._action, self._since = action, now
-            if action == "u_turn" and (not self._turns or now - self._turns[-1] >= TURN_S_MIN):
+            if action is Action.U_TURN and (not self._turns or now - self._turns[-1] >= TURN_S_MIN):
                 self._turns.append(now)
         cell = (floor(pose.x / CELL_M), floor(pose.y / CELL_M))
         far = self._entered is None or hypot(pose.x - self._entered[0], pose.y - self._entered[1]) > 0.5 * CELL_M

@@ -6,7 +6,7 @@ from math import inf, pi
 
 import pytest
 
-from lfa.agents.avoidance.decision import Decision
+from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.leading.way_round import BACK_S, PATIENCE_S, WayRound
 from lfa.agents.perception.obstacle import Class
@@ -25,12 +25,14 @@ def started(*route: tuple[float, float]) -> tuple[WayRound, PathFollower]:
     return WayRound(Mission(robots=(1,), leading=leading), lead), lead
 
 
-def detour(action: str, kind: Class = "wall") -> Decision:
+def detour(action: Action, kind: Class = "wall") -> Decision:
     return Decision(action, inf, 0.0, kind)
 
 
-@pytest.mark.parametrize(("action", "after_s"), [("left", PATIENCE_S), ("u_turn", PATIENCE_S), ("back", BACK_S)])
-def test_a_detour_that_wins_nothing_begins_a_way_round(action: str, after_s: float) -> None:
+@pytest.mark.parametrize(
+    ("action", "after_s"), [(Action.LEFT, PATIENCE_S), (Action.U_TURN, PATIENCE_S), (Action.BACK, BACK_S)]
+)
+def test_a_detour_that_wins_nothing_begins_a_way_round(action: Action, after_s: float) -> None:
     rounding, _ = started()
     rounding.watch(detour(action), 0.0)
     rounding.watch(detour(action), after_s - 0.1)
@@ -43,30 +45,30 @@ def test_a_detour_that_wins_its_way_goes_on_alone() -> None:
     rounding, lead = started()
     for n in range(40):
         lead.track(Pose2D(0.25 * n, 0.4, 0.0))
-        rounding.watch(detour("left"), 0.5 * n)
+        rounding.watch(detour(Action.LEFT), 0.5 * n)
     assert rounding.way is None
 
 
 def test_two_short_detours_are_not_one_long_one() -> None:
     rounding, _ = started()
-    rounding.watch(detour("left"), 0.0)
+    rounding.watch(detour(Action.LEFT), 0.0)
     rounding.watch(None, 0.6 * PATIENCE_S)
-    rounding.watch(detour("left"), 0.7 * PATIENCE_S)
-    rounding.watch(detour("left"), 1.2 * PATIENCE_S)
+    rounding.watch(detour(Action.LEFT), 0.7 * PATIENCE_S)
+    rounding.watch(detour(Action.LEFT), 1.2 * PATIENCE_S)
     assert rounding.way is None
 
 
 def test_what_the_scanner_does_not_show_is_left_to_the_detour() -> None:
     rounding, _ = started()
     for n in range(20):
-        rounding.watch(detour("left", "ditch"), float(n))
+        rounding.watch(detour(Action.LEFT, "ditch"), float(n))
     assert rounding.way is None
 
 
 def test_back_on_the_route_the_leader_goes_on_from_there() -> None:
     rounding, lead = started()
-    rounding.watch(detour("back"), 0.0)
-    rounding.watch(detour("back"), BACK_S)
+    rounding.watch(detour(Action.BACK), 0.0)
+    rounding.watch(detour(Action.BACK), BACK_S)
     assert rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0) == STILL, "no route is planned yet"
     assert rounding.steer([], Pose2D(1.5, 0.0, 0.0), STILL, [], 0.5, BACK_S + 1.1) is None
     assert rounding.way is None
@@ -75,8 +77,8 @@ def test_back_on_the_route_the_leader_goes_on_from_there() -> None:
 
 def test_a_way_point_that_can_be_passed_is_not_passed_over() -> None:
     rounding, lead = started((0.0, 0.0), (1.0, 0.0), (20.0, 0.0))
-    rounding.watch(detour("back"), 0.0)
-    rounding.watch(detour("back"), BACK_S)
+    rounding.watch(detour(Action.BACK), 0.0)
+    rounding.watch(detour(Action.BACK), BACK_S)
     rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0)
     assert rounding.steer([], Pose2D(1.0, 0.0, 0.0), STILL, [], 0.5, BACK_S + 1.1) is None
     assert lead.place_m == pytest.approx(1.0, abs=0.1)
@@ -85,8 +87,8 @@ def test_a_way_point_that_can_be_passed_is_not_passed_over() -> None:
 def test_a_way_round_that_is_not_found_wins_no_progress() -> None:
     """Walled in on all sides: the detour has the robot again, where it was on its route."""
     rounding, lead = started()
-    rounding.watch(detour("back"), 0.0)
-    rounding.watch(detour("back"), BACK_S)
+    rounding.watch(detour(Action.BACK), 0.0)
+    rounding.watch(detour(Action.BACK), BACK_S)
     way = rounding.way
     assert way is not None
     scan = LaserScan(Header("robot1", 1, 1, 0.0), -pi, 2.0 * pi / 180, 0.05, 10.0, (0.6,) * 180)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from lfa.agents.avoidance.decision import Action
 from lfa.agents.recovery.stuck_detector import (
     BACK_S,
     BLOCKED_S,
@@ -22,7 +23,7 @@ from lfa.protocol.geometry import STILL, Pose2D, Twist
 AHEAD = Twist(0.4, 0.0)
 
 
-def watched(seconds: float, wanted: Twist = AHEAD, action: str | None = None, speed: float = 0.0) -> str | None:
+def watched(seconds: float, wanted: Twist = AHEAD, action: Action | None = None, speed: float = 0.0) -> str | None:
     stuck, reason = StuckConditions(), None
     for n in range(round(seconds / 0.02)):
         reason = stuck.watch(Pose2D(speed * 0.02 * n, 0.0, 0.0), wanted, action, None, 0.02 * n)
@@ -43,7 +44,7 @@ def stood(seconds: float, *, leads: bool, speed_mps: float = 0.0) -> str | None:
     """The plight of one that wants next to nothing, and says no other reason."""
     plight = StuckMonitor()
     for n in range(round(seconds / 0.02)):
-        plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, "left", None, 0.02 * n, leads=leads)
+        plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, Action.LEFT, None, 0.02 * n, leads=leads)
     return plight.reason
 
 
@@ -59,15 +60,15 @@ def test_a_follower_stands_as_long_as_its_slot_does() -> None:
 
 
 def test_S2_blocked_on_all_sides() -> None:
-    assert str(watched(2.0, STILL, "blocked")).startswith("S2")
-    assert watched(1.0, STILL, "blocked") is None
+    assert str(watched(2.0, STILL, Action.BLOCKED)).startswith("S2")
+    assert watched(1.0, STILL, Action.BLOCKED) is None
 
 
 def test_S3_turned_round_again_and_again() -> None:
     stuck, reason = StuckConditions(), None
     for n in range(TURNS):
-        stuck.watch(Pose2D(), STILL, "left", None, 2.0 * n)
-        reason = stuck.watch(Pose2D(), STILL, "u_turn", None, 2.0 * n + 1.0)
+        stuck.watch(Pose2D(), STILL, Action.LEFT, None, 2.0 * n)
+        reason = stuck.watch(Pose2D(), STILL, Action.U_TURN, None, 2.0 * n + 1.0)
     assert str(reason).startswith("S3")
 
 
@@ -89,7 +90,7 @@ def test_noise_on_a_cells_border_is_no_coming_back() -> None:
 
 
 def test_S4_waited_too_long_for_what_moves() -> None:
-    assert str(watched(WAITING_S + 0.2, STILL, "wait")).startswith("S4")
+    assert str(watched(WAITING_S + 0.2, STILL, Action.WAIT)).startswith("S4")
 
 
 def test_S5_scan_lost() -> None:
@@ -116,7 +117,7 @@ def test_a_reset_forgets() -> None:
 def in_a_plight() -> StuckMonitor:
     plight = StuckMonitor()
     for n in range(150):
-        plight.watch(Pose2D(), STILL, "blocked", None, 0.02 * n, leads=False)
+        plight.watch(Pose2D(), STILL, Action.BLOCKED, None, 0.02 * n, leads=False)
     assert plight.reason is not None
     return plight
 
@@ -166,7 +167,7 @@ def test_a_new_role_is_watched_anew() -> None:
 def test_the_place_is_where_a_robot_got_stuck_first() -> None:
     monitor = StuckMonitor()
     for now, x in ((0.0, 0.0), (2.0, 0.0), (2.1, 0.8 * FREED_M)):
-        monitor.watch(Pose2D(x, 0.0, 0.0), STILL, "blocked", None, now, leads=False)
+        monitor.watch(Pose2D(x, 0.0, 0.0), STILL, Action.BLOCKED, None, now, leads=False)
     assert monitor.reason is not None
     monitor.rest(Pose2D(FREED_M, 0.0, 0.0), 2.2)
     assert monitor.reason is None
@@ -175,7 +176,7 @@ def test_the_place_is_where_a_robot_got_stuck_first() -> None:
 def test_who_is_stuck_beside_the_axis_is_not_free_where_it_stands() -> None:
     monitor = StuckMonitor()
     for now in (0.0, 2.0):
-        monitor.watch(Pose2D(0.0, 3.0, 0.0), STILL, "blocked", None, now, leads=False)
+        monitor.watch(Pose2D(0.0, 3.0, 0.0), STILL, Action.BLOCKED, None, now, leads=False)
     monitor.rest(Pose2D(0.0, 3.0, 0.0), 2.1)
     assert monitor.reason is not None
     monitor.rest(Pose2D(0.0, 3.0 - FREED_M, 0.0), 2.2)
@@ -189,8 +190,10 @@ def test_S1_holds_beside_the_axis_too() -> None:
     assert str(reason).startswith("S1")
 
 
-@pytest.mark.parametrize(("action", "longest_s"), [("wait", WAITING_S), ("blocked", BLOCKED_S), ("back", BACK_S)])
-def test_an_action_is_too_long_from_its_own_beginning(action: str, longest_s: float) -> None:
+@pytest.mark.parametrize(
+    ("action", "longest_s"), [(Action.WAIT, WAITING_S), (Action.BLOCKED, BLOCKED_S), (Action.BACK, BACK_S)]
+)
+def test_an_action_is_too_long_from_its_own_beginning(action: Action, longest_s: float) -> None:
     stuck, begin_s = StuckConditions(), 100.0
     stuck.watch(Pose2D(), STILL, None, None, begin_s - 0.1)
     stuck.watch(Pose2D(), STILL, action, None, begin_s)
@@ -198,11 +201,11 @@ def test_an_action_is_too_long_from_its_own_beginning(action: str, longest_s: fl
     assert stuck.watch(Pose2D(), STILL, action, None, begin_s + 1.01 * longest_s) is not None
 
 
-def turned(*at_s: float, action: str = "u_turn") -> str | None:
+def turned(*at_s: float, action: Action = Action.U_TURN) -> str | None:
     """Return the reason after turns at these times [s], with another action between them."""
     stuck, reason = StuckConditions(), None
     for now in at_s:
-        stuck.watch(Pose2D(), STILL, "left", None, now - 0.01)
+        stuck.watch(Pose2D(), STILL, Action.LEFT, None, now - 0.01)
         reason = stuck.watch(Pose2D(), STILL, action, None, now)
     return reason
 
@@ -213,7 +216,7 @@ def test_S3_counts_turns_from_the_first_of_three() -> None:
 
 
 def test_S3_counts_u_turns_only_and_flickering_ones_once() -> None:
-    assert turned(1.0, 3.0, 5.0, action="right") is None
+    assert turned(1.0, 3.0, 5.0, action=Action.RIGHT) is None
     assert turned(1.0, 3.0, 3.0 + 0.9 * TURN_S_MIN) is None
     assert turned(1.0, 3.0, 3.0 + 1.1 * TURN_S_MIN) is not None
 

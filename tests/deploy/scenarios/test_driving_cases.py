@@ -29,6 +29,7 @@ LONG = (
     ("driving/c_head_0.3_expl.toml",                                10003),
     ("driving/c_over_0.6_path.toml",                                10004),
     ("driving/c_stopgo_path.toml",                                  10006),
+    ("driving/e_n8.toml",                                          10001),
     ("driving/e_door_path.toml",                                    10001),
     ("driving/e_utrap_path.toml",                                   10001),
     ("driving/e_utrapdeep_path.toml",                               10001),
