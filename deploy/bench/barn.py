@@ -2,37 +2,43 @@
 
 Each world is a field of posts between two walls, which no robot knows. The score of one run is the benchmark's:
 `success T / clip(time, 2 T, 8 T)` with T = shortest path / 2 m/s; the time counts from the first 0.1 m driven, success
-is a robot within 1 m of the goal without a contact, and 0.5 is the most. The benchmark's own planner (DWA) is reported
-with a score of 0.159 and a success of 0.85. The worlds are read from `shared/data/barn`, beside the checkout or above
-it, or from `--worlds FILE`.
+is a robot within 1 m of the goal without a contact, and 0.5 is the most. Beside the teams stands what is published of
+the benchmark's own planner (DWA). A chain whose leader is killed half-way must reach the goal wherever there is a way
+past the dead robot, by a planner that knows the world. The worlds are read from `shared/data/barn`, beside the checkout
+or above it, or from `--worlds FILE`.
 """
 
 from __future__ import annotations
 
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
 from functools import partial
 from math import hypot
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 from msgspec import Struct, to_builtins
 
 from lfa.deploy.bench.harness.kept import Keep, measured_or_kept
 from lfa.deploy.bench.harness.rows import Case, CasePart, Quantity, many, select, show
+from lfa.deploy.bench.harness.way_past import Corridor, way_exists
 from lfa.deploy.bench.motion import complaint
 from lfa.deploy.campaign.items import name_of
 from lfa.protocol.errors import Refused
 
 FOUND_IN = Path("shared") / "data" / "barn" / "worlds.json"
 LEFT_M, RIGHT_M, BOTTOM_M, TOP_M = -4.35, -0.15, 0.15, 9.6
+CORRIDOR = Corridor(LEFT_M, RIGHT_M, BOTTOM_M, TOP_M)
 """Walls [m] that stand for the rows of posts around the field."""
 JACKAL_MPS, JACKAL_MPS2 = 2.0, 4.0
 STARTED_M = 0.1
 T_MIN, T_MAX = 2.0, 8.0
 SCORE_BAR = 0.47
+RADIUS_M = 0.25
+BASELINE = ((Quantity("success", "share"), 0.85), (Quantity("score", ""), 0.159))
+"""Published results of the benchmark's own planner, over 500 runs."""
 DRIVE = (
     f"mission.limits.v_max_mps={JACKAL_MPS}",
     f"mission.limits.a_max_mps2={JACKAL_MPS2}",
@@ -72,7 +78,7 @@ class BarnTeam(Struct, frozen=True):
     good_share: float = 1.0
 
 
-BODY = "mission.radius_m=0.25"
+BODY = f"mission.radius_m={RADIUS_M}"
 COLUMN_OF_THREE = (
     "mission.robots=[1, 2, 3]",
     "mission.formation.side=column",
@@ -85,6 +91,7 @@ TEAMS = (
     BarnTeam("path_following", (BODY, "mission.leading.motion=path_following"), scored=False, good_share=0.95),
     BarnTeam("point_to_point", (BODY, "mission.leading.motion=point_to_point"), scored=False, good_share=0.95),
     BarnTeam("reactive", (BODY, "mission.leading.motion=reactive"), scored=False, good_share=0.8),
+    BarnTeam("chain", (BODY, *COLUMN_OF_THREE), scored=False, good_share=0.95),
     BarnTeam("leader_killed", (BODY, *COLUMN_OF_THREE), False, ("kill leader at 12 s",), good_share=0.95),
 )
 
@@ -100,9 +107,8 @@ def run(
     """Print the rows whose names match the glob `rows`, over the first `seeds` worlds; return 0 if all hold, else 1."""
     field = read(_file() if worlds is None else Path(worlds))
     chosen = field.worlds[: seeds or len(field.worlds)]
-    return show(
-        measured_or_kept("barn", select([case(team, field, chosen) for team in TEAMS], rows), jobs, rows, keep), as_json
-    )
+    cases = select([baseline(), *(case(team, field, chosen) for team in TEAMS)], rows)
+    return show(measured_or_kept("barn", cases, jobs, rows, keep), as_json)
 
 
 def case(team: BarnTeam, field: BarnWorlds, worlds: Sequence[BarnWorld]) -> Case:
@@ -113,33 +119,59 @@ def case(team: BarnTeam, field: BarnWorlds, worlds: Sequence[BarnWorld]) -> Case
     parts = [
         CasePart([world.index, name_of(to_builtins(world))], partial(result, team, field, world)) for world in worlds
     ]
-    return many(f"barn/{team.name}", (good, contacts, *score), parts)
+    stopped = (Quantity("failed though there is a way", "runs", 0.0),) if team.faults else ()
+    return many(f"barn/{team.name}", (good, contacts, *score, *stopped), parts)
+
+
+def baseline() -> Case:
+    """Return the published results of the benchmark's own planner as rows without a bar."""
+    return Case("barn/published baseline (DWA)", tuple(q for q, _ in BASELINE), partial(list, [v for _, v in BASELINE]))
 
 
 def result(team: BarnTeam, field: BarnWorlds, world: BarnWorld) -> list[float]:
-    """Return whether the run was good and whether it had a contact (0 or 1), and where it is scored the score."""
-    score, wrong, contact = outcome(team, field, world)
-    print(f"barn/{team.name} {world.index}: {wrong or 'ok'}, score {score:.3f}", file=sys.stderr, flush=True)
-    return [float(wrong is None), float(contact)] + ([score] if team.scored else [])
+    """Return whether the run was good and whether it had a contact (0 or 1), where it is scored the score, and with a
+    fault whether it failed though there was a way past the dead robot.
+    """
+    done = outcome(team, field, world)
+    told = done.wrong or "ok"
+    print(f"barn/{team.name} {world.index}: {told}, score {done.score:.3f}", file=sys.stderr, flush=True)
+    values = [float(done.wrong is None), float(done.contact)] + ([done.score] if team.scored else [])
+    return values + ([float(done.wrong is not None and done.passable)] if team.faults else [])
 
 
-def outcome(team: BarnTeam, field: BarnWorlds, world: BarnWorld) -> tuple[float, str | None, bool]:
-    """Return the score of one run, the reason why it is not good (None: it is), and whether there was a contact."""
-    from lfa.deploy.simulate import run as simulated
+class BarnOutcome(NamedTuple):
+    """Result of one run: its score, why it is not good (None: it is), and whether there was a contact."""
+
+    score: float
+    wrong: str | None
+    contact: bool
+    passable: bool
+    """True if there is a way from the next robot past the first one, where that stood at the end, to the goal."""
+
+
+def outcome(team: BarnTeam, field: BarnWorlds, world: BarnWorld) -> BarnOutcome:
+    """Do one run of the team in the world, without a record of it."""
+    from lfa.deploy.faults.script import parse_all
+    from lfa.deploy.run.simulate import measure
     from lfa.world.description.load import load
 
-    folder = Path(tempfile.mkdtemp(prefix="lfa-barn-"))
-    try:
-        path = folder / f"barn_{world.index}.toml"
+    with tempfile.TemporaryDirectory(prefix="lfa-barn-") as folder:
+        path = Path(folder) / f"barn_{world.index}.toml"
         path.write_text(scenario_text(field, world))
         scenario = load(str(path), team.sets)
-        done = simulated(scenario, seed=world.index, out=folder / "run", faults=team.faults)
-        wrong = complaint(done.summary)
-        contact = any(robot.contacts for robot in done.summary.robots)
-        took_s = time_s(done.truth[scenario.mission.robots[0]], field)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    return 0.0 if wrong is not None else score_of(world.shortest_path_m, took_s), wrong, contact
+    done = measure(scenario, world.index, parse_all(scenario.mission, (), team.faults))
+    wrong, truth = complaint(done.summary), done.seen.truth
+    first, *others = scenario.mission.robots
+    took_s = time_s(truth[first], field)
+    score = 0.0 if wrong is not None else score_of(world.shortest_path_m, took_s)
+    passable = True
+    if others:
+        dead, stood = truth[first][-1], truth[others[0]]
+        at = min(range(len(stood)), key=lambda n: hypot(stood[n][1] - dead[1], stood[n][2] - dead[2]))
+        discs = [(x, y, field.obstacle_radius_m) for x, y in inside(world)] + [(dead[1], dead[2], RADIUS_M)]
+        passable = way_exists((stood[at][1], stood[at][2]), field.goal, discs, CORRIDOR, RADIUS_M)
+    contact = any(robot.contacts for robot in done.summary.robots)
+    return BarnOutcome(score, wrong, contact, passable)
 
 
 def score_of(shortest_path_m: float, took_s: float) -> float:
@@ -150,8 +182,8 @@ def score_of(shortest_path_m: float, took_s: float) -> float:
 
 def scenario_text(field: BarnWorlds, world: BarnWorld) -> str:
     """Return the scenario file of one world, for one robot that explores it."""
-    inside = [(x, y) for x, y in world.centers_m if LEFT_M < x < RIGHT_M and y > BOTTOM_M]
-    posts = ", ".join(f"{{ center_m = [{x}, {y}], radius_m = {field.obstacle_radius_m} }}" for x, y in inside)
+    radius_m = field.obstacle_radius_m
+    posts = ", ".join(f"{{ center_m = [{x}, {y}], radius_m = {radius_m} }}" for x, y in inside(world))
     (x, y, theta), (goal_x, goal_y) = field.start, field.goal
     return f"""title = "BARN world {world.index}"
 time_limit_s = {field.time_limit_s}
@@ -166,6 +198,11 @@ walls_m = [[{LEFT_M}, {BOTTOM_M}, {LEFT_M}, {TOP_M}], [{RIGHT_M}, {BOTTOM_M}, {R
 [{LEFT_M}, {BOTTOM_M}, {RIGHT_M}, {BOTTOM_M}]]
 obstacles = [{posts}]
 """
+
+
+def inside(world: BarnWorld) -> list[tuple[float, float]]:
+    """Return the centres [m] of the posts between the walls; those of the rim are the walls themselves."""
+    return [(x, y) for x, y in world.centers_m if LEFT_M < x < RIGHT_M and y > BOTTOM_M]
 
 
 def read(path: Path) -> BarnWorlds:

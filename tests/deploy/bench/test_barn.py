@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from lfa.deploy.bench import barn
+from lfa.deploy.bench.harness.way_past import way_exists
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import load
 
@@ -53,3 +54,17 @@ def test_a_file_that_is_none_is_refused_in_one_line(tmp_path: Path, content: byt
     with pytest.raises(Refused, match=says) as refused:
         barn.read(path)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("gap_m", "way"), [(0.9, True), (0.45, False)])
+def test_a_way_past_a_dead_robot_exists_where_a_robot_fits(gap_m: float, way: bool) -> None:
+    """A dead robot in a row of posts, with one gap beside it, as wide as told between its edges."""
+    y, radius = 5.0, 0.075
+    dead = (-2.0, y, barn.RADIUS_M)
+    left = [(dead[0] - barn.RADIUS_M - n * 0.2, y, radius) for n in range(1, 12)]
+    right = [(dead[0] + barn.RADIUS_M + gap_m + radius + n * 0.2, y, radius) for n in range(8)]
+    assert way_exists((-2.0, 4.0), FIELD.goal, [dead, *left, *right], barn.CORRIDOR, barn.RADIUS_M) is way
+
+
+def test_the_published_baseline_stands_beside_the_teams() -> None:
+    assert list(barn.baseline().measure()) == [0.85, 0.159]

@@ -9,7 +9,7 @@ import pytest
 
 from lfa.deploy.analysis.verification.command import command as verify
 from lfa.deploy.bench import motion
-from lfa.deploy.bench.command import command as bench
+from lfa.deploy.bench.harness.command import command as bench
 from lfa.deploy.bench.harness.kept import Keep, measured_or_kept
 from lfa.deploy.bench.harness.rows import CasePart, Quantity, many, measured
 from lfa.deploy.campaign.commands.merge import merge

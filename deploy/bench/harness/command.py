@@ -1,4 +1,4 @@
-"""`lfa bench NAME`: one module per name in this package, each with `run(as_json, ...) -> exit code`.
+"""`lfa bench NAME`: one module per name in `deploy/bench`, each with `run(as_json, ...) -> exit code`.
 
 The parameters of `run` define the other options of a bench (`rows`, `jobs`, `processes`, `kills`, `full`, `minutes`,
 `seeds`).
@@ -14,7 +14,6 @@ from typing import Annotated, Any
 
 import typer
 
-import lfa.deploy.bench
 from lfa.deploy.bench.harness.kept import Keep
 from lfa.deploy.campaign.shard import WHOLE, parse_shard
 from lfa.protocol.errors import Refused
@@ -69,6 +68,6 @@ def command(
 
 
 def _names() -> list[str]:
-    """Return the names of the modules of this package that have a `run`; they are imported to find out."""
-    modules = (module.name for module in iter_modules(lfa.deploy.bench.__path__) if module.name != "command")
+    """Return the names of the modules beside this folder that have a `run`; they are imported to find out."""
+    modules = (module.name for module in iter_modules([str(Path(__file__).parents[1])]))
     return [name for name in modules if hasattr(import_module(f"lfa.deploy.bench.{name}"), "run")]
