@@ -15,6 +15,7 @@ from lfa.deploy.client.session import FleetAddress, Subscriber, find, listen, sc
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.remote import journals
 from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.recording.holes import Holes
 from lfa.deploy.recording.recorder import Recorder
 from lfa.deploy.recording.run_folder import RUNS, About, make
 from lfa.deploy.recording.simulation_time import WorldTime
@@ -54,10 +55,10 @@ def command(
         recorder = Recorder(folder, about, split_bytes=round(1e6 * split_mb), keep=keep)
         kept = journals.of_processes(found.name)
         write_line(f"records fleet {found.name} into {folder}", sys.stderr if as_json else sys.stdout)
-        begun, seen = clock.now(), WorldTime()
+        begun, seen, holes = clock.now(), WorldTime(), Holes()
         while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
             clock.sleep(POLL_S)
-            _write(ear, recorder, seen, begun)
+            _write(ear, recorder, seen, holes, begun)
         recording = recorder.close()
     came = journals.copy(kept | journals.of_processes(found.name), folder)
     if plan is not None:
@@ -65,7 +66,7 @@ def command(
         came += fetched
         for line in wrong:
             print(f"lfa: {line}", file=sys.stderr)
-    recording.dropped = ear.dropped
+    recording.dropped, recording.missing, recording.holes = ear.dropped, holes.missing, holes.widest()
     code = 0 if recording.messages and not recording.dropped and not recording.unwritten else 1
     for line in recording.losses():
         print(f"lfa: {line}", file=sys.stderr)
@@ -74,16 +75,20 @@ def command(
         print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
         return code
     files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
-    print(f"{recording.messages} messages, {ear.dropped} lost, {files}, {came} journals: {folder}")
+    lost = recording.dropped + sum(hole.missing for hole in recording.holes)
+    with_holes = ", with holes" if recording.holes else ""
+    print(f"{recording.messages} messages, {lost} lost, {files}, {came} journals: {folder}{with_holes}")
     return code
 
 
-def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, begun: float) -> None:
+def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, holes: Holes, begun: float) -> None:
     """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
     for arrival, message in ear.take():
         if isinstance(message, Truth):
             seen.see(arrival.at, message.time_s)
-        recorder.record(seen.of(arrival.at) if seen.known else arrival.at - begun, arrival.key, message)
+        at = seen.of(arrival.at) if seen.known else arrival.at - begun
+        recorder.record(at, arrival.key, message)
+        holes.see(at, arrival.key, message.header)
 
 
 def _folder(fleet: FleetAddress, out: Path | None) -> Path:

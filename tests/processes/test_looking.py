@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,9 +14,12 @@ from urllib.request import urlopen
 
 from lfa.deploy.recording import mcap_reader
 from lfa.deploy.recording.recorder import parts
+from lfa.protocol import clock
 from lfa.protocol.transport.zenoh_config import answers
 from tests.rigs.lfa_runs import LFA, eventually, lfa, running
 from tests.rigs.recording_agreement import differing
+
+STOPPED_S = 3.0
 
 
 @contextmanager
@@ -138,3 +142,20 @@ def test_a_running_fleet_can_be_recorded_from_outside(tmp_path: Path) -> None:
     again = lfa("replay", str(out), "--robot", "all")
     assert again.returncode == 0, again.stdout + again.stderr
     assert {line.split("-")[0] for line in again.stdout.splitlines()} == {"robot1", "robot2", "witness", "world"}
+
+
+def test_a_recording_that_missed_messages_says_how_many_and_when(tmp_path: Path) -> None:
+    """The recorder is stopped for longer than its link lives without it."""
+    with running(tmp_path / "run", "straight", "--robots", "2", "--set", "mission.leading.cruise_mps=0.1") as run:
+        run.wait_for("leader_command")
+        out = tmp_path / "outside"
+        words = [*LFA, "record", "--fleet", f"straight-{run.launcher.pid}", "--seconds", "9", "--out", str(out)]
+        recorder = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        eventually(lambda: out.is_dir() and mcap_reader.read(out).end_s > 0.0, "nothing was recorded")
+        recorder.send_signal(signal.SIGSTOP)
+        clock.sleep(STOPPED_S)
+        recorder.send_signal(signal.SIGCONT)
+        told, warned = recorder.communicate(timeout=60)
+    assert told.rstrip().endswith(", with holes"), told + warned
+    assert ", 0 lost, " not in told
+    assert "never arrived, between " in warned
