@@ -18,6 +18,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from lfa.agents.cli import read_mission
 from lfa.deploy.analysis import summary as summaries
+from lfa.deploy.fleet.engine.engine import KnownProcess
 from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, ledger
 from lfa.deploy.fleet.plan import fleet_file, host_plan
 from lfa.deploy.fleet.security import authority, keys
@@ -99,7 +100,8 @@ def _mission(folder: Path) -> Path:
 @_format("ledger (JSON)", lambda path: (ledger(path.parent), end_orphans(path.parent)))
 def _ledger(folder: Path) -> Path:
     dead = Identity(2**22 - 1, 1, 1, ("gone",))
-    (folder / LEDGER).write_bytes(msgspec.json.encode(Ledger("run", "digest", dead, (dead, dead))))
+    known = KnownProcess("robot1", dead, 1, 0)
+    (folder / LEDGER).write_bytes(msgspec.json.encode(Ledger("run", "digest", dead, (known,))))
     return folder / LEDGER
 
 

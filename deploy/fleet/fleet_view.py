@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from msgspec import Struct
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen
+from lfa.deploy.fleet.host.ledger import GUARDIAN, SUPERVISOR
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
 from lfa.deploy.fleet.plan.host_plan import HostPlan
@@ -71,15 +72,12 @@ def _keys(part: HostPlan | None) -> Path | None:
 
 
 def here() -> list[HostPlan]:
-    """Return the plans of this user's supervisors on this machine."""
+    """Return the plans of this user's supervisors on this machine; a guardian is about to start one."""
+    paths = {one.arguments[-1] for one in own_processes() if {SUPERVISOR, GUARDIAN} & set(one.arguments[:-1])}
     found = []
-    for identity in own_processes():
-        words = identity.arguments
-        if "lfa.deploy.fleet.host.supervisor" in words[:-1]:
-            try:
-                found.append(host_plan.read(Path(words[-1])))
-            except Refused:
-                continue
+    for path in sorted(paths):
+        with suppress(Refused):
+            found.append(host_plan.read(Path(path)))
     return found
 
 

@@ -9,8 +9,8 @@ from typing import Annotated
 import msgspec
 import typer
 
+from lfa.deploy.fleet.engine.log_tail import FOLLOW_S
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
-from lfa.deploy.fleet.host.log_tail import FOLLOW_S
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.terminal_text import visible
 from lfa.protocol import clock

@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -74,18 +74,20 @@ def own_processes() -> Iterator[Identity]:
 def start(
     arguments: Sequence[str],
     log: IO[bytes],
-    on_parent_death: signal.Signals = signal.SIGKILL,
+    on_parent_death: signal.Signals | None = signal.SIGKILL,
     stdin: int = subprocess.DEVNULL,
     inside: Sequence[str] = (),
+    environment: Mapping[str, str] | None = None,
 ) -> subprocess.Popen[bytes]:
     """Start `python -P -m ARGUMENTS` as a child in its own session, which the terminal's Ctrl-C does not reach.
 
-    The child receives `on_parent_death` when this process dies. `inside` is a command prefix that executes the child
-    elsewhere, such as `/sbin/ip netns exec NAME`.
+    The child receives `on_parent_death` when this process dies; None: nothing, it goes on. `inside` is a command prefix
+    that executes the child elsewhere, such as `/sbin/ip netns exec NAME`. `environment` is added to this process's own.
 
     Call it from the main thread: for the kernel, the parent of a child is the thread that started it.
     """
     python = sys.executable
-    tether = [python, "-I", "-S", str(TETHER), str(os.getpid()), str(int(on_parent_death))]
+    tether = [python, "-I", "-S", str(TETHER), str(os.getpid()), str(int(on_parent_death))] if on_parent_death else []
     command = [*tether, *inside, python, "-P", "-m", *arguments]
-    return subprocess.Popen(command, stdin=stdin, stdout=log, stderr=log, start_new_session=True)
+    around = {**os.environ, **(environment or {})}
+    return subprocess.Popen(command, stdin=stdin, stdout=log, stderr=log, start_new_session=True, env=around)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -18,6 +18,8 @@ from lfa.protocol import clock
 ROUTER_NAME = "router"
 GRACE_S = 2.0  # between SIGTERM and SIGKILL
 POLL_S = 0.01
+UNKNOWN_CODE = 256
+"""Exit code of a process whose end its parent alone knows: beyond all that a process can have."""
 LAST_BYTES = 4096
 """Number of bytes at the end of a log in which its last line is searched."""
 
@@ -40,23 +42,52 @@ class ProcessSpec(Struct, frozen=True):
         return ProcessSpec(self.name, (*told, *self.restart_args), command_prefix=self.command_prefix)
 
 
+class AdoptedProcess:
+    """A process that another one started, with the part of `Popen`'s interface that a group uses."""
+
+    stdin = None
+
+    def __init__(self, known: Identity) -> None:
+        self._known = known
+        self.pid = known.pid
+
+    def poll(self) -> int | None:
+        """Return None while it runs, then `UNKNOWN_CODE`: its exit code is known to its parent only."""
+        return None if identify(self.pid) == self._known else UNKNOWN_CODE
+
+    def kill(self) -> None:
+        send_signal(self._known, signal.SIGKILL)
+
+    def wait(self) -> int:
+        while self.poll() is None:
+            clock.sleep(POLL_S)
+        return UNKNOWN_CODE
+
+
 class ProcessGroup:
     """Child processes of one run, by name, each with a log file. All calls come from the main thread."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, outlive: bool = False, environment: Mapping[str, str] | None = None) -> None:
+        """`outlive`: the processes go on when this one dies. `environment` is added to theirs."""
         self._logs = folder / LOGS
         self._logs.mkdir(parents=True, exist_ok=True)
-        self._children: dict[str, subprocess.Popen[bytes]] = {}
+        self._children: dict[str, subprocess.Popen[bytes] | AdoptedProcess] = {}
+        self._outlive = outlive
+        self._environment = environment
 
     def start(self, row: ProcessSpec) -> None:
         """Start a process and append its output to its log, if the disk gives one.
 
         Raises OSError when no process can be created.
         """
-        death = signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
+        death = None if self._outlive else signal.SIGCONT if row.outlives_launcher else signal.SIGKILL
         stdin = subprocess.PIPE if row.outlives_launcher else subprocess.DEVNULL
         with self._open_log(row.name) as log:
-            self._children[row.name] = start(row.arguments, log, death, stdin, row.command_prefix)
+            self._children[row.name] = start(row.arguments, log, death, stdin, row.command_prefix, self._environment)
+
+    def adopt(self, name: str, known: Identity) -> None:
+        """Take a running process into the group, as `name`."""
+        self._children[name] = AdoptedProcess(known)
 
     def runs(self, name: str) -> bool:
         child = self._children.get(name)
@@ -75,6 +106,8 @@ class ProcessGroup:
         code = self.code(name)
         if code is None:
             return None
+        if code == UNKNOWN_CODE:
+            return f"{name} ended (an earlier supervisor started it: how is not known)"
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         last_line = self._last_line(name)
         return f"{name} ended ({how})" + (f": {last_line}" if code > 0 and last_line else "")
@@ -131,6 +164,7 @@ class ProcessGroup:
         """Kill every child with SIGKILL and wait for it. For the cleanup after an internal error."""
         for child in self._children.values():
             child.kill()
+        for child in self._children.values():
             child.wait()
 
     def identity(self, name: str) -> Identity | None:

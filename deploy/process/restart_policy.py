@@ -21,6 +21,8 @@ class Restart(Struct, frozen=True, forbid_unknown_fields=True):
     window_s: float = 60.0
     starts_max: int = 5
     """Maximum number of restarts within the window; at the next end the process is not restarted."""
+    watchdog_s: float = 5.0
+    """Time [s] without a sign of life after which a process counts as hung: it is killed, and then restarted."""
 
 
 ROUTER = Restart(policy="always", delay_s=0.05, delay_max_s=2.0, window_s=60.0, starts_max=1_000_000)

@@ -197,6 +197,7 @@ def connect(options: Options, inbox: Inbox, stop: _StopRequest) -> ZenohBus | No
                 text = f"no router at {options.endpoint}{why}: waiting for one (start it with: lfa-router)"
                 write_line(text, sys.stderr)
                 told = True
+            Notify(options.notify).alive()
             stop.wake.wait(CONNECT_RETRY_S)
     return None
 

@@ -24,5 +24,7 @@ class Notify:
             return
         import socket  # not loaded on a robot without systemd
 
-        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
+        # Without waiting: a watcher that stands still leaves its queue full, and must not hold up a control loop.
+        kind = socket.SOCK_DGRAM | socket.SOCK_NONBLOCK
+        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, kind) as out:
             out.sendto(word, self._address)

@@ -45,6 +45,7 @@ ELSEWHERE = {
     "lfa bag RUN": "tests/deploy/ros/test_bag.py",
     "lfa doctor": "tests/hosts/test_refused.py",
     "lfa up FILE --secure": "tests/deploy/fleet/security/test_secure.py",
+    "lfa export compose FILE": "tests/deploy/fleet/export/test_export.py",
     "lfa keys revoke FILE robot3": "tests/deploy/fleet/security/test_secure.py",
     "lfa sim circle --set mission.following.controller=carrot": "tests/agents/controllers/test_readme_controller.py",
     **dict.fromkeys(

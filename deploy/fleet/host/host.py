@@ -19,7 +19,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from lfa.deploy.fleet.host.ledger import Ledger, end_orphans, living, sweep
+from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep, watchers
 from lfa.deploy.fleet.host.router import LISTENS
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
@@ -119,14 +119,18 @@ def start(part: HostPlan) -> Found:
 
 
 def stop(part: HostPlan) -> Found:
-    """End this machine's supervisor and children, by SIGKILL after STOP_S. Raises Refused when a process remains."""
+    """End this machine's watchers and processes, by SIGKILL after STOP_S. Raises Refused when a process remains."""
     running = living(part.folder)
     if running is None:
         end_orphans(part.folder)
         sweep(part.folder)
         return Found(version("lfa"), clock.wall_ms())
-    everybody = (running.supervisor, *running.children)
-    send_signal(running.supervisor, signal.SIGTERM)
+    guardians = tuple(watchers(part.folder, GUARDIAN))
+    everybody = (*guardians, running.supervisor, *running.children)
+    send_signal(running.supervisor, signal.SIGTERM)  # first, or it would start a guardian again
+    for guardian in guardians:
+        send_signal(guardian, signal.SIGTERM)
+        send_signal(guardian, signal.SIGCONT)
     _wait_gone(everybody, STOP_S)
     for identity in everybody:
         send_signal(identity, signal.SIGKILL)
@@ -189,8 +193,8 @@ def _check_world() -> None:
 
 
 def _spawn(part: HostPlan, path: Path, log: Path) -> subprocess.Popen[bytes]:
-    """Start the supervisor, under systemd if that is running here, else in its own session."""
-    command = [sys.executable, "-P", "-m", "lfa.deploy.fleet.host.supervisor", str(path)]
+    """Start the guardian, which starts the supervisor, under systemd if that is running here, else in a session."""
+    command = [sys.executable, "-P", "-m", GUARDIAN, str(path)]
     with log.open("ab") as out:
         for runner in _runners(part):
             asked = subprocess.run([*runner, *command], stdout=out, stderr=out, stdin=subprocess.DEVNULL, check=False)
@@ -204,7 +208,7 @@ def _runners(part: HostPlan) -> list[list[str]]:
     if not SYSTEMD.is_dir() or shutil.which("systemd-run") is None:
         return []
     unit = ["--unit", f"lfa-{part.fleet}-{part.host}", "--collect", "--property", "Restart=on-failure"]
-    log = ["--property", f"StandardOutput=append:{part.run_folder / LOG}"]
+    log = ["--property", f"StandardOutput=append:{part.run_folder / LOG}", "--property", "KillMode=process"]
     return [["systemd-run", *([] if os.getuid() == 0 else ["--user"]), "--quiet", *unit, *log]]
 
 

@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 from msgspec import Struct
 
-from lfa.deploy.fleet.plan.host_plan import SOCKET
+from lfa.deploy.fleet.engine.engine import KnownProcess
+from lfa.deploy.fleet.engine.own import SIGNS
+from lfa.deploy.fleet.plan.host_plan import PART, SOCKET
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
 from lfa.protocol.file_reading import DamagedFile, read_json
 
 LEDGER = "processes.json"
-"""File beside the plan with the supervisor and its children; read by a later incarnation, `lfa down`, `lfa doctor`."""
+"""File beside the plan with the supervisor and its processes; read by a later incarnation, `lfa down`, `lfa doctor`."""
+SUPERVISOR, GUARDIAN = "lfa.deploy.fleet.host.supervisor", "lfa.deploy.fleet.host.guardian"
+"""Modules of the two processes that start each other again; each is called with the plan's file."""
+
+
+WATCH, GUARD = "watch.sock", "guard.sock"
+"""Sockets in the fleet's folder for the signs of life of the supervisor to its guardian, and of the guardian to it."""
 
 
 class Ledger(Struct, frozen=True):
-    """Identities of a fleet's supervisor and child processes on this machine."""
+    """Identities of a fleet's supervisor and processes on this machine."""
 
     run: str
     digest: str
     supervisor: Identity
-    children: tuple[Identity, ...] = ()
+    processes: tuple[KnownProcess, ...] = ()
+
+    @property
+    def children(self) -> tuple[Identity, ...]:
+        return tuple(known.identity for known in self.processes)
 
 
 def ledger(folder: Path) -> Ledger | None:
@@ -41,16 +54,31 @@ def living(folder: Path) -> Ledger | None:
     return written if alive else None
 
 
+def watchers(folder: Path, module: str) -> Iterator[Identity]:
+    """Yield the running supervisors or guardians of that folder, also those that have not yet written a ledger."""
+    path = str(folder / PART)
+    for process in identity.own_processes():
+        if process.arguments[-2:] == (module, path):
+            yield process
+
+
 def end_orphans(folder: Path) -> list[str]:
-    """Kill exactly the processes that the last supervisor of that folder left; return their command lines."""
+    """Kill exactly the processes that the last supervisor of that folder left; return their command lines.
+
+    Its guardian is killed first: it would start a supervisor again.
+    """
     written = ledger(folder)
-    if written is None or living(folder) is not None:
+    if living(folder) is not None:
         return []
-    return [" ".join(child.arguments) for child in written.children if identity.send_signal(child, signal.SIGKILL)]
+    for module in (GUARDIAN, SUPERVISOR):
+        for process in watchers(folder, module):
+            identity.send_signal(process, signal.SIGKILL)
+    left = () if written is None else written.children
+    return [" ".join(child.arguments) for child in left if identity.send_signal(child, signal.SIGKILL)]
 
 
 def sweep(folder: Path) -> None:
-    """Remove the files that a supervisor could not remove itself: socket, its lock, ledger."""
-    for name in (SOCKET, f"{SOCKET}.lock", LEDGER):
+    """Remove the files that a supervisor could not remove itself: sockets, the router's lock, ledger."""
+    for name in (SOCKET, f"{SOCKET}.lock", SIGNS, WATCH, GUARD, LEDGER):
         with suppress(OSError):  # of a file system that became read-only: a later start replaces them
             (folder / name).unlink(missing_ok=True)

@@ -14,6 +14,7 @@ from lfa.deploy.command_line import command_app, run_cli
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.output import write_line
+from lfa.protocol.runtime.systemd import Notify
 from lfa.protocol.topics import HOST_PREFIX
 from lfa.protocol.transport.credentials import Credentials, credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
@@ -21,6 +22,7 @@ from lfa.protocol.transport.zenoh_router import open_router
 
 DEFAULT_TCP, DEFAULT_TLS = "tcp/127.0.0.1:7450", "tls/127.0.0.1:7450"  # 7447 is ROS 2's
 LISTENS = "router listens at"
+SIGN_S = 1.0
 ENDING = {signal.SIGTERM, signal.SIGINT}
 
 
@@ -55,7 +57,12 @@ def command(
 
     close = open_router(endpoints, connect or (), LINK_LEASES_MS[link], _known(keys), secure)
     write_line(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}: ready", sys.stdout)
-    while (came := signal.sigwait(ENDING | {signal.SIGHUP})) not in ENDING:
+    notify = Notify(os.environ.get("NOTIFY_SOCKET", ""))
+    notify.ready()
+    while (came := _signal_within(SIGN_S)) not in ENDING:
+        notify.alive()
+        if came is None:
+            continue
         try:
             _known(keys)
         except Refused as refused:
@@ -64,9 +71,16 @@ def command(
         close()
         os.execv(sys.executable, sys.orig_argv)  # frees the QUIC port, which a closed session keeps
     close()
+    assert came is not None
     by_hand = came == signal.SIGINT
-    write_line(f"router ended, by {'Ctrl-C' if by_hand else signal.Signals(came).name}", sys.stdout)
+    write_line(f"router ended, by {'Ctrl-C' if by_hand else came.name}", sys.stdout)
     return 130 if by_hand else 0
+
+
+def _signal_within(timeout_s: float) -> signal.Signals | None:
+    """Wait for a signal that ends or restarts the router; return None after `timeout_s` [s] without one."""
+    came = signal.sigtimedwait(ENDING | {signal.SIGHUP}, timeout_s)
+    return None if came is None else signal.Signals(came.si_signo)
 
 
 def _known(keys: Path | None) -> Credentials | None:

@@ -1,9 +1,9 @@
 """`python -m lfa.deploy.fleet.host.supervisor PART`: supervisor of one machine's processes.
 
-It depends neither on the machine that ran `lfa up` nor on any other: it starts its router, its robots and the other
-processes of its plan, restarts those that end (`restart_policy.py`), publishes their status once a second (topic
-`host`) and executes an operator's orders (topic `order`). SIGTERM ends everything in order, also without a router.
-Its children do not outlive it (`parent_death.py`); at the start it ends orphans of an earlier incarnation.
+It depends neither on the machine that ran `lfa up` nor on any other: its engine starts the router, the robots and the
+other processes of its plan and restarts those that end or hang. The supervisor publishes their status once a second
+(topic `host`) and executes an operator's orders (topic `order`). SIGTERM ends everything in order, also without a
+router. The processes outlive a supervisor that dies: its guardian (`guardian.py`) starts it again, and it adopts them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import select
 import signal
+import subprocess
 import sys
 import threading
 from collections import OrderedDict
@@ -18,19 +19,23 @@ from pathlib import Path
 
 import msgspec
 
-from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, living, sweep
-from lfa.deploy.fleet.host.log_tail import Tail
+from lfa.deploy.fleet.engine.engine import LogSource, ProcessEngine
+from lfa.deploy.fleet.engine.own import OwnEngine
+from lfa.deploy.fleet.engine.watchdog import HangDetector, SignSocket
+from lfa.deploy.fleet.host.guardian import spawn
+from lfa.deploy.fleet.host.ledger import GUARD, GUARDIAN, LEDGER, WATCH, Ledger, ledger, living, sweep, watchers
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
-from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
-from lfa.deploy.process.restart_policy import REFUSED_CODE, ROUTER, RestartBackoff
+from lfa.deploy.process.identity import Identity
+from lfa.deploy.process.restart_policy import REFUSED_CODE
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines, ProcessReport
+from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.output import replace_file, write_line
+from lfa.protocol.runtime.systemd import Notify
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME, alive_key, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.links import Links
@@ -40,47 +45,22 @@ from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
 from lfa.world.description.scenario import STATE
 
 TELL_S = 1.0
+SIGN_S = 1.0
 STEP_S = 0.1
 JOIN_S = 0.1
-ROUTER_S = 3.0
 LAST_WORDS_S = 0.1
-END_S = 1.5
-"""Time limit [s] for children to end. Their final messages take at most 0.7 s; the rest allows for a lost router."""
 LEAVE_S = 0.5
-"""Time limit [s] for a router to end, which closes links to routers that may have ended already."""
+"""Time limit [s] for closing the session, which takes longer if the router hangs."""
 OPERATORS_MAX = 64
-
-
-class _ManagedProcess:
-    """One supervised process: its specification, restart backoff and state."""
-
-    def __init__(self, row: ProcessSpec, backoff: RestartBackoff) -> None:
-        self.row = row
-        self.backoff = backoff
-        self.starts = 0
-        self.began = 0.0
-        self.began_ms = 0
-        self.state = "waiting"
-        self.start_at: float | None = 0.0
-        self.ended = ""
-        self.ordered_end = False
-
-    def report(self, pid: int, now: float) -> ProcessReport:
-        up_s = round(now - self.began, 1) if pid else 0.0
-        return ProcessReport(self.row.name, self.state, pid, self.starts, self.began_ms, up_s, self.ended)
 
 
 class Supervisor:
     """Supervisor of one machine. Every call comes from the main thread, which the kernel takes as the parent."""
 
-    def __init__(self, part: HostPlan) -> None:
+    def __init__(self, part: HostPlan, engine: ProcessEngine) -> None:
         self._part = part
         self._me = f"{HOST_PREFIX}{part.host}"
-        self._processes = ProcessGroup(part.run_folder)
-        self._managed = {
-            row.name: _ManagedProcess(row, RestartBackoff(ROUTER if row.name == ROUTER_NAME else part.restart))
-            for row in host_plan.rows(part)
-        }
+        self._engine = engine
         self._outbox = Outbox(part.fleet, self._me, incarnations.drawn(), first=1)
         self._obeyed = (0, 0)
         self._orders: OrderedDict[int, int] = OrderedDict()
@@ -89,7 +69,7 @@ class Supervisor:
         """Ledger on disk."""
         self._refused = False
         """True: the disk did not take the last ledger."""
-        self._began = clock.now()
+        self._guardian = _GuardianWatch(part)
         self._tell_at = 0.0
         self._join_at = 0.0
         self._wake = threading.Event()
@@ -97,36 +77,44 @@ class Supervisor:
         self._links = Links()
         self._decoder = Decoder()
         self._bus: ZenohBus | None = None
-        self._tails: dict[str, Tail] = {}
+        self._tails: dict[str, LogSource] = {}
         self._ending = False
 
-    def run(self) -> int:
-        """Run until SIGTERM, Ctrl-C or an order `down`; all children have ended when it returns 0."""
+    def run(self) -> None:
+        """Run until SIGTERM, Ctrl-C or an order `down`; all processes have ended when it returns."""
         bell, ring = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.set_wakeup_fd(ring)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: self._stop())
         signal.signal(signal.SIGCHLD, lambda *_: None)
-        try:
-            self._write_ledger()
-            while not self._ending:
-                self._step(clock.now())
-                if not self._wake.is_set():
-                    ready, _, _ = select.select([bell], [], [], STEP_S)
-                    if ready:
-                        os.read(bell, 4096)
-                self._wake.clear()
-            self._end()
-            return 0
-        finally:
-            self._processes.kill_all()
-            sweep(self._part.folder)
+        self._adopt()
+        wakes = [bell, *(one.fileno() for one in self._engine.wakes)]
+        while not self._ending:
+            self._step(clock.now())
+            if not self._wake.is_set():
+                ready, _, _ = select.select(wakes, [], [], STEP_S)
+                if bell in ready:
+                    os.read(bell, 4096)
+            self._wake.clear()
+        self._end()
 
     def _stop(self) -> None:
         self._ending = True
 
+    def _adopt(self) -> None:
+        """Take over what an earlier supervisor started, and end what it started that is not of this plan."""
+        written = ledger(self._part.folder)
+        known = () if written is None else written.processes
+        self._engine.start(clock.now(), known)
+        adopted = [one.identity for one in self._engine.known()]
+        for orphan in (one.identity for one in known if one.identity not in adopted):
+            if identity.send_signal(orphan, signal.SIGKILL):
+                write_line(f"ended an orphan of an earlier supervisor: {' '.join(orphan.arguments)}", sys.stdout)
+        self._write_ledger()
+
     def _step(self, now: float) -> None:
-        changed = [managed for managed in self._managed.values() if self._look_after(managed, now)]
+        changed = self._engine.step(now, router_up=self._bus is not None)
+        self._guardian.step(now)
         self._join(now)
         told = self._hear(now)
         if changed or told or now >= self._tell_at:
@@ -138,59 +126,10 @@ class Supervisor:
             if tail.over(now):
                 del self._tails[name]
 
-    # --- the processes ---------------------------------------------------------------------------------------------
-
-    def _look_after(self, managed: _ManagedProcess, now: float) -> bool:
-        """Start the process when it is due, detect its end; return True when its state changed."""
-        name = managed.row.name
-        if managed.start_at is not None:
-            if now < managed.start_at or (name != ROUTER_NAME and self._waits_for_router(now)):
-                return False
-            self._start(managed, now)
-            return True
-        code = self._processes.code(name)
-        if managed.state != "running" or code is None:
-            return False
-        managed.ended = str(self._processes.exit_of(name))
-        write_line(managed.ended, sys.stdout)
-        if managed.ordered_end:
-            managed.ordered_end = False
-            managed.start_at, managed.state = now, "waiting"
-            return True
-        verdict = managed.backoff.ended(code, now)
-        managed.start_at, managed.state = verdict.at, verdict.word
-        if name == ROUTER_NAME and verdict.at is None:
-            if managed.starts == 1:
-                raise Refused(managed.ended)
-            managed.start_at, managed.state = now + TELL_S, "waiting"  # it could listen before: retry
-        return True
-
-    def _waits_for_router(self, now: float) -> bool:
-        """Return True during startup until the router is up, so that processes need not retry to connect."""
-        return self._bus is None and now < self._began + ROUTER_S
-
-    def _start(self, managed: _ManagedProcess, now: float) -> None:
-        row = managed.row if managed.starts == 0 or not self._remembers(managed) else managed.row.restarted()
-        managed.start_at = None
-        managed.began, managed.began_ms = now, clock.wall_ms()
-        managed.starts += 1
-        try:
-            self._processes.start(row)
-            managed.state = "running"
-        except OSError as error:
-            managed.ended = f"{row.name} cannot be started: {error.strerror}"
-            verdict = managed.backoff.ended(1, now)
-            managed.start_at, managed.state = verdict.at, verdict.word
-
-    def _remembers(self, managed: _ManagedProcess) -> bool:
-        """Return False for a world that ended before it wrote its first state: it starts without `--resume`."""
-        return not managed.row.restart_args or (self._part.run_folder / STATE).exists()
-
     def _write_ledger(self) -> None:
         me = identity.identify(os.getpid())
         assert me is not None
-        children = [self._processes.identity(name) for name in self._managed]
-        book = Ledger(self._part.run, self._part.digest, me, tuple(child for child in children if child is not None))
+        book = Ledger(self._part.run, self._part.digest, me, tuple(self._engine.known()))
         if book == self._book:
             return
         path = self._part.folder / LEDGER
@@ -202,18 +141,16 @@ class Supervisor:
             self._book = book
 
     def _end(self) -> None:
-        """Terminate robots and world in order, publish a last status, then terminate the router."""
-        self._processes.terminate([name for name in self._managed if name != ROUTER_NAME], END_S)
-        for managed in self._managed.values():
-            if managed.row.name != ROUTER_NAME:
-                managed.state, managed.ended = "ended", "lfa down"
+        """Terminate the guardian, then robots and world in order, publish a last status, terminate the router."""
+        self._guardian.end()
+        self._engine.stop(clock.now(), router=False)
         self._tell(clock.now())
         if self._bus is not None:
             clock.sleep(LAST_WORDS_S)
             leaving = threading.Thread(target=self._bus.close, daemon=True)
             leaving.start()
-            leaving.join(LEAVE_S)  # closing takes longer if the router hangs
-        self._processes.terminate([ROUTER_NAME], LEAVE_S)
+            leaving.join(LEAVE_S)
+        self._engine.stop(clock.now(), router=True)
 
     # --- messages --------------------------------------------------------------------------------------------------
 
@@ -250,7 +187,8 @@ class Supervisor:
         """Execute each order once, however often it is repeated; return True when it is to be confirmed."""
         place, _, name = order.target.rpartition("/")
         here = not place and name in ("", self._part.host)
-        if place not in ("", self._part.host) or not (here or name in self._managed):
+        names = self._engine.names if here else (name,)
+        if place not in ("", self._part.host) or not (here or name in self._engine.names):
             return False
         number = (order.header.incarnation, order.header.seq)
         if order.header.seq <= self._orders.get(order.header.incarnation, 0):
@@ -263,29 +201,19 @@ class Supervisor:
         if order.deed == "down" and here:
             self._ending = True
         elif order.deed == "restart":
-            for managed in self._managed.values() if here else (self._managed[name],):
-                self._start_again(managed, now)
+            for one in names:
+                self._engine.restart(one, now)
         elif order.deed == "logs":
-            for one in self._managed if here else (name,):
+            for one in names:
                 if order.lines or one not in self._tails:
-                    self._tails[one] = Tail(self._processes.log(one), order.lines, now)
+                    self._tails[one] = self._engine.logs(one, order.lines, now)
                 self._tails[one].prolong(now)
         return True
-
-    def _start_again(self, managed: _ManagedProcess, now: float) -> None:
-        managed.backoff.forget()
-        if self._processes.runs(managed.row.name):
-            managed.ordered_end = True
-            self._processes.signal(managed.row.name, signal.SIGTERM)
-            self._processes.signal(managed.row.name, signal.SIGCONT)
-        else:
-            managed.start_at = now
 
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_S
         self._write_ledger()
-        reports = tuple(managed.report(self._processes.pid(name), now) for name, managed in self._managed.items())
-        part = self._part
+        part, reports = self._part, self._engine.states(now)
         header = self._outbox.header("host", now)
         self._publish("host", HostStatus(header, part.host, part.version, part.run, self._obeyed, reports))
 
@@ -294,19 +222,75 @@ class Supervisor:
             send(self._bus, self._outbox.envelope(topic, message))
 
 
+class _GuardianWatch:
+    """Watch over the guardian: signs of life to it, and a new one in place of one that ended or hangs."""
+
+    def __init__(self, part: HostPlan) -> None:
+        """Open the socket for its signs of life. Raises Refused."""
+        self._part = part
+        self._signs = SignSocket(part.folder / GUARD)
+        self._watchdog = HangDetector(part.restart.watchdog_s)
+        self._sign = Notify(str(part.folder / WATCH))
+        self._at = 0.0
+        self._known: Identity | None = None
+        self._spawned: subprocess.Popen[bytes] | None = None
+
+    def step(self, now: float) -> None:
+        if now >= self._at:
+            self._at = now + SIGN_S
+            self._sign.alive()
+            if self._spawned is not None:
+                self._spawned.poll()  # or its end would leave a zombie
+            if self._known is None or identity.identify(self._known.pid) != self._known:
+                self._find(now)
+        if self._known is not None and self._known.pid in self._signs.take():
+            self._watchdog.alive(GUARDIAN, now)
+        if self._known is not None and self._watchdog.hung(now):
+            write_line(f"the guardian hung: no sign of life for {self._watchdog.limit_s:g} s; killed", sys.stdout)
+            identity.send_signal(self._known, signal.SIGKILL)
+
+    def _find(self, now: float) -> None:
+        """Watch the guardian that runs, or start one."""
+        self._known = next(watchers(self._part.folder, GUARDIAN), None)
+        if self._known is None:
+            write_line("starts a guardian", sys.stdout)
+            self._spawned = spawn(GUARDIAN, self._part.folder / host_plan.PART)
+            self._known = identity.identify(self._spawned.pid)
+        self._watchdog.started(GUARDIAN, now)
+
+    def end(self) -> None:
+        """End the guardian: it would start a supervisor again that ended in order."""
+        for guardian in watchers(self._part.folder, GUARDIAN):
+            identity.send_signal(guardian, signal.SIGTERM)
+            identity.send_signal(guardian, signal.SIGCONT)
+        self._signs.close()
+
+
 def main() -> None:
-    """Run the supervisor. Exit codes: 0 ended in order, 2 refused."""
+    """Run the supervisor. Exit codes: 0 ended in order, 2 refused; after any other, its processes go on."""
     try:
-        part = host_plan.read(Path(sys.argv[1]))
-        if living(part.folder) is not None:
-            raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
-        for orphan in end_orphans(part.folder):
-            write_line(f"ended an orphan of an earlier supervisor: {orphan}", sys.stdout)
-        code = Supervisor(part).run()
+        _supervise(host_plan.read(Path(sys.argv[1])))
+        code = 0
     except Refused as refused:
         write_line(f"lfa-supervise: {refused}", sys.stderr)
         code = REFUSED_CODE
+    sys.stdout.flush()
     os._exit(code)  # a session that did not close would block the exit
+
+
+def _supervise(part: HostPlan) -> None:
+    """Supervise until the end in order, and leave nothing. Raises Refused, also with nothing left."""
+    if living(part.folder) is not None:
+        raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
+    state = part.run_folder / STATE
+    engine = OwnEngine(host_plan.rows(part), part.restart, part.folder, part.run_folder, remembered=state)
+    try:
+        Supervisor(part, engine).run()
+    except Refused:
+        engine.kill()
+        raise
+    engine.close()
+    sweep(part.folder)
 
 
 if __name__ == "__main__":

@@ -219,6 +219,7 @@ def _restart(file: FleetFile) -> Iterator[Mistake]:
             Range("restart.delay_max_s", restart.delay_max_s, restart.delay_s, 3600.0, "restart.delay_s"),
             Range("restart.window_s", restart.window_s, 1.0, 86400.0),
             Range("restart.starts_max", restart.starts_max, 0, 1000),
+            Range("restart.watchdog_s", restart.watchdog_s, 2.0, 3600.0),
         )
     )
 

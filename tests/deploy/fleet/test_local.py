@@ -16,7 +16,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, living
+from lfa.deploy.fleet.engine.engine import KnownProcess
+from lfa.deploy.fleet.host.ledger import GUARDIAN, LEDGER, Ledger, end_orphans, living, watchers
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity, identify, own_processes
@@ -30,7 +31,7 @@ fleet = "{FLEET}"
 scenario = "straight"
 team = 2
 hosts.laptop.address = "localhost"
-restart = {{ delay_s = 0.1 }}
+restart = {{ delay_s = 0.1, watchdog_s = 2.0 }}
 """
 
 
@@ -153,13 +154,58 @@ def test_up_again_starts_nothing_and_another_file_is_refused(up: Home) -> None:
     assert {name: row["pid"] for name, row in up.rows().items()} == pids
 
 
-def test_a_killed_supervisor_takes_its_processes_with_it_and_up_starts_anew(up: Home) -> None:
-    everybody = up.processes()
+def test_a_killed_supervisor_comes_back_and_adopts_its_processes_which_drive_on(up: Home) -> None:
+    before = {name: row["pid"] for name, row in up.rows().items()}
+    starts = {name: row["starts"] for name, row in up.rows().items()}
     book = living(up.state)
     assert book is not None and identity.send_signal(book.supervisor, signal.SIGKILL)
-    eventually(lambda: all(identify(one.pid) != one for one in everybody), "something outlives its supervisor")
-    done = up.lfa("up", str(up.file))
-    assert done.returncode == 0, done.stderr
+    eventually(lambda: _is_back(up, book.supervisor), "the supervisor does not come back")
+    after = up.rows()
+    assert {name: row["pid"] for name, row in after.items()} == before, "none was started anew"
+    assert {name: row["starts"] for name, row in after.items()} == starts
+    robot = up.process("lfa.agents.cli", "2")
+    assert identity.send_signal(robot, signal.SIGKILL)
+    eventually(lambda: any(one != robot for one in _of(up, "2")), "what it adopted is not watched")
+
+
+def test_a_killed_guardian_comes_back_and_guards_again(up: Home) -> None:
+    guardian = up.process("lfa.deploy.fleet.host.guardian")
+    assert identity.send_signal(guardian, signal.SIGKILL)
+    eventually(lambda: _other_guardian(up, guardian), "the guardian does not come back")
+    book = living(up.state)
+    assert book is not None and identity.send_signal(book.supervisor, signal.SIGKILL)
+    eventually(lambda: _is_back(up, book.supervisor), "the new guardian does not guard")
+
+
+def test_a_hung_robot_is_killed_within_the_watchdogs_time_and_rejoins(up: Home) -> None:
+    hung = up.process("lfa.agents.cli", "2")
+    assert identity.send_signal(hung, signal.SIGSTOP)
+    eventually(lambda: any(one != hung for one in _of(up, "2")), "what hangs is not restarted")
+    row = up.rows()["robot2"]
+    assert row["ended"] == "robot2 hung: no sign of life for 2 s; killed"
+    done = up.lfa("up", str(up.file), "--json")
+    assert (done.returncode, set(json.loads(done.stdout)["chain"])) == (0, {1, 2}), "it is in the chain again"
+
+
+@pytest.mark.parametrize("module", ["supervisor", "guardian"])
+def test_a_watcher_that_hangs_is_replaced_by_the_other_one(up: Home, module: str) -> None:
+    eventually(lambda: living(up.state) is not None, "no supervisor runs")
+    eventually(lambda: _other_guardian(up, None), "no guardian runs")
+    hung = up.process(f"lfa.deploy.fleet.host.{module}")
+    pids = {name: row["pid"] for name, row in up.rows().items()}
+    assert identity.send_signal(hung, signal.SIGSTOP)
+    eventually(lambda: identify(hung.pid) != hung, f"a hung {module} is not ended")
+    eventually(lambda: living(up.state) is not None and _other_guardian(up, None), f"no {module} comes back")
+    assert {name: row["pid"] for name, row in up.rows().items()} == pids
+
+
+def _is_back(home: Home, before: Identity) -> bool:
+    book = living(home.state)
+    return book is not None and book.supervisor != before
+
+
+def _other_guardian(home: Home, before: Identity | None) -> bool:
+    return any(one != before for one in watchers(home.state, GUARDIAN))
 
 
 def test_orphans_of_an_earlier_life_are_ended_and_nobody_else(up: Home) -> None:
@@ -172,7 +218,8 @@ def test_orphans_of_an_earlier_life_are_ended_and_nobody_else(up: Home) -> None:
         assert lost is not None and other is not None
         dead = Identity(2**22 - 1, 1, os.getuid(), ("gone",))
         elsewhere = Identity(other.pid, other.started - 1, other.user, other.arguments)
-        (up.state / LEDGER).write_bytes(msgspec.json.encode(Ledger(part.run, part.digest, dead, (lost, elsewhere))))
+        known = tuple(KnownProcess(f"robot{n}", one, 1, 0) for n, one in enumerate((lost, elsewhere)))
+        (up.state / LEDGER).write_bytes(msgspec.json.encode(Ledger(part.run, part.digest, dead, known)))
         assert len(end_orphans(up.state)) == 1
         assert orphan.wait(10.0) == -signal.SIGKILL
         assert stranger.poll() is None

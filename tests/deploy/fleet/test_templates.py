@@ -57,7 +57,9 @@ def test_a_unit_is_locked_up_and_starts_again(unit: Path) -> None:
     assert facts["Restart"] in ("always", "on-failure")
 
 
-@pytest.mark.parametrize("name", ["lfa-agent@.service", "lfa-driver@.service", "lfa-world.service"])
+@pytest.mark.parametrize(
+    "name", ["lfa-agent@.service", "lfa-driver@.service", "lfa-world.service", "lfa-router.service"]
+)
 def test_the_loop_is_watched(name: str) -> None:
     facts = service(TEMPLATES / "systemd" / name)
     assert facts["Type"] == "notify" and int(facts["WatchdogSec"]) >= 3, "the loop tells of itself once a second"

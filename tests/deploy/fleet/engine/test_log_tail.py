@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lfa.deploy.fleet.host.log_tail import FOLLOW_S, LINE_CHARACTERS_MAX, Tail
+from lfa.deploy.fleet.engine.log_tail import FOLLOW_S, LINE_CHARACTERS_MAX, Tail
 
 
 def test_the_last_lines_come_first_and_then_what_is_written(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Fleet files as units and manifests for engines that exist: systemd, Quadlet, Compose, Kubernetes, Nomad."""

@@ -1,0 +1,89 @@
+"""`lfa export`: write the units or manifests of a fleet file for an engine, with keys as its secrets."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+import typer
+from msgspec.structs import replace
+
+from lfa.deploy.fleet.export.compose import compose
+from lfa.deploy.fleet.export.kubernetes import kubernetes
+from lfa.deploy.fleet.export.nomad import nomad
+from lfa.deploy.fleet.export.quadlet import quadlet
+from lfa.deploy.fleet.export.services import PORT, USER, secured, services
+from lfa.deploy.fleet.export.systemd import RUN, state_of, systemd
+from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
+from lfa.deploy.fleet.plan.host_plan import parts
+from lfa.deploy.fleet.remote.key_distribution import bundles
+from lfa.deploy.fleet.security.private_files import private_folder, write_private
+from lfa.protocol.errors import Refused
+
+NEXT = {
+    "systemd": "on each machine, in its folder: sh install.sh",
+    "quadlet": "on each machine, in its folder: sh install.sh",
+    "compose": "docker compose -f {folder}/compose.yaml up",
+    "kubernetes": "kubectl apply -f {folder}/lfa.yaml -f {folder}/secrets.yaml",
+    "nomad": "in {folder}: sh install.sh",
+}
+
+
+def command(
+    engine: Annotated[
+        Literal["systemd", "quadlet", "compose", "kubernetes", "nomad"], typer.Argument(help="Engine to export for.")
+    ],
+    file: Annotated[Path, typer.Argument(help="A fleet file (deploy/fleet.example.toml is one).")],
+    out: Annotated[Path | None, typer.Option(help="New or empty folder. Default: FLEET-ENGINE.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the written files as JSON.")] = False,
+) -> int:
+    plan = secured(load(file))
+    folder = out or Path(f"{plan.name}-{engine}")
+    _check_empty(folder)
+    files = exported(engine, plan)
+    _write(folder, files)
+    then = NEXT[engine].format(folder=folder)
+    if as_json:
+        print(msgspec.json.encode({"folder": str(folder), "files": sorted(files), "next": then}).decode())
+    else:
+        print(f"{len(files)} files in {folder}, private keys among them\nnext: {then}")
+    return 0
+
+
+def exported(engine: str, plan: FleetPlan) -> dict[str, str]:
+    """Return the files of a secured plan's export by path; keys are created where missing. Raises Refused."""
+    if engine in ("compose", "kubernetes"):
+        strange = [name for name, machine in plan.hosts.items() if machine.router_port != PORT]
+        if strange:
+            raise Refused(
+                f"hosts.{strange[0]}.router_port: must be {PORT}, each router has an address of its own there"
+            )
+    keys = bundles(plan)
+    if engine == "systemd":
+        shares = parts(plan, RUN, "", keys)
+        return systemd({host: replace(part, state=state_of(plan.name, host)) for host, part in shares.items()})
+    fleet = services(plan, keys, "names" if engine in ("compose", "kubernetes") else "addresses")
+    if engine == "compose":
+        return compose(fleet, USER if os.geteuid() == 0 else os.geteuid())
+    return {"kubernetes": kubernetes, "nomad": nomad, "quadlet": quadlet}[engine](fleet)
+
+
+def _check_empty(folder: Path) -> None:
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise Refused(f"--out {folder}: is there already, must be a new or an empty folder")
+
+
+def _write(folder: Path, files: dict[str, str]) -> None:
+    """Write the files, which only their owner can read; as root, keys for containers get the containers' user."""
+    try:
+        for path, text in files.items():
+            place = folder / path
+            private_folder(place.parent)
+            write_private(place, text.encode())
+            if os.geteuid() == 0 and path.startswith("keys/"):
+                os.chown(place, USER, USER)
+        folder.chmod(0o700)
+    except OSError as error:
+        raise Refused(f"--out {folder}: {error.strerror}: must be a place to write to") from None
