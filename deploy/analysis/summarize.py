@@ -69,7 +69,7 @@ def summary_of(
         violations=violations,
     )
     wanted = scenario.asserted
-    if wanted.goal_reached:
+    if wanted.goal_reached and verdict.outcome != "recorded":
         reached = Assertion("goal_reached", verdict.outcome == "goal_reached", verdict.reason or "")
         summary.assertions.insert(0, reached)
     followed = (tracking_errors.of_follower(seen, robot.id) for robot in robots if robot.alive)

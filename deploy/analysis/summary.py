@@ -15,7 +15,7 @@ from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.world.description.load import Outcome
 
 SUMMARY = "summary.json"
-ENDED_WELL = ("goal_reached", "time_limit")
+ENDED_WELL = ("goal_reached", "time_limit", "recorded")
 
 
 class RobotSummary(Struct, kw_only=True):

@@ -40,8 +40,7 @@ def text(summary: Summary, folder: Path | None, *, verbose: bool = False) -> str
     return "\n".join(
         [
             f"{summary.scenario}, {summary.mode}, seed {summary.seed}: {summary.outcome}{reason}",
-            f"  {summary.sim_duration_s:.1f} s in {summary.duration_s:.1f} s, {summary.real_time_factor:g} x real time"
-            f"{'' if summary.arrived_at_s is None else f'; the leader arrived at {summary.arrived_at_s:.1f} s'}",
+            f"  {_lasted(summary)}",
             *(f"  {line}" for line in _aligned(rows)),
             *(f"  {line}" for line in _notes(summary)),
             *(f"  {line}" for line in _leaders(summary, verbose)),
@@ -52,6 +51,14 @@ def text(summary: Summary, folder: Path | None, *, verbose: bool = False) -> str
             *([] if folder is None else _hints(summary, folder)),
         ]
     )
+
+
+def _lasted(summary: Summary) -> str:
+    arrived = "" if summary.arrived_at_s is None else f"; the leader arrived at {summary.arrived_at_s:.1f} s"
+    took = f"{summary.sim_duration_s:.1f} s in {summary.duration_s:.1f} s, {summary.real_time_factor:g} x real time"
+    if summary.mode == "recorded":
+        took = f"recorded for {summary.duration_s:.1f} s, to {summary.sim_duration_s:.1f} s of its time"
+    return f"{took}{arrived}"
 
 
 def lfa() -> str:

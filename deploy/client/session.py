@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 from msgspec import Struct
@@ -13,6 +14,7 @@ from lfa.deploy.process.identity import own_processes
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
+from lfa.protocol.names import whole_number
 from lfa.protocol.node import Local, PeerDown, PeerUp
 from lfa.protocol.topics import OPERATOR_NAME, alive_key, fleet_name
 from lfa.protocol.transport.bus import Arrival, Inbox, Wake
@@ -131,6 +133,12 @@ def listen(
 
 def scenario_of_fleet(fleet: FleetAddress) -> Scenario | None:
     """Return the drawn scenario of the fleet's world, if that is one of this user's processes here; else None."""
+    known = world_of_fleet(fleet)
+    return None if known is None else known[0]
+
+
+def world_of_fleet(fleet: FleetAddress) -> tuple[Scenario, int] | None:
+    """Return scenario and seed of the fleet's world, if that is one of this user's processes here; else None."""
     for identity in own_processes():
         words = list(identity.arguments)
         module = next(
@@ -139,8 +147,11 @@ def scenario_of_fleet(fleet: FleetAddress) -> Scenario | None:
         if module is None or option(words, "--fleet", "fleet") != fleet.name:
             continue
         named = next((word for word in words[module + 1 :] if not word.startswith("-")), "")
+        overrides = [after for word, after in pairwise(words) if word == "--set"]
+        overrides += [word.removeprefix("--set=") for word in words if word.startswith("--set=")]
+        seed = whole_number(option(words, "--seed", "0")) or 0
         try:
-            return draw(load(named), int(option(words, "--seed", "0")))
+            return draw(load(named, overrides, whole_number(option(words, "--robots", ""))), seed), seed
         except (Refused, ValueError):
             return None
     return None

@@ -11,21 +11,38 @@ from typing import Annotated
 import msgspec
 import typer
 
-from lfa.deploy.client.session import FleetAddress, Subscriber, find, listen, scenario_of_fleet
+from lfa.deploy.analysis.summarize import summarize
+from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.analysis.summary import write as write_summary
+from lfa.deploy.analysis.summary_table import text
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.session import FleetAddress, Subscriber, find, listen, world_of_fleet
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.remote import journals
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.holes import Holes
-from lfa.deploy.recording.recorder import Recorder
-from lfa.deploy.recording.run_folder import RUNS, About, make
+from lfa.deploy.recording.outcome import Verdict
+from lfa.deploy.recording.provenance import provenance
+from lfa.deploy.recording.recorder import Recorder, Recording
+from lfa.deploy.recording.run_folder import RUNS, SCENARIO, About, make, toml
 from lfa.deploy.recording.simulation_time import WorldTime
-from lfa.protocol import clock
+from lfa.deploy.run.termination import Referee
+from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import MissionNote
+from lfa.protocol.mission import Mission
 from lfa.protocol.output import write_line
+from lfa.protocol.transport.message_bus import send
+from lfa.world.description.load import Scenario
 
 POLL_S = 0.05
 SPLIT_MB = 256.0
+NEED_TRUTH = (
+    "goal_reached", "distance_error_max_m", "distance_error_rms_m", "bearing_error_rms_rad", "settled_within_s",
+    "contacts_max", "separation_min_m", "left_behind_max",
+)  # fmt: skip
+"""Assertions about what only ground truth shows."""
 
 
 def command(
@@ -50,50 +67,90 @@ def command(
     plan = None if hosts is None else load(hosts)
     found = find(fleet, connect, keys)
     with listen(found, frozenset({"**"}), every=True) as ear, Interrupts() as interrupts:
-        folder = _folder(found, out)
-        about = About(found.name, "onlooker", 0, found.name).metadata()
-        recorder = Recorder(folder, about, split_bytes=round(1e6 * split_mb), keep=keep)
+        world = world_of_fleet(found)
+        folder = _folder(found, out, world[0] if world else None)
+        name, seed = (world[0].name, world[1]) if world else (found.name, 0)
+        about = About(name, "recorded", seed, found.name, provenance())
+        recorder = Recorder(folder, about.metadata(), split_bytes=round(1e6 * split_mb), keep=keep)
         kept = journals.of_processes(found.name)
         write_line(f"records fleet {found.name} into {folder}", sys.stderr if as_json else sys.stdout)
-        begun, seen, holes = clock.now(), WorldTime(), Holes()
+        begun, seen = clock.now(), WorldTime()
+        followed = _Followed(recorder, seen, begun, world[0] if world else None)
+        send(ear.bus, Operator(found.name, incarnations.drawn()).ask("mission", begun))
         while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
             clock.sleep(POLL_S)
-            _write(ear, recorder, seen, holes, begun)
+            followed.write(ear)
         recording = recorder.close()
+        lasted_s = clock.now() - begun
     came = journals.copy(kept | journals.of_processes(found.name), folder)
     if plan is not None:
         fetched, wrong = journals.fetch(plan, folder)
         came += fetched
         for line in wrong:
             print(f"lfa: {line}", file=sys.stderr)
-    recording.dropped, recording.missing, recording.holes = ear.dropped, holes.missing, holes.widest()
+    recording.dropped, recording.missing, recording.holes = ear.dropped, followed.holes.missing, followed.holes.widest()
+    summary = followed.summarize(folder, about, recording, lasted_s)
     code = 0 if recording.messages and not recording.dropped and not recording.unwritten else 1
     for line in recording.losses():
         print(f"lfa: {line}", file=sys.stderr)
     if as_json:
-        facts = {"folder": str(folder), "fleet": found.name, "journals": came}
+        facts = {"folder": str(folder), "fleet": found.name, "journals": came, "summary": summary}
         print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
         return code
     files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
+    if summary is not None:
+        print(text(summary, folder))
+        code = code or summary.exit_code
     lost = recording.dropped + sum(hole.missing for hole in recording.holes)
     with_holes = ", with holes" if recording.holes else ""
     print(f"{recording.messages} messages, {lost} lost, {files}, {came} journals: {folder}{with_holes}")
     return code
 
 
-def _write(ear: Subscriber, recorder: Recorder, seen: WorldTime, holes: Holes, begun: float) -> None:
-    """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
-    for arrival, message in ear.take():
-        if isinstance(message, Truth):
-            seen.see(arrival.at, message.time_s)
-        at = seen.of(arrival.at) if seen.known else arrival.at - begun
-        recorder.record(at, arrival.key, message)
-        holes.see(at, arrival.key, message.header)
+class _Followed:
+    """What is recorded of a fleet, and what becomes of its run meanwhile."""
+
+    def __init__(self, recorder: Recorder, seen: WorldTime, begun: float, scenario: Scenario | None) -> None:
+        self._recorder = recorder
+        self._seen = seen
+        self._begun = begun
+        self._scenario = scenario
+        self._mission: Mission | None = None
+        self.holes = Holes()
+        self._referee = None if scenario is None else Referee(scenario)
+
+    def write(self, ear: Subscriber) -> None:
+        """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
+        for arrival, message in ear.take():
+            if isinstance(message, Truth):
+                self._seen.see(arrival.at, message.time_s)
+            elif isinstance(message, MissionNote):
+                self._mission = message.mission
+            if self._referee is not None:
+                self._referee.see(message)
+            at_s = self._seen.of(arrival.at) if self._seen.known else arrival.at - self._begun
+            self._recorder.record(at_s, arrival.key, message)
+            self.holes.see(at_s, arrival.key, message.header)
+
+    def summarize(self, folder: Path, about: About, recording: Recording, lasted_s: float) -> Summary | None:
+        """Write the summary of what was recorded and return it; None if not even the mission is known."""
+        if self._scenario is None:
+            if self._mission is None:
+                return None
+            fleet = Scenario(title=f"Fleet {about.fleet}", mission=self._mission, time_limit_s=max(lasted_s, 1.0))
+            (folder / SCENARIO).write_text(toml(fleet), encoding="utf-8")
+        verdict = (self._referee.verdict if self._referee is not None else None) or Verdict("recorded")
+        summary = summarize(folder, about, verdict, lasted_s, ())
+        summary.recording, summary.warnings = recording, recording.losses()
+        if not self._seen.known:
+            summary.warnings.append("no ground truth was heard: errors, contacts and separation are not known")
+            summary.assertions = [one for one in summary.assertions if one.name not in NEED_TRUTH]
+        write_summary(folder, summary)
+        return summary
 
 
-def _folder(fleet: FleetAddress, out: Path | None) -> Path:
+def _folder(fleet: FleetAddress, out: Path | None, scenario: Scenario | None) -> Path:
     """Create and return the folder; it contains the scenario (walls, obstacles) if the world runs on this machine."""
-    scenario = scenario_of_fleet(fleet)
     path = out or RUNS / f"{fleet.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     if scenario is not None:
         return make(path, scenario)

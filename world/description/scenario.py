@@ -182,4 +182,5 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     """Name of the scenario that this file is a saved session of (`lfa web`): its runs bear that name."""
 
 
-Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted"]
+Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted", "recorded"]
+"""How a run ended; `recorded`: it went on when its recording ended."""

@@ -18,10 +18,12 @@ from lfa.deploy.analysis.paper.criteria import Finding
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.analysis.summary import SUMMARY
 from lfa.deploy.analysis.verification.checker import Violation
-from lfa.deploy.analysis.verification.journals import verify
+from lfa.deploy.analysis.verification.journals import JournalVerdict, verify
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.analysis.verification.shares import check_share
 from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
+from lfa.deploy.recording import event_log
+from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.scenario_loading import load_controller_of_run
 from lfa.protocol.errors import Refused
 
@@ -114,7 +116,8 @@ def check(folder: Path) -> tuple[Checked, Kept]:
 
     Raises Refused when `folder` is no finished run or its journals cannot be re-executed.
     """
-    lease = verify(folder)
+    journalled = any((folder / JOURNALS).glob("*.bin"))
+    lease = verify(folder) if journalled or not (folder / SUMMARY).is_file() else from_events(folder)
     if not (folder / SUMMARY).is_file():
         raise Refused(f"{folder}: no {SUMMARY}, must be the folder of a run that came to its end")
     run = Run(folder)
@@ -123,6 +126,13 @@ def check(folder: Path) -> tuple[Checked, Kept]:
         str(folder), summary.scenario, summary.seed, lease.journals, lease.happenings, lease.broken, tuple(of_run(run))
     )
     return known, across_seeds.keep(run)
+
+
+def from_events(folder: Path) -> JournalVerdict:
+    """Return what the events alone show of a run without journals: whether terms went back (I2)."""
+    events = event_log.lines(folder)
+    broken = tuple(Violation(v.invariant, v.at_s, v.text) for v in event_log.terms_that_went_back(events))
+    return JournalVerdict(0, len(events), broken)
 
 
 def _faulty(one: Checked) -> bool:
@@ -137,6 +147,13 @@ def _print(one: Checked) -> None:
     for violation in one.broken:
         print(f"{violation.name} broken at {violation.at:.3f} s: {violation.text}")
     names = ", ".join(checker.name for checker in SAFETY)
+    if not one.journals:
+        print(
+            f"{one.folder}: {one.scenario}, seed {one.seed}\n"
+            f"{one.happenings} events, I2: {len(one.broken)} violations; "
+            "the other invariants need the journals of all processes, which their option --journal DIR keeps"
+        )
+        return
     print(
         f"{one.folder}: {one.scenario}, seed {one.seed}\n"
         f"{one.journals} journals, {one.happenings} happenings, {names}: {len(one.broken)} violations"
