@@ -123,13 +123,18 @@ pages: $(STAMP)
 pictures: $(STAMP)
 	rm -rf build/pictures
 	$(BIN)/lfa sim leader_killed --seed 7 --out build/pictures
+	$(BIN)/lfa view build/pictures --gif deploy/docs/pictures/killed.gif
 	cp $(foreach name,fig07_distance_error fig09_path_flow lease_timeline,build/pictures/figures/$(name).png) deploy/docs/pictures
 
 # The documentation site in build/site, from the pages of the repository and its docstrings, and tests of what was built.
 docs: $(STAMP) $(DOCS_STAMP)
 	rm -rf build/pages build/site
 	mkdir -p build/pages
+<<<<<<< HEAD
 	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.css' -o -path '*/examples/*.py' -o -name 'grafana.json' \
+=======
+	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.gif' -o -name '*.css' -o -path '*/examples/*.py' \
+>>>>>>> a5c9b03 (lfa web plays recordings; lfa view writes a run as one HTML file, a GIF or an MP4)
 	    | tar cf - -T - | tar xf - -C build/pages
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --config-file deploy/docs/mkdocs.yml
 	LFA_SITE=build/site $(BIN)/pytest tests/docs/test_site.py

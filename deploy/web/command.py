@@ -9,10 +9,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 
 from lfa.deploy.fleet.host.router import host_credentials
-from lfa.deploy.web.engine import Engine
+from lfa.deploy.view.picture.clip import clip_of
+from lfa.deploy.web.engine import Engine, RecordingEngine
 from lfa.deploy.web.lessons import LESSONS
 from lfa.deploy.web.server import PageServer, PageTokens, is_loopback
 from lfa.deploy.web.share import Setting, setting_of
@@ -25,7 +27,8 @@ HOST = "127.0.0.1"
 
 def command(
     what: Annotated[
-        str | None, typer.Argument(metavar="[SCENARIO | LINK]", help="Default: the lesson of the killed leader.")
+        list[str] | None,
+        typer.Argument(metavar="[SCENARIO | LINK | RUN [RUN]]", help="Default: the lesson of the killed leader."),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of noise, places and losses; default the scenario's.")] = None,
     robots: Annotated[int | None, typer.Option(help="Number of robots, instead of the scenario's.")] = None,
@@ -38,19 +41,25 @@ def command(
     if not 0 <= port <= 65535:
         raise Refused(f"--port {port}: must be from 0 to 65535")
     secure = _secured(listen, keys)
-    engine, fragment = _virtual(what, seed, robots, tuple(overrides or ()))
-    return serve_engine(engine, fragment, listen, port, secure)
+    runs = [Path(name) for name in what or () if Path(name).is_dir()]
+    if runs:
+        if len(runs) < len(what or ()) or seed is not None or robots is not None or overrides:
+            raise Refused("a run is shown as it was: give run folders only, one or two")
+        clip = msgspec.json.encode(clip_of(runs))
+        return serve_engine(RecordingEngine(), listen, port, secure, clip)
+    if len(what or ()) > 1:
+        raise Refused(f"{' '.join(what or ())}: must be one scenario, or one or two run folders")
+    engine = _virtual(what[0] if what else None, seed, robots, tuple(overrides or ()))
+    return serve_engine(engine, listen, port, secure)
 
 
-def serve_engine(
-    engine: Engine, fragment: str, listen: str, port: int, secure: ssl.SSLContext | None, clip: bytes = b""
-) -> int:
-    """Print the addresses of the page and serve it until Ctrl-C; `fragment` stands after the `#` of the address."""
+def serve_engine(engine: Engine, listen: str, port: int, secure: ssl.SSLContext | None, clip: bytes = b"") -> int:
+    """Print the addresses of the page and serve it until Ctrl-C."""
     tokens = PageTokens(secrets.token_urlsafe(18), secrets.token_urlsafe(18))
 
     def ready() -> None:
         base = f"http{'s' if secure else ''}://{f'[{listen}]' if ':' in listen else listen}:{server.port}/"
-        print(f"to operate: {base}?token={tokens.operator}{f'#{fragment}' if fragment else ''}")
+        print(f"to operate: {base}?token={tokens.operator}")
         print(f"to look:    {base}?token={tokens.viewer}", flush=True)
 
     server = PageServer(engine, tokens, clip)
@@ -62,16 +71,16 @@ def serve_engine(
     return 0
 
 
-def _virtual(what: str | None, seed: int | None, robots: int | None, overrides: tuple[str, ...]) -> tuple[Engine, str]:
+def _virtual(what: str | None, seed: int | None, robots: int | None, overrides: tuple[str, ...]) -> Engine:
     """Return the engine of a scenario, of a link, or of the first lesson. Raises Refused."""
     if what is None and seed is None and robots is None and not overrides:
         lesson = LESSONS[0]
-        return VirtualEngine(lesson.setting, lesson), ""
+        return VirtualEngine(lesson.setting, lesson)
     if what is not None and "#" in what:
         setting = setting_of(what)
     else:
         setting = Setting(what or LESSONS[0].setting.scenario, seed, robots, overrides)
-    return VirtualEngine(setting, allowed=setting.scenario), ""
+    return VirtualEngine(setting, allowed=setting.scenario)
 
 
 def _secured(listen: str, keys: Path | None) -> ssl.SSLContext | None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import hypot
 from typing import Any, Protocol
 
-from lfa.deploy.web.picture import COLUMNS, Picture
-from lfa.world.description.scenario import Obstacle, Scenario
-from lfa.world.description.terrain import patches_of
-
-CORNERS = 24
+from lfa.deploy.view.picture.picture import Picture
+from lfa.protocol.errors import Refused
 
 
 class Engine(Protocol):
@@ -39,41 +36,29 @@ class Engine(Protocol):
         """Release what the engine holds."""
 
 
-def ground_of(scenario: Scenario | None, label: str = "") -> dict[str, Any]:
-    """Return walls, obstacles, terrain, route and robots of a drawn scenario as plain lists, in metres in `map`."""
-    if scenario is None:
-        return {"label": label, "walls": [], "obstacles": [], "terrain": [], "route": [], "columns": COLUMNS}
-    mission, world = scenario.mission, scenario.world
-    explores = mission.leading.motion == "explore"
-    return {
-        "label": label,
-        "walls": [list(wall) for wall in world.walls_m],
-        "obstacles": [_shape(obstacle) for obstacle in world.obstacles],
-        "terrain": [_patch(patch) for patch in patches_of(world)],
-        "route": [] if explores else [list(point) for point in mission.leading.route_m],
-        "goal": list(mission.goal_m),
-        "robots": list(mission.robots),
-        "radius": mission.radius_m,
-        "gap": mission.formation.separation_m,
-        "limit": scenario.time_limit_s,
-        "columns": COLUMNS,
-    }
+class RecordingEngine:
+    """Engine of a page that plays a recording by itself: it has nothing to say."""
 
+    number = 0
 
-def _shape(obstacle: Obstacle) -> dict[str, Any]:
-    """Return an obstacle: its centre, and its outline relative to it."""
-    radius = obstacle.radius_m or 0.0
-    circle = [(radius * cos(2.0 * pi * n / CORNERS), radius * sin(2.0 * pi * n / CORNERS)) for n in range(CORNERS)]
-    return {"at": list(obstacle.center_m), "outline": [list(corner) for corner in obstacle.corners_m or circle]}
+    @property
+    def pictures(self) -> list[Picture]:
+        return []
 
+    def scene(self) -> dict[str, Any]:
+        return {"engine": "recording", "title": "", "panes": []}
 
-def _patch(patch: Any) -> dict[str, Any]:
-    """Return a terrain patch: its outline in `map`, and whether it rises."""
-    a, b, r = patch.half_x_m, patch.half_y_m, patch.radius_m
-    circle = [(r * cos(2.0 * pi * n / CORNERS), r * sin(2.0 * pi * n / CORNERS)) for n in range(CORNERS)]
-    corners = circle if r > 0.0 else [(a, -b), (a, b), (-a, b), (-a, -b)]
-    laid = [[patch.x + patch.c * u - patch.s * v, patch.y + patch.s * u + patch.c * v] for u, v in corners]
-    return {"outline": laid, "rises": patch.height_m > 0.0}
+    def state(self) -> dict[str, Any]:
+        return {}
+
+    def advance(self) -> None:
+        """Do nothing."""
+
+    def obey(self, order: dict[str, Any]) -> dict[str, Any]:
+        raise Refused(f"{str(order.get('do'))[:20]}: a recording takes no orders")
+
+    def close(self) -> None:
+        """Do nothing."""
 
 
 def robot_under(picture: Picture, robots: tuple[int, ...], x: float, y: float, apart_m: float) -> int | None:

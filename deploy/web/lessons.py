@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from lfa.deploy.web.picture import Picture
+from lfa.deploy.view.picture.picture import Picture
 from lfa.deploy.web.share import Setting
 
 SWING_S = 3.0

@@ -14,9 +14,10 @@ from lfa.deploy.faults.script import LEADER, Fault, parse, parse_all
 from lfa.deploy.recording.recorder import EventLines
 from lfa.deploy.run.simulate import SimulatedRun, refuse_common
 from lfa.deploy.scenario_loading import load_scenario
-from lfa.deploy.web.engine import ground_of, robot_under
+from lfa.deploy.view.picture.ground import ground_of
+from lfa.deploy.view.picture.picture import TOPICS, Picture
+from lfa.deploy.web.engine import robot_under
 from lfa.deploy.web.lessons import LESSONS, Lecture, Lesson
-from lfa.deploy.web.picture import TOPICS, Picture
 from lfa.deploy.web.share import FAULTS_MAX, Setting, fragment_of, saved, setting_of
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message

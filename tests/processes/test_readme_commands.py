@@ -36,6 +36,7 @@ ELSEWHERE = {
     "lfa view": "tests/deploy/view/test_bad_input.py",
     "lfa metrics": "tests/processes/test_metrics.py",
     "lfa web": "tests/deploy/web/test_page.py",
+    "lfa web RUN": "tests/deploy/web/test_recording.py",
     "lfa web SCENARIO": "tests/deploy/web/test_server.py",
     "lfa record": "tests/processes/test_looking.py",
     "lfa bench control --jobs 2": "tests/deploy/bench/test_control.py",

@@ -49,9 +49,14 @@ def command(
     keys: Annotated[Path | None, typer.Option(help="Folder written by lfa keys, for a secured fleet.")] = None,
     serve_web: Annotated[bool, typer.Option("--serve-web", help="Serve the viewer to a browser.")] = False,
     screenshot: Annotated[Path | None, typer.Option(help="Write a PNG and exit; needs no display.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write one HTML file that plays RUN, for anybody to open.")] = None,
+    gif: Annotated[Path | None, typer.Option(help="Write a film of RUN as a GIF.")] = None,
+    mp4: Annotated[Path | None, typer.Option(help="Write a film of RUN as an MP4; needs ffmpeg.")] = None,
     port: Annotated[int, typer.Option(help="Port for the data of viewers.")] = PORT,
     web_port: Annotated[int, typer.Option(help="Port for the viewer in a browser.")] = WEB_PORT,
 ) -> int:
+    if html is not None or gif is not None or mp4 is not None:
+        return _write_clip(folder, html, gif, mp4)
     need_rerun()
     if serve_web:
         check_free_port(port, "--port")
@@ -71,6 +76,22 @@ def command(
     if serve_web:
         return await_end(serve(web_port, port, str(rrd)))
     return run_viewer(str(rrd))
+
+
+def _write_clip(folder: Path | None, html: Path | None, gif: Path | None, mp4: Path | None) -> int:
+    """Write a recording as files that need no lfa; print their names. Raises Refused."""
+    from lfa.deploy.view.picture.clip import clip_of
+    from lfa.deploy.view.picture.film import write_gif, write_mp4
+    from lfa.deploy.view.picture.html_file import html_of
+
+    if folder is None:
+        raise Refused("--html, --gif and --mp4: need a run folder")
+    clip = clip_of([folder])
+    for path, write in ((html, lambda c, p: p.write_text(html_of(c), "utf-8")), (gif, write_gif), (mp4, write_mp4)):
+        if path is not None:
+            write(clip, path)
+            print(path)
+    return 0
 
 
 def converted(folder: Path) -> Path:

@@ -42,7 +42,7 @@ export class Controls {
     this.scrub = null;
     if (rights === "recording") {
       this.scrub = element("input", { type: "range", id: "scrub", min: 0, max: 1, step: 0.01, value: 0, "aria-label": "Time", list: "marks", oninput: () => page.order({ do: "seek", value: Number(this.scrub.value) }) });
-      parts.push(this.scrub);
+      parts.push(element("div", { class: "time" }, this.scrub, this.marks(scene.marks ?? [])));
     }
     if (acts) {
       parts.push(element("div", { class: "group", role: "group", "aria-label": "Formation" },
@@ -64,6 +64,18 @@ export class Controls {
     byId("stop").hidden = !acts || !scene.stop;
     this.buildOpen(scene, acts);
     this.setTool("look");
+  }
+
+  // Elections, contacts, faults and decisions on the time line.
+  marks(marks) {
+    const end = Math.max(1, this.page.scene.end ?? 1);
+    const holder = element("div", { class: "marks", "aria-hidden": "true" });
+    for (const [t, kind] of marks) {
+      const mark = element("i", { class: kind, title: `${seconds(t)} ${kind}` });
+      mark.style.left = `${(100 * t) / end}%`;
+      holder.append(mark);
+    }
+    return holder;
   }
 
   slider(name, min, max, step, words) {

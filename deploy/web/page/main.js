@@ -40,16 +40,23 @@ class Page {
     };
     const clip = document.getElementById("clip");
     if (clip) this.source = new ClipSource(JSON.parse(clip.textContent), handlers);
-    else if (new URLSearchParams(location.hash.slice(1)).has("recording"))
-      fetch(`clip.json${location.search}`).then((got) => got.json()).then((got) => (this.source = new ClipSource(got, handlers)));
     else this.source = new LiveSource(handlers);
+    this.handlers = handlers;
   }
 
   order(order) {
     this.source?.order(order);
   }
 
+  // A server that has a recording says so, and the clip is played here.
+  async #recording() {
+    this.source.close();
+    const got = await fetch(`clip.json${location.search}`);
+    this.source = new ClipSource(await got.json(), this.handlers);
+  }
+
   #scene(scene, rights, viewer) {
+    if (scene.engine === "recording" && rights !== "recording") return void this.#recording();
     Object.assign(this, { scene, rights, viewer });
     document.title = `lfa: ${scene.title}`;
     byId("title").textContent = scene.title;

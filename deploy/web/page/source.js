@@ -17,6 +17,7 @@ export class LiveSource {
     this.socket.onmessage = (event) => this.#hear(JSON.parse(event.data));
     this.socket.onopen = () => (this.tries = 0);
     this.socket.onclose = () => {
+      if (this.closed) return;
       this.tries += 1;
       this.handlers.lost();
       setTimeout(() => this.#open(), Math.min(5000, 300 * 2 ** this.tries));
@@ -32,6 +33,11 @@ export class LiveSource {
     } else if (message.news) {
       if (message.number === this.number) this.handlers.news(message.news);
     } else this.handlers.answer(message);
+  }
+
+  close() {
+    this.closed = true;
+    this.socket.close();
   }
 
   order(order) {
@@ -51,7 +57,7 @@ export class ClipSource {
     this.told = clip.panes.map(() => 0);
     this.shown = clip.panes.map(() => -1);
     this.last = 0;
-    handlers.scene(clip.scene, "recording", "");
+    handlers.scene({ ...clip.scene, end: this.end }, "recording", "");
     this.#show(true);
     requestAnimationFrame((at) => this.#tick(at));
   }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from lfa.deploy.client.term_count import TermCount
 from lfa.protocol.names import robot_id_of
 
 ENDINGS = {
@@ -35,6 +36,7 @@ class LeaderTable:
         self.stepped_down = False
         """True after a holder's lease ended, until another lease begins."""
         self._term: tuple[int, int] = (0, 0)
+        self._count = TermCount()
         self._hit: dict[int, str] = {}
         """How the present term of each robot was ended, or is about to be."""
 
@@ -55,6 +57,15 @@ class LeaderTable:
             case "leader_command" if robot is not None and event.term is not None:
                 return self._begin(t, robot, (int(event.term.n), int(event.term.issuer)))
         return None
+
+    def found(self, t: float, robot: int, term: tuple[int, int]) -> dict[str, Any] | None:
+        """Return the entry of a leader that led before anybody looked; None if one is known."""
+        if self.leader is not None:
+            return None
+        entry = self._begin(t, robot, term)
+        if entry is not None:
+            entry["why"] = "led already when this page began to look"
+        return entry
 
     def _note_fault(self, deed: str, target: Any) -> None:
         hit = self.leader if target == "leader" else target
@@ -77,6 +88,6 @@ class LeaderTable:
             why = f"robot {before} {self._hit.get(before, 'handed its lease over')}"
         self._hit.pop(robot, None)
         self.stepped_down = False
-        self._term, self.term, self.leader = term, term[0], robot
-        self.leads.append({"t": round(t, 3), "robot": robot, "term": term[0], "why": why})
+        self._term, self.term, self.leader = term, self._count.number(term[0]), robot
+        self.leads.append({"t": round(t, 3), "robot": robot, "term": self.term, "why": why})
         return self.leads[-1]

@@ -15,8 +15,8 @@ from msgspec import Struct
 from lfa.deploy.client.radio_loss import RadioLoss
 from lfa.deploy.client.team_status import told
 from lfa.deploy.faults.link_faults import links
-from lfa.deploy.web.leaders import LeaderTable
-from lfa.deploy.web.news import News
+from lfa.deploy.view.picture.leaders import LeaderTable
+from lfa.deploy.view.picture.news import News
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import wrap
 from lfa.protocol.names import robot_id_of, robot_name
