@@ -130,11 +130,7 @@ pictures: $(STAMP)
 docs: $(STAMP) $(DOCS_STAMP)
 	rm -rf build/pages build/site
 	mkdir -p build/pages
-<<<<<<< HEAD
-	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.css' -o -path '*/examples/*.py' -o -name 'grafana.json' \
-=======
-	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.gif' -o -name '*.css' -o -path '*/examples/*.py' \
->>>>>>> a5c9b03 (lfa web plays recordings; lfa view writes a run as one HTML file, a GIF or an MP4)
+	find $(PAGES) -name '*.md' -o -name '*.svg' -o -name '*.png' -o -name '*.gif' -o -name '*.css' -o -path '*/examples/*.py' -o -name 'grafana.json' \
 	    | tar cf - -T - | tar xf - -C build/pages
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --config-file deploy/docs/mkdocs.yml
 	LFA_SITE=build/site $(BIN)/pytest tests/docs/test_site.py
