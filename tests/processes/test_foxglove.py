@@ -33,8 +33,9 @@ def test_foxgloves_client_sees_the_fleet_and_hands_over(tmp_path: Path) -> None:
                 told["heard"]
             )
             assert "robot1/odom" in told["frames"]
-            assert {"/lfa/handover", "/lfa/formation/column"} <= set(told["services"])
-            assert told["called"] == {"success": True, "message": "robot 2 leads"}
+            assert {"/lfa/stop", "/lfa/resume", "/lfa/handover", "/lfa/formation/column"} <= set(told["services"])
+            assert told["called"]["success"], told["called"]
+            assert re.fullmatch(r"robot [23] leads", told["called"]["message"])  # a loaded machine may change it before
             eventually(lambda: any(e.get("change") == "handed_over" for e in run.events()), "nobody handed over")
             server.send_signal(signal.SIGINT)
             assert server.wait(30.0) == 0

@@ -64,7 +64,7 @@ def test_a_ros_users_sdk_lists_echoes_and_hands_over_and_the_robots_obey(tmp_pat
             assert bridged.returncode == 0
 
 
-def test_the_bridge_of_a_secured_fleet_shows_it_and_hands_over_with_the_operators_keys(tmp_path: Path) -> None:
+def test_the_bridge_of_a_secured_fleet_shows_and_commands_it_with_the_operators_keys(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     with attacked() as fleet:
         words = ("--serve", "--fleet", FLEET, "--connect", fleet.unix, "--keys", str(fleet.home))
@@ -72,10 +72,15 @@ def test_the_bridge_of_a_secured_fleet_shows_it_and_hands_over_with_the_operator
             node = space.node("user")
             odom = node.subscription("/robot1/odom", "nav_msgs/msg/Odometry")
             awaited(odom.take, "the secured fleet's odometry")
-            trigger = node.client("/lfa/handover", "std_srvs/srv/Trigger")
-            answered = trigger.call(kind("std_srvs/msg/Trigger_Request")(0), timeout_s=10.0)
-            assert answered is not None
-            assert (answered.success, answered.message) == (True, "robot 2 leads")
+            for service, told in (
+                ("/lfa/handover", "robot 2 leads"),
+                ("/lfa/stop", "stopped: robot1, robot2, robot3 (epoch 1)"),
+                ("/lfa/resume", "may go: robot1, robot2, robot3 (epoch 2)"),
+            ):
+                client = node.client(service, "std_srvs/srv/Trigger")
+                answered = client.call(kind("std_srvs/msg/Trigger_Request")(0), timeout_s=10.0)
+                assert answered is not None, service
+                assert (answered.success, answered.message) == (True, told)
 
 
 def test_without_a_ros_router_the_bridge_says_in_one_line_what_to_do(tmp_path: Path) -> None:

@@ -9,18 +9,26 @@ from typing import Protocol
 
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, scenario_of_fleet
+from lfa.deploy.client.stop_call import Said
 from lfa.deploy.ros import messages
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE
 from lfa.deploy.ros.bridge.sender_clocks import SenderClocks
+from lfa.deploy.ros.bridge.stop_calls import StopCalls
 from lfa.deploy.ros.mapping import FleetMapping, RosMessage
+from lfa.deploy.ros.session import ServiceCall
+from lfa.deploy.ros.topics import SOURCES
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.stop import StopState
+from lfa.protocol.messages.team import MissionNote
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.transport.message_bus import send
 
 PERIOD_S = 0.02
 EAGER = frozenset({"sensors", "scan"})
 """Topics that are passed on at once; all others within a period."""
+HEARD = SOURCES | {"*/stop_state"}
+"""Topics that a bridge hears: what it shows, and the gateways' answers to a stop."""
 
 
 class Output(Protocol):
@@ -51,9 +59,13 @@ class Bridge:
         self._operator = Operator(ear.fleet.name, incarnations.drawn())
         self._output = output
         self._mapping = FleetMapping(tf_per_robot=tf_per_robot, sim_time=sim_time, heard=output.heard)
+        self._robots: tuple[int, ...] = ()
+        """Robots of the mission; empty until it is known."""
+        self._stops = StopCalls(self._say_stop)
         scenario = scenario_of_fleet(ear.fleet)
         if scenario is not None:
             self._mapping.set_mission(scenario.mission)
+            self._robots = scenario.mission.robots
         self._clocks = SenderClocks(time.time_ns() - round(1e9 * clock.now()), sim_time=sim_time)
 
     @property
@@ -72,11 +84,17 @@ class Bridge:
                 continue
             owner = arrival.key.split("/", 3)[2]
             robot = robot_id_of(owner)
+            if isinstance(message, StopState) and robot:
+                self._stops.hear(robot, message, now)
+                continue
+            if isinstance(message, MissionNote):
+                self._robots = message.mission.robots
             if self._clocks.ready and (not robot or robot in present):
                 stamp_ns = self._clocks.stamp_ns(message.header, arrival.at)
                 self._output.publish(self._mapping.update(stamp_ns, owner, message))
         if self._clocks.ready:
             self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
+        self._stops.step(now)
 
     def _follow_robots(self) -> None:
         """Declare robots whose tokens appeared, undeclare those whose tokens vanished."""
@@ -90,6 +108,13 @@ class Bridge:
     def order(self, name: str, **arguments: object) -> None:
         """Send an operator's command to the fleet."""
         send(self._ear.bus, self._operator.command(name, clock.now(), **arguments))
+
+    def stop(self, call: ServiceCall, now: float, *, stand: bool) -> None:
+        """Say stop (`stand`) or resume to every gateway; `call` is answered by what became of it."""
+        self._stops.ask(call, {*self._robots, *self._output.robots}, now, stand=stand)
+
+    def _say_stop(self, said: Said, now: float) -> None:
+        send(self._ear.bus, self._operator.stop(said.word, said.gateways, now))
 
     def warn(self, words: str) -> None:
         """Print a warning, and publish it on /rosout."""

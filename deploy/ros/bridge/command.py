@@ -15,11 +15,11 @@ import typer
 
 from lfa.deploy.client.session import find, listen
 from lfa.deploy.process.signals import Interrupts
-from lfa.deploy.ros.bridge.bridge import EAGER, PERIOD_S, Bridge
+from lfa.deploy.ros.bridge.bridge import EAGER, HEARD, PERIOD_S, Bridge
 from lfa.deploy.ros.bridge.inward import OperatorInput
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE, RosOutput
 from lfa.deploy.ros.session import GraphFeed, RosSpace
-from lfa.deploy.ros.topics import SOURCES, WORLD_TIME
+from lfa.deploy.ros.topics import WORLD_TIME
 from lfa.deploy.ros.types import typestore
 from lfa.deploy.ros.wire import Distro, check_domain
 from lfa.protocol import clock
@@ -64,11 +64,11 @@ def command(
         space = RosSpace(session, domain, distro, wake)
         graph = GraphFeed(space)
         check_graph(graph, distro, 0.0 if serve else GRAPH_S)
-        sources = SOURCES | {WORLD_TIME} if sim_time else SOURCES
+        sources = HEARD | {WORLD_TIME} if sim_time else HEARD
         with Interrupts() as interrupts, listen(found, sources, every=True, wake=wake, eager=EAGER) as ear:
             output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
             bridge = Bridge(ear, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
-            orders = OperatorInput(output.node, bridge.order, bridge.warn)
+            orders = OperatorInput(output.node, bridge.order, bridge.stop, bridge.warn)
             foreign = ForeignNodes(graph, distro)
             how = "router at" if serve else "through"
             print(f"fleet {found.name} is on ROS domain {domain}, {how} {endpoint}", file=sys.stderr, flush=True)

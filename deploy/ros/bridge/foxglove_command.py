@@ -11,10 +11,11 @@ import typer
 
 from lfa.deploy.client.session import find, listen
 from lfa.deploy.process.signals import Interrupts
-from lfa.deploy.ros.bridge.bridge import EAGER, PERIOD_S, Bridge
+from lfa.deploy.ros.bridge.answers import answer
+from lfa.deploy.ros.bridge.bridge import EAGER, HEARD, PERIOD_S, Bridge
 from lfa.deploy.ros.bridge.foxglove_output import FoxgloveOutput
-from lfa.deploy.ros.bridge.inward import HandoverCalls, answer
-from lfa.deploy.ros.topics import SOURCES
+from lfa.deploy.ros.bridge.inward import HandoverCalls
+from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.bus import Wake
@@ -44,8 +45,8 @@ def command(
         raise Refused(f"--port {port}: must be 0 to 65535")
     found = find(fleet, connect, keys)
     wake = Wake()
-    with Interrupts() as interrupts, listen(found, SOURCES, every=True, wake=wake, eager=EAGER) as ear:
-        output = FoxgloveOutput(host, port, (HANDOVER, *FORMATIONS), tf_per_robot=tf_per_robot)
+    with Interrupts() as interrupts, listen(found, HEARD, every=True, wake=wake, eager=EAGER) as ear:
+        output = FoxgloveOutput(host, port, (STOP, RESUME, HANDOVER, *FORMATIONS), tf_per_robot=tf_per_robot)
         try:
             bridge = Bridge(ear, output, sim_time=False, tf_per_robot=tf_per_robot)
             handovers = HandoverCalls(bridge.order)
@@ -68,6 +69,8 @@ def _obey(output: FoxgloveOutput, bridge: Bridge, handovers: HandoverCalls, now:
         name, call = output.calls.popleft()
         if name == HANDOVER:
             handovers.ask(call, bridge.leader, now)
+        elif name in (STOP, RESUME):
+            bridge.stop(call, now, stand=name == STOP)
         else:
             bridge.order("formation", side=FORMATIONS[name])
             answer(call, success=True, text=f"asked for {FORMATIONS[name]}")

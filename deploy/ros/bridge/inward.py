@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from lfa.agents.formation.formation import named
+from lfa.deploy.ros.bridge.answers import answer
+from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
 from lfa.deploy.ros.session import NodeHandle, ServiceCall
-from lfa.deploy.ros.types import kind
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import FormationSpec
 
@@ -18,6 +18,8 @@ WORDS_MAX = 120
 
 Order = Callable[..., None]
 """Sends an operator's command, by its name and its arguments."""
+StopOrder = Callable[..., None]
+"""Begins a stop (`stand=True`) or resume of the fleet for a service call, at a time [s]."""
 
 
 class HandoverCalls:
@@ -50,17 +52,24 @@ class HandoverCalls:
 
 
 class OperatorInput:
-    """Topics and services for operators: `/lfa/formation/set` (String) and `/lfa/handover` (Trigger)."""
+    """Topic `/lfa/formation/set` (String), services `/lfa/stop`, `/lfa/resume` and `/lfa/handover` (Trigger)."""
 
-    def __init__(self, node: NodeHandle, order: Order, warn: Callable[[str], None]) -> None:
+    def __init__(self, node: NodeHandle, order: Order, stop: StopOrder, warn: Callable[[str], None]) -> None:
         self._order = order
+        self._stop = stop
         self._warn = warn
         self._formation = node.subscription("/lfa/formation/set", "std_msgs/msg/String")
         self._service = node.service("/lfa/handover", "std_srvs/srv/Trigger")
+        self._stops = node.service(STOP, "std_srvs/srv/Trigger")
+        self._resumes = node.service(RESUME, "std_srvs/srv/Trigger")
         self._handovers = HandoverCalls(order)
 
     def step(self, leader: int, now: float) -> None:
-        """Obey what came in; answer the calls that are decided. `leader`: 0 for none."""
+        """Obey what came in, a stop first; answer the calls that are decided. `leader`: 0 for none."""
+        for call in self._resumes.take():
+            self._stop(call, now, stand=False)
+        for call in self._stops.take():
+            self._stop(call, now, stand=True)
         for message in self._formation.take():
             self._change_formation(message.data)
         for call in self._service.take():
@@ -74,9 +83,3 @@ class OperatorInput:
             self._warn(f"/lfa/formation/set: {refused}"[:WORDS_MAX])
             return
         self._order("formation", side=side)
-
-
-def answer(call: ServiceCall, *, success: bool, text: str) -> None:
-    """Answer a call of a Trigger service."""
-    response: Any = kind("std_srvs/msg/Trigger_Response")(success=success, message=text)
-    call.answer(response)

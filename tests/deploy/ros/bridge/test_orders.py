@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
+from lfa.deploy.ros.bridge.answers import answer
 from lfa.deploy.ros.bridge.command import check_graph
 from lfa.deploy.ros.bridge.inward import HANDOVER_S_MAX, OperatorInput
 from lfa.deploy.ros.bridge.outward import RosOutput
-from lfa.deploy.ros.session import GraphFeed, RosSpace
+from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
+from lfa.deploy.ros.session import GraphFeed, RosSpace, ServiceCall
 from lfa.deploy.ros.types import kind
 from lfa.protocol.errors import Refused
 from tests.rigs.ros_peers import awaited, ros_pair
@@ -23,10 +25,15 @@ class Fleet:
     def __init__(self, space: RosSpace) -> None:
         self.told: list[tuple[str, dict[str, object]]] = []
         self.warned: list[str] = []
-        self.orders = OperatorInput(space.node("lfa_bridge"), self._order, self.warned.append)
+        self.stopped: list[bool] = []
+        self.orders = OperatorInput(space.node("lfa_bridge"), self._order, self._stop, self.warned.append)
 
     def _order(self, name: str, **arguments: object) -> None:
         self.told.append((name, arguments))
+
+    def _stop(self, call: ServiceCall, now: float, *, stand: bool) -> None:
+        self.stopped.append(stand)
+        answer(call, success=True, text=f"asked at {now:g}")
 
 
 @pytest.fixture
@@ -109,3 +116,19 @@ def test_a_robot_that_leaves_vanishes_from_the_graph(pair: tuple[RosSpace, RosSp
     output.leave(2)
     awaited(lambda: not graph.poll(0.0).endpoints("MP", "/robot2/tf"), "the robot vanishes")
     assert graph.poll(0.0).endpoints("MP", "/clock")
+
+
+def test_of_a_resume_and_a_stop_that_wait_together_the_stop_is_the_last_word(pair: tuple[RosSpace, RosSpace]) -> None:
+    ours, theirs = pair
+    fleet, user = Fleet(ours), theirs.node("user")
+    clients = [user.client(service, "std_srvs/srv/Trigger") for service in (STOP, RESUME)]
+    calls = [
+        threading.Thread(target=client.call, args=(kind("std_srvs/msg/Trigger_Request")(0), 15.0)) for client in clients
+    ]
+    for call in calls:
+        call.start()
+    awaited(lambda: ours.counters.received == len(calls), "both calls arrive")
+    fleet.orders.step(1, 0.0)
+    for call in calls:
+        call.join()
+    assert fleet.stopped == [False, True]
