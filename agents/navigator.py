@@ -35,7 +35,7 @@ from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base, slowed
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
-from lfa.protocol.messages.team import ObstacleNote
+from lfa.protocol.messages.team import ObstacleNote, RouteProgress
 from lfa.protocol.mission import Mission
 
 if TYPE_CHECKING:
@@ -105,6 +105,19 @@ class Navigator:
     def stuck(self) -> str | None:
         """Reason why this robot is stuck; None when it is not."""
         return self._stuck_monitor.reason
+
+    def change(self, mission: Mission, route: int, now: float) -> None:
+        """Go on with a mission that an operator has changed; `route`: version of the order that gave its route."""
+        new_route = route != self._team.route
+        self._mission = mission
+        self.leading = Leadership(mission, self.formation, self._team)
+        if new_route:
+            self._team.route, self._team.progress = route, None
+        known = self.estimator.pose_at(now)
+        if self._role is Role.LEADER and known is not None:
+            # On a new route nothing has been driven yet, whatever the odometer says.
+            self.leading.begin(known[0], 0.0 if new_route else self.estimator.odometer_m, now)
+            self._stuck_monitor.begin(leading=True)
 
     def lost_input(self, now: float) -> str | None:
         """Return the input of the robot's own hardware that is too old to drive by; None when all is well."""
@@ -236,7 +249,8 @@ class Navigator:
         self._last = safe(wanted, self._last, braked_for, self._mission.radius_m, limits, dt)
         self.follower.overridden(self._last)
         if role is Role.LEADER:
-            self._team.progress = self.lead.progress(pose, self._last)
+            progress = self.lead.progress(pose, self._last)
+            self._team.progress = RouteProgress(progress.waypoint, progress.to_m, self._team.route)
         return self._last
 
     def narrow_ahead(self, pose: Pose2D) -> str | None:

@@ -20,6 +20,7 @@ from lfa.agents.navigator import Navigator
 from lfa.agents.stop_listener import StopListener
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
+from lfa.agents.team_orders import QUESTION, TeamOrders
 from lfa.agents.team_state import TeamState
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
@@ -28,6 +29,7 @@ from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseEx
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.messages.stop import StopOrder, StopReport
 from lfa.protocol.messages.team import Ask, FormationNote, ObstacleNote, OperatorNote, PoseStamped, TableRow
@@ -36,6 +38,7 @@ from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import PeerDown, PeerUp, Stop, Vitals
 from lfa.protocol.outbox import Outbox
+from lfa.protocol.topics import OPERATOR_NAME
 
 HardwareMessage = Sensors | Localization | LaserScan | GroundProfile
 TeamMessage = PoseStamped | TableRow | ObstacleNote | FormationNote
@@ -76,11 +79,13 @@ class RobotCore:
         self._stop_listener = StopListener(robot_id, mission.robots, outbox)
         self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place, self._stop_listener)
         self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
+        self._team_orders = TeamOrders(outbox, mission)
         self._reports = Reports(outbox, len(mission.robots))
         self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
         self._next_control = now
         self._arrived = False
+        self._spec = mission.formation
         self._lost_input = ""
         self._slow_scans = False
         """Input of the robot's own hardware that was reported as lost; empty for none."""
@@ -142,6 +147,10 @@ class RobotCore:
                 self._obey(message, now)
             case StopOrder() | StopReport() | Ask():
                 self._stop_listener.receive(message, now)
+                if isinstance(message, Ask) and message.what == QUESTION and lease.role is Role.LEADER:
+                    self._team_orders.say(lease.term, now)
+            case OrderNote():
+                self._take_order(message, now)
             case Vitals():
                 self._attendance.update(lease, self._team, now)
                 outside = self._attendance.text()
@@ -207,6 +216,28 @@ class RobotCore:
         elif note.command == "handover":
             self._hand_over(now)
 
+    def _take_order(self, note: OrderNote, now: float) -> None:
+        """Process a change of the mission that an operator proposes, or that a leader carries (E32)."""
+        lease, orders = self.lease, self._team_orders
+        leads = lease.role is Role.LEADER
+        if note.header.sender == OPERATOR_NAME:
+            changed = orders.propose(note.order, leads, lease.term, now)
+        else:
+            changed = not leads and orders.hear(note, lease.config.version.term, now)
+        if changed:
+            self._change_mission(now)
+
+    def _change_mission(self, now: float) -> None:
+        orders, formation = self._team_orders, self._formation_commands
+        side, separation_m = self._spec.side, self._spec.separation_m
+        self._spec = orders.mission.formation
+        if orders.order.route != self._team.route:
+            self._arrived = False
+        self.navigator.change(orders.mission, orders.order.route, now)
+        formation.change(orders.mission)
+        if self.lease.role is Role.LEADER and (side, separation_m) != (self._spec.side, self._spec.separation_m):
+            formation.order(self._spec.side, "operator", self.lease.chain[1:], self.lease.term, now)
+
     def _forget(self, note: OperatorNote, now: float) -> None:
         """Exclude incarnations that are dead for good from the lease's next attempt (E20)."""
         try:
@@ -237,6 +268,8 @@ class RobotCore:
                     self._event("lease", now, {"change": "acquired"}, term)
                     self._event("role", now, {"role": Role.LEADER.value, "leader": self._id}, term)
                     self._formation_commands.begin(now)
+                    if self._team_orders.begin(term, now):
+                        self._change_mission(now)
                     self._control(now)
                 case StepDown(term, cause):
                     self.defer_grants = False
@@ -286,7 +319,8 @@ class RobotCore:
             self._control_without_pose(role, now)
             return
         pose, twist = known
-        drives = Role.WAITING if self._stop_listener.stands else role
+        paused = role is Role.LEADER and self._team_orders.order.paused
+        drives = Role.WAITING if paused or self._stop_listener.stands else role
         command = navigator.drive(drives, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
         told = navigator.published(twist)
@@ -297,6 +331,7 @@ class RobotCore:
             self._hand_over(now)
             return
         if role is Role.LEADER:
+            self._team_orders.lead(lease.term, now)
             narrow = partial(navigator.narrow_ahead, pose)
             self._formation_commands.lead(navigator.lead, self._place.ids[1:], lease.term, now, narrow)
         if role is Role.LEADER and not self._arrived and navigator.arrived(pose, command):

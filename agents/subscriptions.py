@@ -16,7 +16,7 @@ def with_mission(fleet: str, own: str, predecessor: int | None, *, asks: bool) -
 
     `asks`: it also hears what other agents answer about the fleet stop.
     """
-    topics = ("table", "formation", "obstacles", "stop", "ask", *(("stop_known",) if asks else ()))
+    topics = ("table", "formation", "obstacles", "stop", "ask", "team_order", *(("stop_known",) if asks else ()))
     others = {f"lfa/{fleet}/*/{topic}" for topic in topics}
     lease = {f"lfa/{fleet}/*/lease/{to}" for to in (TO_ALL, TO_HELLO, own)} | {alive_key(fleet, "*", "*")}
     hardware = {key(fleet, own, topic) for topic in ("sensors", "localization", "scan", "ground")}

@@ -36,6 +36,8 @@ class TeamState:
         self._clocks: dict[int, ClockOffset] = {}
         self.obstacles = SharedObstacles(self.poses)
         """Moving obstacles that other robots reported."""
+        self.route = 0
+        """Version of the order that gave the team's present route."""
         self.progress: RouteProgress | None = None
         """Progress of the team on its route: the own one while this robot leads, else the leader's as last heard."""
 
@@ -60,8 +62,9 @@ class TeamState:
         if known is not None and known[0].header.incarnation == row.header.incarnation:
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
-        if row.progress is not None and (row.role is Role.LEADER or self.progress is None):
-            self.progress = row.progress
+        told = row.progress
+        if told is not None and told.route == self.route and (row.role is Role.LEADER or self.progress is None):
+            self.progress = told
         self._table[robot] = (row, at)
         self._clocks[robot].heard(row.header.stamp, at)
 

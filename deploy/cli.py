@@ -63,6 +63,14 @@ COMMANDS = (
           "lfa stop; lfa stop --json"),
     Command("resume", "lfa.deploy.operate.resume", "Lift a stop: the fleet goes on with what it was doing.",
           "lfa resume"),
+    Command("pause", "lfa.deploy.operate.pause", "Let the leader of a running fleet stand, and its team with it.",
+          "lfa pause; lfa go"),
+    Command("go", "lfa.deploy.operate.go", "Send a running fleet to another goal or along a route, or end a pause.",
+          "lfa go 3 -1.5 90; lfa go --route route.txt; lfa go"),
+    Command("home", "lfa.deploy.operate.home", "Send a running fleet back to its mission's first way-point.",
+          "lfa home"),
+    Command("set", "lfa.deploy.operate.set", "Change speed, motion or formation of a running fleet.",
+          "lfa set cruise_mps=0.3 separation_m=1.5"),
     Command("formation", "lfa.deploy.operate.formation", "Ask the leader of a running fleet for another formation.",
           "lfa formation column"),
     Command("watch", "lfa.deploy.view.terminal.watch",
@@ -128,6 +136,8 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "web": (*RUNS, "websockets"),
 }  # fmt: skip
 """Modules outside the base install without which a command can do nothing."""
+TAKES_NUMBERS = frozenset({"go"})
+"""Commands whose arguments may begin with a minus sign, as in `lfa go 3 -1.5`."""
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
     "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
@@ -190,7 +200,13 @@ def build(called: Sequence[str]) -> typer.Typer:
     app = typer.Typer(name="lfa", help=_ABOUT, no_args_is_help=True, **PLAIN)
     for entry in COMMANDS:
         function = import_module(entry.module).command if entry.name in called else _absent
-        app.command(entry.name, help=entry.help, epilog=f"Example: {entry.example}", no_args_is_help=False)(function)
+        app.command(
+            entry.name,
+            help=entry.help,
+            epilog=f"Example: {entry.example}",
+            no_args_is_help=False,
+            context_settings={"ignore_unknown_options": entry.name in TAKES_NUMBERS},
+        )(function)
     return app
 
 

@@ -14,6 +14,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import BadMessage, Message, decode
 from lfa.protocol.messages.consensus import LeaseNote
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, Truth
 from lfa.protocol.messages.stop import StopOrder, StopReport, StopState
@@ -81,6 +82,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("stop",         StopOrder,     ("operator",),         None, False, True,  "real_time",  None),
     Topic("stop_state",   StopState,     ("driver",),           None, False, True,  "real_time",  None),
     Topic("stop_known",   StopReport,    ("agent",),            None, False, True,  "prompt",     None),
+    Topic("team_order",   OrderNote,     ("agent", "operator"), None, False, True,  "prompt",     None),
     Topic("status",       Status,        TEAM,                  1.0,  True,  False, "background", 3.0),
     Topic("event",        Event,         ANYONE,                None, False, False, "background", None),
     Topic("sensors",      Sensors,       ("driver",),           50.0, True,  False, "real_time",  0.2),

@@ -49,6 +49,10 @@ class FormationCommands:
         self._side: str = mission.formation.side
         """Side before the narrow place."""
 
+    def change(self, mission: Mission) -> None:
+        """Use the formation and the orientations of a mission that an operator has changed."""
+        self._mission, self._next = mission, None
+
     def remember(self, side: str, now: float) -> None:
         """Keep an operator's order of another robot's term, which that robot may not live to carry out."""
         self._pending = side, now

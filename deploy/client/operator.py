@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from lfa.protocol.messages.consensus import Member
+from lfa.protocol.messages.orders import OrderNote, TeamOrder
 from lfa.protocol.messages.stop import StopOrder, StopWord
 from lfa.protocol.messages.team import Ask, OperatorNote
 from lfa.protocol.node import Envelope
@@ -28,6 +29,10 @@ class Operator:
     def stop(self, word: StopWord | None, gateways: tuple[Member, ...], now: float) -> Envelope:
         """Return an order to all gateways to stand or to go; without a `word` it only asks."""
         return self._outbox.envelope("stop", StopOrder(self._outbox.header("stop", now), word, gateways))
+
+    def order(self, order: TeamOrder, now: float) -> Envelope:
+        """Return a change of the mission, for the leader to carry out."""
+        return self._outbox.envelope("team_order", OrderNote(self._outbox.header("team_order", now), order))
 
     def ask(self, what: str, now: float) -> Envelope:
         """Return a request to publish `what`, such as the mission."""

@@ -14,6 +14,7 @@ import msgspec
 from lfa.protocol.messages.consensus import LeaseNote
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, Truth
 from lfa.protocol.messages.stop import StopOrder, StopReport, StopState
@@ -58,6 +59,7 @@ Message = (
     | StopOrder
     | StopState
     | StopReport
+    | OrderNote
 )
 
 _encoder = msgspec.msgpack.Encoder()

@@ -41,6 +41,8 @@ class RouteProgress(Struct, frozen=True, array_like=True, gc=False):
     """Index of the next way-point; the number of way-points once the team has arrived."""
     to_m: Number
     """Distance [m] to it, along the route where there is one."""
+    route: Count = 0
+    """Version of the order that gave this route (E32); 0: the mission's own."""
 
 
 class TableRow(Struct, frozen=True, array_like=True, tag="table"):

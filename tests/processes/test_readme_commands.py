@@ -20,7 +20,18 @@ ON_A_RUN = (
     "lfa validate FILE", "lfa schema", "lfa completion bash", "lfa sim SCENARIO --seed 7", "lfa --version",
     "lfa why RUN",
 )  # fmt: skip
-ON_A_FLEET = ("lfa watch", "lfa topic", "lfa formation column", "lfa stop", "lfa resume", "lfa fault kill leader")
+ON_A_FLEET = (
+    "lfa watch",
+    "lfa topic",
+    "lfa formation column",
+    "lfa stop",
+    "lfa resume",
+    "lfa pause",
+    "lfa set cruise_mps=0.3",
+    "lfa go 3 -1.5",
+    "lfa home",
+    "lfa fault kill leader",
+)
 ELSEWHERE = {
     "lfa run SCENARIO": "tests/processes/test_run.py",
     "lfa run paper_path1 --fault 'kill leader at 20 s'": "tests/processes/test_run.py",

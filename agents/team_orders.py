@@ -1,0 +1,91 @@
+"""The operator's orders to the team at one robot: what it may change of the mission, and from whom (E32).
+
+Every robot hears what the operator proposes, and keeps the newest. The leader checks it, carries it out, and says it
+again once a second under its term; a new leader goes on with the newest order that it knows.
+"""
+
+from __future__ import annotations
+
+from msgspec import structs
+
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.orders import OrderNote, TeamOrder
+from lfa.protocol.mission import Mission
+from lfa.protocol.mission_checks import check_mission
+from lfa.protocol.outbox import Outbox
+
+REPEAT_S = 1.0
+QUESTION = "team_order"
+
+
+class TeamOrders:
+    """Newest order at one robot, and the mission by it."""
+
+    def __init__(self, outbox: Outbox, mission: Mission) -> None:
+        self._outbox = outbox
+        self.mission = mission
+        """Mission as the newest order changes it."""
+        self.order = TeamOrder(mission.leading, mission.formation)
+        self._proposed: TeamOrder | None = None
+        """Newest order of an operator that no leader has been heard to carry out."""
+        self._repeat_at = float("-inf")
+
+    def propose(self, order: TeamOrder, leads: bool, term: Term, now: float) -> bool:
+        """Process an operator's order: as leader, carry it out or say why not. Return True if the mission changes."""
+        if not leads:
+            if self._proposed is None or order.version > self._proposed.version:
+                self._proposed = order
+            return False
+        if order == self.order:
+            self._say(term, now)
+            return False
+        if order.version <= self.order.version:
+            self._refuse(order, f"version {self.order.version} holds already", term, now)
+            return False
+        try:
+            self._adopt(order)
+        except Refused as refused:
+            self._refuse(order, str(refused), term, now)
+            return False
+        self._say(term, now)
+        return True
+
+    def hear(self, note: OrderNote, newest: Term, now: float) -> bool:
+        """Process what a leader carries; `newest` is the newest known term. Return True if the mission changes."""
+        if note.term is None or note.term < newest or note.order.version <= self.order.version:
+            return False
+        try:
+            self._adopt(note.order)
+        except Refused:
+            return False
+        self._outbox.event("order", now, note.term, {"version": note.order.version})
+        return True
+
+    def begin(self, term: Term, now: float) -> bool:
+        """Start a term as leader, with the newest order. Return True if the mission changes."""
+        self._repeat_at = now
+        proposed, self._proposed = self._proposed, None
+        newer = proposed is not None and proposed.version > self.order.version
+        return proposed is not None and newer and self.propose(proposed, True, term, now)
+
+    def lead(self, term: Term, now: float) -> None:
+        """Say the order again once in a while, for those that have missed it."""
+        if self.order.version > 0 and now >= self._repeat_at:
+            self.say(term, now)
+
+    def say(self, term: Term, now: float) -> None:
+        """Publish the order as the leader of `term` carries it."""
+        self._repeat_at = now + REPEAT_S
+        self._outbox.publish("team_order", OrderNote(self._outbox.header("team_order", now), self.order, term))
+
+    def _adopt(self, order: TeamOrder) -> None:
+        self.mission = check_mission(structs.replace(self.mission, leading=order.leading, formation=order.formation))
+        self.order = order
+
+    def _say(self, term: Term, now: float) -> None:
+        self.say(term, now)
+        self._outbox.event("order", now, term, {"version": self.order.version, "by": "leader"})
+
+    def _refuse(self, order: TeamOrder, reason: str, term: Term, now: float) -> None:
+        self._outbox.event("order_refused", now, term, {"version": order.version, "reason": reason})

@@ -1,0 +1,33 @@
+"""`lfa home`: sends a running fleet back to its mission's first way-point."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lfa.deploy.client.order_call import Change
+from lfa.deploy.client.order_fleet import along, walls_of
+from lfa.deploy.client.session import Subscriber
+from lfa.deploy.operate import pause
+from lfa.protocol.mission import Mission
+
+
+def command(
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+) -> int:
+    """Send the team to the mission's first way-point; return 0 if a leader has acknowledged it, else 1."""
+
+    def homewards(ear: Subscriber) -> Change:
+        walls = walls_of(ear)
+
+        def change(mission: Mission, first: Mission) -> Mission:
+            return along((first.leading.route_m[0],), walls)(mission, first)
+
+        return change
+
+    return pause.say("home", homewards, fleet, connect, keys, as_json, paused=False)

@@ -1,0 +1,49 @@
+"""`lfa pause`: the leader stands, and its team with it, until `lfa go`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from lfa.deploy.client.order_call import Change
+from lfa.deploy.client.order_fleet import TOPICS, order_fleet, unchanged
+from lfa.deploy.client.session import Subscriber, find, listen
+
+
+def command(
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+) -> int:
+    """Pause the team; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
+    return say("pause", lambda ear: unchanged, fleet, connect, keys, as_json, paused=True)
+
+
+def say(
+    what: str,
+    make: Callable[[Subscriber], Change],
+    fleet: str | None,
+    connect: str | None,
+    keys: Path | None,
+    as_json: bool,
+    *,
+    paused: bool | None = None,
+) -> int:
+    """Change a fleet's mission as `make` says, print what became of it, and return the exit code. Raises Refused."""
+    with listen(find(fleet, connect, keys), TOPICS) as ear:
+        outcome = order_fleet(ear, make(ear), paused=paused)
+    if as_json:
+        print(msgspec.json.encode(outcome).decode())
+    elif outcome.leader is None:
+        print(f"{what}: no leader has answered")
+    elif outcome.reason:
+        print(f"{what}: robot{outcome.leader} refuses it: {outcome.reason}")
+    else:
+        known = f"{len(outcome.robots)} robots know it"
+        print(f"{what}: order {outcome.version} carried out by robot{outcome.leader}, {known}")
+    return 0 if outcome.leader is not None and not outcome.reason else 1

@@ -1,0 +1,64 @@
+"""`lfa set`: changes speed, motion or formation of a running fleet, within the limits of its mission."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from msgspec import structs
+
+from lfa.deploy.client.order_call import Change
+from lfa.deploy.client.order_fleet import unchanged
+from lfa.deploy.operate import pause
+from lfa.protocol.errors import Refused
+from lfa.protocol.mission import FormationSpec, Leading, Mission
+from lfa.protocol.mission_checks import check_mission
+
+IN_LEADING = ("motion", "cruise_mps", "acceleration_mps2", "goal_tolerance_m", "waypoint_tolerance_m")
+IN_FORMATION = ("separation_m", "angle_rad", "side")
+
+
+def command(
+    values: Annotated[list[str], typer.Argument(help="Changes as key=value, such as cruise_mps=0.3 side=column.")],
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+) -> int:
+    """Change the mission's values; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
+    change = to_values(values)
+    return pause.say(f"set {' '.join(values)}", lambda ear: change, fleet, connect, keys, as_json)
+
+
+def to_values(values: list[str]) -> Change:
+    """Return the change to these values, each `key=value`. Raises Refused for a key that cannot change."""
+    pairs = dict(_pair(value) for value in values)
+
+    def change(mission: Mission, _first: Mission) -> Mission:
+        leading = {**msgspec.to_builtins(mission.leading), **_part(pairs, IN_LEADING)}
+        formation = {**msgspec.to_builtins(mission.formation), **_part(pairs, IN_FORMATION)}
+        try:
+            changed = structs.replace(
+                mission,
+                leading=msgspec.convert(leading, Leading, strict=False),
+                formation=msgspec.convert(formation, FormationSpec, strict=False),
+            )
+        except msgspec.ValidationError as error:
+            raise Refused(f"set: {error}") from None
+        return check_mission(changed)
+
+    return change if pairs else unchanged
+
+
+def _pair(value: str) -> tuple[str, str]:
+    key, equals, text = value.partition("=")
+    key = key.removeprefix("mission.").removeprefix("leading.").removeprefix("formation.")
+    if not equals or key not in (*IN_LEADING, *IN_FORMATION):
+        raise Refused(f"set {value}: must be key=value with one of {', '.join((*IN_LEADING, *IN_FORMATION))}")
+    return key, text
+
+
+def _part(pairs: dict[str, str], keys: tuple[str, ...]) -> dict[str, str]:
+    return {key: text for key, text in pairs.items() if key in keys}

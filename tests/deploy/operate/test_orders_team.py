@@ -1,0 +1,154 @@
+"""E32: pause, goal and values of a running team in virtual time, and a leader that dies right after the order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import hypot
+
+import pytest
+from msgspec import structs
+
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome
+from lfa.deploy.client.order_fleet import QUESTION, along, to_goal, unchanged
+from lfa.deploy.fuzz.agent_simulation import FLEET, AgentSimulation
+from lfa.deploy.fuzz.network import FAIR
+from lfa.deploy.fuzz.schedules import draw
+from lfa.deploy.operate.set import to_values
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.orders import OrderNote
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.team import Event
+from lfa.protocol.transport.message_bus import send
+
+DRIVING_S = 4.0
+NEAR_M = 0.3
+
+
+class Commanded:
+    """A team of three that drives along a straight road, and its operator."""
+
+    def __init__(self, seed: int = 0) -> None:
+        schedule = structs.replace(
+            draw(seed), robots=3, profile="std", witness=True, rates={}, faults=(), stops=(), radio=FAIR
+        )
+        self.team = AgentSimulation(schedule)
+        self.truth: dict[int, tuple[float, float, float]] = {}
+        """Of each robot x [m], y [m] and speed [m/s]."""
+        self._call: OrderCall | None = None
+        self.team.simulator.taps.append(self._hear)
+        self.team.start_all()
+        self.team.run(DRIVING_S)
+
+    def _hear(self, _now: float, _key: str, _payload: bytes, message: Message) -> None:
+        match message:
+            case Truth():
+                self.truth = {robot.id: (robot.x, robot.y, abs(robot.linear_x)) for robot in message.robots}
+            case OrderNote() | Event() if self._call is not None:
+                self._call.hear(message)
+
+    def say(
+        self,
+        change: Change,
+        *,
+        paused: bool | None = False,
+        during: Callable[[], None] = lambda: None,
+        after_s: float = 0.0,
+    ) -> OrderOutcome:
+        """Order `change`, call `during` so long after its first word, and run until the call is over."""
+        operator = Operator(FLEET, round(1000 * self.team.now))
+        call = self._call = OrderCall(change, paused, self.team.now)
+        call.hear_mission(self.team.mission)
+        send(self.team.simulator, operator.ask(QUESTION, self.team.now))
+        first_at: float | None = None
+        while (outcome := call.outcome(self.team.now)) is None or first_at is None:
+            order = call.said(self.team.now)
+            if order is not None:
+                send(self.team.simulator, operator.order(order, self.team.now))
+                first_at = self.team.now if first_at is None else first_at
+            if first_at is not None and self.team.now >= first_at + after_s:
+                during()
+                during = lambda: None  # noqa: E731
+            self.team.run(self.team.now + 0.005)
+        during()
+        return outcome
+
+    def run(self, for_s: float) -> Commanded:
+        self.team.run(self.team.now + for_s)
+        return self
+
+    def leader(self) -> int:
+        (leader,) = self.team.leaders()
+        return leader
+
+    def kill_leader(self) -> None:
+        self.team.kill(self.leader())
+
+
+def test_e32_a_pause_stops_the_team_and_go_ends_it() -> None:
+    scene = Commanded()
+    outcome = scene.say(unchanged, paused=True)
+    assert (outcome.leader, outcome.version) == (1, 1)
+    assert all(speed < 1e-3 for _, _, speed in scene.run(6.0).truth.values())
+    assert scene.leader() == 1, "a leader that pauses is not stuck"
+    assert scene.say(to_values(["cruise_mps=0.4"]), paused=None).version == 2
+    assert all(speed < 1e-3 for _, _, speed in scene.run(1.0).truth.values()), "a pause outlasts other orders"
+    assert scene.say(unchanged).version == 3
+    assert all(speed > 0.1 for _, _, speed in scene.run(3.0).truth.values())
+
+
+def test_e32_a_goal_by_hand_is_driven_to() -> None:
+    scene = Commanded()
+    x, y, _ = scene.truth[1]
+    goal = (x + 4.0, y + 1.0)
+    assert scene.say(along((goal,), ())).leader == 1
+    scene.run(14.0)
+    assert hypot(scene.truth[1][0] - goal[0], scene.truth[1][1] - goal[1]) < NEAR_M
+    assert all(speed < 1e-2 for _, _, speed in scene.truth.values())
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.02, 0.1])
+def test_e32_a_leader_that_dies_right_after_the_order_leaves_it_to_the_next(after_s: float) -> None:
+    scene = Commanded()
+    x, y, _ = scene.truth[1]
+    goal = (x + 4.0, y + 1.5)
+    outcome = scene.say(along((goal,), ()), during=scene.kill_leader, after_s=after_s)
+    assert outcome.leader in (1, 2)
+    assert scene.run(1.0).leader() == 2
+    scene.run(18.0)
+    assert hypot(scene.truth[2][0] - goal[0], scene.truth[2][1] - goal[1]) < NEAR_M
+
+
+def test_e32_a_speed_within_the_limits_holds_and_one_beyond_them_changes_nothing() -> None:
+    scene = Commanded()
+    assert scene.say(to_values(["cruise_mps=0.2"])).leader == 1
+    assert abs(scene.run(3.0).truth[1][2] - 0.2) < 0.02
+    with pytest.raises(Refused, match="cruise_mps = 9"):
+        scene.say(to_values(["cruise_mps=9"]))
+    assert abs(scene.run(1.0).truth[1][2] - 0.2) < 0.02
+
+
+def test_e32_k_d_by_hand_moves_the_slots() -> None:
+    scene = Commanded()
+    assert scene.say(to_values(["separation_m=1.8", "side=column"])).leader == 1
+    scene.run(25.0)
+    gap_m = hypot(scene.truth[1][0] - scene.truth[2][0], scene.truth[1][1] - scene.truth[2][1])
+    assert abs(gap_m - 1.8) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("point", "reason"),
+    [((1.0, 2.0), "in a wall"), ((1.0, 3.0), "outside of the map or walled off")],
+)
+def test_a_goal_in_or_behind_a_wall_is_refused_in_one_line(point: tuple[float, float], reason: str) -> None:
+    walls = ((-200.0, 2.0, 200.0, 2.0), (-200.0, 4.0, 200.0, 4.0), (-200.0, 2.0, -200.0, 4.0), (200.0, 2.0, 200.0, 4.0))
+    scene = Commanded()
+    with pytest.raises(Refused, match=reason):
+        scene.say(along((point,), walls))
+    assert scene.run(1.0).truth[1][2] > 0.1
+
+
+def test_a_goal_that_is_no_number_is_refused() -> None:
+    with pytest.raises(Refused, match="must be finite"):
+        to_goal(float("nan"), 1.0, None)
