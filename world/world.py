@@ -11,7 +11,7 @@ from math import inf
 
 import msgspec
 
-from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Localization, Sensors
@@ -77,8 +77,8 @@ class World:
         simulated = [robot for robot in scenario.mission.robots if robot_name(robot) not in self._real]
         self._simulated: list[tuple[int, RobotHardware]] = []
         """Simulated robots with their indices."""
-        self._driven: dict[int, tuple[Twist, float]] = {}
-        """Twist last reported by each real robot, and when [s], by its index."""
+        self._driven: dict[int, Twist] = {}
+        """Twist last reported by each real robot, by its index."""
         self._cut_off = False
         self._added = AddedObstacles(scenario, () if memory is None else memory.added)
         self._time = TimeGrid(scenario.world.physics_hz, 0 if memory is None else memory.step, start_at)
@@ -123,9 +123,9 @@ class World:
             case StopOrder():
                 return [robot.order(message, now) for _, robot in self._simulated if not robot.hangs("driver")]
             case Sensors(twist=twist):
-                self._hear_real(received.key, None, twist, now)
+                self._hear_real(received.key, None, twist)
             case Localization(pose_map=pose):
-                self._hear_real(received.key, pose, None, now)
+                self._hear_real(received.key, pose, None)
             case Ask(what="mission"):
                 return [self._mission(now)]
             case PeerUp(name=name, incarnation=incarnation) if name in self._place:
@@ -224,20 +224,20 @@ class World:
             self._scanner.set_down(obstacle)
         return [self._event("obstacle", None, data | {"t": self._time.time_of(now)}, now)]
 
-    def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None, now: float) -> None:
+    def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None) -> None:
         where = address(at_key)
         place = self._real.get(where.owner) if where is not None else None
         if place is None:
             return
         if twist is not None:
-            self._driven[place] = twist, now
+            self._driven[place] = twist
         if pose is not None:
             self._bodies.place(place, pose)
 
     def _move(self, now: float) -> list[Touch]:
         wanted = [robot.twist(now) for robot in self._robots]
-        for place, (twist, at) in self._driven.items():  # a real robot keeps its last reported twist until the timeout
-            wanted[place] = twist if now - at <= (TOPIC["sensors"].timeout_s or 0.0) else STILL
+        for place, twist in self._driven.items():  # wheels whose driver died or hangs turn on as it last told them
+            wanted[place] = twist
         touches = self._bodies.step(wanted)
         for robot, wheels in zip(self._robots, self._bodies.wheels, strict=True):
             robot.odometry.turn(wheels, self._time.dt_s)

@@ -43,14 +43,16 @@ def test_the_world_says_nothing_in_its_name_and_hears_none_of_its_commands() -> 
 
 
 @pytest.mark.parametrize("bodies", [Physics, Kinematic])
-def test_its_body_goes_where_it_says_and_on_as_it_says_for_a_while(bodies: type[Physics] | type[Kinematic]) -> None:
+def test_its_body_goes_where_it_says_and_drives_on_when_its_driver_falls_silent(
+    bodies: type[Physics] | type[Kinematic],
+) -> None:
     made = world(bodies)
     run(made, 0.0, 0.1)
     told(made, 0.1, Pose2D(-3.0, 2.0, 0.0), Twist(0.5, 0.0))
     shown = [envelope.message for envelope in run(made, 0.1, 2.0) if isinstance(envelope.message, Truth)]
     first, last = (next(robot for robot in truth.robots if robot.id == 2) for truth in (shown[0], shown[-1]))
     assert (first.x, first.y) == pytest.approx((-3.0, 2.0), abs=0.02)
-    assert -2.98 < last.x < -2.9, "its body speeds up while sensors are fresh (0.2 s), then brakes"
+    assert last.x > -2.3, "the world hides that a hung driver leaves its wheels turning"
 
 
 def test_what_a_simulated_robots_driver_would_say_moves_nothing() -> None:

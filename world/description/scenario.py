@@ -117,7 +117,8 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     start: tuple[float, ...] | None = None
     """Start x, y [m] and optionally theta [rad] of the first robot; the others stand behind it where walls permit."""
     real_robots: tuple[int, ...] = ()
-    """Ids of robots with a driver of their own (`lfa-driver`): not simulated, their bodies follow reported poses."""
+    """Ids of robots with a driver of their own (`lfa-driver`): not simulated, their bodies follow reported poses, and
+    drive on as last reported when their driver falls silent."""
     map: str | None = None
     """ROS `map.yaml`, relative to the scenario's file; its occupied cells become walls when the scenario is read."""
     keepout: str | None = None
