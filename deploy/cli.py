@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import typer
-from lfa.deploy.command_line import PLAIN, print_refusal, run_cli
+from lfa.deploy.command_line import PLAIN, print_refusal, print_text, run_cli
 from lfa.protocol.errors import Refused
 
 
@@ -152,11 +152,9 @@ def main() -> None:
     if sys.argv[1:] == ["--version"]:
         from lfa.deploy.version import version_line
 
-        print(version_line())
-        sys.exit(0)
+        sys.exit(print_text("lfa", version_line()))
     if sys.argv[1:] in ([], ["-h"], ["--help"]):  # before the parser is imported: that import dominates
-        print(overview())
-        sys.exit(0)
+        sys.exit(print_text("lfa", overview()))
     signal.signal(signal.SIGTERM, _end)
     absent = _absent_modules(sys.argv[1])
     if absent and not {"-h", "--help"} & set(sys.argv[2:]):

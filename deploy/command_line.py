@@ -26,12 +26,28 @@ def run_cli(name: str, app: typer.Typer) -> int:
     """Run `app` on the command line and return the exit code. Used by all scripts of `deploy`."""
     import typer
 
+    try:
+        return _guarded(name, lambda: _called(name, app))
+    except typer.Abort:
+        return 130
+
+
+def print_text(name: str, text: str) -> int:
+    """Print `text` for the script `name`, without its parser; return the exit code."""
+
+    def write() -> int:
+        print(text, flush=True)
+        return 0
+
+    return _guarded(name, write)
+
+
+def _guarded(name: str, call: Callable[[], int]) -> int:
+    """Return what `call` returns; what an output refuses is a line and an exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without a degree sign must not fail
     try:
-        return _called(name, app)
-    except typer.Abort:
-        return 130
+        return call()
     except BrokenPipeError:  # the reader of the pipe has exited
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1

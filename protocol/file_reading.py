@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 import msgspec
 
@@ -36,6 +36,20 @@ def read_bytes(path: Path, bytes_max: int = FILE_BYTES_MAX) -> bytes:
     if len(data) > bytes_max:
         raise DamagedFile(f"longer than {bytes_max} bytes")
     return data
+
+
+def open_binary(path: Path) -> BinaryIO:
+    """Open a file to read its bytes. Raises OSError, and ValueError for a null byte in the path.
+
+    A named pipe that nobody writes to is an empty file, in place of blocking for ever; one with a writer is read.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        os.set_blocking(handle, True)
+        return os.fdopen(handle, "rb")
+    except OSError:  # a folder
+        os.close(handle)
+        raise
 
 
 def read_text(path: Path, bytes_max: int = FILE_BYTES_MAX) -> str:

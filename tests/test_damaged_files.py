@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import struct
 import traceback
 import zlib
@@ -38,6 +39,7 @@ from lfa.world.description import load, maps
 from lfa.world.description.scenario import STATE
 
 MUTATIONS = 500
+BLOCKED_S = 20
 FORMATS: dict[str, tuple[Callable[[Path], Path], Callable[[Path], object]]] = {}
 """By name: makes a good file in a folder and returns its path; reads the file at that path."""
 Format = Callable[[Path], Path]
@@ -241,6 +243,33 @@ def test_a_damaged_file_is_a_value_or_one_line(name: str, tmp_path: Path) -> Non
         path.chmod(mode)
         said = _outcome(read, path)
         assert "\n" not in said, f"{name}, seed {seed}: {said}"
+
+
+def _pipe(path: Path) -> None:
+    os.mkfifo(path, 0o600)
+
+
+def _loop(path: Path) -> None:
+    path.symlink_to(path.name)
+
+
+@pytest.mark.parametrize("put", [_pipe, Path.mkdir, _loop, lambda path: path.symlink_to("missing")])
+@pytest.mark.parametrize("name", FORMATS)
+def test_what_is_no_file_in_a_files_place_is_a_value_or_one_line(
+    name: str, put: Callable[[Path], None], tmp_path: Path
+) -> None:
+    """A named pipe, a folder, links in a circle or to nothing: none blocks, which the alarm would end."""
+    make, read = FORMATS[name]
+    path = make(tmp_path)
+    path.unlink()
+    put(path)
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.alarm(BLOCKED_S)
+    try:
+        said = _outcome(read, path)
+    finally:
+        signal.alarm(0)
+    assert "\n" not in said, said
 
 
 def _outcome(read: Callable[[Path], object], path: Path) -> str:

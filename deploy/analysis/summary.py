@@ -111,6 +111,10 @@ def read(folder: Path) -> Summary:
         raise Refused(
             f"{folder / SUMMARY}: of another version or damaged ({error}): read it with the lfa of its time"
         ) from None
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise Refused(f"{folder / SUMMARY}: cannot be read ({error.strerror}): must be a file that lfa wrote") from None
 
 
 class Assertion(Struct):

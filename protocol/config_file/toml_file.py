@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from lfa.protocol.config_file.mistake import FileError, Mistake, RefusedFile, refuse_file
 from lfa.protocol.config_file.toml_lines import lines_of, member
+from lfa.protocol.file_reading import open_binary
 
 FILE_BYTES_MAX = 4 * 1024 * 1024
 _LAST_PART = re.compile(r"(\.[^.\[\]]*|\[\d+\])$")
@@ -48,7 +49,7 @@ def read_toml(path: Path, kind: str) -> TomlFile:
     """Read the file as TOML. Raises RefusedFile, naming `kind`, if it cannot be read, is too long or is not TOML."""
     right = f"must be {kind} in TOML"
     try:
-        with path.open("rb") as file:
+        with open_binary(path) as file:
             data = file.read(FILE_BYTES_MAX + 1)
     except OSError as error:
         raise refuse_file(path, f"cannot be read ({error.strerror or error}): {right}") from None

@@ -18,7 +18,7 @@ import msgspec
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, decode_msgpack
+from lfa.protocol.file_reading import DamagedFile, decode_msgpack, open_binary
 from lfa.protocol.output import AppendedFile, write_line
 
 JOURNAL_VERSION = 1
@@ -118,13 +118,17 @@ class Journal:
 def read(path: Path) -> tuple[Heading, Iterator[JournalEntry]]:
     """Return heading and entries of a journal, up to its last whole entry. Raises ValueError if it is no journal.
 
-    The iterator of entries raises Refused at corrupted bytes.
+    Raises Refused for what is no file in its place; the iterator of entries does at corrupted bytes.
     """
     bodies = _bodies(path)
     try:
         heading = decode_msgpack(next(bodies), _heading_decoder)
     except (StopIteration, DamagedFile) as error:
         raise ValueError(f"{path}: not a journal") from error
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise Refused(f"{path}: cannot be read ({error.strerror}): must be a journal as a process wrote it") from None
     return heading, _entries(path, bodies)
 
 
@@ -139,7 +143,7 @@ def _entries(path: Path, bodies: Iterator[bytes]) -> Iterator[JournalEntry]:
 
 def _bodies(path: Path) -> Iterator[bytes]:
     """Yield the encoded entries, one in memory at a time, up to the end or to where the file is cut off."""
-    with path.open("rb") as file:
+    with open_binary(path) as file:
         while len(head := file.read(4)) == 4:
             size = int.from_bytes(head, "little")
             body = file.read(size) if size <= ENTRY_BYTES_MAX else b""

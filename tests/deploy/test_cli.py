@@ -36,6 +36,14 @@ def test_a_path_that_nothing_can_have_is_refused_in_one_line() -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize("asked", ["--help", "--version", "list"])
+def test_a_full_disk_behind_the_output_is_one_line(asked: str) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([*LFA, asked], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+    assert "No space left on device" in done.stderr
+
+
 def test_help_does_not_wait_for_the_parser() -> None:
     code = "import sys; from lfa.deploy import cli; cli.overview(); print('typer' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import open_binary
 
 CELLS_MAX = 64_000_000
 BYTES_MAX = 5 * CELLS_MAX
@@ -26,7 +27,7 @@ def shades_of(yaml: Path, image: str) -> tuple[Shades, npt.NDArray[np.bool_] | N
     """
     path = yaml.parent / image
     try:
-        with path.open("rb") as file:
+        with open_binary(path) as file:
             data = file.read(BYTES_MAX)
     except (OSError, ValueError) as error:  # a path with a null byte is a ValueError
         why = getattr(error, "strerror", None) or error

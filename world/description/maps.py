@@ -16,6 +16,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import open_binary
 from lfa.world.description.images import Shades, shades_of
 
 UNKNOWN = -1
@@ -167,7 +168,7 @@ def _runs(edges: npt.NDArray[np.int8]) -> list[tuple[int, int, int]]:
 def _fields(path: Path) -> dict[str, str]:
     """Parse the flat `key: value` lines of a map.yaml, the subset of YAML that ROS writes. Raises Refused."""
     try:
-        with path.open("rb") as file:
+        with open_binary(path) as file:
             text = file.read(YAML_BYTES_MAX + 1).decode("utf-8-sig")
     except OSError as error:
         raise Refused(f"{path}: cannot be read ({error.strerror or error}): must be a map.yaml") from None
