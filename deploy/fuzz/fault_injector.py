@@ -12,6 +12,7 @@ from lfa.deploy.analysis.verification.checker import Checker, Violation
 from lfa.deploy.analysis.verification.leadership import NextInChain, Steady, StopsWithoutQuorum
 from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS
 from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.fuzz.held_messages import MessageHolder
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
@@ -226,6 +227,7 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
     simulation.listen(checkers)
     faults = Faults(simulation, schedule)
     if isinstance(simulation, LeaseSimulation):
+        simulation.filter = MessageHolder(simulation, schedule) if schedule.held else None
         traffic = StopTraffic(simulation, simulation.mission.robots, schedule.seed)
         traffic.begin(schedule.stops)
         simulation.listen([*checkers, traffic.observer])

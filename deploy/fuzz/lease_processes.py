@@ -12,7 +12,7 @@ from lfa.protocol.fleet_stop.memory import StopMemory
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
 from lfa.protocol.lease.machine.lease import Lease, Observed
-from lfa.protocol.lease.machine.table import LeaseEvent
+from lfa.protocol.lease.machine.table import LeaseEvent, LeaseState
 from lfa.protocol.lease.timing import CONTROL_PERIOD_S
 from lfa.protocol.messages.consensus import (
     NO_TERM,
@@ -41,6 +41,7 @@ INBOX_SIZE_MAX = 500
 NEVER = float("inf")
 
 Call = Callable[..., list[Effect]]
+Transition = tuple[LeaseEvent, LeaseState, LeaseState]
 
 
 class Process:
@@ -70,6 +71,8 @@ class Hosts(GatewaySimulation):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
+        self.transitions: set[Transition] = set()
+        """Transitions that any lease has made; coverage for a guided search."""
         self.processes: dict[int, Process] = {}
         self.log: list[tuple[float, int, Effect]] = []
         """`BecomeLeader`, `StepDown` and `StandAside` effects, each with its true time [s] and the id."""
@@ -90,7 +93,8 @@ class Hosts(GatewaySimulation):
         self.carry_out(process, method(*arguments, process.clock.local(self.now)))
 
     def observed(self, observed: Observed) -> None:
-        """Notify the checkers of a promise that a lease receives."""
+        """Note the transition, and notify the checkers of a promise that a lease receives."""
+        self.transitions.add((observed.event, observed.before, observed.after))
         if observed.event is LeaseEvent.PROMISE:
             self._report(Checker.promises, self.now, *observed.given)
 

@@ -32,6 +32,8 @@ MIXED_AT_S = 0.05
 """Time [s] of a fault before the first election."""
 
 LEADER = -1
+FIRST_AT_S = 1.5
+"""Time [s] of the first fault of a systematic schedule: a leader has long led."""
 
 
 class ScheduledFault(Struct, frozen=True):
@@ -42,6 +44,13 @@ class ScheduledFault(Struct, frozen=True):
     targets: tuple[int, ...] = ()
     duration_s: float = 0.0
     value: float = 0.0
+
+
+class HeldMessage(Struct, frozen=True):
+    """Message `number` of the leases, counted from the first fault: `by_s` [s] later than its link; None: lost."""
+
+    number: int
+    by_s: float | None
 
 
 class Schedule(Struct, frozen=True):
@@ -59,6 +68,7 @@ class Schedule(Struct, frozen=True):
     """Calls of operators, each at a host: `stop`, `resume`; and the `replay` of an earlier word to a robot."""
     revive_all: bool
     """True if every dead process restarts at the end of the faults; else only as many as a quorum needs."""
+    held: tuple[HeldMessage, ...] = ()
 
     @property
     def is_single(self) -> bool:
@@ -104,7 +114,7 @@ def draw(seed: int) -> Schedule:
     kinds = [kind for kind in KINDS if random.random() < 0.4 and (witness or kind != "witness")] or ["kill"]
     share = random.random()
     radio = _radio(random)
-    faults = [_fault(random, kinds, ids) for _ in range(_count(random, FAULTS_MEAN))]
+    faults = [draw_fault(random, kinds, ids) for _ in range(_count(random, FAULTS_MEAN))]
     if share < CALM_SHARE:
         faults = []
     elif share < CALM_SHARE + SINGLE_SHARE:
@@ -162,7 +172,8 @@ def _radio(random: Random) -> Radio:
     )
 
 
-def _fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> ScheduledFault:
+def draw_fault(random: Random, kinds: list[str], ids: tuple[int, ...]) -> ScheduledFault:
+    """Draw one fault of one of `kinds` on a team of robots `ids`."""
     at = random.uniform(WARM_UP_S, FAULTS_UNTIL_S)
     kind = random.choice(kinds)
     target = LEADER if random.random() < LEADER_SHARE else random.choice(ids)

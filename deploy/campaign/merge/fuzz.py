@@ -9,8 +9,9 @@ from lfa.deploy.campaign.merge.files import ResultTable
 from lfa.deploy.campaign.merge.page import Section, rows, tiles
 from lfa.deploy.campaign.merge.report import MergeReport
 from lfa.deploy.fuzz.schedules import KINDS
-from lfa.deploy.fuzz.search import Tally
-from lfa.deploy.fuzz.shares import tally_of
+from lfa.deploy.fuzz.search import systematic
+from lfa.deploy.fuzz.search.searches import Tally
+from lfa.deploy.fuzz.search.shares import tally_of
 
 SHOWN_MAX = 100
 
@@ -32,8 +33,11 @@ def report(combined: Combined) -> MergeReport:
     )
     seeds = sorted(tally.failed)
     table = ResultTable({"seed": [*seeds], "violations": ["; ".join(tally.failed[seed]) for seed in seeds]})
+    about = combined.campaign.about
+    covered = systematic.covered(range(about["first"], about["last"] + 1)) if about["kind"] == "systematic" else []
+    lines += covered if combined.missing == 0 else []
     sections = (
-        Section("Summary", tiles(totals)),
+        Section("Summary", tiles(totals) + "".join(f"<p>{escape(line)}</p>" for line in covered)),
         Section("Violations", shown or "<p>None.</p>"),
         Section("Faults that took effect", rows(("kind", "number"), faults, text=(0,))),
     )

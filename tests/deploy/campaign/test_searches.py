@@ -16,10 +16,11 @@ from lfa.deploy.campaign.commands.merge import merge
 from lfa.deploy.campaign.folder import open_folder
 from lfa.deploy.campaign.shard import Shard
 from lfa.deploy.campaign.work import campaign_of
-from lfa.deploy.fuzz import shares
-from lfa.deploy.fuzz.command import command as fuzz
 from lfa.deploy.fuzz.fault_injector import play
 from lfa.deploy.fuzz.schedules import draw
+from lfa.deploy.fuzz.search import shares
+from lfa.deploy.fuzz.search.command import command as fuzz
+from lfa.deploy.fuzz.search.searches import Search
 from lfa.protocol.errors import Refused
 from tests.protocol.lease.planted import PLANTED
 from tests.test_imports import ROOT
@@ -30,7 +31,7 @@ CSV = Path("merged") / "results.csv"
 def test_shares_of_a_fuzz_search_play_every_seed_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(shares.CHUNKS, play, 2)
+    monkeypatch.setattr(Search, "chunk", 2)
     for number in (1, 2):
         assert fuzz(seeds="0..4", out=tmp_path / f"{number}", shard=f"{number}/2") == 0
     capsys.readouterr()
@@ -44,13 +45,15 @@ def test_a_violation_is_shrunk_on_the_spot_and_stands_with_seed_and_schedule_on_
     planted = next(bug for bug in PLANTED if bug.what == "a restarted process votes at once")
     planted.plant(monkeypatch)
     seed = next(seed for seed in range(20) if play(draw(seed)).violations)
-    item = shares._item(range(seed, seed + 1), play)
+    item = shares._item(range(seed, seed + 1), Search())
     result = item.measure()
     (found,) = result.data["found"]
     assert found["again"] == f"lfa fuzz --seed {seed} -v"
     assert "robots, witness" in found["shrunk"]
     assert f"reproduce: lfa fuzz --seed {seed} -v" in result.complaint
-    kept = open_folder(tmp_path, campaign_of(shares.KIND, "one", [item]))
+    kept = open_folder(
+        tmp_path, campaign_of(shares.KIND, "one", [item], shares.facts_of(range(seed, seed + 1), Search()))
+    )
     kept.store(item.name, result)
     assert merge([tmp_path], None, as_json=False) == 1
     page = (tmp_path / "merged" / "index.html").read_text()

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from lfa.deploy.fuzz.fault_injector import play_whole
 from lfa.deploy.fuzz.schedules import KINDS, LEADER, ScheduledFault, draw
-from lfa.deploy.fuzz.search import shrink
+from lfa.deploy.fuzz.search.searches import shrink
 from lfa.protocol.lease.gateway import Gateway
 
 SEEDS = (2, 3, 4, 7, 8, 14, 15, 18, 19)

@@ -9,10 +9,10 @@ import sys
 import pytest
 
 from lfa.deploy.analysis.verification.safety import OneBond
-from lfa.deploy.fuzz.command import parse_seeds, so_far
 from lfa.deploy.fuzz.fault_injector import play
 from lfa.deploy.fuzz.schedules import ScheduledFault, draw, without
-from lfa.deploy.fuzz.search import Tally, shrink
+from lfa.deploy.fuzz.search.command import parse_seeds, so_far
+from lfa.deploy.fuzz.search.searches import Tally, shrink
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.membership import first_config
 from lfa.protocol.lease.timing import timing_of
@@ -29,7 +29,7 @@ def test_schedules_keep_every_invariant(start: int) -> None:
 def test_one_seed_is_one_run_under_any_hash_seed() -> None:
     told = [
         subprocess.run(
-            [sys.executable, "-c", "from lfa.deploy.fuzz.command import _one; _one(5, True)"],
+            [sys.executable, "-c", "from lfa.deploy.fuzz.search.command import _one; _one(5, True)"],
             env={**os.environ, "PYTHONHASHSEED": number},
             capture_output=True,
             check=True,

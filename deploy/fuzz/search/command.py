@@ -15,16 +15,16 @@ from typing import Annotated
 import typer
 
 from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
-from lfa.deploy.fuzz.fault_injector import play, play_whole
-from lfa.deploy.fuzz.schedules import KINDS, draw
-from lfa.deploy.fuzz.search import CHUNKS, Player, Tally, again, explain, play_part, write_explanation
-from lfa.deploy.fuzz.shares import do_fuzz
-from lfa.deploy.fuzz.trace_text import columns, describe, said
+from lfa.deploy.fuzz.schedules import KINDS
+from lfa.deploy.fuzz.search import systematic
+from lfa.deploy.fuzz.search.searches import Search, Tally, again, explain, play_part, write_explanation
+from lfa.deploy.fuzz.search.shares import do_fuzz
+from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 from lfa.deploy.process.worker_pool import workers
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import whole_number
 
-SEEDS: dict[Player, str] = {play: "1000", play_whole: "60"}
+SEEDS, SEEDS_WHOLE = "1000", "60"
 """Default of `--seeds`."""
 KINDS_CLAIM_SEEDS = 60
 """Minimum number of seeds from which on every kind of fault must have taken effect."""
@@ -32,6 +32,7 @@ SEEDS_MAX = 100_000_000
 FAILURES_SHOWN_MAX = 5
 TELL_EVERY_S = 10.0
 TRACES = Path("runs/fuzz")
+DRAWN = Search()
 
 
 def command(
@@ -40,6 +41,12 @@ def command(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Run only this seed.")] = None,
     whole: Annotated[bool, typer.Option("--whole", help="Simulate complete agents and the world.")] = False,
+    is_systematic: Annotated[
+        bool, typer.Option("--systematic", help="Few faults and delays, in order; a seed is a place in that order.")
+    ] = False,
+    is_guided: Annotated[
+        bool, typer.Option("--guided", help="Change schedules that made a lease do something new.")
+    ] = False,
     verbose: Annotated[
         bool, typer.Option("-v", "--verbose", help="With --seed: print the trace, one column per robot.")
     ] = False,
@@ -51,21 +58,25 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the totals as JSON.")] = False,
 ) -> int:
     """Search for fault schedules that violate an invariant of the lease protocol; exit with code 1 if one does."""
-    player = play_whole if whole else play
+    if is_systematic and is_guided:
+        raise Refused("--systematic with --guided: must be one of the two")
+    if whole and (is_systematic or is_guided):
+        raise Refused("--whole: must go without --systematic and --guided, which play leases alone")
+    search = Search("systematic" if is_systematic else "guided" if is_guided else "drawn", whole)
     if seed is not None and seeds is not None:
         raise Refused(f"--seed {seed} with --seeds {seeds}: must be one of the two")
     if verbose and (seed is None or as_json):
         raise Refused("--verbose: must go with --seed, whose trace it tells, and without --json")
     if seed is not None:
-        return _one(seed, verbose, player, as_json)
-    chosen = parse_seeds(seeds or SEEDS[player])
+        return _one(seed, verbose, search, as_json)
+    chosen = parse_seeds(seeds or (SEEDS_WHOLE if whole else SEEDS))
     if jobs < 1:
         raise Refused(f"--jobs {jobs}: must be 1 or more")
     if out is not None:
-        return _kept(chosen, jobs, out, WHOLE if shard is None else parse_shard(shard), as_json, player)
+        return _kept(chosen, jobs, out, WHOLE if shard is None else parse_shard(shard), as_json, search)
     if shard is not None:
         raise Refused(f"--shard {shard}: must go with --out, the folder of the results")
-    return _hunt(chosen, jobs, as_json, player)
+    return _hunt(chosen, jobs, as_json, search)
 
 
 def parse_seeds(text: str) -> range:
@@ -80,9 +91,10 @@ def parse_seeds(text: str) -> range:
     return chosen
 
 
-def _one(seed: int, verbose: bool, player: Player = play, as_json: bool = False) -> int:
+def _one(seed: int, verbose: bool, search: Search = DRAWN, as_json: bool = False) -> int:
     lines: list[str] = []
-    played = player(draw(seed), columns(lines, draw(seed)) if verbose else None)
+    schedule = search.schedule(seed)
+    played = search.player(schedule, columns(lines, schedule) if verbose else None)
     if as_json:
         facts = {"seed": seed, "schedule": describe(played.schedule), "elections": played.elections}
         violations = [said(violation) for violation in played.violations]
@@ -97,19 +109,19 @@ def _one(seed: int, verbose: bool, player: Player = play, as_json: bool = False)
     return 1 if played.violations else 0
 
 
-def _kept(seeds: range, jobs: int, out: Path, shard: Shard, as_json: bool, player: Player) -> int:
+def _kept(seeds: range, jobs: int, out: Path, shard: Shard, as_json: bool, search: Search) -> int:
     """Do a share of a search whose results are kept in `out`; `lfa campaign merge` joins several."""
     began = time.perf_counter()
-    kept, tally = do_fuzz(seeds, player, out, shard, jobs)
-    of = len(seeds) if len(kept.names_there()) == len(kept.campaign.names) else tally.seeds
-    return _tell(tally, of, time.perf_counter() - began, jobs, as_json)
+    kept, tally = do_fuzz(seeds, search, out, shard, jobs)
+    played = seeds if len(kept.names_there()) == len(kept.campaign.names) else seeds[: tally.seeds]
+    return _tell(tally, played, time.perf_counter() - began, jobs, as_json, search)
 
 
-def _hunt(seeds: range, jobs: int, as_json: bool, player: Player) -> int:
+def _hunt(seeds: range, jobs: int, as_json: bool, search: Search) -> int:
     began, tally = time.perf_counter(), Tally()
     told_at = began
     try:
-        for part in _played(seeds, jobs, player):
+        for part in _played(seeds, jobs, search):
             tally.add(part)
             if time.perf_counter() > told_at + TELL_EVERY_S:
                 told_at = time.perf_counter()
@@ -118,24 +130,32 @@ def _hunt(seeds: range, jobs: int, as_json: bool, player: Player) -> int:
         return _interrupted(tally, seeds, time.perf_counter() - began, as_json)
     seconds = time.perf_counter() - began
     for seed in sorted(tally.failed)[:FAILURES_SHOWN_MAX]:
-        typer.echo(f"seed {seed}: {tally.failed[seed][0]}  reproduce: {again(seed, player)}", err=True)
-        path = write_explanation(seed, explain(seed, player), TRACES, player)
+        typer.echo(f"seed {seed}: {tally.failed[seed][0]}  reproduce: {again(seed, search)}", err=True)
+        path = write_explanation(seed, explain(seed, search), TRACES, search)
         typer.echo(f"  shrunk trace: {path}", err=True)
-    return _tell(tally, len(seeds), seconds, jobs, as_json)
+    return _tell(tally, seeds, seconds, jobs, as_json, search)
 
 
-def _tell(tally: Tally, of: int, seconds: float, jobs: int, as_json: bool) -> int:
-    """Print the result of a search over `of` seeds and return its exit code."""
-    missing = [kind for kind in KINDS if kind not in tally.faults] if of >= KINDS_CLAIM_SEEDS else []
+def _tell(tally: Tally, seeds: range, seconds: float, jobs: int, as_json: bool, search: Search) -> int:
+    """Print the result of a search over `seeds` and return its exit code."""
+    claimed = len(seeds) >= KINDS_CLAIM_SEEDS and search.kind == "drawn"
+    missing = [kind for kind in KINDS if kind not in tally.faults] if claimed else []
+    covered = systematic.covered(seeds) if search.kind == "systematic" else []
     if missing:
         typer.echo(f"faults that never took effect: {', '.join(missing)}", err=True)
     rate = round(60.0 * tally.seeds / seconds)
     if as_json:
         facts = {"seeds": tally.seeds, "elections": tally.elections, "faults": tally.faults}
         failed = {str(s): what for s, what in tally.failed.items()}
-        typer.echo(json.dumps({**facts, "per_minute": rate, "jobs": jobs, "failed": failed, "missing": missing}))
+        typer.echo(
+            json.dumps(
+                {**facts, "per_minute": rate, "jobs": jobs, "failed": failed, "missing": missing, "covered": covered}
+            )
+        )
     else:
         typer.echo(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in KINDS))
+        for line in covered:
+            typer.echo(line)
         rate_text = f"{rate} a minute with {jobs} jobs"
         typer.echo(f"{tally.seeds} schedules ({rate_text}), {tally.elections} elections, {len(tally.failed)} failed")
     return 1 if tally.failed or missing else 0
@@ -159,9 +179,9 @@ def so_far(tally: Tally, of: int, seconds: float) -> str:
     return f"{tally.seeds} of {of} schedules ({rate}), {tally.elections} elections, {faults} faults, {failed}"
 
 
-def _played(seeds: range, jobs: int, player: Player) -> Iterator[Tally]:
-    chunk = CHUNKS[player]
-    parts = [(seeds[i : i + chunk], player) for i in range(0, len(seeds), chunk)]
+def _played(seeds: range, jobs: int, search: Search) -> Iterator[Tally]:
+    chunk = search.chunk
+    parts = [(seeds[i : i + chunk], search) for i in range(0, len(seeds), chunk)]
     if jobs == 1:
         yield from map(play_part, parts)
         return
