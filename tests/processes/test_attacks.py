@@ -11,7 +11,7 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -20,18 +20,28 @@ import zenoh
 from lfa.deploy.fleet.security import authority, keys
 from lfa.protocol import clock
 from lfa.protocol.lease.term_window import FREE
-from lfa.protocol.messages.codec import decode, encode
-from lfa.protocol.messages.consensus import Fence, LeaseNote, Prepare, Propose, Release, Term, Version
-from lfa.protocol.messages.header import MESSAGE_BYTES_MAX, Header
+from lfa.protocol.messages.codec import decode
+from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
 from lfa.protocol.messages.team import Status
 from lfa.protocol.topics import RECORDER_NAME, TOPIC
 from lfa.protocol.transport.credentials import ACCESS_FILE
 from tests.rigs.lfa_runs import eventually
-from tests.rigs.secured_fleet import ELSEWHERE, FLEET, REVOKED, TRAITOR, Attacked, attacked, forge, free_port, tls
+from tests.rigs.secured_fleet import (
+    BASE,
+    ELSEWHERE,
+    FLEET,
+    REVOKED,
+    TRAITOR,
+    Attacked,
+    Poison,
+    attacked,
+    forge,
+    free_port,
+    tls,
+)
 
 pytestmark = pytest.mark.processes
 
-BASE = f"lfa/{FLEET}"
 FLOOD_S = 3.0
 SILENT_GAP_S, SILENT_S = 0.05, 12.0
 REPLAYED = 20
@@ -278,7 +288,8 @@ def test_old_messages_of_another_played_again_on_its_key(fleet: Attacked) -> Non
     assert not before & set(heard)
 
 
-def test_silent_connections_lock_out_neither_a_new_member_nor_one_that_returns(fleet: Attacked) -> None:
+@contextmanager
+def silent_connections(fleet: Attacked) -> Iterator[None]:
     """Twenty a second from anyone, without any certificate: Zenoh alone lets nobody in any more after some seconds."""
     silent: list[socket.socket] = []
     stop = threading.Event()
@@ -292,52 +303,52 @@ def test_silent_connections_lock_out_neither_a_new_member_nor_one_that_returns(f
     standing.start()
     try:
         eventually(lambda: len(silent) > SILENT_S / SILENT_GAP_S, "nobody stands at the door", 4.0 * SILENT_S)
-        assert not fleet.refused(fleet.tls)
-        fleet.team.signal(2, signal.SIGKILL)  # the robot whose link goes through the door
-        fleet.team.wait_until(lambda: 2 not in fleet.team.chain(), "robot 2 is not missed")
-        fleet.team.restart(2)
-        fleet.team.wait_until(lambda: set(fleet.team.chain()) == {1, 2, 3}, "robot 2 does not come back", SILENT_S)
+        yield
     finally:
         stop.set()
         standing.join()
         for one in silent:
             one.close()
-    fleet.team.signal(3, signal.SIGKILL)  # so that the chain is in its order again for the other tests
-    fleet.team.wait_until(lambda: 3 not in fleet.team.chain(), "robot 3 is not missed")
-    fleet.team.restart(3)
+
+
+def _to_the_tail(fleet: Attacked, robot: int) -> None:
+    """Kill a robot and start it again: it joins at the tail."""
+    fleet.team.signal(robot, signal.SIGKILL)
+    fleet.team.wait_until(lambda: robot not in fleet.team.chain(), f"robot {robot} is not missed")
+    fleet.team.restart(robot)
+    fleet.team.wait_until(lambda: set(fleet.team.chain()) == {1, 2, 3}, f"robot {robot} does not come back", SILENT_S)
+
+
+def test_silent_connections_lock_out_neither_a_new_member_nor_one_that_returns(fleet: Attacked) -> None:
+    with silent_connections(fleet):
+        assert not fleet.refused(fleet.tls)
+        _to_the_tail(fleet, 2)  # the robot whose link goes through the door
+    _to_the_tail(fleet, 3)  # so that the chain is in its order again for the other tests
+
+
+def test_a_leader_that_dies_while_silent_connections_stand_at_the_door_is_followed_by_the_next(fleet: Attacked) -> None:
+    """The next in the chain is the robot behind the door; the leader comes back at the tail."""
+    with silent_connections(fleet):
+        fleet.team.signal(1, signal.SIGKILL)
+        fleet.team.wait_until(lambda: fleet.team.chain() == (2, 3), "robot 2 does not lead on", SILENT_S)
+        fleet.team.restart(1)
+        fleet.team.wait_until(lambda: fleet.team.chain() == (2, 3, 1), "robot 1 does not come back", SILENT_S)
+    for robot in (2, 3):
+        _to_the_tail(fleet, robot)
 
 
 def test_made_up_terms_stop_nobody(fleet: Attacked) -> None:
     """E26: the last term there is, said with robot 3's keys, does nothing; after a far one comes the leader's own."""
-    proposes: list[Propose] = []
-    statuses: list[Status] = []
-
-    def hear(sample: zenoh.Sample) -> None:
-        note = decode(sample.payload.to_bytes(), LeaseNote)
-        if isinstance(note, LeaseNote) and isinstance(note.body, Propose):
-            proposes.append(note.body)
-
     with fleet.open(fleet.unix) as attacker:
-        attacker.declare_subscriber(f"{BASE}/robot1/lease/all", hear)
-        attacker.declare_subscriber(f"{BASE}/{TRAITOR}/status", lambda sample: statuses.append(_status(sample)))
-        eventually(lambda: bool(proposes) and bool(statuses), "robot 1 or robot 3 says nothing")
-        agreed, mine = proposes[-1].agreed, statuses[-1].header.incarnation
-
-        def say(term: Term) -> None:
-            said = (Prepare(term, Version(), agreed=agreed), Prepare(term, Version(term), agreed=agreed), Release(term))
-            orders = {f"gateway{robot}": (Fence(term, term),) for robot in (1, 2, 3)}
-            for to, bodies in ({"all": said} | orders).items():
-                for body in bodies:
-                    attacker.put(f"{BASE}/{TRAITOR}/lease/{to}", encode(LeaseNote(Header(TRAITOR, mine, 0, 0.0), body)))
-                    clock.sleep(0.01)  # in one batch they are a flood to the router
+        poison = Poison(attacker)
 
         def goes_on() -> bool:
-            say(Term(2**53, 3, mine))
-            say(Term(FREE, 3, mine))
-            return proposes[-1].term.n > FREE
+            poison.say(2**53)
+            poison.say(FREE)
+            return poison.proposes[-1].term.n > FREE
 
         eventually(goes_on, "robot 1 does not go on under a term after the made-up one")
-        assert proposes[-1].term.n < 2**53
+        assert poison.proposes[-1].term.n < 2**53
 
 
 @pytest.mark.alone

@@ -17,13 +17,19 @@ from lfa.deploy.bench.harness.team import Team, endless
 from lfa.deploy.fleet.security import authority, keys
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.protocol import clock
+from lfa.protocol.messages.codec import decode, encode
+from lfa.protocol.messages.consensus import Fence, LeaseNote, Prepare, Propose, Release, Term, Version
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Status
 from lfa.protocol.topics import RECORDER_NAME
 from lfa.protocol.transport.credentials import Credentials, credentials
+from tests.rigs.lfa_runs import eventually
 
 FLEET, ROBOTS = "secured", 3
 WHOLE_S = 20.0
 TRAITOR = "robot3"
 """Robot whose keys the attacker has; the last of the chain."""
+BASE = f"lfa/{FLEET}"
 REVOKED, ELSEWHERE = "robot4", "robot5"
 """Members without a process: one revoked, one assigned to machine `b`."""
 
@@ -122,6 +128,43 @@ class Attacked:
                 assert clock.now() < until, "what the attacker may say does not come either"
                 clock.sleep(0.005)
         return any(payload[:6] == b"attack" or deleted for _, payload, deleted in heard)
+
+
+class Poison:
+    """Messages with terms of the attacker's choice, in the name of robot 3, whose keys it has."""
+
+    def __init__(self, attacker: zenoh.Session) -> None:
+        """Listen until the leader, robot 1, has said what the team agrees on."""
+        self.proposes: list[Propose] = []
+        """What robot 1 proposed so far."""
+        self._attacker = attacker
+        self._statuses: list[Status] = []
+        attacker.declare_subscriber(f"{BASE}/robot1/lease/all", self._hear_lease)
+        attacker.declare_subscriber(f"{BASE}/{TRAITOR}/status", self._hear_status)
+        eventually(lambda: bool(self.proposes) and bool(self._statuses), "robot 1 or robot 3 says nothing")
+        self.agreed = self.proposes[-1].agreed
+
+    def say(self, number: int) -> None:
+        """Say a term with this number to all voters and gateways."""
+        mine = self._statuses[-1].header.incarnation
+        term, agreed = Term(number, 3, mine), self.agreed
+        said = (Prepare(term, Version(), agreed=agreed), Prepare(term, Version(term), agreed=agreed), Release(term))
+        orders = {f"gateway{robot}": (Fence(term, term),) for robot in range(1, ROBOTS + 1)}
+        for to, bodies in ({"all": said} | orders).items():
+            for body in bodies:
+                note = LeaseNote(Header(TRAITOR, mine, 0, 0.0), body)
+                self._attacker.put(f"{BASE}/{TRAITOR}/lease/{to}", encode(note))
+                clock.sleep(0.01)  # in one batch they are a flood to the router
+
+    def _hear_lease(self, sample: zenoh.Sample) -> None:
+        note = decode(sample.payload.to_bytes(), LeaseNote)
+        if isinstance(note, LeaseNote) and isinstance(note.body, Propose):
+            self.proposes.append(note.body)
+
+    def _hear_status(self, sample: zenoh.Sample) -> None:
+        status = decode(sample.payload.to_bytes(), Status)
+        assert isinstance(status, Status)
+        self._statuses.append(status)
 
 
 def tls(ca: Path, stem: Path) -> dict[str, Any]:
