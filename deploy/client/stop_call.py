@@ -15,7 +15,7 @@ from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.stop import EPOCH_MAX, StopState, StopWord
 
 REPEAT_S = 0.03
-ANSWER_S = 1.0
+ANSWER_S = 0.95
 """Time [s] within which every gateway answers, or is named."""
 REST_S = 4.0
 """Time [s] within which a robot that has answered comes to rest, or is named."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from random import Random
 
 from lfa.deploy.analysis.verification.checker import Checker
-from lfa.deploy.client.stop_call import StopCall
+from lfa.deploy.client.stop_call import StopCall, StopOutcome
 from lfa.deploy.fuzz.lease_processes import Hosts, Process
 from lfa.deploy.fuzz.network import place
 from lfa.deploy.fuzz.schedules import ScheduledFault
@@ -40,6 +40,8 @@ class StopTraffic:
         self._acknowledged: dict[int, StopWord] = {}
         """Greatest stop that each robot's gateway has acknowledged, as kept by its agent too."""
         self._answers = 0
+        self.outcomes: list[tuple[float, float, StopOutcome]] = []
+        """Results of the calls that have ended, with the times [s] of their begin and end."""
 
     @property
     def observer(self) -> Checker:
@@ -60,9 +62,9 @@ class StopTraffic:
     def _call(self, stand: bool, host: int, number: int) -> None:
         call = StopCall(stand, self._team.now)
         call.name(self._robots)
-        self._step(call, host, number, 1)
+        self._step(call, host, number, 1, self._team.now)
 
-    def _step(self, call: StopCall, host: int, number: int, seq: int) -> None:
+    def _step(self, call: StopCall, host: int, number: int, seq: int, begun: float) -> None:
         now = self._team.now
         try:
             said = call.said(now)
@@ -75,8 +77,11 @@ class StopTraffic:
                 self._team.report(Checker.resume_said, now, said.word)
             for robot in self._robots:
                 self._send(order, robot, host, call)
-        if call.outcome(now) is None:
-            self._team.at(now + STEP_S, self._step, call, host, number, seq + 1)
+        outcome = call.outcome(now)
+        if outcome is None:
+            self._team.at(now + STEP_S, self._step, call, host, number, seq + 1, begun)
+        else:
+            self.outcomes.append((begun, now, outcome))
 
     def _send(self, order: StopOrder, robot: int, host: int, call: StopCall | None) -> None:
         for delay_s in self._delays(host, self._team.host_of_gateway(robot)):
