@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import msgspec
 import pytest
 
 from lfa.deploy.analysis.paper.criteria import Bar, Finding, Measured
@@ -45,3 +46,12 @@ def test_the_cost_of_a_world_is_a_row_beside_its_bar(
     assert [(row["name"], row["bar"]) for row in rows] == [
         ("world/4 robots/in process", 15.0), ("world/20 robots/in process", 60.0)]  # fmt: skip
     assert all(row["value"] > 0.0 for row in rows)
+
+
+def test_kept_runs_of_the_paper_make_the_rows_of_fresh_ones() -> None:
+    bar = Bar("7", "distance error outside of events", "<", 0.02, "m")
+    path = paper.PATHS[0]
+    runs = [paper.PaperRun(path, seed, tuple(findings(bar, 0.01 * seed)), ()) for seed in (1, 2)]
+    stored = [msgspec.convert(msgspec.json.decode(msgspec.json.encode(run)), paper.PaperRun) for run in runs]
+    assert paper.rows_of(stored) == paper.rows_of(runs)
+    assert paper.rows_of(runs)[0].holds == 1
