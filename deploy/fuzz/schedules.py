@@ -72,9 +72,9 @@ class Schedule(Struct, frozen=True):
 
     @property
     def is_single(self) -> bool:
-        """Schedule with perfect links and one fault: the leader is killed."""
+        """Schedule with perfect links and one fault: the leader is killed, and no message is held back."""
         kinds = [fault.kind for fault in self.faults]
-        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.radio == FAIR
+        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.radio == FAIR and not self.held
 
 
 KINDS: tuple[str, ...] = (

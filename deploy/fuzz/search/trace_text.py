@@ -31,6 +31,9 @@ def describe(schedule: Schedule) -> str:
     for fault in schedule.faults:
         targets = ", ".join("leader" if t < 0 else str(t) for t in fault.targets)
         lines.append(f"{fault.at * 1000.0:8.1f}  {fault.kind} {targets} ({fault.duration_s:.3f} s, {fault.value:.2f})")
+    for held in schedule.held:
+        late = "is lost" if held.by_s is None else f"comes {held.by_s:g} s late"
+        lines.append(f"message {held.number} from the first fault on {late}")
     return "\n".join(lines)
 
 

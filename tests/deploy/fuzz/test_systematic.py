@@ -9,6 +9,7 @@ from lfa.deploy.fuzz.schedules import FIRST_AT_S, draw
 from lfa.deploy.fuzz.search import guided, systematic
 from lfa.deploy.fuzz.search.command import command
 from lfa.deploy.fuzz.search.searches import Search
+from lfa.deploy.fuzz.search.trace_text import describe
 from lfa.protocol.errors import Refused
 
 FIRST_LEVELS = sum(systematic.level_size(*level) for level in systematic.LEVELS[: systematic.WHOLE])
@@ -81,3 +82,12 @@ def test_a_systematic_search_prints_how_many_schedules_of_each_level_it_covered(
 ) -> None:
     assert command(seeds="0..3", is_systematic=True) == 0
     assert "0 faults, 1 delays: 3 of 180" in capsys.readouterr().out
+
+
+def test_l6_is_not_claimed_where_a_message_is_held_back() -> None:
+    """Of candidates that stand 10 ms apart, the second wins when the first one's PREPARE is lost."""
+    one = systematic.schedule(211)
+    assert [fault.kind for fault in one.faults] == ["kill"]
+    assert len(one.held) == 1
+    assert play(one).violations == []
+    assert "message" in describe(one).splitlines()[-1]
