@@ -140,8 +140,8 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     limits: Limits = Limits()
     radius_m: float = 0.15
     operator_timeout_s: float | None = None
-    """Silence [s] of all operators (`lfa watch`, `lfa teleop`, a bridge) after which every robot stands, until one is
-    there again. None: a team needs no operator."""
+    """Silence [s] of all operators after which every robot stands, until one is there again; `lfa watch` shows that one
+    is. None: a team needs no operator."""
     version: int = 1
 
     @property
