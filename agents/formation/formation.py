@@ -7,7 +7,7 @@ phi is the bearing of the follower's slot in its predecessor's formation frame, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import cos, hypot, isfinite, pi, sin, sqrt
+from math import cos, hypot, pi, sin, sqrt
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import TAU, wrap
@@ -69,10 +69,10 @@ def named(name: str, spec: FormationSpec) -> FormationSpec:
 def check_slot(slot: Slot, separation_min_m: float) -> Slot:
     """Return `slot`; raise `Refused` when no follower can take it."""
     where = f"slot of robot{slot.robot}"
-    if not (isfinite(slot.separation_m) and separation_min_m <= slot.separation_m <= SEPARATION_MAX_M):
+    if not separation_min_m <= slot.separation_m <= SEPARATION_MAX_M:  # true of no NaN either
         right = f"must be from {separation_min_m:g} (robots' size and margin) to {SEPARATION_MAX_M:g}"
         raise Refused(f"{where}: separation_m = {slot.separation_m}: {right}")
-    if not (isfinite(slot.phi) and -TAU <= slot.phi <= TAU):
+    if not -TAU <= slot.phi <= TAU:
         raise Refused(f"{where}: phi = {slot.phi}: must be within -2 pi and 2 pi")
     if abs(wrap(slot.phi)) < pi / 2 - 1e-9:
         raise Refused(f"{where}: phi = {slot.phi:g}: must be beside or behind, |phi| >= pi/2")
@@ -102,9 +102,8 @@ class Formation:
 
     @classmethod
     def of(cls, mission: Mission) -> Formation:
-        formation = cls(mission.formation, mission.robots, 2.0 * mission.radius_m + 0.1, trace=mission.following.trace)
-        formation.trace = mission.following.trace
-        return formation
+        """Create as a mission wants it; no slot is nearer than two robots beside each other and 0.1 m."""
+        return cls(mission.formation, mission.robots, 2.0 * mission.radius_m + 0.1, trace=mission.following.trace)
 
     def request(self, note: FormationNote) -> bool:
         """Apply a leader's request; return False if it is old, repeated, or cannot be obeyed (counted)."""

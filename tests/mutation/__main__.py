@@ -69,12 +69,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="a source file, such as protocol/lease/holder.py")
     parser.add_argument("--sample", type=int, help="try this many faults, drawn at random (all)")
+    parser.add_argument("--lines", type=int, nargs="+", help="try the faults in these lines, once more")
     parser.add_argument("--seed", type=int, default=1, help="of the draw (1)")
     parser.add_argument("--tests", nargs="+", help="tests to run (those of the file's room)")
     given = parser.parse_args()
     file = given.file.resolve().relative_to(ROOT)
     source, tests = (ROOT / file).read_text(), given.tests or tests_of(file)
-    found: list[Mutant] = list(mutants(source))
+    found: list[Mutant] = [mutant for mutant in mutants(source) if not given.lines or mutant.line in given.lines]
     if given.sample is not None and given.sample < len(found):
         found = sorted(Random(given.seed).sample(found, given.sample), key=lambda mutant: mutant.line)
     began = time.perf_counter()

@@ -8,6 +8,7 @@ from math import atan2, cos, hypot, pi, sin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
 from lfa.agents.config import DEFAULT
 from lfa.agents.formation.formation import (
@@ -25,11 +26,11 @@ from lfa.agents.formation.formation import (
 from lfa.agents.formation.pose_history import PoseHistory
 from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.protocol.errors import Refused
-from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
-from lfa.protocol.messages.consensus import Term
+from lfa.protocol.geometry import STILL, TAU, Pose2D, Twist, along_arc, wrap
+from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import FormationNote, Slot
-from lfa.protocol.mission import FormationSpec, Limits
+from lfa.protocol.mission import Following, FormationSpec, Limits, Mission, Side
 
 DT = 0.02
 LIMITS = Limits()
@@ -54,9 +55,24 @@ def test_eq_32_33_every_branch_lies_behind_and_33_is_the_mirror_image_of_32(phi:
     assert wrap(left + right) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_eq_32_33_are_refused_at_pi_half_where_they_jump() -> None:
+@pytest.mark.parametrize(
+    ("side", "phi", "bearing"),
+    [
+        ("left", 0.0, pi), ("left", 1.2, pi - 1.2), ("left", 2.0, 2.0 - 1.5 * pi),
+        ("right", 1.2, 1.2 - pi), ("right", 2.0, 1.5 * pi - 2.0), ("left", pi, -pi / 2),
+        ("zigzag", 1.2, pi - 1.2), ("zigzag", 2.0, 1.5 * pi - 2.0), ("column", 1.2, pi), ("column", 2.0, pi),
+    ],
+)  # fmt: skip
+def test_eq_32_counts_from_the_rear_axis_below_pi_half_and_changes_the_side_above(
+    side: Side, phi: float, bearing: float
+) -> None:
+    assert paper_phi(side, phi) == pytest.approx(bearing)
+
+
+@pytest.mark.parametrize("phi", [pi / 2, -0.1, 3.2])
+def test_eq_32_33_are_refused_at_pi_half_where_they_jump_and_out_of_their_range(phi: float) -> None:
     with pytest.raises(Refused, match="pi/2"):
-        paper_phi("left", pi / 2)
+        paper_phi("left", phi)
 
 
 def test_zigzag_alternates_and_column_is_straight_behind() -> None:
@@ -77,8 +93,11 @@ def test_an_operators_unknown_formation_is_refused_with_the_known_ones() -> None
         Slot(2, float("inf"), pi),
         Slot(2, 1.2, float("nan")),
         Slot(2, 1.2, 9.0),
+        Slot(2, 1.2, -9.0),
         Slot(2, 1.2, 0.3),
+        Slot(2, 1.2, 1.4),
         Slot(2, -1.2, pi),
+        Slot(2, 101.0, pi),
     ],
 )
 def test_slots_that_no_robot_can_take_are_refused(slot: Slot) -> None:
@@ -86,8 +105,34 @@ def test_slots_that_no_robot_can_take_are_refused(slot: Slot) -> None:
         check_slot(slot, 0.4)
 
 
+@pytest.mark.parametrize("slot", [Slot(2, 0.4, pi / 2), Slot(2, 100.0, -pi / 2), Slot(2, 1.2, TAU - pi)])
+def test_the_last_slots_that_a_robot_can_take_are_taken(slot: Slot) -> None:
+    assert check_slot(slot, 0.4) is slot
+
+
 def _note(term: Term, number: int, *slots: Slot) -> FormationNote:
     return FormationNote(Header("robot1", 1, 0, 0.0), term, number, slots)
+
+
+def test_a_mission_names_the_slots_of_all_followers_and_their_least_separation() -> None:
+    formation = Formation.of(Mission((1, 2, 3), radius_m=0.3, following=Following(trace=True)))
+    assert [robot for robot in range(5) if formation.is_named(robot)] == [2, 3]
+    assert formation.trace
+    assert formation.slot_of(4) == Slot(4, FormationSpec().separation_m, pi), "straight behind, if nobody named one"
+    assert not formation.request(_note(Term(1, 1, 1), 0, Slot(2, 0.69, pi)))
+    assert formation.request(_note(Term(1, 1, 1), 1, Slot(2, 0.71, pi)))
+
+
+def test_the_first_request_counts_whatever_its_term() -> None:
+    assert Formation(FormationSpec(), (1, 2), 0.4).request(_note(NO_TERM, 0, Slot(2, 1.0, pi)))
+
+
+def test_a_request_brings_its_side_and_whether_followers_keep_to_the_path() -> None:
+    formation = Formation(FormationSpec(), (1, 2), 0.4)
+    for number, (said, side, trace) in enumerate([("right", "right", True), ("diamond", "", False)]):
+        note = structs.replace(_note(Term(1, 1, 1), number, Slot(2, 1.0, pi)), side=said, trace=trace)
+        assert formation.request(note)
+        assert (formation.side, formation.trace) == (side, trace)
 
 
 def test_the_highest_term_and_number_counts_and_a_bad_request_changes_nothing() -> None:
@@ -128,6 +173,7 @@ def test_the_leader_is_capped_so_that_no_follower_exceeds_nine_tenths_of_v_max()
     for curvature in (-0.5, -0.2, 0.0, 0.2):
         cap = leader_speed_cap(slots, curvature, LIMITS)
         assert max([1.0, *speed_factors(slots, curvature)]) * cap <= 0.9 * LIMITS.v_max_mps + 1e-9
+    assert leader_speed_cap((), 0.0, Limits(v_max_mps=0.8)) == pytest.approx(0.72)
     assert leader_speed_cap((), 4.0, LIMITS) == pytest.approx(0.9 * LIMITS.omega_max_radps / 4.0)
     assert leader_speed_floor(slots, 0.25) == pytest.approx(0.05 / speed_factors(slots, 0.25)[-1])
 
