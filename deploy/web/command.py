@@ -12,9 +12,11 @@ from typing import Annotated
 import msgspec
 import typer
 
+from lfa.deploy.client.session import find
 from lfa.deploy.fleet.host.router import host_credentials
 from lfa.deploy.view.picture.clip import clip_of
 from lfa.deploy.web.engine import Engine, RecordingEngine
+from lfa.deploy.web.fleet import FleetEngine
 from lfa.deploy.web.lessons import LESSONS
 from lfa.deploy.web.server import PageServer, PageTokens, is_loopback
 from lfa.deploy.web.share import Setting, setting_of
@@ -34,6 +36,9 @@ def command(
     robots: Annotated[int | None, typer.Option(help="Number of robots, instead of the scenario's.")] = None,
     overrides: Annotated[list[str] | None, typer.Option("--set", help="Override a field of the scenario.")] = None,
     port: Annotated[int, typer.Option(help="Port of the page; 0: any free one.")] = PORT,
+    live: Annotated[bool, typer.Option("--live", help="Show the fleet that runs here.")] = False,
+    fleet: Annotated[str | None, typer.Option(help="Show this running fleet.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router of that fleet, if not its own here.")] = None,
     listen: Annotated[str, typer.Option(help="Address to listen on; one for others needs --keys.")] = HOST,
     keys: Annotated[Path | None, typer.Option(help="Keys of this machine, from lfa keys.")] = None,
 ) -> int:
@@ -41,6 +46,10 @@ def command(
     if not 0 <= port <= 65535:
         raise Refused(f"--port {port}: must be from 0 to 65535")
     secure = _secured(listen, keys)
+    if live or fleet is not None or connect is not None:
+        if what or seed is not None or robots is not None or overrides:
+            raise Refused("--live, --fleet, --connect: show a fleet as it runs, give no scenario with them")
+        return serve_engine(FleetEngine(find(fleet, connect, keys)), listen, port, secure)
     runs = [Path(name) for name in what or () if Path(name).is_dir()]
     if runs:
         if len(runs) < len(what or ()) or seed is not None or robots is not None or overrides:
@@ -85,10 +94,10 @@ def _virtual(what: str | None, seed: int | None, robots: int | None, overrides: 
 
 def _secured(listen: str, keys: Path | None) -> ssl.SSLContext | None:
     """Return the TLS context of this machine in the fleet; None on this machine's own addresses. Raises Refused."""
-    if keys is None:
-        if not is_loopback(listen):
-            raise Refused(f"--listen {listen}: must come with --keys, so that nobody reads the token on its way")
+    if is_loopback(listen):
         return None
+    if keys is None:
+        raise Refused(f"--listen {listen}: must come with --keys, so that nobody reads the token on its way")
     known = host_credentials(keys)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_3

@@ -6,29 +6,36 @@ from math import cos, pi, sin
 from typing import Any
 
 from lfa.deploy.view.picture.picture import COLUMNS
+from lfa.protocol.mission import Mission
 from lfa.world.description.scenario import Obstacle, Scenario
 from lfa.world.description.terrain import patches_of
 
 CORNERS = 24
 
 
-def ground_of(scenario: Scenario | None, label: str = "") -> dict[str, Any]:
+def ground_of(scenario: Scenario, label: str = "") -> dict[str, Any]:
     """Return walls, obstacles, terrain, route and robots of a drawn scenario as plain lists, in metres in `map`."""
-    if scenario is None:
-        return {"label": label, "walls": [], "obstacles": [], "terrain": [], "route": [], "columns": COLUMNS}
-    mission, world = scenario.mission, scenario.world
-    explores = mission.leading.motion == "explore"
+    world = scenario.world
     return {
-        "label": label,
+        **ground_of_mission(scenario.mission, label),
         "walls": [list(wall) for wall in world.walls_m],
         "obstacles": [_shape(obstacle) for obstacle in world.obstacles],
         "terrain": [_patch(patch) for patch in patches_of(world)],
+    }
+
+
+def ground_of_mission(mission: Mission, label: str = "") -> dict[str, Any]:
+    """Return the same of a mission alone, for a fleet whose world is not known."""
+    explores = mission.leading.motion == "explore"
+    return {
+        "label": label,
+        "walls": [],
+        "obstacles": [],
+        "terrain": [],
         "route": [] if explores else [list(point) for point in mission.leading.route_m],
         "goal": list(mission.goal_m),
         "robots": list(mission.robots),
         "radius": mission.radius_m,
-        "gap": mission.formation.separation_m,
-        "limit": scenario.time_limit_s,
         "columns": COLUMNS,
     }
 

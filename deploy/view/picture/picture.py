@@ -58,7 +58,8 @@ class _Robot(Struct):
 class Picture:
     """Picture of one team, updated by `see`; `news` has what happened, `frame` what is now."""
 
-    def __init__(self, robots: tuple[int, ...]) -> None:
+    def __init__(self, robots: tuple[int, ...], *, late: bool = False) -> None:
+        """`late`: a leader that led before the first message is known by its own poses."""
         self.t = 0.0
         self.news = News()
         self.leaders = LeaderTable()
@@ -75,6 +76,7 @@ class Picture:
         self.loss_ordered = 0.0
         """Share of messages that an order lets every receiver lose."""
         self._ids = robots
+        self._late = late
         self._robots = {robot: _Robot() for robot in robots}
         self._true = False
         self._moved: dict[int, tuple[float, float]] = {}
@@ -148,6 +150,8 @@ class Picture:
                 self._event(t, owner, message)
             case "pose" if robot in self._robots:
                 self._pose(t, self._robots[robot], message)
+                if self._late and self._robots[robot].role == "leader":
+                    self._found(t, robot, message)
             case "tracking" if robot in self._robots:
                 self._tracking(t, self._robots[robot], message)
             case "status" if robot in self._robots:
@@ -174,6 +178,11 @@ class Picture:
         if not self._true:
             shown.x, shown.y, shown.theta = float(message.x), float(message.y), float(message.theta)
             shown.speed, shown.placed = float(message.twist.linear_x), True
+
+    def _found(self, t: float, robot: int, message: Any) -> None:
+        lead = self.leaders.found(t, robot, (int(message.term.n), int(message.term.issuer)))
+        if lead is not None:
+            self.news.add({"k": "lead", **lead})
 
     def _tracking(self, t: float, shown: _Robot, message: Any) -> None:
         ahead = self._robots.get(message.predecessor)

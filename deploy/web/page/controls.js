@@ -47,8 +47,10 @@ export class Controls {
     if (acts) {
       parts.push(element("div", { class: "group", role: "group", "aria-label": "Formation" },
         ...SIDES.map((side) => button(side, () => this.fault(`formation ${side}`), { id: `side-${side}` }))));
-      this.loss = this.slider("loss", 0, 1, 0.05, (value) => `${Math.round(100 * value)} %`);
-      parts.push(this.loss.label);
+      if (scene.faults !== false) {
+        this.loss = this.slider("loss", 0, 1, 0.05, (value) => `${Math.round(100 * value)} %`);
+        parts.push(this.loss.label);
+      }
       if (scene.engine === "virtual") {
         this.range = this.slider("range", 0, 20, 0.5, (value) => (value > 0 ? `${value} m` : "no limit"));
         parts.push(this.range.label);
@@ -57,11 +59,13 @@ export class Controls {
         this.draw = button("Obstacle", () => this.setTool(this.tool === "draw" ? "look" : "draw"), { id: "draw", "aria-pressed": "false", title: "Click or drag on the ground (O)" });
         parts.push(this.draw);
       }
-      if (scene.lease_cut !== false) parts.push(button("Heal all", () => this.fault("heal"), { id: "healall" }));
+      if (scene.faults !== false) parts.push(button("Heal all", () => this.fault("heal"), { id: "healall" }));
     }
     holder.replaceChildren(...parts);
     for (const id of ["share", "save"]) byId(id).hidden = !acts || scene.engine !== "virtual";
     byId("stop").hidden = !acts || !scene.stop;
+    byId("resume").hidden = true;
+    this.scene = scene;
     this.buildOpen(scene, acts);
     this.setTool("look");
   }
@@ -110,6 +114,7 @@ export class Controls {
     this.clock.textContent = seconds(state.t ?? t);
     if (this.speed && document.activeElement !== this.speed && SPEEDS.some(([value]) => value === state.speed)) this.speed.value = state.speed;
     this.play.disabled = Boolean(state.over);
+    byId("resume").hidden = !state.stopped || this.rights !== "operate";
     if (state.loss !== undefined && this.loss) this.loss.set(state.loss);
     if (state.range !== undefined && this.range) this.range.set(state.range);
     if (this.scrub) {
@@ -132,12 +137,12 @@ export class Controls {
   // The menu of a robot, beside it.
   menu(robot, at) {
     const menu = byId("robotmenu");
-    if (robot === null || this.rights !== "operate") {
+    if (robot === null || this.rights !== "operate" || this.scene.faults === false) {
       menu.hidden = true;
       return;
     }
     const deeds = DEEDS.map(([deed, text, key]) => button(text, () => this.deed(deed, robot), { id: `do-${deed}`, title: key }));
-    const scan = button("Scan", () => this.scan(robot), { id: "do-scan", title: "L", "aria-pressed": String(this.scanned.has(robot)) });
+    const scan = this.engine === "fleet" ? "" : button("Scan", () => this.scan(robot), { id: "do-scan", title: "L", "aria-pressed": String(this.scanned.has(robot)) });
     const close = button("×", () => this.page.choose(null), { "aria-label": "Close" });
     menu.replaceChildren(element("h2", {}, `Robot ${robot}`, close), element("div", { class: "row" }, ...deeds, scan));
     menu.hidden = false;
@@ -179,7 +184,7 @@ export class Controls {
     else if (event.key === "?") byId("keys").showModal();
     else if (event.key === "Escape") page.choose(null);
     else if (event.key === "o" && this.draw) this.setTool(this.tool === "draw" ? "look" : "draw");
-    else if (event.key === "l" && chosen !== null) this.scan(chosen);
+    else if (event.key === "l" && chosen !== null && this.engine === "virtual") this.scan(chosen);
     else if (event.key === "]" || event.key === "[") page.next(event.key === "]" ? 1 : -1);
     else if (deed && chosen !== null) this.deed(deed[0], chosen);
     else return false;

@@ -149,6 +149,7 @@ class Page {
     byId("fit").onclick = () => this.stages.forEach((stage) => stage.fit());
     byId("follow").onclick = () => this.follow();
     byId("save").onclick = () => this.order({ do: "save" });
+    byId("resume").onclick = () => this.order({ do: "resume" });
     byId("stop").onclick = () => this.order({ do: "stop" });
     byId("share").onclick = () => this.share();
     byId("keylist").replaceChildren(...KEYS.flatMap(([key, what]) => [element("span", {}, element("kbd", {}, key)), element("span", {}, what)]));

@@ -1,0 +1,214 @@
+"""Engine of the page on a running fleet of real processes: it listens, and does what its operator's rights allow.
+
+Faults take the way of `lfa fault`: a signal to a process of this user here, or an operator's message to all. The stop
+button is `lfa stop`: every gateway latches it, and who has not stopped is named.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import Any
+
+from lfa.deploy.client.discovery import agents
+from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.session import FleetAddress, Subscriber, listen, scenario_of_fleet
+from lfa.deploy.client.stop_call import StopCall
+from lfa.deploy.client.stop_fleet import TOPICS as STOP_TOPICS
+from lfa.deploy.client.stop_fleet import told
+from lfa.deploy.faults.link_faults import note
+from lfa.deploy.faults.script import DEEDS, LEADER, ORDERS, RESTART, SIGNALS, SIMULATED
+from lfa.deploy.process.identity import send_signal
+from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.deploy.view.picture.ground import ground_of, ground_of_mission
+from lfa.deploy.view.picture.picture import TOPICS, Picture
+from lfa.protocol import clock, incarnations
+from lfa.protocol.errors import Refused
+from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.messages.stop import StopState
+from lfa.protocol.messages.team import MissionNote
+from lfa.protocol.mission import Mission
+from lfa.protocol.names import robot_id_of, whole_number
+from lfa.protocol.topics import address
+from lfa.protocol.transport.message_bus import send
+
+HEARD = frozenset(f"*/{topic}" for topic in TOPICS - {"scan"}) | STOP_TOPICS
+MISSION_S = 2.0
+"""Time [s] within which a fleet says its mission."""
+BEAT_S = 0.2
+"""Period [s] at which the fleet hears that an operator is there."""
+RESTART_S, RESTART_EVERY_S = 2.0, 0.3
+SENT_S = 0.02
+"""Delay [s] so that the event about a fault leaves before the fault."""
+WEATHER_DEEDS = ("cut", "heal", "loss")
+
+
+class FleetEngine:
+    """Engine of one running fleet; without processes of this user's own it can only stop it and order formations."""
+
+    number = 1
+
+    def __init__(self, fleet: FleetAddress) -> None:
+        """Listen, and wait for the mission. Raises Refused for a fleet that says none."""
+        self._fleet = fleet
+        self._open = ExitStack()
+        self._ear: Subscriber = self._open.enter_context(listen(fleet, HEARD))
+        self._operator = Operator(fleet.name, incarnations.drawn())
+        self._time = WorldTime()
+        self._call: tuple[StopCall, bool] | None = None
+        self._stopped = False
+        self._restarts: dict[int, tuple[float, float]] = {}
+        """Robots to restart: until when [s], and when the launcher is asked next."""
+        self._beat_at = 0.0
+        self._began = clock.now()
+        mission = self._mission()
+        scenario = scenario_of_fleet(fleet)
+        self._ground = ground_of_mission(mission) if scenario is None else ground_of(scenario)
+        self._simulated = scenario is not None
+        self._robots = mission.robots
+        self._picture = Picture(mission.robots, late=True)
+
+    @property
+    def pictures(self) -> list[Picture]:
+        return [self._picture]
+
+    def _mission(self) -> Mission:
+        send(self._ear.bus, self._operator.ask("mission", clock.now()))
+        until = clock.now() + MISSION_S
+        while clock.now() < until:
+            self._ear.wait(0.05)
+            for _, message in self._ear.take():
+                if isinstance(message, MissionNote):
+                    return message.mission
+        self.close()
+        raise Refused(f"fleet {self._fleet.name}: nobody says its mission within {MISSION_S:g} s, is it running?")
+
+    def scene(self) -> dict[str, Any]:
+        return {
+            "engine": "fleet",
+            "title": f"fleet {self._fleet.name}",
+            "scenario": self._fleet.name,
+            "panes": [self._ground],
+            "stop": True,
+            "faults": bool(self._fleet.team),
+            "simulated": self._simulated and bool(self._fleet.team),
+        }
+
+    def state(self) -> dict[str, Any]:
+        return {"playing": True, "speed": 1, "over": "", "faults": [], "stopped": self._stopped}
+
+    def advance(self) -> None:
+        """Take in what came, say what is due, and repeat what has not been answered yet."""
+        now = clock.now()
+        for arrival, message in self._ear.take():
+            where = address(arrival.key)
+            if where is None:
+                continue
+            if isinstance(message, Truth):
+                self._time.see(arrival.at, message.time_s)
+            robot = robot_id_of(where.owner)
+            if isinstance(message, StopState) and robot is not None and self._call is not None:
+                self._call[0].hear(robot, message, now)
+            if where.topic in TOPICS:
+                self._picture.see(self._at(arrival.at), where.owner, where.topic, message)
+        self._go_on_stopping(now)
+        self._go_on_restarting(now)
+        if now >= self._beat_at and self._call is None:
+            self._beat_at = now + BEAT_S
+            send(self._ear.bus, self._operator.stop(None, (), now))
+
+    def _at(self, arrived: float) -> float:
+        """Return the time [s] of the page: that of the world, without one since the page began to look."""
+        return self._time.of(arrived) if self._time.known else arrived - self._began
+
+    def obey(self, order: dict[str, Any]) -> dict[str, Any]:
+        match order:
+            case {"do": "stop" | "resume" as do}:
+                self._call = StopCall(do == "stop", clock.now()), do == "stop"
+                self._call[0].name(self._robots)
+                self._go_on_stopping(clock.now())
+                return {"said": f"{do}: said to all"}
+            case {"do": "fault", "text": str(text)}:
+                return {"said": self._fault(text)}
+        raise Refused(f"{str(order.get('do'))[:20]}: no such order for a running fleet")
+
+    def _go_on_stopping(self, now: float) -> None:
+        if self._call is None:
+            return
+        call, stand = self._call
+        try:
+            said = call.said(now)
+            if said is not None:
+                send(self._ear.bus, self._operator.stop(said.word, said.gateways, now))
+            outcome = call.outcome(now)
+        except Refused as refused:
+            self._call = None
+            self._tell(str(refused), alarm=True)
+            return
+        if outcome is not None:
+            self._call = None
+            self._stopped = stand
+            self._tell("; ".join(told(outcome, stand=stand)), alarm=not outcome.complete)
+
+    def _go_on_restarting(self, now: float) -> None:
+        for robot, (until, again) in list(self._restarts.items()):
+            if self._picture.role(robot) != "gone":
+                del self._restarts[robot]
+            elif now > until:
+                del self._restarts[robot]
+                self._tell(f"restart {robot}: no lfa run is there that starts it again", alarm=True)
+            elif now >= again:
+                self._restarts[robot] = until, now + RESTART_EVERY_S
+                send(self._ear.bus, self._operator.command(RESTART, now, robot=robot))
+
+    def _tell(self, text: str, *, alarm: bool) -> None:
+        """Add a line to what happens."""
+        t = round(self._picture.t, 3)
+        self._picture.news.add({"k": "event", "t": t, "kind": "operator", "who": None, "text": text, "alarm": alarm})
+
+    def _fault(self, text: str) -> str:
+        """Carry out a fault; return what was done. Raises Refused."""
+        deed, _, target = text.strip().partition(" ")
+        if deed not in DEEDS or deed in SIMULATED:
+            raise Refused(f"{deed[:20]!r}: must be one of {', '.join(d for d in DEEDS if d not in SIMULATED)}")
+        if target == LEADER:
+            if self._picture.leader is None:
+                raise Refused(f"{text}: nobody leads at the moment")
+            target = str(self._picture.leader)
+        if deed in ORDERS:
+            return self._order(deed, target)
+        robot = whole_number(target)
+        if robot not in self._robots or robot is None:
+            raise Refused(f"{text[:60]}: must name a robot of {', '.join(map(str, self._robots))}")
+        if deed == RESTART:
+            now = clock.now()
+            self._restarts[robot] = now + RESTART_S, now
+            return f"{RESTART} {robot}"
+        return self._signal(deed, robot)
+
+    def _signal(self, deed: str, robot: int) -> str:
+        own = (agent for agent in agents() if agent.fleet == self._fleet.name and agent.robot == robot)
+        victim = next(own, None)
+        if victim is None:
+            raise Refused(f"{deed} {robot}: no process of yours here is robot {robot}")
+        send(self._ear.bus, self._operator.event("fault", clock.now(), deed=deed, robot=robot))
+        clock.sleep(SENT_S)
+        if not send_signal(victim.identity, SIGNALS[deed]):
+            raise Refused(f"{deed} {robot}: its process {victim.identity.pid} has gone in the meantime")
+        return f"{deed} {robot} (process {victim.identity.pid})"
+
+    def _order(self, deed: str, target: str) -> str:
+        team = [agent for agent in agents() if agent.fleet == self._fleet.name]
+        if deed != "formation" and not team:
+            raise Refused(f"{deed}: the processes of this fleet are not yours")
+        if deed in WEATHER_DEEDS and not all("--faults" in agent.identity.arguments for agent in team):
+            raise Refused(f"{deed}: the fleet's processes were started without --faults")
+        now = clock.now()
+        said = note(self._operator, now, deed, target, self._robots)
+        robot = whole_number(target)
+        send(self._ear.bus, self._operator.event("fault", now, deed=deed, robot=target if robot is None else robot))
+        send(self._ear.bus, said)
+        return f"{deed} {target}".strip()
+
+    def close(self) -> None:
+        """End the session with the fleet, which goes on."""
+        self._open.close()
