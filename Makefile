@@ -124,7 +124,7 @@ pages: $(STAMP)
 # The pictures of the tutorial: figures of its own run.
 pictures: $(STAMP)
 	rm -rf build/pictures
-	$(BIN)/lfa sim leader_killed --seed 7 --out build/pictures
+	$(BIN)/lfa sim leader_killed --seed 7 --figures --out build/pictures
 	$(BIN)/lfa view build/pictures --gif deploy/docs/pictures/killed.gif
 	cp $(foreach name,fig07_distance_error fig09_path_flow lease_timeline,build/pictures/figures/$(name).png) deploy/docs/pictures
 

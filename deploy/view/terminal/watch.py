@@ -42,7 +42,18 @@ SIDES = ("left", "right", "column", "zigzag")
 #        key   action
 DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
 STOPS = {" ": True, "r": False}
-HELP = "SPACE stop all, r resume; 1-9 robot, k kill, s stop, c continue, x cut, h heal, f formation, q quit"
+HELP = "SPACE stop all, r resume, 1-9 robot, ? all keys, q quit"
+KEYS = (
+    "SPACE  stop all robots         r  let them drive on",
+    "1-9    choose a robot          f  the next formation",
+    "k      kill it, after asking   s  pause it    c  continue",
+    "x      cut its links           h  heal all links",
+    "?      this list               q  quit; the fleet goes on",
+)
+WIDE = 78
+"""Width [characters] from which the table has all columns."""
+PROCESS_HEADS = ("lag ms", "CPU %", "MiB")
+"""Columns that a narrower terminal does without."""
 ROLE_STYLES = {"leader": "bold green", "follower": "", "waiting": "yellow", "silent": "bold red", "unheard": "dim"}
 
 
@@ -69,7 +80,8 @@ def command(
     else:
         from rich.console import Console
 
-        Console(width=max(WIDTH_MIN, shutil.get_terminal_size().columns)).print(_table(rows, None))
+        width = max(WIDTH_MIN, shutil.get_terminal_size().columns)
+        Console(width=width).print(_table(rows, None, width))
     return 0 if any(row.pose_age_s is not None for row in rows) else 1
 
 
@@ -119,6 +131,9 @@ class KeyHandler:
         self.chosen: int | None = None
         self.said = "" if ear.fleet.team else "this fleet is not yours to command: keys other than q do nothing"
         self._side = 0
+        self._asked = False
+        self.help = False
+        """True while the list of keys is shown."""
         self._operator = Operator(ear.fleet.name, incarnations.drawn())
 
     def await_keys(self) -> str:
@@ -130,6 +145,13 @@ class KeyHandler:
         return pressed
 
     def press(self, key: str) -> None:
+        confirmed, self._asked = self._asked and key == "y", False
+        if confirmed:
+            self._do("kill")
+            return
+        if key == "?":
+            self.help = not self.help
+            return
         if key in STOPS:
             self._stop(stand=STOPS[key])
         if not self._ear.fleet.team:
@@ -141,6 +163,9 @@ class KeyHandler:
             self._side = (self._side + 1) % len(SIDES)
             formation.say(self._ear, SIDES[self._side])
             self.said = f"formation {SIDES[self._side]} asked for"
+        elif key == "k" and self.chosen is not None:
+            self._asked = True
+            self.said = f"kill the process of robot {self.chosen}? y: yes, any other key: no"
         elif key in DEEDS:
             self._do(DEEDS[key])
 
@@ -175,27 +200,31 @@ def _screen(ear: Subscriber, board: Board, hand: KeyHandler, width: int, height:
     who = "nobody leads" if leader is None else f"robot {leader} leads"
     left = height - len(shown) - 7
     more = f", {len(rows) - len(shown)} more robots" if len(shown) < len(rows) else ""
-    events = list(board.events)[-left:] if left > 0 else []
+    events = list(board.events)[-left:] if left > 0 and not hand.help else []
     return Group(
         Text(visible(f"fleet {ear.fleet.name}: {who}{more}"), style="bold", no_wrap=True),
-        _table(shown, hand.chosen),
+        _table(shown, hand.chosen, width),
         _timeline(board, width),
         *(Text(visible(f" {_ago(e.at):>6} {e.who:<9} {e.what}"), no_wrap=True, overflow="ellipsis") for e in events),
+        *(Text(f" {keys}", no_wrap=True) for keys in KEYS[: max(left, 0)] if hand.help),
         Text(visible(hand.said), style="cyan", no_wrap=True, overflow="ellipsis"),
         Text(HELP, style="dim", no_wrap=True, overflow="ellipsis"),
     )
 
 
-def _table(rows: list[RobotStatus], chosen: int | None) -> RenderableType:
+def _table(rows: list[RobotStatus], chosen: int | None, width: int) -> RenderableType:
     from rich.table import Table
 
+    kept = [n for n, head in enumerate(HEADS) if width >= WIDE or head not in PROCESS_HEADS]
+
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    for head in HEADS:
+    for head in (HEADS[n] for n in kept):
         left = head in ("role", "state")
         table.add_column(head, justify="left" if left else "right", no_wrap=True, overflow="ellipsis")
     for row in rows:
         table.add_row(
-            *map(cell, _cells(row)), style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, "")
+            *(cell(_cells(row)[n]) for n in kept),
+            style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, ""),
         )
     return table
 

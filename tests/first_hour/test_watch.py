@@ -1,0 +1,50 @@
+"""`lfa watch` fits narrow terminals, and asks before it kills."""
+
+from __future__ import annotations
+
+import io
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from rich.console import Console
+
+from lfa.deploy.client.team_status import RobotStatus
+from lfa.deploy.view.terminal import watch
+
+ROW = RobotStatus(
+    robot=12, role="follower", term=1795960024479, predecessor=11, error_m=-0.123, heading_error_rad=3.0,
+    speed_mps=-0.55, pose_age_s=0.123, loop_lag_ms=12.0, cpu_percent=12.0, rss_mib=33.0, state="follow",
+)  # fmt: skip
+
+
+def shown(width: int) -> list[str]:
+    out = io.StringIO()
+    Console(file=out, width=width).print(watch._table([ROW], None, width))
+    return [line.rstrip() for line in out.getvalue().splitlines()]
+
+
+@pytest.mark.parametrize("width", [60, 79, 80, 120])
+def test_no_cell_of_the_table_is_cut(width: int) -> None:
+    head, row = shown(width)
+    assert "…" not in head + row
+    assert max(len(head), len(row)) <= width
+    assert ("CPU %" in head) is (width >= watch.WIDE)
+    assert row.split()[-1] == "follow"
+
+
+def test_the_keys_are_listed_in_sixty_columns() -> None:
+    assert max(map(len, (*watch.KEYS, watch.HELP))) <= 58
+
+
+@pytest.mark.parametrize(("answer", "killed"), [("y", ["1"]), ("n", []), ("k", []), ("q", [])])
+def test_a_kill_is_asked_for(monkeypatch: pytest.MonkeyPatch, answer: str, killed: list[str]) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(watch.fault, "command", lambda deed, target, **_: done.append(target))
+    ear = SimpleNamespace(fleet=SimpleNamespace(name="fleet", team=(1,)), bus=None)
+    hand = watch.KeyHandler(cast(Any, ear))
+    hand.press("1")
+    hand.press("k")
+    assert (done, hand.said) == ([], "kill the process of robot 1? y: yes, any other key: no")
+    hand.press(answer)
+    assert done == killed
