@@ -1,9 +1,9 @@
 """Systematic search: schedules of few faults and few delayed messages, in the order of how few (delay-bounded).
 
-Three robots and the witness on perfect links; a leader holds its lease, then one or two faults make it lead no longer,
-so a schedule goes through two terms or three. Up to three messages after the first fault are late or lost. Within a
-level, schedules are taken at equal distances, so a search that ends early has seen all of its kinds. Emmi, Qadeer,
-Rakamaric, Delay-bounded scheduling (2011).
+Three robots and the witness on perfect links and the worst clocks; a leader holds its lease, then one or two faults end
+its term, so a schedule goes through two terms or three. Up to three messages after the first fault are late or lost.
+Within a level, schedules are taken at equal distances, so a search that ends early has seen all of its kinds. Emmi,
+Qadeer, Rakamaric, Delay-bounded scheduling (2011).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from math import comb, gcd
 
 from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import FIRST_AT_S, LEADER, HeldMessage, Schedule, ScheduledFault
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
 
 ROBOTS = 3
 FAULTS_MAX, DELAYS_MAX = 2, 3
@@ -63,6 +64,13 @@ LEVELS: tuple[tuple[int, int], ...] = tuple(
     sorted(product(range(FAULTS_MAX + 1), range(DELAYS_MAX + 1)), key=lambda level: (sum(level), level))
 )
 """Levels (faults, delays), the fewest deviations first. The first three are searched whole, the others in turn."""
+TURNS = (
+    (1, 1), (2, 0), (1, 2), (1, 1), (2, 1), (0, 2), (1, 1), (2, 0), (0, 3), (1, 2), (1, 1), (2, 1), (1, 3), (2, 0),
+    (2, 2), (2, 3),
+)  # fmt: skip
+"""Levels of the schedules after those: small levels more often, for of a large one a search sees little anyway."""
+WORST_RATES = {1: 1.0 - CLOCK_RATE_ERROR} | dict.fromkeys((0, SECOND, LAST), 1.0 + CLOCK_RATE_ERROR)
+"""Clocks on which leases last longest and bonds end first, with robot 1 as the first leader."""
 WHOLE = 3
 _WHOLE_SIZES = tuple(accumulate(level_size(*level) for level in LEVELS[:WHOLE]))
 SCHEDULES = sum(level_size(*level) for level in LEVELS)
@@ -73,8 +81,9 @@ def place(number: int) -> tuple[tuple[int, int], int]:
     for level, end in zip(LEVELS[:WHOLE], _WHOLE_SIZES, strict=True):
         if number < end:
             return level, number - end + level_size(*level)
-    step, turn = divmod(number - _WHOLE_SIZES[-1], len(LEVELS) - WHOLE)
-    level = LEVELS[WHOLE + turn]
+    rounds, turn = divmod(number - _WHOLE_SIZES[-1], len(TURNS))
+    level = TURNS[turn]
+    step = rounds * TURNS.count(level) + TURNS[:turn].count(level)
     return level, step % level_size(*level)
 
 
@@ -97,7 +106,7 @@ def schedule(number: int) -> Schedule:
         rest, hold = divmod(rest, len(HOLDS_S))
         held.append(HeldMessage(message, HOLDS_S[hold]))
     return Schedule(
-        seed=number, robots=ROBOTS, witness=True, profile="std", gateways_at_world=False, rates={},
+        seed=number, robots=ROBOTS, witness=True, profile="std", gateways_at_world=False, rates=WORST_RATES,
         faults=tuple(chosen), radio=FAIR, stops=(), revive_all=True, held=tuple(held),
     )  # fmt: skip
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import pytest
+from msgspec import structs
 
 from lfa.deploy.fuzz.fault_injector import play
-from lfa.deploy.fuzz.schedules import FIRST_AT_S, draw
+from lfa.deploy.fuzz.schedules import FIRST_AT_S, LEADER, HeldMessage, ScheduledFault, draw
 from lfa.deploy.fuzz.search import guided, systematic
 from lfa.deploy.fuzz.search.command import command
 from lfa.deploy.fuzz.search.searches import Search
@@ -22,12 +25,13 @@ def test_the_levels_with_one_deviation_are_searched_whole_and_each_schedule_once
 
 
 def test_a_search_that_goes_on_takes_all_other_levels_in_turn() -> None:
-    others = len(systematic.LEVELS) - systematic.WHOLE
+    cycle = len(systematic.TURNS)
     sizes = [
         (len(one.faults), len(one.held))
-        for one in map(systematic.schedule, range(FIRST_LEVELS, FIRST_LEVELS + 2 * others))
+        for one in map(systematic.schedule, range(FIRST_LEVELS, FIRST_LEVELS + 2 * cycle))
     ]
-    assert sizes == [*systematic.LEVELS[systematic.WHOLE :]] * 2
+    assert sizes == [*systematic.TURNS] * 2
+    assert set(systematic.TURNS) == set(systematic.LEVELS[systematic.WHOLE :])
 
 
 def test_no_schedule_has_more_than_two_faults_and_three_delays_among_three_robots() -> None:
@@ -42,17 +46,15 @@ def test_no_schedule_has_more_than_two_faults_and_three_delays_among_three_robot
 def test_the_schedules_of_a_level_are_all_different() -> None:
     level = (2, 0)
     size = systematic.level_size(*level)
-    turn = systematic.LEVELS.index(level) - systematic.WHOLE
-    others = len(systematic.LEVELS) - systematic.WHOLE
-    numbers = (FIRST_LEVELS + turn + others * step for step in range(size))
-    assert len({systematic.schedule(number).faults for number in numbers}) == size
+    numbers = (n for n in range(FIRST_LEVELS, 40 * size) if systematic.place(n)[0] == level)
+    assert len({systematic.schedule(number).faults for number in islice(numbers, size)}) == size
 
 
 def test_what_is_covered_is_counted_by_level() -> None:
-    lines = systematic.covered(range(FIRST_LEVELS + 9))
+    lines = systematic.covered(range(FIRST_LEVELS + len(systematic.TURNS)))
     assert lines[:3] == [
         "0 faults, 0 delays: 1 of 1", "0 faults, 1 delays: 180 of 180", "1 faults, 0 delays: 24 of 24"]  # fmt: skip
-    assert lines[3].startswith("0 faults, 2 delays: 1 of ")
+    assert lines[3].startswith("1 faults, 1 delays: 4 of ")
 
 
 def test_a_message_is_delayed_or_lost_by_its_number_from_the_first_fault_on() -> None:
@@ -86,8 +88,8 @@ def test_a_systematic_search_prints_how_many_schedules_of_each_level_it_covered(
 
 def test_l6_is_not_claimed_where_a_message_is_held_back() -> None:
     """Of candidates that stand 10 ms apart, the second wins when the first one's PREPARE comes 30 ms late."""
-    one = systematic.schedule(211)
-    assert [fault.kind for fault in one.faults] == ["kill"]
-    assert [held.by_s for held in one.held] == [0.03] * 3
+    late = tuple(HeldMessage(number, 0.03) for number in range(3))
+    one = structs.replace(systematic.schedule(0), faults=(ScheduledFault(1.5, "kill", (LEADER,)),), held=late)
+    assert not one.is_single
     assert play(one).violations == []
     assert "message" in describe(one).splitlines()[-1]
