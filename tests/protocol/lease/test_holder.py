@@ -75,3 +75,33 @@ def test_a_config_is_committed_by_a_quorum_that_accepted_it_or_a_later_one() -> 
     holder.granted(OTHER, grant(1, seq=1), newer, 10.01)
     holder.granted(OTHER, grant(0), newer, 10.02)  # late, of the older config: forgets nothing
     assert holder.committed(newer)
+
+
+def test_fenced_terms_are_named_until_the_bonds_under_them_have_ended() -> None:
+    fenced = (Term(4, 2, 1),)
+    holder = Holder(ME, TERM, STD, 10.0, agreed=1, fenced=fenced)
+    assert holder.next_propose(CONFIG, 10.0 + 0.99 * STD.grant_s).fenced == fenced
+    assert holder.next_propose(CONFIG, 10.0 + STD.grant_s).fenced == ()
+
+
+def test_e16_a_term_that_was_handed_over_counts_from_its_nonce_and_goes_on_after_its_issuers_round() -> None:
+    holder = Holder(ME, TERM, STD, 10.0, agreed=1)
+    holder.transferred(7, since=9.9)
+    for voter in (ME, OTHER):
+        holder.granted(voter, grant(7), CONFIG, 10.01)
+    assert holder.expiry == pytest.approx(9.9 + STD.act_s)
+    assert [holder.next_propose(CONFIG, 10.02 + n).round for n in range(2)] == [8, 9]
+
+
+def test_an_incarnation_is_silent_after_its_last_message_and_one_never_heard_after_the_beginning() -> None:
+    holder = asked(1)
+    holder.granted(OTHER, grant(0), CONFIG, 10.5)
+    assert [holder.silent(OTHER, at, 1.0) for at in (11.5, 11.6)] == [False, True]
+    assert [holder.silent(THIRD, at, 1.0) for at in (11.0, 11.1)] == [False, True]
+
+
+def test_the_last_nonce_of_each_voter_is_kept() -> None:
+    holder = asked(2)
+    for number, nonce in enumerate((3.5, 4.5)):
+        holder.granted(OTHER, Grant(TERM, number, CONFIG.version, nonce), CONFIG, 10.1)
+    assert holder.nonces[OTHER] == 4.5
