@@ -20,6 +20,7 @@ from lfa.agents.following.factory import follower_of, predecessor_of
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.free_slot import FreeSlot
+from lfa.agents.leading.hand_driving import HandDriving
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
 from lfa.agents.leading.narrow_gap import narrow_gap_m
 from lfa.agents.leading.path_follower import PathFollower
@@ -89,6 +90,8 @@ class Navigator:
         self._last = STILL
         self._driven_at: float | None = None
         self._placeless_since: float | None = None
+        self.hand_driving = HandDriving()
+        self._was_by_hand = False
         self.was_placed = False
         """True once the robot has had a pose."""
 
@@ -228,7 +231,8 @@ class Navigator:
         moving = self._obstacles.moving(pose, now)
         still = resting(points, pose, moving) if self._crossing.patient else points + shadow(moving, pose)
         if role is Role.LEADER:
-            wanted = self._lead(chain, still, pose, now)
+            by_hand = self._by_hand(pose, now)
+            wanted = self._lead(chain, still, pose, now) if by_hand is None else by_hand
         elif role is Role.FOLLOWER:
             wanted = self._follow(still, pose, twist, dt, now)
             wanted = self._back_out(points, pose, wanted, now) if self._back_up_path.under_way else wanted
@@ -279,7 +283,7 @@ class Navigator:
     def _watch(self, role: Role, pose: Pose2D, wanted: Twist, now: float) -> None:
         """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team."""
         waits = role is Role.LEADER and self.leading.waiting
-        if role is Role.WAITING or waits or self.arrived(pose, self._last):
+        if role is Role.WAITING or waits or self._was_by_hand or self.arrived(pose, self._last):
             self._stuck_monitor.rest(pose, now)
             return
         decision = self.decision
@@ -312,6 +316,16 @@ class Navigator:
                 dx, dy = place.x - pose.x, place.y - pose.y
                 mates.append((c * dx + s * dy, c * dy - s * dx))
         return mates
+
+    def _by_hand(self, pose: Pose2D, now: float) -> Twist | None:
+        """Return the twist of an operator who drives this leader; None for the route, on which it begins anew then."""
+        twist = self.hand_driving.wanted(self._mission.limits, now)
+        if twist is not None:
+            self._detour.decision = None
+        elif self._was_by_hand:
+            self.leading.begin(pose, self.estimator.odometer_m, now)
+        self._was_by_hand = twist is not None
+        return twist
 
     def _lead(self, chain: tuple[int, ...], points: list[Point], pose: Pose2D, now: float) -> Twist:
         around_these = self.leading.look(points, pose, now)

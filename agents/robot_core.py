@@ -206,6 +206,8 @@ class RobotCore:
         lease = self.lease
         if note.command == "forget":
             self._forget(note, now)
+        if note.command == "teleop":
+            self.navigator.hand_driving.hear(note.arguments, now)
         side = str(note.arguments.get("side"))
         if lease.role is not Role.LEADER:
             if note.command == "formation":
@@ -320,6 +322,7 @@ class RobotCore:
             return
         pose, twist = known
         paused = role is Role.LEADER and self._team_orders.order.paused
+        paused = paused and not self.navigator.hand_driving.active(now)
         drives = Role.WAITING if paused or self._stop_listener.stands else role
         command = navigator.drive(drives, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)

@@ -72,6 +72,8 @@ COMMANDS = (
           "lfa home"),
     Command("set", "lfa.deploy.operate.set", "Change speed, motion or formation of a running fleet.",
           "lfa set cruise_mps=0.3 separation_m=1.5"),
+    Command("teleop", "lfa.deploy.operate.teleop", "Drive the leader of a running fleet by keyboard; the team follows.",
+          "lfa pause; lfa teleop"),
     Command("formation", "lfa.deploy.operate.formation", "Ask the leader of a running fleet for another formation.",
           "lfa formation column"),
     Command("watch", "lfa.deploy.view.terminal.watch",

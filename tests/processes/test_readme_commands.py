@@ -40,6 +40,7 @@ ELSEWHERE = {
         ("lfa sim SCENARIO --seeds 1..100 --set a=1,2,3", "lfa campaign PLAN", "lfa campaign merge DIR..."),
         "tests/deploy/campaign/test_docs_page.py",
     ),
+    "lfa teleop": "tests/deploy/operate/test_orders_team.py",
     "lfa forget 3": "tests/protocol/lease/test_forget.py",
     "lfa fuzz [--whole]": "tests/deploy/fuzz/test_agent_simulation.py",
     "lfa map RUN --out DIR": "tests/deploy/scenarios/test_explore.py",

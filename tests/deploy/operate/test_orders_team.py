@@ -153,3 +153,32 @@ def test_a_goal_in_or_behind_a_wall_is_refused_in_one_line(point: tuple[float, f
 def test_a_goal_that_is_no_number_is_refused() -> None:
     with pytest.raises(Refused, match="must be finite"):
         to_goal(float("nan"), 1.0, None)
+
+
+def _driven(scene: Commanded, for_s: float, v_mps: object, omega_radps: float) -> None:
+    """Drive the leader by hand for so long, 20 times a second."""
+    operator, until = Operator(FLEET, round(1000 * scene.team.now)), scene.team.now + for_s
+    while scene.team.now < until:
+        send(scene.team.simulator, operator.command("teleop", scene.team.now, v_mps=v_mps, omega_radps=omega_radps))
+        scene.run(0.05)
+
+
+def test_a_leader_driven_by_hand_brakes_when_the_keys_are_released_and_returns_to_its_route() -> None:
+    scene = Commanded()
+    scene.say(unchanged, paused=True)
+    scene.run(2.0)
+    _driven(scene, 2.0, 0.3, 0.0)
+    assert abs(scene.truth[1][2] - 0.3) < 0.02, "also while the team is paused"
+    scene.run(0.8)
+    assert scene.truth[1][2] < 1e-3, "released"
+    scene.say(unchanged)
+    assert scene.run(5.0).truth[1][2] > 0.3, "its route goes on"
+
+
+def test_a_twist_that_is_no_number_drives_nobody() -> None:
+    scene = Commanded()
+    scene.say(unchanged, paused=True)
+    scene.run(2.0)
+    for bad in (float("nan"), "fast", None):
+        _driven(scene, 0.5, bad, 0.0)
+        assert scene.truth[1][2] < 1e-3
