@@ -203,7 +203,7 @@ def _keys(folder: Path) -> Path:
 def _read_certificate(path: Path) -> object:
     at = path.parent
     ca = authority.load(at.parent / "ca.pem", at.parent / "ca.key")
-    return credentials(at, "robot1", 10**12), authority.fits(at / "robot1", ca, "robot1", ())
+    return credentials(at, "robot1", 10**12), authority.fits(at / "robot1", ca.certificate, "robot1", ())
 
 
 @_format("certificate (PEM)", _read_certificate)

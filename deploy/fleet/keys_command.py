@@ -24,7 +24,7 @@ DAYS_MAX = 36500.0
 
 
 def command(
-    action: Annotated[Literal["init", "rotate", "revoke", "show"], typer.Argument(help="What to do.")],
+    action: Annotated[Literal["init", "csr", "rotate", "revoke", "show"], typer.Argument(help="What to do.")],
     folder: Annotated[Path, typer.Argument(help="Folder of the keys (machine a's in hosts/a), or a fleet file.")],
     names: Annotated[
         list[str] | None, typer.Argument(help="rotate, revoke, show: members, such as robot3, world, host-a.")
@@ -42,6 +42,9 @@ def command(
         list[int] | None, typer.Option(help="init: id of a robot with a hardware driver; repeatable.")
     ] = None,
     fleet: Annotated[str, typer.Option(help="init: name of the fleet, part of every key expression.")] = "fleet",
+    ca_cert: Annotated[
+        Path | None, typer.Option("--ca-cert", help="init: certificate of an outside authority, which is to sign.")
+    ] = None,
     days: Annotated[float, typer.Option(help="init, rotate: validity of certificates [days].")] = keys.DAYS,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> int:
@@ -61,8 +64,13 @@ def command(
         chosen = list(dict.fromkeys([*chosen, *keys.kept_on(folder, machine)]))
     if action == "revoke" and not chosen:
         raise Refused("revoke: say whom, as in lfa keys revoke DIR robot3, or --machine b")
+    if ca_cert is not None and action != "init":
+        raise Refused(f"--ca-cert {ca_cert}: must stand with init")
     if action == "init":
-        return _init(folder, planned(fleet, hosts, robots, place or [], driver or []), days, as_json)
+        return _init(folder, planned(fleet, hosts, robots, place or [], driver or []), days, ca_cert, as_json)
+    if action == "csr":
+        paths = [str(path) for path in keys.requested(folder, chosen)]
+        return _say({"requests": paths}, "\n".join(paths) or "all certificates are signed", as_json)
     if action != "show":
         return _change(action, folder, chosen, days, plan, machine, as_json)
     return _show(folder, chosen, as_json)
@@ -107,8 +115,8 @@ def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: lis
     return keys.spread(fleet_name(fleet), machines, range(1, robots + 1), said, drivers)
 
 
-def _init(folder: Path, plan: KeyPlan, days: float, as_json: bool) -> int:
-    made = keys.make(folder, plan, days)
+def _init(folder: Path, plan: KeyPlan, days: float, ca_cert: Path | None, as_json: bool) -> int:
+    made = keys.make(folder, plan, days, ca_cert)
     machines = {host: str(keys.folder_of(folder, host)) for host in plan.hosts}
     lines = [f"{len(made)} certificates made, {len(plan.places)} in all: {folder}"]
     for host, path in machines.items():

@@ -52,12 +52,18 @@ def command(
     secure: Annotated[
         bool, typer.Option("--secure", help="Require certificates of every process; deny all that is not allowed.")
     ] = False,
+    system: Annotated[
+        bool, typer.Option("--system", help="Let the machines' systemd run the processes, as system units.")
+    ] = False,
+    boot: Annotated[
+        bool, typer.Option("--boot", help="Let systemd start the processes when a machine is switched on.")
+    ] = False,
     wait: Annotated[float, typer.Option(help="Time limit [s] for the fleet to become healthy.")] = 60.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print how it went as JSON.")] = False,
 ) -> int:
     if not 0.0 < wait < inf:
         raise Refused(f"--wait {wait:g}: must be above 0, in seconds")
-    plan = _secured(load(file)) if secure else load(file)
+    plan = _chosen(load(file), secure=secure, system=system, boot=boot)
     began = clock.now()
     try:
         with Interrupts() as interrupts:
@@ -78,8 +84,11 @@ def command(
     return 0
 
 
-def _secured(plan: FleetPlan) -> FleetPlan:
-    return replace(plan, file=replace(plan.file, secure=True))
+def _chosen(plan: FleetPlan, *, secure: bool, system: bool, boot: bool) -> FleetPlan:
+    """Return the plan with what the options add to its file; `--boot` needs an engine that starts at boot."""
+    file = plan.file
+    engine = "systemd-system" if system else "systemd" if boot and file.engine == "own" else file.engine
+    return replace(plan, file=replace(file, secure=secure or file.secure, engine=engine, boot=boot or file.boot))
 
 
 async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
@@ -93,7 +102,9 @@ async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool
         _join_those_that_run(plan, fleet, found, digest, keys)
         fresh = [name for name in plan.hosts if not found[name].run]
         _say(f"starting {len(fresh)} of {len(found)} hosts")
-        await fleet.do("start")
+        started = await fleet.do("start")
+        for name in (name for name in fresh if name in started and started[name].note):
+            _say(f"host {name}: {started[name].note}")
         if fleet.wrong:
             raise NotUp(fleet.lines(), 1)
         return await asyncio.to_thread(_await_health, plan, fleet.parts, interrupts, wait_s)

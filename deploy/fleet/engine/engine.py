@@ -46,6 +46,10 @@ class ProcessEngine(Protocol):
     """Engine of one machine. `now` is the supervisor's clock [s]."""
 
     @property
+    def bound(self) -> bool:
+        """True: the processes belong to another engine than the supervisor, and do not end with it."""
+
+    @property
     def names(self) -> Sequence[str]:
         """Names of the processes, the router first."""
 

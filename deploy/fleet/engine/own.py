@@ -60,6 +60,7 @@ class OwnEngine:
         self, rows: Sequence[ProcessSpec], restart: Restart, folder: Path, run_folder: Path, remembered: Path | None
     ) -> None:
         """`remembered`: file without which a process that can resume starts anew. Raises Refused."""
+        self.bound = False
         self._signs = SignSocket(folder / SIGNS)
         self._watchdog = HangDetector(restart.watchdog_s)
         self._processes = ProcessGroup(run_folder, outlive=True, environment={"NOTIFY_SOCKET": str(folder / SIGNS)})

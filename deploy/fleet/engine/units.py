@@ -13,6 +13,7 @@ from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.process.restart_policy import REFUSED_CODE, Restart
 from lfa.protocol.topics import WORLD_NAME
 
+SUPERVISOR_NAME = "supervisor"
 Scope = Literal["user", "system"]
 """Whose systemd: the user's own manager, or the machine's."""
 MEMORY_MAX = {ROUTER_NAME: "512M", WORLD_NAME: "1G"}
@@ -24,6 +25,17 @@ _CHARACTERS = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ012
 LOCKED_UP = """\
 UMask=0077
 NoNewPrivileges=yes
+RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
+RestrictNamespaces=yes
+RestrictRealtime=yes
+RestrictSUIDSGID=yes
+LockPersonality=yes
+SystemCallArchitectures=native
+SystemCallFilter=@system-service
+"""
+"""Sandbox of every service, also of a user's: what needs neither privileges nor user namespaces."""
+OF_SYSTEM = """\
+CapabilityBoundingSet=
 ProtectSystem=strict
 ProtectClock=yes
 ProtectHostname=yes
@@ -31,17 +43,9 @@ ProtectControlGroups=yes
 ProtectKernelLogs=yes
 ProtectKernelModules=yes
 ProtectKernelTunables=yes
-PrivateTmp=yes
-RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
-RestrictNamespaces=yes
-RestrictRealtime=yes
-RestrictSUIDSGID=yes
-LockPersonality=yes
-SystemCallArchitectures=native
+PrivateDevices=yes
 """
-"""Sandbox of every service. The state folder is the only place that a process may write to."""
-_OF_SYSTEM = "CapabilityBoundingSet=\nPrivateDevices=yes\nSystemCallFilter=@system-service\n"
-"""What only the machine's systemd may restrict."""
+"""What only the machine's systemd can restrict. The state folder is then the only place to write to."""
 
 
 def stem(fleet: str, host: str) -> str:
@@ -81,10 +85,12 @@ def _service(
     fleet: str, host: str, row: ProcessSpec, restart: Restart, state: Path, python: str, scope: Scope, user: str
 ) -> str:
     router = row.name == ROUTER_NAME
-    again = "always" if router or restart.policy == "always" else {"never": "no"}.get(restart.policy, restart.policy)
+    policy = "on-failure" if row.name == SUPERVISOR_NAME else restart.policy
+    again = "always" if router or policy == "always" else {"never": "no"}.get(policy, policy)
     limit = 0 if router else restart.window_s
     after = "" if router else f"After={unit_of(fleet, host, ROUTER_NAME)}\n"
     whose = f"User={user}\n" if scope == "system" and user else ""
+    inside = f"{OF_SYSTEM}ReadWritePaths={quoted(str(state))}\n" if scope == "system" else ""
     command = " ".join(quoted(word) for word in (python, "-P", "-m", *row.arguments))
     return (
         f"[Unit]\nDescription=lfa: {row.name} of fleet {fleet}\nPartOf={target_of(fleet, host)}\n{after}"
@@ -96,8 +102,7 @@ def _service(
         f"Restart={again}\nRestartSec={restart.delay_s:g}\n"
         f"RestartPreventExitStatus={REFUSED_CODE}\nTimeoutStopSec=5\n"
         f"MemoryMax={MEMORY_MAX.get(row.name, AGENT_MEMORY_MAX)}\n"
-        f"{whose}{LOCKED_UP}{_OF_SYSTEM if scope == 'system' else ''}"
-        f"ReadWritePaths={quoted(str(state))}\n\n"
+        f"{whose}{LOCKED_UP}{inside}\n"
         f"[Install]\nWantedBy={target_of(fleet, host)}\n"
     )
 

@@ -19,8 +19,9 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep, watchers
+from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, ledger, living, sweep, watchers
 from lfa.deploy.fleet.host.router import LISTENS
+from lfa.deploy.fleet.host.units_host import check_units, start_units, stop_units
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import unpack
@@ -40,6 +41,8 @@ READY_S = 15.0
 STOP_S = 8.0
 POLL_S = 0.02
 LISTEN_S = 4.0
+BACK_S = 4.0
+"""Longest time [s] until a supervisor that its guardian starts again runs."""
 FREE_MIB_MIN = 64
 OTHERS_WRITE = 0o022
 LOG = "supervisor.log"
@@ -55,6 +58,8 @@ class Found(Struct, frozen=True):
     """Run of the supervisor that is running; empty: none."""
     digest: str = ""
     orphans: tuple[str, ...] = ()
+    note: str = ""
+    """What the user should know about a start; empty: nothing."""
     router: bool = False
     """True: the router answers."""
     certificate: str = ""
@@ -65,21 +70,37 @@ def check(part: HostPlan) -> Found:
     """Check that `start` would succeed: version, socket, folder, port, packages. Raises Refused; has no side effect."""
     if part.version != version("lfa"):
         raise Refused(f"has lfa {version('lfa')}: must be {part.version}, as on the operator's (lfa up --install)")
-    running = living(part.folder)
+    running = _await_supervisor(part)
     found = Found(version("lfa"), clock.wall_ms())
     if running is not None:
         return _running(found, running, host_plan.read(part.folder / host_plan.PART))
     path = socket_path(part.socket)
     if path is None or len(os.fsencode(path)) > UNIX_PATH_BYTES_MAX:
         raise Refused(f"state = {part.state}: too long for a socket in it: at most {UNIX_PATH_BYTES_MAX} bytes")
-    if path.exists() and answers(part.socket):
+    if path.exists() and answers(part.socket) and not _left(part):
         raise Refused(f"{path}: a router that this fleet did not start answers there: end it, or give another state")
     _check_place(part)
+    if part.engine != "own":
+        check_units(part)
     if part.port:
         _check_port(part)
     if part.world:
         _check_world()
     return found
+
+
+def _await_supervisor(part: HostPlan) -> Ledger | None:
+    """Return the ledger of the running supervisor; one whose guardian runs is about to be started again."""
+    until = clock.now() + BACK_S
+    while (running := living(part.folder)) is None and clock.now() < until and any(watchers(part.folder, GUARDIAN)):
+        clock.sleep(POLL_S)
+    return running
+
+
+def _left(part: HostPlan) -> bool:
+    """Return True if an earlier supervisor's processes run on; `start` ends them."""
+    written = ledger(part.folder)
+    return written is not None and any(identify(child.pid) == child for child in written.children)
 
 
 def _running(found: Found, running: Ledger, own: HostPlan) -> Found:
@@ -113,14 +134,19 @@ def start(part: HostPlan) -> Found:
     except OSError as error:
         raise Refused(f"{part.folder}: {error.strerror}: must be a folder to write to") from None
     log = part.run_folder / LOG
-    child = _spawn(part, path, log)
+    log.touch(mode=0o600)
+    note = "" if part.engine == "own" else start_units(part)
+    child = _spawn(part, path, log) if part.engine == "own" else None
     _await_ready(part, child, log)
-    return msgspec.structs.replace(found, run=part.run, digest=part.digest, orphans=tuple(orphans))
+    return msgspec.structs.replace(found, run=part.run, digest=part.digest, orphans=tuple(orphans), note=note)
 
 
 def stop(part: HostPlan) -> Found:
     """End this machine's watchers and processes, by SIGKILL after STOP_S. Raises Refused when a process remains."""
     running = living(part.folder)
+    written = _written(part)
+    if written is not None and written.engine != "own":
+        return _stop_units(written, running)
     if running is None:
         end_orphans(part.folder)
         sweep(part.folder)
@@ -139,6 +165,25 @@ def stop(part: HostPlan) -> Found:
         raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
     sweep(part.folder)
     return Found(version("lfa"), clock.wall_ms(), run=running.run, digest=running.digest)
+
+
+def _written(part: HostPlan) -> HostPlan | None:
+    """Return the plan that was started last in this folder, None if there is none."""
+    try:
+        return host_plan.read(part.folder / host_plan.PART)
+    except Refused:
+        return None
+
+
+def _stop_units(part: HostPlan, running: Ledger | None) -> Found:
+    """End a machine's units, and what a systemd that fails left. Raises Refused when a process remains."""
+    stop_units(part)
+    left = _wait_gone(() if running is None else (running.supervisor, *running.children), STOP_S)
+    if left:
+        raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
+    sweep(part.folder)
+    run, digest = ("", "") if running is None else (running.run, running.digest)
+    return Found(version("lfa"), clock.wall_ms(), run=run, digest=digest)
 
 
 def _wait_gone(everybody: tuple[Identity, ...], within_s: float) -> list[Identity]:
@@ -212,15 +257,16 @@ def _runners(part: HostPlan) -> list[list[str]]:
     return [["systemd-run", *([] if os.getuid() == 0 else ["--user"]), "--quiet", *unit, *log]]
 
 
-def _await_ready(part: HostPlan, child: subprocess.Popen[bytes], log: Path) -> None:
+def _await_ready(part: HostPlan, child: subprocess.Popen[bytes] | None, log: Path) -> None:
     """Wait until the supervisor is running and its router answers. Raises Refused after READY_S."""
     known = part.known_as(f"{HOST_PREFIX}{part.host}")
     until = clock.now() + READY_S
     while not (living(part.folder) is not None and answers(part.socket, known)):
-        code = child.poll()
+        code = None if child is None else child.poll()
         if code not in (None, 0) or clock.now() > until:
-            child.kill()
-            child.wait()
+            if child is not None:
+                child.kill()
+                child.wait()
             stop(part)
             lines = log.read_text(errors="replace").strip().splitlines()
             raise Refused(f"its supervisor is not ready: {lines[-1] if lines else f'see {log}'}")

@@ -58,7 +58,7 @@ def watchers(folder: Path, module: str) -> Iterator[Identity]:
     """Yield the running supervisors or guardians of that folder, also those that have not yet written a ledger."""
     path = str(folder / PART)
     for process in identity.own_processes():
-        if process.arguments[-2:] == (module, path):
+        if process.arguments[1:] == ("-P", "-m", module, path):
             yield process
 
 

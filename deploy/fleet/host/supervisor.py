@@ -21,9 +21,11 @@ import msgspec
 
 from lfa.deploy.fleet.engine.engine import LogSource, ProcessEngine
 from lfa.deploy.fleet.engine.own import OwnEngine
+from lfa.deploy.fleet.engine.systemd import SystemdEngine
 from lfa.deploy.fleet.engine.watchdog import HangDetector, SignSocket
 from lfa.deploy.fleet.host.guardian import spawn
 from lfa.deploy.fleet.host.ledger import GUARD, GUARDIAN, LEDGER, WATCH, Ledger, ledger, living, sweep, watchers
+from lfa.deploy.fleet.host.units_host import scope_of
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
@@ -69,7 +71,10 @@ class Supervisor:
         """Ledger on disk."""
         self._refused = False
         """True: the disk did not take the last ledger."""
-        self._guardian = _GuardianWatch(part)
+        self._guardian = None if engine.bound else _GuardianWatch(part)
+        self._sign = Notify(os.environ.get("NOTIFY_SOCKET", ""))
+        self._ordered = False
+        """True: an operator ordered the end."""
         self._tell_at = 0.0
         self._join_at = 0.0
         self._wake = threading.Event()
@@ -80,14 +85,18 @@ class Supervisor:
         self._tails: dict[str, LogSource] = {}
         self._ending = False
 
-    def run(self) -> None:
-        """Run until SIGTERM, Ctrl-C or an order `down`; all processes have ended when it returns."""
+    def run(self) -> bool:
+        """Run until SIGTERM, Ctrl-C or an order `down`; return True when all processes have ended.
+
+        Those of another engine go on after a signal.
+        """
         bell, ring = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.set_wakeup_fd(ring)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: self._stop())
         signal.signal(signal.SIGCHLD, lambda *_: None)
         self._adopt()
+        self._sign.ready()
         wakes = [bell, *(one.fileno() for one in self._engine.wakes)]
         while not self._ending:
             self._step(clock.now())
@@ -96,7 +105,9 @@ class Supervisor:
                 if bell in ready:
                     os.read(bell, 4096)
             self._wake.clear()
-        self._end()
+        over = self._ordered or not self._engine.bound
+        self._end(over=over)
+        return over
 
     def _stop(self) -> None:
         self._ending = True
@@ -114,7 +125,8 @@ class Supervisor:
 
     def _step(self, now: float) -> None:
         changed = self._engine.step(now, router_up=self._bus is not None)
-        self._guardian.step(now)
+        if self._guardian is not None:
+            self._guardian.step(now)
         self._join(now)
         told = self._hear(now)
         if changed or told or now >= self._tell_at:
@@ -140,17 +152,20 @@ class Supervisor:
         if not reason:
             self._book = book
 
-    def _end(self) -> None:
-        """Terminate the guardian, then robots and world in order, publish a last status, terminate the router."""
-        self._guardian.end()
-        self._engine.stop(clock.now(), router=False)
+    def _end(self, *, over: bool) -> None:
+        """Leave the fleet; if it is `over` here, first terminate robots and world, and at last the router."""
+        if self._guardian is not None:
+            self._guardian.end()
+        if over:
+            self._engine.stop(clock.now(), router=False)
         self._tell(clock.now())
         if self._bus is not None:
             clock.sleep(LAST_WORDS_S)
             leaving = threading.Thread(target=self._bus.close, daemon=True)
             leaving.start()
             leaving.join(LEAVE_S)
-        self._engine.stop(clock.now(), router=True)
+        if over:
+            self._engine.stop(clock.now(), router=True)
 
     # --- messages --------------------------------------------------------------------------------------------------
 
@@ -199,7 +214,7 @@ class Supervisor:
         self._obeyed = number
         write_line(f"order: {order.deed} {order.target}", sys.stdout)
         if order.deed == "down" and here:
-            self._ending = True
+            self._ending = self._ordered = True
         elif order.deed == "restart":
             for one in names:
                 self._engine.restart(one, now)
@@ -212,6 +227,7 @@ class Supervisor:
 
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_S
+        self._sign.alive()
         self._write_ledger()
         part, reports = self._part, self._engine.states(now)
         header = self._outbox.header("host", now)
@@ -279,18 +295,23 @@ def main() -> None:
 
 
 def _supervise(part: HostPlan) -> None:
-    """Supervise until the end in order, and leave nothing. Raises Refused, also with nothing left."""
+    """Supervise until the end in order. Raises Refused, with nothing left."""
     if living(part.folder) is not None:
         raise Refused(f"fleet {part.fleet} already runs in {part.folder}: lfa down first")
-    state = part.run_folder / STATE
-    engine = OwnEngine(host_plan.rows(part), part.restart, part.folder, part.run_folder, remembered=state)
+    rows = host_plan.rows(part)
+    engine: ProcessEngine
+    if part.engine == "own":
+        engine = OwnEngine(rows, part.restart, part.folder, part.run_folder, remembered=part.run_folder / STATE)
+    else:
+        engine = SystemdEngine(part.fleet, part.host, [row.name for row in rows], scope_of(part))
     try:
-        Supervisor(part, engine).run()
+        over = Supervisor(part, engine).run()
     except Refused:
         engine.kill()
         raise
     engine.close()
-    sweep(part.folder)
+    if over:
+        sweep(part.folder)
 
 
 if __name__ == "__main__":

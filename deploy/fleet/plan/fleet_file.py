@@ -94,6 +94,10 @@ class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
     robots: Robots = Robots()
     links: LinkPlan = LinkPlan()
     restart: Restart = Restart()
+    engine: Literal["own", "systemd", "systemd-system"] = "own"
+    """Engine of the processes: our own supervisor, the user's systemd, or the machine's (also `lfa up --system`)."""
+    boot: bool = False
+    """True: systemd starts the processes when the machine is switched on (also `lfa up --boot`)."""
     secure: bool = False
     """True: every process shows a certificate, and everything not allowed is denied (also `lfa up --secure`)."""
     keys: str = ""
@@ -211,6 +215,11 @@ def _names(file: FleetFile) -> Iterator[Mistake]:
             yield wrong(key, value, "two machines")
 
 
+def _engine(file: FleetFile) -> Iterator[Mistake]:
+    if file.boot and file.engine == "own":
+        yield wrong("boot", "true", 'false, or engine = "systemd", which can start at boot')
+
+
 def _restart(file: FleetFile) -> Iterator[Mistake]:
     restart = file.restart
     return out_of_range(
@@ -264,4 +273,6 @@ def _together(file: FleetFile) -> Iterator[Mistake]:
 
 
 _NAME = "small letters, digits and '-', at most 31"
-FLEET_RULES: tuple[Rule[FleetFile], ...] = tuple(Rule(check) for check in (_names, _restart, _machines, _together))
+FLEET_RULES: tuple[Rule[FleetFile], ...] = tuple(
+    Rule(check) for check in (_names, _engine, _restart, _machines, _together)
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Literal
 
 from msgspec import Struct
 
@@ -62,6 +63,9 @@ class HostPlan(Struct, frozen=True):
     secure: bool = False
     keyed: bool = False
     """True: processes show certificates; the router does so to other routers, or to every process if secured."""
+    engine: Literal["own", "systemd", "systemd-system"] = "own"
+    boot: bool = False
+    """True: systemd starts the processes when the machine is switched on."""
     bundle: dict[str, str] = {}
     """Contents of the key files by file name, for transfer to the machine; not stored in the plan's file."""
 
@@ -124,6 +128,8 @@ def parts(
             link=mission.profile,
             secure=file.secure,
             keyed=file.secure or (len(names) > 1 and file.links.transport == "quic"),
+            engine=file.engine,
+            boot=file.boot,
             bundle=(bundles or {}).get(name, {}),
         )
     return made

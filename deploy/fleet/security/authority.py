@@ -100,7 +100,45 @@ def issue(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...
     _write_certificate(stem.with_name(f"{stem.name}.pem"), signed)
 
 
-def fits(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...]) -> bool:
+def certificate_of(path: Path) -> x509.Certificate:
+    """Return the certificate of an authority. Raises Refused when the file holds none."""
+    try:
+        found = x509.load_pem_x509_certificate(read_bytes(path, PEM_BYTES_MAX))
+        signs = found.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+    except (OSError, *DAMAGED, x509.ExtensionNotFound, x509.DuplicateExtension) as error:
+        raise Refused(f"{path}: {error}, must be an authority's certificate in PEM") from None
+    if not signs:
+        raise Refused(f"{path}: is no authority's certificate (basic constraints), must be the one that signs")
+    return found
+
+
+def request(stem: Path, request_path: Path, common_name: str, addresses: tuple[str, ...]) -> None:
+    """Write a signing request for an outside authority, and the key at `stem`.key if there is none yet.
+
+    It asks for what `issue` writes. Raises Refused for a key that cannot be read.
+    """
+    key = stem.with_name(f"{stem.name}.key")
+    if not key.exists():
+        write_key(key, generate_private_key(SECP256R1()))
+    try:
+        private = load_pem_private_key(read_bytes(key, PEM_BYTES_MAX), None)
+    except (OSError, *DAMAGED) as error:
+        raise Refused(f"{key}: {error}, must be a private key that `lfa keys` made") from None
+    if not isinstance(private, EllipticCurvePrivateKey):
+        raise Refused(f"{key}: must be a private key that `lfa keys` made")
+    usages = [ExtendedKeyUsageOID.CLIENT_AUTH] + ([ExtendedKeyUsageOID.SERVER_AUTH] if addresses else [])
+    asked = (
+        x509.CertificateSigningRequestBuilder()
+        .subject_name(_name(common_name))
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(x509.ExtendedKeyUsage(usages), critical=False)
+        .add_extension(x509.SubjectAlternativeName(_names(addresses or (common_name,))), critical=False)
+        .sign(private, SHA256())
+    )
+    request_path.write_bytes(asked.public_bytes(Encoding.PEM))
+
+
+def fits(stem: Path, ca: x509.Certificate, common_name: str, addresses: tuple[str, ...]) -> bool:
     """Return True if the certificate at `stem` is valid for reuse.
 
     It is issued by this authority for this name and these addresses, matches its key, and remains valid for more than
@@ -108,7 +146,7 @@ def fits(stem: Path, ca: Authority, common_name: str, addresses: tuple[str, ...]
     """
     try:
         private, public, found = _pair(stem.with_name(f"{stem.name}.key"), stem.with_name(f"{stem.name}.pem"))
-        found.verify_directly_issued_by(ca.certificate)
+        found.verify_directly_issued_by(ca)
         said = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except (OSError, *DAMAGED, InvalidSignature, x509.ExtensionNotFound, x509.DuplicateExtension):
         return False

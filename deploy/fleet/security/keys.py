@@ -2,6 +2,7 @@
 
     DIR/ca.pem, ca.key       the fleet's authority; the key never leaves the operator's machine
     DIR/fleet.json           routers and common name of each member (no secrets)
+    DIR/requests/            signing requests for an outside authority, if one signs (no ca.key then)
     DIR/issued/              certificate, key and password of every member: the operator's `--keys`, on no machine
     DIR/hosts/a/             all files that machine `a` needs, and no others: `scp -r DIR/hosts/a a:/etc/lfa/keys`
         ca.pem, host-a.*     for its router and supervisor (the only server certificates)
@@ -48,7 +49,7 @@ from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, PASSWORD_BYTES_MAX, USERS_FILE, validity
 
-REGISTRY, HOSTS, CA_KEY = "fleet.json", "hosts", "ca.key"
+REGISTRY, HOSTS, CA_KEY, REQUESTS = "fleet.json", "hosts", "ca.key", "requests"
 DAYS = 365.0
 KINDS = ("pem", "key", "password")
 
@@ -59,6 +60,8 @@ class Registry(Struct, frozen=True):
     plan: KeyPlan
     common_names: dict[str, str] = {}
     """Common names in the certificates of admitted members. A name is not reused after a revocation."""
+    outside: bool = False
+    """True: an outside authority signs, whose key is not here."""
     revoked: dict[str, int] = {}
     """Number of revocations of each member."""
 
@@ -119,17 +122,26 @@ def _turn(names: list[str], n: int) -> tuple[str, ...]:
     return tuple(dict.fromkeys((names[n % len(names)], names[(n + 1) % len(names)])))
 
 
-def make(folder: Path, plan: KeyPlan, days: float = DAYS) -> list[str]:
-    """Create all files of `plan` in `folder`; return the members with a new certificate. Raises Refused."""
+def make(folder: Path, plan: KeyPlan, days: float = DAYS, ca_cert: Path | None = None) -> list[str]:
+    """Create all files of `plan` in `folder`; return the members with a new certificate. Raises Refused.
+
+    With the certificate `ca_cert` of an outside authority, requests are written for it (`requested`), and nobody gets
+    keys before all are signed.
+    """
+    outside = None if ca_cert is None else authority.certificate_of(ca_cert)
     authority.check_names(plan.fleet, {name: _addresses(name, plan) for name in plan.places})
     try:
         private_folder(folder)
         known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
         if known.plan.fleet != plan.fleet:
             raise Refused(f"{folder}: holds the keys of fleet {known.plan.fleet!r}, give another folder")
-        if not (folder / CA_KEY).exists():
+        if outside is not None and (folder / CA_KEY).exists():
+            raise Refused(f"{folder}: has an authority of its own, give another folder with --ca-cert")
+        if ca_cert is not None:
+            write_private(folder / CA_FILE, ca_cert.read_bytes())
+        elif not known.outside and not (folder / CA_KEY).exists():
             authority.found(folder / CA_FILE, folder / CA_KEY, plan.fleet)
-        registry = structs.replace(known, plan=plan)
+        registry = structs.replace(known, plan=plan, outside=known.outside or outside is not None)
         return _lay_out(folder, registry, days, renew=())
     except OSError as error:
         raise _unwritable(folder, error) from None
@@ -142,6 +154,8 @@ def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[
     Raises Refused.
     """
     registry = load(folder)
+    if registry.outside:
+        raise Refused(f"{folder}: an outside authority signs: lfa keys csr {folder} NAMES, and init once it has")
     chosen = list(names) or [name for name in registry.members() if name in registry.common_names]
     _check_names(registry, chosen)
     back = {name: f"{name}.{registry.revoked.get(name, 0) + 1}" for name in chosen if name not in registry.common_names}
@@ -217,9 +231,11 @@ def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]
     for inner in (issued, folder / HOSTS):
         private_folder(inner)
     write_private(issued / CA_FILE, (folder / CA_FILE).read_bytes())
-    ca = authority.load(folder / CA_FILE, folder / CA_KEY)
     fresh = {name: name for name in registry.members() if name not in registry.revoked}
     registry = structs.replace(registry, common_names=fresh | registry.common_names)
+    if registry.outside:
+        _await_signatures(folder, registry, renew)
+    ca = None if registry.outside else authority.load(folder / CA_FILE, folder / CA_KEY)
     made = []
     for name in registry.members():
         stem = issued / name
@@ -228,7 +244,7 @@ def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]
             _remove(stem)
             continue
         addresses = _addresses(name, registry.plan)
-        if name in renew or not authority.fits(stem, ca, common, addresses):
+        if ca is not None and (name in renew or not authority.fits(stem, ca.certificate, common, addresses)):
             authority.issue(stem, ca, common, addresses, days)
             made.append(name)
         _password(stem.with_name(f"{name}.password"), common)
@@ -236,6 +252,41 @@ def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]
         _lay_out_host(folder, registry, host)
     write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
     return made
+
+
+def requested(folder: Path, names: Sequence[str] = ()) -> list[Path]:
+    """Write requests for the members (all of `names`) whose certificate an outside authority has yet to sign.
+
+    Return their paths. Raises Refused where the authority is the fleet's own.
+    """
+    registry = load(folder)
+    if not registry.outside:
+        raise Refused(f"{folder}: signs by itself, requests are for an outside authority (lfa keys init --ca-cert)")
+    _check_names(registry, names)
+    return _requests(folder, registry, names)
+
+
+def _await_signatures(folder: Path, registry: Registry, renew: Sequence[str]) -> None:
+    """Write the requests that are open, and the registry. Raises Refused while there are some."""
+    write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
+    waiting = _requests(folder, registry, renew)
+    if waiting:
+        where = f"have {folder / REQUESTS}/*.csr signed, put the certificates into {folder / ISSUED}/NAME.pem"
+        raise Refused(f"{len(waiting)} certificates are not signed yet ({waiting[0].stem}, ...): {where}, and repeat")
+
+
+def _requests(folder: Path, registry: Registry, renew: Sequence[str]) -> list[Path]:
+    ca, waiting = authority.certificate_of(folder / CA_FILE), []
+    private_folder(folder / REQUESTS)
+    for name, common in registry.common_names.items():
+        stem, path = folder / ISSUED / name, folder / REQUESTS / f"{name}.csr"
+        addresses = _addresses(name, registry.plan)
+        if name not in renew and authority.fits(stem, ca, common, addresses):
+            path.unlink(missing_ok=True)
+            continue
+        authority.request(stem, path, common, addresses)
+        waiting.append(path)
+    return waiting
 
 
 def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
