@@ -7,6 +7,7 @@ import re
 from lfa.protocol.errors import Refused
 
 PORT_MAX = 65535
+CERTIFIED = ("tls", "quic")
 _NETWORKED = re.compile(r"(tcp|udp|tls|quic|ws)/(\[[^\]/]+\]|[^:/\[\]]+):(\d+)([?#].*)?")
 _ON_DISK = re.compile(r"unixsock-stream/[^?#]+")
 
@@ -22,3 +23,6 @@ def check_endpoints(endpoints: str, where: str) -> None:
             raise Refused(f"{where} {endpoint}: must be like tcp/127.0.0.1:7447 or unixsock-stream//run/lfa.sock")
         if networked is not None and int(networked[3]) > PORT_MAX:
             raise Refused(f"{where} {endpoint}: port {networked[3]} must be {PORT_MAX} or lower")
+        if where == "connect" and networked is not None and networked[1] in CERTIFIED and networked[2].startswith("["):
+            why = "Zenoh makes no certified link to an address of IPv6"
+            raise Refused(f"{where} {endpoint}: must have a name or an address of IPv4, or be tcp/: {why}")

@@ -11,7 +11,7 @@ from lfa.protocol.transport.endpoints import check_endpoints
     [
         "tcp/127.0.0.1:7447",
         "tcp/machine-a:0",
-        "quic/[::1]:7447",
+        "tcp/[::1]:7447",
         "quic/10.0.0.1:7447?rel=0",
         "unixsock-stream//run/lfa.sock",
         "unixsock-stream/relative.sock",
@@ -35,8 +35,16 @@ def test_what_a_router_can_be_reached_at_is_taken(good: str) -> None:
         "http/1.2.3.4:80",
         "unixsock-stream/",
         "tcp/127.0.0.1:7447,foo",
+        "tls/[::1]:7447",
+        "quic/[fd00::1]:7447",
     ],
 )
 def test_anything_else_is_refused_with_the_option_that_gave_it(bad: str) -> None:
     with pytest.raises(Refused, match=r"^connect "):
         check_endpoints(bad, "connect")
+
+
+def test_a_certified_link_to_an_address_of_ipv6_is_refused_with_the_reason_in_place_of_waiting_for_ever() -> None:
+    with pytest.raises(Refused, match="Zenoh makes no certified link to an address of IPv6"):
+        check_endpoints("unixsock-stream//run/lfa.sock,tls/[::1]:7447", "connect")
+    check_endpoints("quic/[::]:7447", "listen")
