@@ -126,9 +126,10 @@ def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
         m.refuse(src, NO_TERM, now)
 
 
-def on_superseded(m: LeaseMemory, _src: Member, body: Superseded, _now: float) -> None:
-    """Note that others know a later incarnation."""
-    note_later(m, body.newest)
+def on_superseded(m: LeaseMemory, _src: Member, body: Superseded, now: float) -> None:
+    """Note that others know a later incarnation, if this one sends HELLO: others never say it to a member in place."""
+    if m.is_out(now):
+        note_later(m, body.newest)
 
 
 def note_later(m: LeaseMemory, incarnation: int) -> None:

@@ -101,6 +101,16 @@ def test_e23_who_is_told_of_an_earlier_number_goes_on_as_before() -> None:
     assert lease.superseded_by is None
 
 
+@pytest.mark.parametrize("robot_id", [1, 2])
+def test_e23_a_member_unseats_neither_a_leader_nor_a_bound_voter_by_a_made_up_later_number(robot_id: int) -> None:
+    team = Team()
+    liar, process = team.lease_of(3).me, team.processes[robot_id]
+    made_up = Superseded(team.lease_of(robot_id).me.incarnation + 1)
+    assert team.leaders() == [1]
+    team.lease_of(robot_id).receive(liar, made_up, process.clock.local(team.now))
+    assert team.lease_of(robot_id).superseded_by is None
+
+
 def test_e23_a_gateway_obeys_no_earlier_incarnation_and_tells_the_newest() -> None:
     gateway = Gateway(1, 1, STD, 0.0)
     assert gateway.agent is None
