@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shlex
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 import msgspec
 import pytest
@@ -36,6 +38,23 @@ goal_reached = false
 left_behind_max = 1
 """
 pytestmark = pytest.mark.processes
+
+
+ENGINE_S_MAX = 240
+
+
+@pytest.fixture(autouse=True)
+def _bounded() -> Iterator[None]:
+    """End a test whose engine never ends: a job that stays in a queue would be waited for."""
+
+    def over(_signum: int, _frame: FrameType | None) -> None:
+        raise TimeoutError(f"no end after {ENGINE_S_MAX} s")
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.alarm(ENGINE_S_MAX)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture
