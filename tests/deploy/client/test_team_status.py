@@ -103,7 +103,7 @@ def test_the_table_keeps_every_number_whole_on_80_columns() -> None:
         10, "follower", 1795717143586, 9, -1.7159, -3.1, -0.25, 12.345, "follow, avoids", 1200.0, 100.0, 135.0
     )
     console = Console(width=80, file=StringIO(), record=True)
-    console.print(_table([row], None))
+    console.print(_table([row], None, 80))
     _, line = console.export_text().splitlines()
     assert line.split()[:11] == ["10", "follower", "3586", "9", "-1716", "-178", "-0.25", "12345", "1200", "100", "135"]
     assert len(line) <= 80
