@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from lfa.agents.attendance import Attendance
+from lfa.agents.avoidance.safety import obeyed
 from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
 from lfa.agents.config import CONTROL_PERIOD_S
@@ -326,7 +327,7 @@ class RobotCore:
         drives = Role.WAITING if paused or self._stop_listener.stands else role
         command = navigator.drive(drives, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
-        told = navigator.published(twist)
+        told = obeyed(navigator.last, twist)
         for kind, data in navigator.leading.drain():
             self._event(kind, now, data, lease.term)
         self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, told, now)

@@ -31,8 +31,8 @@ ORDER = (
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
-    "agents/leading", "agents/navigator", "agents/stuck_policy", "agents/telemetry", "agents/attendance",
-    "agents/chain_place", "agents/stop_listener", "agents/team_orders", "agents/command_publisher",
+    "agents/leading", "agents/behaviors", "agents/navigator", "agents/stuck_policy", "agents/telemetry",
+    "agents/attendance", "agents/chain_place", "agents/stop_listener", "agents/team_orders", "agents/command_publisher",
     "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",

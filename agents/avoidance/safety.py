@@ -18,6 +18,8 @@ BRAKING_SHARE = 0.8
 TURNING_MPS = 0.1
 """Speed [m/s] below which a turn is not slowed with the motion ahead."""
 
+OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
+"""Maximum difference between command and measured twist while the wheels obey: several periods of full acceleration."""
 SHARED_RAD = pi / 3
 """Angle [rad] off the motion, now or after turning for `TURN_S`, within which a team-mate counts as ahead."""
 TURN_S = 0.4
@@ -55,6 +57,15 @@ def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limi
                 wanted = Twist(sign * v_max, wanted.angular_z * v_max / abs(v))
                 v = wanted.linear_x
     return wanted
+
+
+def obeyed(command: Twist, measured: Twist) -> Twist:
+    """Return the twist to publish: the command, which the wheels follow next, so that no delay is added.
+
+    Return the measured twist where the wheels do not obey (an obstacle in contact, a closed gateway).
+    """
+    off_mps, off_radps = command.linear_x - measured.linear_x, command.angular_z - measured.angular_z
+    return command if abs(off_mps) < OBEYED_MPS and abs(off_radps) < OBEYED_RADPS else measured
 
 
 def within(twist: Twist, limits: Limits) -> tuple[float, float]:

@@ -1,0 +1,63 @@
+"""Behaviour of a robot that is stuck: it backs out of the place along its trail, and keeps out of it from then on."""
+
+from __future__ import annotations
+
+from math import inf, pi
+
+from lfa.agents.avoidance.decision import Action, Decision
+from lfa.agents.avoidance.detour import Detour
+from lfa.agents.following.follower import Follower
+from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.scan import Point
+from lfa.agents.recovery.back_up import BackUp
+from lfa.agents.recovery.stuck_detector import StuckMonitor
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.mission import Mission
+
+
+class BackOut:
+    """Backing out of one robot; `detour` holds the present decision, and is shared with the other behaviours'."""
+
+    def __init__(
+        self, mission: Mission, follower: Follower, detour: Detour, obstacles: ObstacleModel, stuck: StuckMonitor
+    ) -> None:
+        self._mission = mission
+        self._follower = follower
+        self._detour = detour
+        self._obstacles = obstacles
+        self._stuck = stuck
+        self._path = BackUp()
+
+    @property
+    def under_way(self) -> bool:
+        return self._path.under_way
+
+    def begin(self, pose: Pose2D) -> None:
+        """Start backing out of the place in which the robot is stuck."""
+        if self._stuck.reason is not None and not self._path.under_way:
+            self._path.begin(pose)
+            self._stuck.backing_out = True
+
+    def keep(self, pose: Pose2D) -> None:
+        """Extend the trail by which the robot would back out."""
+        if not self._path.under_way:
+            self._path.keep(pose)
+
+    def step(self, points: list[Point], pose: Pose2D, wanted: Twist, last: Twist, now: float) -> Twist:
+        """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out."""
+        twist = self._path.step(points, pose, self._mission.radius_m)
+        if twist is not None:
+            action = Action.BACK if twist.linear_x else Action.BLOCKED
+            self._detour.decision = Decision(action, inf, pi, "wall", "out of a trap")
+            return twist
+        self._stuck.out()
+        self._detour.decision = None
+        self._follower.rejoin(pose, last)
+        if self._path.trap is not None:
+            self.bar(self._path.trap, now)
+        return wanted
+
+    def bar(self, trap: Point, now: float) -> None:
+        """Block `trap` from now on, except for an explorer: it plans on its map, and would be enclosed in a corner."""
+        if self._mission.leading.motion != "explore":
+            self._obstacles.avoid_trap(*trap, now)

@@ -1,0 +1,38 @@
+"""Team-mates of one robot: where each of them is, as far as it is known."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from lfa.agents.following.predecessor import Predecessor
+from lfa.agents.perception.scan import Point
+from lfa.agents.team_state import TeamState
+from lfa.protocol.geometry import Pose2D
+
+
+class TeamMates:
+    """The other robots of a mission, and the one that this robot follows."""
+
+    def __init__(self, robot_id: int, robots: tuple[int, ...], team: TeamState) -> None:
+        self._others = tuple(robot for robot in robots if robot != robot_id)
+        self._team = team
+        self.predecessor: Predecessor | None = None
+
+    def places(self, now: float) -> list[Pose2D]:
+        """Return the known poses in `map`: the predecessor's from its pose messages, the others' from the table."""
+        places = [self._team.pose_of(robot, now) for robot in self._others]
+        if self.predecessor is not None:
+            sighting = self.predecessor.at(now)
+            places.append(None if sighting is None else sighting.pose)
+        return [place for place in places if place is not None]
+
+    def strangers(self, pose: Pose2D, now: float) -> list[Point]:
+        """Return those that this robot does not follow, in `base_link`: no controller keeps a distance to them."""
+        ahead = None if self.predecessor is None else self.predecessor.robot
+        c, s, mates = cos(pose.theta), sin(pose.theta), []
+        for robot in self._others:
+            place = None if robot == ahead else self._team.pose_of(robot, now)
+            if place is not None:
+                dx, dy = place.x - pose.x, place.y - pose.y
+                mates.append((c * dx + s * dy, c * dy - s * dx))
+        return mates
