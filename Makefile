@@ -121,11 +121,14 @@ pages: $(STAMP)
 	$(BIN)/lfa schema --markdown >> world/SCENARIO.md
 	$(BIN)/python -m tests.protocol.lease.page
 
-# The pictures of the tutorial: figures of its own run.
+# The pictures of the tutorial: figures of its own run, and its report in a browser.
 pictures: $(STAMP)
 	rm -rf build/pictures
 	$(BIN)/lfa sim leader_killed --seed 7 --figures --out build/pictures
 	$(BIN)/lfa view build/pictures --gif deploy/docs/pictures/killed.gif
+	$(BIN)/lfa report build/pictures
+	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1500 --virtual-time-budget=3000 \
+	    --screenshot=deploy/docs/pictures/report.png file://$(CURDIR)/build/pictures/report.html
 	cp $(foreach name,fig07_distance_error fig09_path_flow lease_timeline,build/pictures/figures/$(name).png) deploy/docs/pictures
 
 # The documentation site in build/site, from the pages of the repository and its docstrings, and tests of what was built.

@@ -35,6 +35,7 @@ def path_flow(figure: FigureBase, run: Run) -> None:
         _stance(axes, run, float(t), labels)
     goal = run.scenario.mission.goal_m
     axes.plot(*goal, marker="*", markersize=14, color="black", linestyle="none", label="goal", zorder=5)
+    axes.margins(0.03, 0.15)
     axes.set(title=f"Path flow: {run.scenario.title}", xlabel="x in map [m]", ylabel="y in map [m]", aspect="equal")
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
 
@@ -79,8 +80,8 @@ def _stance(axes: Axes, run: Run, t: float, labels: list[Array]) -> None:
             axes.plot([row[1], ahead[1]], [row[2], ahead[2]], color="#666666", linewidth=0.7, zorder=3)
         colour = look(run, robot)["color"]
         axes.plot(row[1], row[2], marker=(3, 0, float(np.degrees(row[3])) - 90.0), markersize=8, color=colour, zorder=4)
-    lowest = min(at.values(), key=lambda row: float(row[2]), default=None)
-    if lowest is not None and all(np.hypot(*(lowest[1:3] - there)) > LABEL_M for there in labels):
-        labels.append(lowest[1:3])
-        axes.annotate(f"{t:.0f} s", (lowest[1], lowest[2]), xytext=(0, -14), textcoords="offset points",
+    highest = max(at.values(), key=lambda row: float(row[2]), default=None)
+    if highest is not None and all(np.hypot(*(highest[1:3] - there)) > LABEL_M for there in labels):
+        labels.append(highest[1:3])
+        axes.annotate(f"{t:.0f} s", (highest[1], highest[2]), xytext=(0, 7), textcoords="offset points",
                       fontsize="small", ha="center", color="#333333", zorder=5)  # fmt: skip
