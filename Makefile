@@ -21,6 +21,7 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: $(STAMP)
 	$(BIN)/lfa run paper_path1 --fault 'kill leader at 20 s'
+	@echo 'to click a robot dead yourself: $(BIN)/lfa web (prints an address, http://127.0.0.1:8642/?token=...)'
 
 # First what computes, on two workers; then the teams of real processes, two at a time, for they keep time and mostly wait.
 # What a busy machine kept from keeping time is tried once more, alone: a fault of the code fails there too.

@@ -17,7 +17,7 @@ from lfa.deploy.client.stop_fleet import TOPICS as STOP_TOPICS
 from lfa.deploy.client.stop_fleet import told
 from lfa.deploy.faults.link_faults import note
 from lfa.deploy.faults.script import DEEDS, LEADER, ORDERS, RESTART, SIGNALS, SIMULATED
-from lfa.deploy.process.identity import send_signal
+from lfa.deploy.process.identity import identify, send_signal
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.view.picture.ground import ground_of, ground_of_mission
 from lfa.deploy.view.picture.picture import TOPICS, Picture
@@ -186,15 +186,22 @@ class FleetEngine:
         return self._signal(deed, robot)
 
     def _signal(self, deed: str, robot: int) -> str:
-        own = (agent for agent in agents() if agent.fleet == self._fleet.name and agent.robot == robot)
-        victim = next(own, None)
-        if victim is None:
-            raise Refused(f"{deed} {robot}: no process of yours here is robot {robot}")
-        send(self._ear.bus, self._operator.event("fault", clock.now(), deed=deed, robot=robot))
-        clock.sleep(SENT_S)
-        if not send_signal(victim.identity, SIGNALS[deed]):
-            raise Refused(f"{deed} {robot}: its process {victim.identity.pid} has gone in the meantime")
-        return f"{deed} {robot} (process {victim.identity.pid})"
+        told = False
+        for team in (
+            self._fleet.team,
+            None,
+        ):  # those found at the start, without a look through all processes; then all
+            here = agents() if team is None else team
+            for agent in here:
+                if agent.fleet != self._fleet.name or agent.robot != robot or identify(agent.identity.pid) is None:
+                    continue
+                if not told:
+                    send(self._ear.bus, self._operator.event("fault", clock.now(), deed=deed, robot=robot))
+                    clock.sleep(SENT_S)
+                told = True
+                if send_signal(agent.identity, SIGNALS[deed]):
+                    return f"{deed} {robot} (process {agent.identity.pid})"
+        raise Refused(f"{deed} {robot}: no process of yours here is robot {robot}")
 
     def _order(self, deed: str, target: str) -> str:
         team = [agent for agent in agents() if agent.fleet == self._fleet.name]
