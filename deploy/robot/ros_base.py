@@ -12,10 +12,11 @@ from math import hypot, isfinite
 from typing import Any
 
 from lfa.deploy.robot.base import Reading, Scan
-from lfa.deploy.robot.ros_frames import FrameTree, yaw_of
+from lfa.deploy.robot.ros_frames import FrameTree
 from lfa.deploy.robot.ros_presets import RosPreset, full_name
 from lfa.deploy.robot.ros_scan import converted
 from lfa.deploy.ros import messages
+from lfa.deploy.ros.quaternions import yaw_of
 from lfa.deploy.ros.session import NodeHandle
 from lfa.deploy.ros.topics import TF_QOS
 from lfa.deploy.ros.wire import LATCHED, SENSOR_DATA

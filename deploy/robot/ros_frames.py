@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from math import atan2, isfinite
+from math import isfinite
 from typing import Any
 
 from msgspec import Struct
 
+from lfa.deploy.ros.quaternions import is_tilted, yaw_of
 from lfa.protocol.geometry import Pose2D, between, compose
 
 FRAMES_MAX = 1000
-TILT_MAX = 0.05
-"""Largest sine of the angle between a frame's z axis and the vertical that still counts as level."""
 
 
 class Frame(Struct, frozen=True):
@@ -69,20 +68,6 @@ class FrameTree:
             poses[link.parent] = compose(link.at, poses[frame])
             frame = link.parent
         return poses
-
-
-def yaw_of(turn: Any) -> float | None:
-    """Return the yaw [rad] of a quaternion; None if it is none."""
-    parts = (turn.x, turn.y, turn.z, turn.w)
-    if not all(map(isfinite, parts)) or not 0.5 < sum(part * part for part in parts) < 2.0:
-        return None
-    return atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
-
-
-def is_tilted(turn: Any) -> bool:
-    """Return True if the rotated z axis does not point up: rolled, pitched or upside down."""
-    up = 1.0 - 2.0 * float(turn.x * turn.x + turn.y * turn.y)
-    return up < 0.0 or 1.0 - up * up > TILT_MAX * TILT_MAX
 
 
 def _plain(frame: str) -> str:

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from lfa.deploy.ros import messages
 from lfa.deploy.ros.topics import fleet_topics, robot_topics
 from lfa.deploy.ros.types import kind, type_hash
+from lfa.protocol.geometry import Pose2D
 from tests.rigs.foreign_peers import answer, start
 from tests.rigs.lfa_runs import LFA, eventually, lfa, running
 from tests.rigs.ros_peers import awaited, free_endpoint, ros_client
@@ -74,13 +76,25 @@ def test_the_bridge_of_a_secured_fleet_shows_and_commands_it_with_the_operators_
             awaited(odom.take, "the secured fleet's odometry")
             for service, told in (
                 ("/lfa/handover", "robot 2 leads"),
+                ("/lfa/pause", "order 1 carried out by robot 2"),
+                ("/lfa/go", "order 2 carried out by robot 2"),
                 ("/lfa/stop", "stopped: robot1, robot2, robot3 (epoch 1)"),
                 ("/lfa/resume", "may go: robot1, robot2, robot3 (epoch 2)"),
             ):
                 client = node.client(service, "std_srvs/srv/Trigger")
                 answered = client.call(kind("std_srvs/msg/Trigger_Request")(0), timeout_s=10.0)
                 assert answered is not None, service
-                assert (answered.success, answered.message) == (True, told)
+                assert answered.success, answered.message
+                assert answered.message.startswith(told)
+            goals = node.publisher("/goal_pose", "geometry_msgs/msg/PoseStamped")
+            awaited(goals.heard, "the bridge listens to goals")
+            goals.publish(messages.pose_stamped(0, Pose2D(20.0, 5.0, 0.0)))
+
+            def driven_to() -> bool:
+                fleet.team.listen()
+                return any(event.kind == "order" and event.data["version"] == 3 for event in fleet.team.heard.events)
+
+            awaited(driven_to, "the team takes the goal")
 
 
 def test_without_a_ros_router_the_bridge_says_in_one_line_what_to_do(tmp_path: Path) -> None:

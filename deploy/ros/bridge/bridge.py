@@ -7,10 +7,14 @@ import time
 from collections.abc import Iterable
 from typing import Protocol
 
+from lfa.agents.team_orders import QUESTION
 from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.order_fleet import along, to_goal, unchanged, walls_of
 from lfa.deploy.client.session import Subscriber, scenario_of_fleet
 from lfa.deploy.client.stop_call import Said
 from lfa.deploy.ros import messages
+from lfa.deploy.ros.bridge.answers import answer
+from lfa.deploy.ros.bridge.order_calls import OrderCalls
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE
 from lfa.deploy.ros.bridge.sender_clocks import SenderClocks
 from lfa.deploy.ros.bridge.stop_calls import StopCalls
@@ -18,17 +22,19 @@ from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.session import ServiceCall
 from lfa.deploy.ros.topics import SOURCES
 from lfa.protocol import clock, incarnations
+from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.orders import OrderNote, TeamOrder
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.stop import StopState
-from lfa.protocol.messages.team import MissionNote
+from lfa.protocol.messages.team import Event, MissionNote
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.transport.message_bus import send
 
 PERIOD_S = 0.02
 EAGER = frozenset({"sensors", "scan"})
 """Topics that are passed on at once; all others within a period."""
-HEARD = SOURCES | {"*/stop_state"}
-"""Topics that a bridge hears: what it shows, and the gateways' answers to a stop."""
+HEARD = SOURCES | {"*/stop_state", "*/team_order"}
+"""Topics that a bridge hears: what it shows, and the answers to a stop and to a change of the mission."""
 
 
 class Output(Protocol):
@@ -62,6 +68,7 @@ class Bridge:
         self._robots: tuple[int, ...] = ()
         """Robots of the mission; empty until it is known."""
         self._stops = StopCalls(self._say_stop)
+        self._orders = OrderCalls(self._say_order, self._ask_orders)
         scenario = scenario_of_fleet(ear.fleet)
         if scenario is not None:
             self._mapping.set_mission(scenario.mission)
@@ -84,17 +91,25 @@ class Bridge:
                 continue
             owner = arrival.key.split("/", 3)[2]
             robot = robot_id_of(owner)
-            if isinstance(message, StopState) and robot:
-                self._stops.hear(robot, message, now)
-                continue
-            if isinstance(message, MissionNote):
-                self._robots = message.mission.robots
+            self._hear_answer(robot, message, now)
             if self._clocks.ready and (not robot or robot in present):
                 stamp_ns = self._clocks.stamp_ns(message.header, arrival.at)
                 self._output.publish(self._mapping.update(stamp_ns, owner, message))
         if self._clocks.ready:
             self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
         self._stops.step(now)
+        self._orders.step(now)
+
+    def _hear_answer(self, robot: int | None, message: Message, now: float) -> None:
+        """Take what answers a stop or a change of the mission."""
+        match message:
+            case StopState() if robot:
+                self._stops.hear(robot, message, now)
+            case OrderNote() | Event():
+                self._orders.hear(message)
+            case MissionNote(mission=mission):
+                self._robots = mission.robots
+                self._orders.hear_mission(mission)
 
     def _follow_robots(self) -> None:
         """Declare robots whose tokens appeared, undeclare those whose tokens vanished."""
@@ -112,6 +127,26 @@ class Bridge:
     def stop(self, call: ServiceCall, now: float, *, stand: bool) -> None:
         """Say stop (`stand`) or resume to every gateway; `call` is answered by what became of it."""
         self._stops.ask(call, {*self._robots, *self._output.robots}, now, stand=stand)
+
+    def pause(self, call: ServiceCall, now: float, *, paused: bool) -> None:
+        """Let the leader stand, or drive on; `call` is answered when the team knows it, or by why it does not."""
+        self._orders.begin(unchanged, paused, now, lambda success, text: answer(call, success=success, text=text))
+
+    def go(self, x: float, y: float, theta_deg: float, now: float) -> None:
+        """Send the team to a goal in `map` [m, degrees]; warns if that is not carried out. Raises Refused."""
+        points = to_goal(x, y, theta_deg)
+
+        def tell(success: bool, text: str) -> None:
+            if not success:
+                self.warn(f"goal ({x:g}, {y:g}): {text}")
+
+        self._orders.begin(along(points, walls_of(self._ear)), False, now, tell)
+
+    def _say_order(self, order: TeamOrder, now: float) -> None:
+        send(self._ear.bus, self._operator.order(order, now))
+
+    def _ask_orders(self, now: float) -> None:
+        send(self._ear.bus, self._operator.ask("mission", now), self._operator.ask(QUESTION, now))
 
     def _say_stop(self, said: Said, now: float) -> None:
         send(self._ear.bus, self._operator.stop(said.word, said.gateways, now))

@@ -68,7 +68,7 @@ def command(
         with Interrupts() as interrupts, listen(found, sources, every=True, wake=wake, eager=EAGER) as ear:
             output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
             bridge = Bridge(ear, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
-            orders = OperatorInput(output.node, bridge.order, bridge.stop, bridge.warn)
+            orders = OperatorInput(output.node, bridge)
             foreign = ForeignNodes(graph, distro)
             how = "router at" if serve else "through"
             print(f"fleet {found.name} is on ROS domain {domain}, {how} {endpoint}", file=sys.stderr, flush=True)

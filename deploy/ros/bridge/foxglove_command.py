@@ -14,14 +14,12 @@ from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.ros.bridge.answers import answer
 from lfa.deploy.ros.bridge.bridge import EAGER, HEARD, PERIOD_S, Bridge
 from lfa.deploy.ros.bridge.foxglove_output import FoxgloveOutput
-from lfa.deploy.ros.bridge.inward import HandoverCalls
-from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
+from lfa.deploy.ros.bridge.inward import SERVICES, ServiceInput
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.bus import Wake
 
 PORT = 8765
-HANDOVER = "/lfa/handover"
 FORMATIONS = {f"/lfa/formation/{side}": side for side in ("left", "right", "column", "zigzag")}
 LAYOUT = Path(__file__).with_name("foxglove_layout.json")
 """Layout for Foxglove and Lichtblick: map, robots, slots, leader, errors and buttons."""
@@ -46,10 +44,10 @@ def command(
     found = find(fleet, connect, keys)
     wake = Wake()
     with Interrupts() as interrupts, listen(found, HEARD, every=True, wake=wake, eager=EAGER) as ear:
-        output = FoxgloveOutput(host, port, (STOP, RESUME, HANDOVER, *FORMATIONS), tf_per_robot=tf_per_robot)
+        output = FoxgloveOutput(host, port, (*SERVICES, *FORMATIONS), tf_per_robot=tf_per_robot)
         try:
             bridge = Bridge(ear, output, sim_time=False, tf_per_robot=tf_per_robot)
-            handovers = HandoverCalls(bridge.order)
+            services = ServiceInput(bridge)
             print(f"fleet {found.name}: open ws://{host}:{output.port} in Foxglove or Lichtblick", flush=True)
             print(f"layout: {LAYOUT}", flush=True)
             while interrupts.signal is None:
@@ -57,24 +55,22 @@ def command(
                 now = clock.now()
                 bridge.step(now)
                 output.greet(time.time_ns())
-                _obey(output, bridge, handovers, now)
+                _obey(output, bridge, services, now)
         finally:
             output.close()
     return 0
 
 
-def _obey(output: FoxgloveOutput, bridge: Bridge, handovers: HandoverCalls, now: float) -> None:
-    """Pass on the buttons that were pressed, and answer the hand-overs that are decided."""
+def _obey(output: FoxgloveOutput, bridge: Bridge, services: ServiceInput, now: float) -> None:
+    """Pass on the buttons that were pressed, and answer the calls that are decided."""
     while output.calls:
         name, call = output.calls.popleft()
-        if name == HANDOVER:
-            handovers.ask(call, bridge.leader, now)
-        elif name in (STOP, RESUME):
-            bridge.stop(call, now, stand=name == STOP)
-        else:
+        if name in FORMATIONS:
             bridge.order("formation", side=FORMATIONS[name])
             answer(call, success=True, text=f"asked for {FORMATIONS[name]}")
-    handovers.step(bridge.leader, now)
+        else:
+            services.obey(name, call, bridge.leader, now)
+    services.step(bridge.leader, now)
 
 
 def _write_layout(path: Path) -> int:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from math import nan, pi
 from typing import Any
 
 import pytest
 
+from lfa.deploy.ros import messages
 from lfa.deploy.ros.bridge.answers import answer
 from lfa.deploy.ros.bridge.command import check_graph
 from lfa.deploy.ros.bridge.inward import HANDOVER_S_MAX, OperatorInput
@@ -16,6 +18,7 @@ from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
 from lfa.deploy.ros.session import GraphFeed, RosSpace, ServiceCall
 from lfa.deploy.ros.types import kind
 from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D
 from tests.rigs.ros_peers import awaited, ros_pair
 
 
@@ -25,15 +28,27 @@ class Fleet:
     def __init__(self, space: RosSpace) -> None:
         self.told: list[tuple[str, dict[str, object]]] = []
         self.warned: list[str] = []
-        self.stopped: list[bool] = []
-        self.orders = OperatorInput(space.node("lfa_bridge"), self._order, self._stop, self.warned.append)
+        self.goals: list[tuple[float, float, float]] = []
+        self.orders = OperatorInput(space.node("lfa_bridge"), self)
 
-    def _order(self, name: str, **arguments: object) -> None:
+    def order(self, name: str, **arguments: object) -> None:
         self.told.append((name, arguments))
 
-    def _stop(self, call: ServiceCall, now: float, *, stand: bool) -> None:
-        self.stopped.append(stand)
+    def stop(self, call: ServiceCall, now: float, *, stand: bool) -> None:
+        self.told.append(("stop", {"stand": stand}))
         answer(call, success=True, text=f"asked at {now:g}")
+
+    def pause(self, call: ServiceCall, now: float, *, paused: bool) -> None:
+        self.told.append(("pause", {"paused": paused}))
+        answer(call, success=True, text=f"asked at {now:g}")
+
+    def go(self, x: float, y: float, theta_deg: float, now: float) -> None:
+        if x > 100.0:
+            raise Refused("outside of the map")
+        self.goals.append((x, y, theta_deg))
+
+    def warn(self, words: str) -> None:
+        self.warned.append(words)
 
 
 @pytest.fixture
@@ -131,4 +146,38 @@ def test_of_a_resume_and_a_stop_that_wait_together_the_stop_is_the_last_word(pai
     fleet.orders.step(1, 0.0)
     for call in calls:
         call.join()
-    assert fleet.stopped == [False, True]
+    assert fleet.told == [("stop", {"stand": False}), ("stop", {"stand": True})]
+
+
+def goal(x: float, y: float, yaw: float, frame: str = "map") -> Any:
+    message = messages.pose_stamped(0, Pose2D(x, y, yaw))
+    message.header.frame_id = frame
+    return message
+
+
+@pytest.mark.parametrize(
+    ("message", "goals", "warning"),
+    [
+        (goal(3.0, -1.5, pi / 2), [(3.0, -1.5, 90.0)], None),
+        (goal(3.0, -1.5, 0.0, "odom"), [], "/goal_pose: frame 'odom': must be 'map'"),
+        (goal(3.0, -1.5, nan), [], "/goal_pose: orientation: must be a quaternion"),
+        (goal(101.0, 0.0, 0.0), [], "/goal_pose: outside of the map"),
+    ],
+    ids=["in map", "in another frame", "no rotation", "refused"],
+)
+def test_a_goal_of_rviz_is_passed_on_or_warned_of_in_one_line(
+    message: Any, goals: list[tuple[float, ...]], warning: str | None, pair: tuple[RosSpace, RosSpace]
+) -> None:
+    ours, theirs = pair
+    fleet = Fleet(ours)
+    publisher = theirs.node("rviz").publisher("/goal_pose", "geometry_msgs/msg/PoseStamped")
+    awaited(publisher.heard, "the subscription matches")
+    publisher.publish(message)
+
+    def decided() -> bool:
+        fleet.orders.step(1, 0.0)
+        return bool(fleet.goals or fleet.warned)
+
+    awaited(decided, "the goal is read")
+    assert [tuple(round(number, 6) for number in one) for one in fleet.goals] == goals
+    assert [line.startswith(warning or "?") for line in fleet.warned] == [True] * (warning is not None)

@@ -1,0 +1,77 @@
+"""Changes of the mission that ROS users ask for: who is told what became of them."""
+
+from __future__ import annotations
+
+from msgspec import structs
+
+from lfa.deploy.client.order_call import ANSWER_S
+from lfa.deploy.client.order_fleet import along, unchanged
+from lfa.deploy.ros.bridge.order_calls import OrderCalls
+from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.orders import OrderNote, TeamOrder
+from lfa.protocol.messages.team import Event
+from lfa.protocol.mission import Mission
+from tests.deploy.ros.test_mapping import header
+
+MISSION = Mission(robots=(1, 2, 3))
+HOLDS = OrderNote(header(), TeamOrder(MISSION.leading, MISSION.formation), Term(1, 1, 1))
+WALL = (2.0, -1.0, 2.0, 1.0)
+
+
+class Team:
+    """Orders that were said, and what those who asked were told."""
+
+    def __init__(self) -> None:
+        self.said: list[TeamOrder] = []
+        self.asked = 0
+        self.told: list[tuple[bool, str]] = []
+        self.calls = OrderCalls(lambda order, _now: self.said.append(order), self._ask)
+
+    def _ask(self, _now: float) -> None:
+        self.asked += 1
+
+    def tell(self, success: bool, text: str) -> None:
+        self.told.append((success, text))
+
+    def know(self) -> None:
+        self.calls.hear_mission(MISSION)
+        self.calls.hear(HOLDS)
+
+    def answer(self, robot: int, by: str) -> None:
+        sender = structs.replace(header(), sender=f"robot{robot}")
+        self.calls.hear(Event(sender, "order", None, {"version": 1, "by": by}))
+
+
+def test_a_pause_is_told_as_carried_out_when_the_leader_and_most_of_the_team_know_it() -> None:
+    team = Team()
+    team.calls.begin(unchanged, True, 0.0, team.tell)
+    team.calls.step(0.0)
+    assert (team.asked, team.said) == (1, [])
+    team.know()
+    team.calls.step(0.1)
+    assert [(order.version, order.paused) for order in team.said] == [(1, True)]
+    team.answer(1, "leader")
+    team.calls.step(0.2)
+    assert team.told == []
+    team.answer(2, "follower")
+    team.calls.step(0.3)
+    assert team.told == [(True, "order 1 carried out by robot 1, 2 robots know it")]
+
+
+def test_a_goal_in_a_wall_is_told_and_nothing_is_said() -> None:
+    team = Team()
+    team.calls.begin(along(((2.0, 0.0),), (WALL,)), False, 0.0, team.tell)
+    team.know()
+    team.calls.step(0.1)
+    assert team.said == []
+    ((success, text),) = team.told
+    assert not success
+    assert "goal (2, 0): in a wall" in text
+
+
+def test_a_team_without_a_leader_is_told_after_a_while_and_a_newer_order_ends_an_older_one() -> None:
+    team = Team()
+    team.calls.begin(unchanged, True, 0.0, team.tell)
+    team.calls.begin(unchanged, False, 0.1, team.tell)
+    team.calls.step(0.1 + ANSWER_S)
+    assert team.told == [(False, "another order came in the meantime"), (False, "no leader has answered")]
