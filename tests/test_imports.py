@@ -56,6 +56,7 @@ ORDER = (
 no circle and nothing runs upwards."""
 
 FILES_MAX = 14
+LINES_MAX = 400
 
 #           module       only imported by (within these packages)
 ONLY: dict[str, tuple[set[str], tuple[str, ...]]] = {
@@ -151,6 +152,11 @@ def test_a_planted_import_upwards_is_seen(tmp_path: Path) -> None:
 def test_a_folder_holds_no_more_files_than_a_reader_keeps_in_mind() -> None:
     count = Counter(path.parent.relative_to(ROOT) for path in _files(*PACKAGES) if _code(path))
     assert {str(folder): n for folder, n in count.items() if n > FILES_MAX} == {}
+
+
+def test_no_file_is_longer_than_a_reader_takes_in_at_once() -> None:
+    lines = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in _files(*PACKAGES)}
+    assert {name: n for name, n in lines.items() if n > LINES_MAX} == {}
 
 
 @pytest.mark.parametrize("name", PACKAGES)
