@@ -76,7 +76,7 @@ class HandoverCalls:
 
 
 class ServiceInput:
-    """Calls of the Trigger services, whoever brings them: ROS or Foxglove."""
+    """Calls of the Trigger services, from ROS or from Foxglove."""
 
     def __init__(self, fleet: FleetCommands) -> None:
         self._fleet = fleet
