@@ -60,7 +60,9 @@ ELSEWHERE = {
     "lfa up FILE --secure": "tests/deploy/fleet/security/test_secure.py",
     "lfa export compose FILE": "tests/deploy/fleet/export/test_export.py",
     "lfa keys revoke FILE robot3": "tests/deploy/fleet/security/test_secure.py",
-    "lfa sim circle --set mission.following.controller=carrot": "tests/agents/controllers/test_readme_controller.py",
+    "lfa sim circle --controller carrot": "tests/agents/controllers/test_plug_in.py",
+    "lfa doctor FILE": "tests/hosts/test_refused.py",
+    "lfa-agent": "tests/first_hour/test_hour.py",
     **dict.fromkeys(
         ("lfa up FILE", "lfa up", "lfa up deploy/fleet.example.toml", "lfa ps", "lfa top", "lfa logs",
          "lfa logs -f robot3", "lfa restart", "lfa restart 3", "lfa down"),
