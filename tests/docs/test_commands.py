@@ -102,7 +102,7 @@ def wrong(command: str) -> str | None:
         return None if target in TARGETS else f"target {target}"
     if program == "python":
         return None if rest[0] == "-m" or (ROOT / rest[0]).is_file() else f"file {rest[0]}"
-    if program != "lfa" or rest == ["--version"]:
+    if program != "lfa" or rest in (["--version"], ["--help"]):
         return None
     name, *arguments = rest
     if name not in OPTIONS:

@@ -74,7 +74,7 @@ def test_which_file_decides_left_or_right() -> None:
     detour, *others = named(text)
     assert detour == (ROOT / "agents" / "avoidance" / "detour.py", "Detour")
     assert {path.name for path, _ in others} == {"openings.py", "decision.py"}
-    assert '"left" if side > 0.0 else "right"' in detour[0].read_text()
+    assert "Action.LEFT if side > 0.0 else Action.RIGHT" in detour[0].read_text()
 
 
 def test_what_happens_when_the_leader_dies() -> None:
