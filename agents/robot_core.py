@@ -154,8 +154,8 @@ class RobotCore:
                 self._take_order(message, now)
             case Vitals():
                 self._attendance.update(lease, self._team, now)
-                outside = self._attendance.text()
-                self._reports.status(message, navigator, self._team, lease, self._role(), outside, now)
+                held = (self._stop_listener.text() if lease.chain else "") or self._attendance.text()
+                self._reports.status(message, navigator, self._team, lease, self._role(), held, now)
             case Stop():
                 self._stop(now)
 
@@ -280,6 +280,7 @@ class RobotCore:
                 case AdoptChain(config):
                     self._adopt(now)
                     chain = [member.id for member in config.chain]
+                    self._stop_listener.memory.hear_chain(chain)
                     self._event("chain", now, {"chain": chain, "seq": config.version.seq}, config.version.term)
                 case StandAside(reason):
                     self.refusal = reason

@@ -36,6 +36,14 @@ class StopListener:
         """True while this robot's wheels must not or cannot turn."""
         return self._gateway_stands or self.memory.stands
 
+    def text(self) -> str:
+        """Return why this robot stands, as text for its status; empty if no stop holds it."""
+        if self.memory.stands:
+            return "stopped: lfa resume lets it go"
+        if self._gateway_stands and not self.memory.certain:
+            return "stands until others say that nobody has stopped the fleet: lfa resume lets it go"
+        return ""
+
     def hear_sensors(self, sensors: Sensors) -> None:
         """Update with the state of the own gateway."""
         self._gateway_stands = sensors.stands

@@ -64,10 +64,10 @@ class Schedule(Struct, frozen=True):
     rates: dict[int, float]
     faults: tuple[ScheduledFault, ...]
     radio: Radio
-    stops: tuple[ScheduledFault, ...]
-    """Calls of operators, each at a host: `stop`, `resume`; and the `replay` of an earlier word to a robot."""
     revive_all: bool
     """True if every dead process restarts at the end of the faults; else only as many as a quorum needs."""
+    stops: tuple[ScheduledFault, ...] = ()
+    """Calls of operators, each at a host: `stop`, `resume`; and the `replay` of an earlier word to a robot."""
     held: tuple[HeldMessage, ...] = ()
 
     @property

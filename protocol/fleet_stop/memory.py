@@ -1,7 +1,8 @@
 """What one agent knows of the fleet stop: the memory from which its gateway learns after a restart (E30).
 
 An agent hears the orders as the gateways do. One that starts knows nothing: its own gateway tells it, if that has run
-on; otherwise it asks the other agents, and is certain when more than half of the team has answered, itself included.
+on; otherwise it asks the other agents, and is certain when more than half of the team has answered, itself included, or
+all of the chain that the voters have agreed on: a team that begins without some of its robots need not wait for them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ class StopMemory:
     def __init__(self, robot_id: int, robots: Iterable[int]) -> None:
         self._robots = set(robots)
         self._heard = {robot_id}
+        self._chain: set[int] = set()
         self._word: StopWord = NO_STOP
         self._ask_at = float("-inf")
         self.certain = len(self._robots) == 1
@@ -50,12 +52,17 @@ class StopMemory:
         if not self.certain and robot in self._robots:
             self._adopt(known.word)
             self._heard.add(robot)
-            self.certain = 2 * len(self._heard) > len(self._robots)
+            self._decide()
+
+    def hear_chain(self, robots: Iterable[int]) -> None:
+        """Update with the chain that a majority of the voters has agreed on."""
+        self._chain = set(robots)
+        self._decide()
 
     def forget(self, robots: Iterable[int]) -> None:
         """Ask no more for the answers of robots that an operator declared lost for good (E20)."""
         self._robots -= set(robots) - self._heard
-        self.certain = self.certain or 2 * len(self._heard) > len(self._robots)
+        self._decide()
 
     def ask_due(self, now: float) -> bool:
         """Return True if the other agents are to be asked now."""
@@ -63,6 +70,10 @@ class StopMemory:
             return False
         self._ask_at = now + ASK_S
         return True
+
+    def _decide(self) -> None:
+        enough = 2 * len(self._heard) > len(self._robots)
+        self.certain = self.certain or enough or (bool(self._chain) and self._chain <= self._heard)
 
     def _adopt(self, word: StopWord) -> None:
         self._word = max(self._word, word)

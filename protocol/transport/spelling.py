@@ -6,6 +6,7 @@ words as another client, crosses no link. In other words it does, and so replace
 
 from __future__ import annotations
 
+from itertools import pairwise
 from random import Random
 
 NOTHING = "$*"
@@ -17,9 +18,9 @@ RESTS = ("**", "*/**", "*/*/**")
 
 
 def respelled(expression: str, random: Random) -> str:
-    """Return a spelling of `expression` drawn from some 2^n, n its letters after the owner.
+    """Return a spelling of `expression` drawn from some 2^n, n its pairs of letters after the owner.
 
-    `lfa/f/*/lease/all` may become `lfa/f/*/l$*eas$*e/all$*`. An expression of wildcards alone has no other spelling.
+    `lfa/f/*/lease/all` may become `lfa/f/*/l$*eas$*e/al$*l`. An expression of wildcards alone has no other spelling.
     """
     parts = expression.split("/")
     if parts[-1] == "**" and len(parts) == TOPIC_AT:
@@ -30,5 +31,7 @@ def respelled(expression: str, random: Random) -> str:
 def _respelled(part: str, random: Random) -> str:
     if "*" in part:
         return part
-    letters = [letter + random.choice(("", NOTHING)) for letter in part]
-    return random.choice(("", NOTHING)) + "".join(letters)
+    # Inside words only: `stop$*` would match `stop_state` too, and `robot1$*2` robot 112.
+    pairs = pairwise(part)
+    gaps = [random.choice(("", NOTHING)) if left.isalpha() and right.isalpha() else "" for left, right in pairs]
+    return "".join(letter + gap for letter, gap in zip(part, [*gaps, ""], strict=True))

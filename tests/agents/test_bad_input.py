@@ -8,16 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lfa.agents.config import DEFAULT
-from lfa.agents.controllers.headway import Headway
-from lfa.agents.controllers.kanayama import Kanayama
-from lfa.agents.following.controller import Controller, Law
+from lfa.agents.following.controller import Law
 from lfa.agents.following.follower import Follower
+from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import Predecessor
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.messages.consensus import NO_TERM, Role
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import PoseStamped, Slot
-from lfa.protocol.mission import Limits
+from lfa.protocol.mission import Following, Limits
 
 LIMITS = Limits()
 DT = 0.02
@@ -45,7 +44,7 @@ def messages(draw: st.DrawFn) -> tuple[float, PoseStamped]:
     times=st.lists(st.floats(-0.05, 0.6), min_size=5, max_size=40),
     own=st.lists(st.builds(Pose2D, anything, anything, anything), min_size=1, max_size=3),
     slot=st.builds(Slot, st.just(2), st.floats(0.4, 5.0), st.floats(-2.0 * pi, 2.0 * pi)),
-    make=st.sampled_from([Law, Kanayama, Headway]),
+    name=st.sampled_from(["law", "kanayama", "headway"]),
     mode=st.sampled_from(["velocity", "pose"]),
     delay_s=st.sampled_from([0.0, 0.1, None]),
     on_trace=st.booleans(),
@@ -57,14 +56,14 @@ def test_no_input_makes_a_command_that_is_not_finite_or_breaks_a_limit(
     times: list[float],
     own: list[Pose2D],
     slot: Slot,
-    make: type[Law],
+    name: str,
     mode: str,
     delay_s: float | None,
     on_trace: bool,
     paper: bool,
     heading_filter_m: float,
 ) -> None:
-    controller: Controller = make(DEFAULT, LIMITS)
+    controller = make_controller(Following(controller=name), DEFAULT, LIMITS)
     follower = Follower(DEFAULT, LIMITS, controller, heading_filter_m=heading_filter_m, paper_observer=paper)
     predecessor = Predecessor(1, mode=mode, delay_s=delay_s)  # type: ignore[arg-type]
     now, pose, before = 100.0, Pose2D(), STILL

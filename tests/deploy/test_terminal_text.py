@@ -53,7 +53,7 @@ def test_ps_shows_a_hostile_text_as_text(says: str, field: str) -> None:
 @pytest.mark.parametrize("says", HOSTILE)
 def test_watch_shows_a_hostile_state_as_text(says: str) -> None:
     row = RobotStatus(1, "leader", 7, None, None, None, 0.0, 0.1, says, None, None, None)
-    assert visible(says) in _printed(watch._table([row], None))
+    assert visible(says) in _printed(watch._table([row], None, 160))
 
 
 @pytest.mark.parametrize("text", ["plain", "Größe 3 °", "a\tb"])

@@ -7,7 +7,7 @@ from math import nan
 
 import pytest
 
-import lfa.agents.formation.formation
+import lfa.agents.formation.slot_motion
 from lfa.deploy.bench import control
 from lfa.deploy.bench.control_cases import string_stability
 from lfa.deploy.bench.control_cases.table import steady
@@ -63,9 +63,9 @@ def test_a_wrong_sign_of_k_omega_in_the_slot_velocity_makes_the_bench_fail(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """(21)/(22) in the opposite bearing convention, as printed."""
-    right = lfa.agents.formation.formation.slot_velocity
+    right = lfa.agents.formation.slot_motion.slot_velocity
     monkeypatch.setattr(
-        lfa.agents.formation.formation, "slot_velocity", lambda theta, v, w, dx, dy: right(theta, v, -w, dx, dy)
+        lfa.agents.formation.slot_motion, "slot_velocity", lambda theta, v, w, dx, dy: right(theta, v, -w, dx, dy)
     )
     assert control.run(True, "clean/circle/left/*", 1) == 1
     failed = {r["name"] for r in json.loads(capsys.readouterr().out)["rows"] if not r["ok"]}

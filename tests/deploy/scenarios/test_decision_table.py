@@ -121,7 +121,7 @@ CASES = (
         "stationary",
         "its end is not in sight",
         ("creep",),
-        (HALF_HIDDEN.format(0.2),),
+        (HALF_HIDDEN.format(0.26),),
         "goal",
     ),
     Case(

@@ -36,6 +36,21 @@ def test_e30_one_of_them_that_knows_of_a_stop_is_enough_to_stand() -> None:
     assert memory.stands and memory.certain
 
 
+def test_e30_a_team_that_begins_without_some_of_its_robots_needs_the_answers_of_its_chain_only() -> None:
+    memory = StopMemory(1, (1, 2, 3, 4))
+    memory.hear_chain((1, 2))
+    assert not memory.certain
+    memory.hear_agent(2, UNCERTAIN)
+    assert memory.known == NEVER_STOPPED
+
+
+def test_e30_who_joins_a_chain_that_was_stopped_stands_with_it() -> None:
+    memory = StopMemory(3, (1, 2, 3, 4))
+    memory.hear_chain((1, 3))
+    memory.hear_agent(1, STOPPED)
+    assert memory.stands and memory.certain
+
+
 def test_a_certain_agent_takes_no_word_from_another() -> None:
     memory = StopMemory(1, (1,))
     memory.hear_agent(2, STOPPED)

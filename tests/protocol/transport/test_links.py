@@ -73,7 +73,7 @@ FOLLOWED = [
     "lfa/f/**",
 ]
 KEYS = [key("f", "robot3", topic.name) for topic in TOPICS] + [
-    *(key("f", "robot3", "lease", to) for to in ("all", "hello", "robot12", "robot1")),
+    *(key("f", "robot3", "lease", to) for to in ("all", "hello", "robot12", "robot1", "robot112")),
     alive_key("f", "robot3", 7),
     "lfa/g/robot3/pose",
 ]
