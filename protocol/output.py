@@ -37,9 +37,12 @@ def write_line(text: str, stream: TextIO | None) -> None:
             os.write(out, text.encode(errors="replace")[:LINE_BYTES_MAX] + b"\n")
 
 
-def replace_file(path: Path, data: bytes) -> str:
-    """Replace the file at `path` by `data`, in one step for its readers; return the reason of a failure, else ""."""
-    fresh = path.with_name(f"{path.name}.new")
+def replace_file(path: Path, data: bytes, writer: str = "new") -> str:
+    """Replace the file at `path` by `data`, in one step for its readers; return the reason of a failure, else "".
+
+    `writer` ends the name of the file that is written first: writers of one path at one time need different ones.
+    """
+    fresh = path.with_name(f"{path.name}.{writer}")
     try:
         fresh.write_bytes(data)
         fresh.replace(path)

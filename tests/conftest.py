@@ -4,6 +4,8 @@ and Ctrl-C means what it says, also to a run that a shell has started in the bac
 Workers of pytest-xdist with `--dist loadgroup`: all tests with real processes are in two groups, each run by one
 worker, one test after the other, so that there are no more than two teams at a time. Tests that share a fixture of
 their module stay together, so that it is made once. Each worker has a runtime folder of its own.
+With pytest 9.2, xdist 3.8 does not see the groups: two workers still are two teams, and a test may not rely on what
+another one left.
 """
 
 from __future__ import annotations

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import socket
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from msgspec import Struct
 from lfa.deploy.campaign.items import ItemResult
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.output import replace_file
 
 DESCRIPTION = "campaign.json"
 RESULTS = "results"
@@ -133,14 +133,9 @@ def _ours(name: str) -> bool:
 
 def _write(path: Path, data: bytes) -> None:
     """Write a file in one step for every reader; shares that write the same one do not meet. Raises Refused."""
-    fresh = path.with_name(f"{path.name}.{socket.gethostname()}-{os.getpid()}")
-    try:
-        fresh.write_bytes(data)
-        fresh.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            fresh.unlink(missing_ok=True)
-        raise Refused(f"{path}: {error.strerror}: must be a place that has room, and that this user may use") from None
+    reason = replace_file(path, data, f"{socket.gethostname()}-{os.getpid()}")
+    if reason:
+        raise Refused(f"{path}: {reason}: must be a place that has room, and that this user may use")
 
 
 def _check_same(path: Path, found: Campaign, wanted: Campaign) -> None:
