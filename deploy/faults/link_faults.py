@@ -51,13 +51,13 @@ def _side(text: str, robots: tuple[int, ...], right: str) -> list[str]:
     return [WORLD_NAME if word == WORLD_WORD else robot_name(int(word)) for word in words]
 
 
-def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, dict[str, Any]]:
+def order(action: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, dict[str, Any]]:
     """Return the operator's command and its arguments for each of `script.ORDERS`.
 
     Raises Refused.
     """
     text = str(target)
-    match deed:
+    match action:
         case "cut":
             return WEATHER, {"cut": links(text, robots)}
         case "heal":
@@ -67,27 +67,29 @@ def order(deed: str, target: int | str, robots: tuple[int, ...]) -> tuple[str, d
         case "range":
             return WEATHER, {"radio": {"range_m": _range_m(text)}}
         case "hang" | "resume":
-            return deed, _part(deed, text, robots)
+            return action, _part(action, text, robots)
         case "formation":
-            return deed, {"side": _side_of_team(text)}
+            return action, {"side": _side_of_team(text)}
         case "obstacle":
-            return deed, _obstacle(text)
+            return action, _obstacle(text)
         case _:
-            return deed, {}
+            return action, {}
 
 
-def note(operator: Operator, now: float, deed: str, target: int | str, robots: tuple[int, ...]) -> Envelope:
+def note(operator: Operator, now: float, action: str, target: int | str, robots: tuple[int, ...]) -> Envelope:
     """Return the operator's message for a fault, stamped `now` [s]. Raises Refused."""
-    command, arguments = order(deed, target, robots)
+    command, arguments = order(action, target, robots)
     return operator.command(command, now, **arguments)
 
 
-def _part(deed: str, text: str, robots: tuple[int, ...]) -> dict[str, Any]:
+def _part(action: str, text: str, robots: tuple[int, ...]) -> dict[str, Any]:
     match = PART.fullmatch(text)
     robot = None if match is None else whole_number(match["robot"])
     if match is None or robot not in robots:
         ids = ", ".join(map(str, robots))
-        raise Refused(f"{deed} {text!r}: must be driver, localization or scanner of a robot of {ids}, such as driver 2")
+        raise Refused(
+            f"{action} {text!r}: must be driver, localization or scanner of a robot of {ids}, such as driver 2"
+        )
     return {"part": match["part"], "robot": robot}
 
 

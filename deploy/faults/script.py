@@ -24,7 +24,7 @@ FaultAction = Literal[
 ]  # fmt: skip
 
 #            action        effect
-DEEDS: dict[str, str] = {
+FAULT_ACTIONS: dict[str, str] = {
     "kill":      "SIGKILL: ends at once, without any message",
     "stop":      "SIGSTOP: frozen, with its messages queued",
     "continue":  "SIGCONT: continues with an outdated state",
@@ -58,13 +58,15 @@ RESTART: FaultAction = "restart"
 """Fault action carried out by the launcher; in a fleet that already runs, an operator's message requests it."""
 SIMULATED = ("range",)
 """Fault actions that only the simulator executes: a live receiver does not know how far away its senders are."""
+LIVE = tuple(action for action in FAULT_ACTIONS if action not in SIMULATED)
+"""Fault actions for a fleet that runs as processes."""
 COMMON = ("router", "world")
 """Processes besides robots that can be killed, stopped and continued, where the fleet runs as processes."""
 TIME_S_MAX = 1e6
 """Longest time limit [s] of a scenario."""
-RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(DEEDS)})"
+RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(FAULT_ACTIONS)})"
 _SENTENCE = re.compile(
-    r"(?P<deed>\w+)(?: +(?!at )(?P<target>(?:(?:driver|localization|scanner) +)?[\w.,>-]+))?"
+    r"(?P<action>\w+)(?: +(?!at )(?P<target>(?:(?:driver|localization|scanner) +)?[\w.,>-]+))?"
     r"(?: +at +(?P<at>\d+(?:\.\d+)?) *s)?"
     r"(?: +for +(?P<duration>\d+(?:\.\d+)?) *s)?",
     re.ASCII,
@@ -77,7 +79,7 @@ class Fault(Struct, frozen=True):
     `target` is a robot's id, `leader` for the leader at that moment, or the argument of an operator command.
     """
 
-    deed: FaultAction
+    action: FaultAction
     target: int | str
     at_s: float
     for_s: float | None = None
@@ -86,7 +88,7 @@ class Fault(Struct, frozen=True):
 
     def __str__(self) -> str:
         lasting = "" if self.for_s is None else f" for {_plain(self.for_s)} s"
-        return " ".join(word for word in (self.deed, str(self.target), f"at {_plain(self.at_s)} s{lasting}") if word)
+        return " ".join(word for word in (self.action, str(self.target), f"at {_plain(self.at_s)} s{lasting}") if word)
 
 
 def _plain(seconds: float) -> str:
@@ -97,20 +99,20 @@ def _plain(seconds: float) -> str:
 def parse(text: str, mission: Mission, where: str = "--fault") -> Fault:
     """Parse one fault. Raises Refused if `text` is not a fault, or names a robot that is not in the mission."""
     match = _SENTENCE.fullmatch(text.strip())
-    if match is None or match["deed"] not in DEEDS or match["at"] is None:
+    if match is None or match["action"] not in FAULT_ACTIONS or match["at"] is None:
         raise Refused(f"{where} {text!r}: must be like {RIGHT}")
     if max(float(match["at"]), float(match["duration"] or 0.0)) > TIME_S_MAX:
         raise Refused(f"{where} {text!r}: times must be at most {TIME_S_MAX:g} s, what the longest run lasts")
-    if match["deed"] in ORDERS:
-        target = _ordered(match["deed"], " ".join((match["target"] or "").split()), text, mission, where)
+    if match["action"] in ORDERS:
+        target = _ordered(match["action"], " ".join((match["target"] or "").split()), text, mission, where)
     else:
         target = _target(match["target"] or "", text, mission, where)
     for_s = None if match["duration"] is None else float(match["duration"])
-    if for_s is not None and match["deed"] not in LASTING:
+    if for_s is not None and match["action"] not in LASTING:
         raise Refused(f"{where} {text!r}: only {', '.join(LASTING)} can be 'for' a while")
-    if match["deed"] in ("restart", "continue") and target == LEADER:
-        raise Refused(f"{where} {text!r}: {match['deed']} needs an id, one of {_ids(mission)}")
-    return Fault(cast(FaultAction, match["deed"]), target, float(match["at"]), for_s)
+    if match["action"] in ("restart", "continue") and target == LEADER:
+        raise Refused(f"{where} {text!r}: {match['action']} needs an id, one of {_ids(mission)}")
+    return Fault(cast(FaultAction, match["action"]), target, float(match["at"]), for_s)
 
 
 def parse_all(mission: Mission, from_scenario: Sequence[str], from_operator: Sequence[str]) -> list[Fault]:
@@ -132,35 +134,35 @@ class FaultSchedule:
 
     def due(self, now: float, leader: int | None) -> list[tuple[FaultAction, int | str]]:
         """Return the actions and targets due at world time `now` [s]; a fault on the leader waits until one exists."""
-        deeds: list[tuple[FaultAction, int | str]] = []
+        actions: list[tuple[FaultAction, int | str]] = []
         while self.pending and self.pending[0].at_s <= now:
             fault = self.pending[0]
             victim = leader if fault.target == LEADER else fault.target
             if victim is None:
                 break
             self.pending.pop(0)
-            deeds.append((fault.deed, victim))
+            actions.append((fault.action, victim))
             if fault.for_s is not None:
-                undone = "" if fault.deed == "loss" else victim
-                self.add(Fault(LASTING[fault.deed], undone, now + fault.for_s, undoes=True))
-        return deeds
+                undone = "" if fault.action == "loss" else victim
+                self.add(Fault(LASTING[fault.action], undone, now + fault.for_s, undoes=True))
+        return actions
 
 
 def _place(fault: Fault) -> tuple[float, bool]:
     return fault.at_s, fault.undoes
 
 
-def _ordered(deed: str, word: str, text: str, mission: Mission, where: str) -> int | str:
+def _ordered(action: str, word: str, text: str, mission: Mission, where: str) -> int | str:
     """Return the target of an operator command: empty, `leader`, one robot's id, or its argument. Raises Refused."""
-    if deed == "handover" and word not in ("", LEADER):
+    if action == "handover" and word not in ("", LEADER):
         raise Refused(f"{where} {text!r}: only the leader hands over")
-    if deed == "handover" or (deed == "cut" and word == LEADER):
+    if action == "handover" or (action == "cut" and word == LEADER):
         return LEADER
     try:
-        order(deed, word, mission.robots)
+        order(action, word, mission.robots)
     except Refused as refused:
         raise Refused(f"{where} {text!r}: {refused}") from None
-    robot = whole_number(word) if deed in ("cut", "heal") else None
+    robot = whole_number(word) if action in ("cut", "heal") else None
     return word if robot is None else robot
 
 

@@ -125,9 +125,9 @@ class FleetView:
                 return name
         return None
 
-    def order(self, deed: str, target: str = "", lines: int = 0) -> HostOrder:
+    def order(self, action: str, target: str = "", lines: int = 0) -> HostOrder:
         """Return a new order with its own sequence number; repeat it by `say` until it is obeyed."""
-        return HostOrder(self._outbox.header("order", clock.now()), deed, target, lines)
+        return HostOrder(self._outbox.header("order", clock.now()), action, target, lines)
 
     def say(self, order: HostOrder) -> None:
         send(self._ear.bus, self._outbox.envelope("order", order))

@@ -17,7 +17,7 @@ from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agent
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import COMMON, DEEDS, LEADER, ORDERS, RESTART, SIGNALS, SIMULATED
+from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, LEADER, LIVE, ORDERS, RESTART, SIGNALS
 from lfa.deploy.process.identity import Identity, own_processes, send_signal
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
@@ -36,7 +36,7 @@ SENT_S = 0.05  # delay [s] so that the event about a fault leaves before the fau
 
 
 def command(
-    deed: Annotated[str, typer.Argument(help=f"One of: {', '.join(deed for deed in DEEDS if deed not in SIMULATED)}.")],
+    action: Annotated[str, typer.Argument(help=f"One of: {', '.join(LIVE)}.")],
     target: Annotated[
         str,
         typer.Argument(
@@ -48,53 +48,53 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Inject a fault into a fleet that runs on this machine. Raises Refused."""
-    if deed not in DEEDS or deed in SIMULATED:
-        raise Refused(f"{deed!r}: must be one of {', '.join(deed for deed in DEEDS if deed not in SIMULATED)}")
+    if action not in LIVE:
+        raise Refused(f"{action!r}: must be one of {', '.join(LIVE)}")
     team = one_fleet(agents(), fleet)
     inbox = Inbox()
     bus = _bus(team[0], inbox)
-    if deed in ORDERS:
-        return _order(deed, target, team, bus, inbox, as_json)
-    if deed == RESTART:
+    if action in ORDERS:
+        return _order(action, target, team, bus, inbox, as_json)
+    if action == RESTART:
         return _restart(target, team[0].fleet, bus, inbox, as_json)
     try:
         whom, identity = _whom(target, team, bus, inbox)
         operator = Operator(team[0].fleet, incarnations.drawn())
-        send(bus, operator.event("fault", clock.now(), deed=deed, robot=whom))
+        send(bus, operator.event("fault", clock.now(), deed=action, robot=whom))
         clock.sleep(SENT_S)
-        done = send_signal(identity, SIGNALS[deed])
+        done = send_signal(identity, SIGNALS[action])
     finally:
         bus.close()
     name = f"robot {whom}" if isinstance(whom, int) else whom
     if not done:
         raise Refused(f"{name}: its process {identity.pid} has gone in the meantime")
-    facts = {"deed": deed, "robot": whom, "fleet": team[0].fleet, "pid": identity.pid}
-    said = f"{deed} {name} of {team[0].fleet} (process {identity.pid}): {DEEDS[deed]}"
+    facts = {"deed": action, "robot": whom, "fleet": team[0].fleet, "pid": identity.pid}
+    said = f"{action} {name} of {team[0].fleet} (process {identity.pid}): {FAULT_ACTIONS[action]}"
     print(msgspec.json.encode(facts).decode() if as_json else said)
     return 0
 
 
-def _order(deed: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
+def _order(action: str, target: str, team: Sequence[Running], bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:
     """Send an operator's message to all of the fleet. Raises Refused if it is invalid, or the fleet ignores faults."""
     fleet, robots = team[0].fleet, tuple(sorted(agent.robot for agent in team))
     try:
-        if deed in ("cut", "heal", "loss") and not all("--faults" in agent.identity.arguments for agent in team):
+        if action in ("cut", "heal", "loss") and not all("--faults" in agent.identity.arguments for agent in team):
             without = ", ".join(str(agent.robot) for agent in team if "--faults" not in agent.identity.arguments)
             raise Refused(
-                f"{deed}: the links of a fleet are changed only where its processes allow it: start lfa-world "
+                f"{action}: the links of a fleet are changed only where its processes allow it: start lfa-world "
                 f"and each lfa-agent with --faults (robots without: {without})"
             )
         whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
         operator = Operator(fleet, incarnations.drawn())
-        said = note(operator, clock.now(), deed, whom, robots)
+        said = note(operator, clock.now(), action, whom, robots)
         robot = whole_number(whom)
-        event = operator.event("fault", clock.now(), deed=deed, robot=whom if robot is None else robot)
+        event = operator.event("fault", clock.now(), deed=action, robot=whom if robot is None else robot)
         send(bus, event, said)
         clock.sleep(SENT_S)
     finally:
         bus.close()
-    facts = {"deed": deed, "target": whom, "fleet": fleet}
-    line = f"{deed} {whom} in {fleet}: {DEEDS[deed]}"
+    facts = {"deed": action, "target": whom, "fleet": fleet}
+    line = f"{action} {whom} in {fleet}: {FAULT_ACTIONS[action]}"
     print(msgspec.json.encode(facts).decode() if as_json else line)
     return 0
 
@@ -122,7 +122,7 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
     finally:
         bus.close()
     facts = {"deed": RESTART, "robot": robot, "fleet": fleet}
-    said = f"{RESTART} robot {robot} of {fleet}: {DEEDS[RESTART]}"
+    said = f"{RESTART} robot {robot} of {fleet}: {FAULT_ACTIONS[RESTART]}"
     print(msgspec.json.encode(facts).decode() if as_json else said)
     return 0
 

@@ -239,7 +239,7 @@ class _LoggedCommand(_LoggedEvent, kw_only=True):
 
 
 class _LoggedFault(_LoggedEvent, kw_only=True):
-    deed: str
+    action: str = msgspec.field(name="deed")
 
 
 class _LoggedChain(_LoggedEvent, kw_only=True):

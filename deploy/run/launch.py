@@ -56,7 +56,7 @@ RECORDER_S_MAX = 30.0  # to read the recording and write the summary
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
     """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out` or fault."""
-    simulated = next((fault for fault in faults if fault.deed in SIMULATED), None)
+    simulated = next((fault for fault in faults if fault.action in SIMULATED), None)
     if simulated is not None or scenario.radio.range_m > 0.0:
         what = "radio.range_m" if simulated is None else f"fault '{simulated}'"
         raise Refused(f"{what}: only in lfa sim, a live receiver does not know how far away its senders are")

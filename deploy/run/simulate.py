@@ -202,8 +202,8 @@ class SimulatedRun:
 
     def _do_due(self) -> None:
         now = self._simulator.now
-        for deed, victim in self._schedule.due(now, self._referee.leader):
-            self._do(deed, victim)
+        for action, victim in self._schedule.due(now, self._referee.leader):
+            self._do(action, victim)
         next_s = self._schedule.pending[0].at_s if self._schedule.pending else inf
         self._check_at = next_s if next_s > now else now + LEADER_WAIT_S
 
@@ -216,18 +216,18 @@ class SimulatedRun:
             write_line(f"{self._simulator.now:7.1f} s of at most {limit_s:g} s simulated, {leader}", sys.stderr)
         return False
 
-    def _do(self, deed: FaultAction, victim: int | str) -> None:
+    def _do(self, action: FaultAction, victim: int | str) -> None:
         """Execute a fault action; it has no effect on an absent robot, nor has a restart on a running one."""
-        if deed in ORDERS:
-            self._order(deed, victim)
+        if action in ORDERS:
+            self._order(action, victim)
             return
         assert isinstance(victim, int), victim
         name = robot_name(victim)
         present = name in self._simulator.names
-        if present == (deed == "restart"):
+        if present == (action == "restart"):
             return
-        self._say("fault", deed=deed, robot=victim, t=self._simulator.now)
-        match deed:
+        self._say("fault", deed=action, robot=victim, t=self._simulator.now)
+        match action:
             case "kill":
                 self._simulator.kill(name)
             case "stop":
@@ -239,11 +239,11 @@ class SimulatedRun:
             case "restart":
                 self._add(self._agent(victim))
 
-    def _order(self, deed: FaultAction, target: int | str) -> None:
+    def _order(self, action: FaultAction, target: int | str) -> None:
         """Execute an operator command: link conditions go to the link model, other commands to all agents."""
         now = self._simulator.now
-        self._say("fault", deed=deed, robot=target, t=now)
-        said = note(self._operator, now, deed, target, self._scenario.mission.robots)
+        self._say("fault", deed=action, robot=target, t=now)
+        said = note(self._operator, now, action, target, self._scenario.mission.robots)
         if isinstance(said.message, OperatorNote) and said.message.command == WEATHER:
             self._simulator.air.obey(said.message.arguments)
             self._record(now, said.key, said.message)

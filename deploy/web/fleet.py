@@ -16,7 +16,7 @@ from lfa.deploy.client.stop_call import StopCall
 from lfa.deploy.client.stop_fleet import TOPICS as STOP_TOPICS
 from lfa.deploy.client.stop_fleet import told
 from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import DEEDS, LEADER, ORDERS, RESTART, SIGNALS, SIMULATED
+from lfa.deploy.faults.script import LEADER, LIVE, ORDERS, RESTART, SIGNALS
 from lfa.deploy.process.identity import identify, send_signal
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.view.picture.ground import ground_of, ground_of_mission
@@ -39,7 +39,7 @@ BEAT_S = 0.2
 RESTART_S, RESTART_EVERY_S = 2.0, 0.3
 SENT_S = 0.02
 """Delay [s] so that the event about a fault leaves before the fault."""
-WEATHER_DEEDS = ("cut", "heal", "loss")
+LINK_FAULTS = ("cut", "heal", "loss")
 
 
 class FleetEngine:
@@ -167,25 +167,25 @@ class FleetEngine:
 
     def _fault(self, text: str) -> str:
         """Carry out a fault; return what was done. Raises Refused."""
-        deed, _, target = text.strip().partition(" ")
-        if deed not in DEEDS or deed in SIMULATED:
-            raise Refused(f"{deed[:20]!r}: must be one of {', '.join(d for d in DEEDS if d not in SIMULATED)}")
+        action, _, target = text.strip().partition(" ")
+        if action not in LIVE:
+            raise Refused(f"{action[:20]!r}: must be one of {', '.join(LIVE)}")
         if target == LEADER:
             if self._picture.leader is None:
                 raise Refused(f"{text}: nobody leads at the moment")
             target = str(self._picture.leader)
-        if deed in ORDERS:
-            return self._order(deed, target)
+        if action in ORDERS:
+            return self._order(action, target)
         robot = whole_number(target)
         if robot not in self._robots or robot is None:
             raise Refused(f"{text[:60]}: must name a robot of {', '.join(map(str, self._robots))}")
-        if deed == RESTART:
+        if action == RESTART:
             now = clock.now()
             self._restarts[robot] = now + RESTART_S, now
             return f"{RESTART} {robot}"
-        return self._signal(deed, robot)
+        return self._signal(action, robot)
 
-    def _signal(self, deed: str, robot: int) -> str:
+    def _signal(self, action: str, robot: int) -> str:
         told = False
         for team in (
             self._fleet.team,
@@ -196,25 +196,25 @@ class FleetEngine:
                 if agent.fleet != self._fleet.name or agent.robot != robot or identify(agent.identity.pid) is None:
                     continue
                 if not told:
-                    send(self._ear.bus, self._operator.event("fault", clock.now(), deed=deed, robot=robot))
+                    send(self._ear.bus, self._operator.event("fault", clock.now(), deed=action, robot=robot))
                     clock.sleep(SENT_S)
                 told = True
-                if send_signal(agent.identity, SIGNALS[deed]):
-                    return f"{deed} {robot} (process {agent.identity.pid})"
-        raise Refused(f"{deed} {robot}: no process of yours here is robot {robot}")
+                if send_signal(agent.identity, SIGNALS[action]):
+                    return f"{action} {robot} (process {agent.identity.pid})"
+        raise Refused(f"{action} {robot}: no process of yours here is robot {robot}")
 
-    def _order(self, deed: str, target: str) -> str:
+    def _order(self, action: str, target: str) -> str:
         team = [agent for agent in agents() if agent.fleet == self._fleet.name]
-        if deed != "formation" and not team:
-            raise Refused(f"{deed}: the processes of this fleet are not yours")
-        if deed in WEATHER_DEEDS and not all("--faults" in agent.identity.arguments for agent in team):
-            raise Refused(f"{deed}: the fleet's processes were started without --faults")
+        if action != "formation" and not team:
+            raise Refused(f"{action}: the processes of this fleet are not yours")
+        if action in LINK_FAULTS and not all("--faults" in agent.identity.arguments for agent in team):
+            raise Refused(f"{action}: the fleet's processes were started without --faults")
         now = clock.now()
-        said = note(self._operator, now, deed, target, self._robots)
+        said = note(self._operator, now, action, target, self._robots)
         robot = whole_number(target)
-        send(self._ear.bus, self._operator.event("fault", now, deed=deed, robot=target if robot is None else robot))
+        send(self._ear.bus, self._operator.event("fault", now, deed=action, robot=target if robot is None else robot))
         send(self._ear.bus, said)
-        return f"{deed} {target}".strip()
+        return f"{action} {target}".strip()
 
     def close(self) -> None:
         """End the session with the fleet, which goes on."""

@@ -12,7 +12,7 @@ from lfa.deploy.web.share import Setting
 
 SWING_S = 3.0
 Seen = Callable[[Sequence[Picture]], bool]
-Deeds = Callable[[Sequence[Picture]], list[str]]
+Actions = Callable[[Sequence[Picture]], list[str]]
 
 
 class Step(Struct, frozen=True):
@@ -21,7 +21,7 @@ class Step(Struct, frozen=True):
     says: str
     rule: str
     until: Seen
-    deeds: Deeds | None = None
+    actions: Actions | None = None
     """Faults, without times, that do for the reader what the step asks; None if the step only asks to look."""
 
 
@@ -48,14 +48,14 @@ class Lecture:
         if self.step < len(self.lesson.steps) and self.lesson.steps[self.step].until(pictures):
             self.step += 1
 
-    def deeds(self, pictures: Sequence[Picture]) -> list[str]:
+    def actions(self, pictures: Sequence[Picture]) -> list[str]:
         """Return the faults that take the present step."""
         steps = self.lesson.steps
-        deeds = steps[self.step].deeds if self.step < len(steps) else None
-        return [] if deeds is None else deeds(pictures)
+        actions = steps[self.step].actions if self.step < len(steps) else None
+        return [] if actions is None else actions(pictures)
 
     def scene(self) -> dict[str, Any]:
-        steps = [{"says": s.says, "rule": s.rule, "shows": s.deeds is not None} for s in self.lesson.steps]
+        steps = [{"says": s.says, "rule": s.rule, "shows": s.actions is not None} for s in self.lesson.steps]
         return {"key": self.lesson.key, "title": self.lesson.title, "steps": steps}
 
 
@@ -90,7 +90,7 @@ def _lost_leader(pictures: Sequence[Picture]) -> bool:
     return len(pictures[0].leaders.leads) > 1 or pictures[0].leaders.stepped_down
 
 
-def _do(*faults: str) -> Deeds:
+def _do(*faults: str) -> Actions:
     return lambda _: list(faults)
 
 

@@ -182,7 +182,7 @@ class VirtualEngine:
             case {"do": "lesson", "key": str(key)}:
                 self._learn(key)
             case {"do": "show"} if self._lecture is not None:
-                for text in self._lecture.deeds(self.pictures):
+                for text in self._lecture.actions(self.pictures):
                     self._fault(text)
                 self._playing = True
             case {"do": "save"}:
@@ -218,14 +218,14 @@ class VirtualEngine:
         fault = parse(f"{' '.join(words)} at {at_s:.2f} s", mission, "order")
         refuse_common([fault])
         if (
-            fault.deed in RUNNING_NEEDED
+            fault.action in RUNNING_NEEDED
             and fault.target in mission.robots
             and picture.role(int(fault.target)) == "gone"
         ):
             raise Refused(f"{text}: robot {fault.target} does not run, restart it first")
-        if fault.deed == "restart" and picture.role(int(fault.target)) != "gone":
+        if fault.action == "restart" and picture.role(int(fault.target)) != "gone":
             raise Refused(f"{text}: robot {fault.target} runs")
-        if fault.deed == "obstacle":
+        if fault.action == "obstacle":
             self._check_free(str(fault.target))
         for team in self._teams:
             team.run.add_fault(fault)

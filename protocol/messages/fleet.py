@@ -40,7 +40,7 @@ class HostOrder(Struct, frozen=True, array_like=True, tag="order"):
     """Order of an operator to the supervisors, repeated until every addressed supervisor has executed it."""
 
     header: Header
-    deed: str
+    action: str
     """Action: `report`, `restart`, `logs` or `down`."""
     target: str
     """Addressed process (`robot3`, `a/router`) or host; empty: all."""

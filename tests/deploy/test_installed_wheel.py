@@ -60,6 +60,6 @@ def test_with_its_extras_it_simulates_and_runs(wheel: Path, tmp_path: Path) -> N
     commands = _environment(tmp_path, wheel, "[world,view,deploy]")
     short = ("straight", "--robots", "2", "--set", "mission.leading.route_m=[[1.0, 0.0]]", "--no-figures")
     (tmp_path / "world.py").write_text("raise SystemExit('a file beside the user')\n")
-    for deed in ("sim", "run"):
-        _ran(commands / "lfa", deed, *short, "--out", tmp_path / deed, cwd=tmp_path)
-        assert (tmp_path / deed / "summary.json").is_file()
+    for action in ("sim", "run"):
+        _ran(commands / "lfa", action, *short, "--out", tmp_path / action, cwd=tmp_path)
+        assert (tmp_path / action / "summary.json").is_file()

@@ -40,7 +40,7 @@ def test_the_keys_are_listed_in_sixty_columns() -> None:
 @pytest.mark.parametrize(("answer", "killed"), [("y", ["1"]), ("n", []), ("k", []), ("q", [])])
 def test_a_kill_is_asked_for(monkeypatch: pytest.MonkeyPatch, answer: str, killed: list[str]) -> None:
     done: list[str] = []
-    monkeypatch.setattr(watch.fault, "command", lambda deed, target, **_: done.append(target))
+    monkeypatch.setattr(watch.fault, "command", lambda action, target, **_: done.append(target))
     ear = SimpleNamespace(fleet=SimpleNamespace(name="fleet", team=(1,)), bus=None)
     hand = watch.KeyHandler(cast(Any, ear))
     hand.press("1")

@@ -51,8 +51,8 @@ def test_by_hand_the_world_is_stopped_and_killed_and_a_robot_started_again(tmp_p
     with running(tmp_path / "run", *arguments) as run:
         run.wait_for("leader_command")
         fleet = f"straight-{run.launcher.pid}"
-        for deed, target in (("stop", "world"), ("continue", "world"), ("kill", "2"), ("restart", "2")):
-            assert fault(deed, target, fleet) == 0
+        for action, target in (("stop", "world"), ("continue", "world"), ("kill", "2"), ("restart", "2")):
+            assert fault(action, target, fleet) == 0
         eventually(lambda: len(list((run.folder / "journal").glob("robot2-*.bin"))) == 2, "robot 2 has no second life")
         with pytest.raises(Refused, match="runs already"):
             fault("restart", "2", fleet)

@@ -261,10 +261,10 @@ class OneAgreement(Checker):
         if grant.term in self._holder:
             self._alike(at, voter, self._holder[grant.term], "granted to")
 
-    def _alike(self, at: float, voter: Member, asker: Member, deed: str) -> None:
+    def _alike(self, at: float, voter: Member, asker: Member, action: str) -> None:
         mine = self._agreed.get(voter)
         if self._agreed.get(asker, mine) != mine:
-            self.broken(at, f"{shown(voter)} {deed} {shown(asker)}, which holds another agreement")
+            self.broken(at, f"{shown(voter)} {action} {shown(asker)}, which holds another agreement")
 
 
 SAFETY: tuple[type[Checker], ...] = (

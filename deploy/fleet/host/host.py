@@ -312,13 +312,13 @@ def rekey(part: HostPlan) -> Found:
     return Found(version("lfa"), clock.wall_ms(), running.run, running.digest)
 
 
-DEEDS = {"check": check, "start": start, "stop": stop, "listen": listen, "rekey": rekey}
+ANSWERS_TO = {"check": check, "start": start, "stop": stop, "listen": listen, "rekey": rekey}
 
 
 def main() -> None:
     try:
         part = msgspec.json.decode(sys.stdin.buffer.read(), type=HostPlan)
-        print(f"{ANSWER}{msgspec.json.encode(DEEDS[sys.argv[1]](part)).decode()}")
+        print(f"{ANSWER}{msgspec.json.encode(ANSWERS_TO[sys.argv[1]](part)).decode()}")
     except Refused as refused:
         print(refused, file=sys.stderr)
         sys.exit(2)

@@ -212,13 +212,13 @@ class Supervisor:
         if len(self._orders) > OPERATORS_MAX:
             self._orders.popitem(last=False)
         self._obeyed = number
-        write_line(f"order: {order.deed} {order.target}", sys.stdout)
-        if order.deed == "down" and here:
+        write_line(f"order: {order.action} {order.target}", sys.stdout)
+        if order.action == "down" and here:
             self._ending = self._ordered = True
-        elif order.deed == "restart":
+        elif order.action == "restart":
             for one in names:
                 self._engine.restart(one, now)
-        elif order.deed == "logs":
+        elif order.action == "logs":
             for one in names:
                 if order.lines or one not in self._tails:
                     self._tails[one] = self._engine.logs(one, order.lines, now)

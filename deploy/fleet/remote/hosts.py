@@ -56,12 +56,12 @@ class FleetHosts:
         await self._each(self._shells, one)
         return answers
 
-    async def do(self, deed: str, names: Iterable[str] | None = None) -> dict[str, Found]:
+    async def do(self, action: str, names: Iterable[str] | None = None) -> dict[str, Found]:
         """Run `start`, `stop` or `rekey` on each reached machine, or on `names`; return their answers."""
         answers: dict[str, Found] = {}
 
         async def one(name: str) -> None:
-            answers[name] = await ask(self._shells[name], self._plan.hosts[name], deed, self.parts[name])
+            answers[name] = await ask(self._shells[name], self._plan.hosts[name], action, self.parts[name])
 
         chosen = set(self._shells if names is None else names)
         await self._each({name: shell for name, shell in self._shells.items() if name in chosen}, one)
@@ -86,10 +86,10 @@ class FleetHosts:
         await asyncio.gather(*(guarded(name) for name in names if name not in self.wrong))
 
 
-async def ask(shell: Shell, machine: Machine, deed: str, part: HostPlan) -> Found:
+async def ask(shell: Shell, machine: Machine, action: str, part: HostPlan) -> Found:
     """Run `host.py` on a machine and return its answer. Raises Refused, naming a wrong Python or version of `lfa`."""
     python = python_of(machine)
-    done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", deed), msgspec.json.encode(part))
+    done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", action), msgspec.json.encode(part))
     if done.code == 0:
         with contextlib.suppress(DamagedFile):  # not our program: the probe finds the cause
             return decode_json(done.answer or b"", Found)

@@ -67,13 +67,13 @@ class LeaderTable:
             entry["why"] = "led already when this page began to look"
         return entry
 
-    def _note_fault(self, deed: str, target: Any) -> None:
+    def _note_fault(self, action: str, target: Any) -> None:
         hit = self.leader if target == "leader" else target
-        if isinstance(hit, str) and deed == "cut" and self.leader is not None:
+        if isinstance(hit, str) and action == "cut" and self.leader is not None:
             hit = self.leader if str(self.leader) in hit.replace(">", ",").replace("-", ",").split(",") else hit
-        if isinstance(hit, int) and deed in ENDINGS:
-            self._hit[hit] = ENDINGS[deed]
-        elif isinstance(hit, int) and deed in ("restart", "continue", "heal"):
+        if isinstance(hit, int) and action in ENDINGS:
+            self._hit[hit] = ENDINGS[action]
+        elif isinstance(hit, int) and action in ("restart", "continue", "heal"):
             self._hit.pop(hit, None)
 
     def _begin(self, t: float, robot: int, term: tuple[int, int]) -> dict[str, Any] | None:

@@ -244,27 +244,27 @@ class Picture:
         if all(isinstance(number, int | float) for number in numbers):
             self.news.add({"k": "obstacle", **dict(zip(("index", "x", "y", "radius_m"), numbers, strict=True))})
 
-    def _fault(self, deed: str, target: Any) -> None:
+    def _fault(self, action: str, target: Any) -> None:
         shown = self._robots.get(target) if isinstance(target, int) else None
-        match deed:
+        match action:
             case "loss":
                 self.loss_ordered = float(target) if target else 0.0
             case "cut" | "heal":
                 self.loss_ordered = self.loss_ordered if target else 0.0
-                self._cut(deed, "" if target is None else str(target))
+                self._cut(action, "" if target is None else str(target))
             case "kill" | "terminate" if shown is not None:
                 shown.gone, shown.stopped = True, False
             case "restart" if shown is not None:
                 shown.gone, shown.stopped, shown.role = False, False, "waiting"
             case "stop" | "continue" if shown is not None:
-                shown.stopped = deed == "stop"
+                shown.stopped = action == "stop"
 
-    def _cut(self, deed: str, target: str) -> None:
+    def _cut(self, action: str, target: str) -> None:
         try:
             named = set(links(target, self._ids)) if target else set()
         except Refused:
             return
-        self._cuts = self._cuts | named if deed == "cut" else self._cuts - named if named else set()
+        self._cuts = self._cuts | named if action == "cut" else self._cuts - named if named else set()
 
 
 def _scan_row(scan: Any) -> list[Any]:

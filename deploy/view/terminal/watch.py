@@ -40,7 +40,7 @@ TOPICS = frozenset({"*/pose", "*/tracking", "*/status", "*/event"}) | stop_fleet
 HEADS = ("robot", "role", "term", "ahead", "off mm", "turn °", "m/s", "age ms", "lag ms", "CPU %", "MiB", "state")
 SIDES = ("left", "right", "column", "zigzag")
 #        key   action
-DEEDS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
+ACTION_KEYS = {"k": "kill", "s": "stop", "c": "continue", "x": "cut", "h": "heal"}
 STOPS = {" ": True, "r": False}
 HELP = "SPACE stop all, r resume, 1-9 robot, ? all keys, q quit"
 KEYS = (
@@ -166,8 +166,8 @@ class KeyHandler:
         elif key == "k" and self.chosen is not None:
             self._asked = True
             self.said = f"kill the process of robot {self.chosen}? y: yes, any other key: no"
-        elif key in DEEDS:
-            self._do(DEEDS[key])
+        elif key in ACTION_KEYS:
+            self._do(ACTION_KEYS[key])
 
     def _stop(self, *, stand: bool) -> None:
         try:
@@ -175,15 +175,15 @@ class KeyHandler:
         except Refused as refused:
             self.said = str(refused)
 
-    def _do(self, deed: str) -> None:
-        if self.chosen is None and deed != "heal":
-            self.said = f"{deed}: choose a robot first, by its digit"
+    def _do(self, action: str) -> None:
+        if self.chosen is None and action != "heal":
+            self.said = f"{action}: choose a robot first, by its digit"
             return
-        target = "" if deed == "heal" else str(self.chosen)
+        target = "" if action == "heal" else str(self.chosen)
         told = io.StringIO()
         try:
             with contextlib.redirect_stdout(told):
-                fault.command(deed, target, fleet=self._ear.fleet.name, as_json=False)
+                fault.command(action, target, fleet=self._ear.fleet.name, as_json=False)
         except Refused as refused:
             self.said = str(refused)
         else:

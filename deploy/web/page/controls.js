@@ -1,10 +1,10 @@
-// What can be done: time, faults, formations, tools, keys. Every deed is an order to the source of the frames.
+// What can be done: time, faults, formations, tools, keys. Every action is an order to the source of the frames.
 
 import { button, byId, element, say, seconds } from "./dom.js";
 
 const SPEEDS = [[0.1, "0.1 ×"], [0.25, "0.25 ×"], [0.5, "0.5 ×"], [1, "1 ×"], [2, "2 ×"], [5, "5 ×"], [10, "10 ×"], [1000, "as fast as it goes"]];
 const SIDES = ["left", "right", "column", "zigzag"];
-const DEEDS = [["kill", "Kill", "K"], ["stop", "Freeze", "S"], ["continue", "Continue", "C"], ["cut", "Cut radio", "X"], ["heal", "Heal radio", "H"], ["restart", "Restart", "R"]];
+const ACTIONS = [["kill", "Kill", "K"], ["stop", "Freeze", "S"], ["continue", "Continue", "C"], ["cut", "Cut radio", "X"], ["heal", "Heal radio", "H"], ["restart", "Restart", "R"]];
 export const KEYS = [
   ["Space", "play or pause"], [".", "one step"], ["[ ]", "choose a robot"], ["K S C X H R", "kill, freeze, continue, cut, heal, restart it"],
   ["O", "set obstacles down"], ["L", "its laser scan"], ["+ − 0", "zoom in, out, show all"], ["arrows", "move the view"], ["F", "follow the leader, or the chosen robot"],
@@ -141,18 +141,18 @@ export class Controls {
       menu.hidden = true;
       return;
     }
-    const deeds = DEEDS.map(([deed, text, key]) => button(text, () => this.deed(deed, robot), { id: `do-${deed}`, title: key }));
+    const actions = ACTIONS.map(([action, text, key]) => button(text, () => this.action(action, robot), { id: `do-${action}`, title: key }));
     const scan = this.engine === "fleet" ? "" : button("Scan", () => this.scan(robot), { id: "do-scan", title: "L", "aria-pressed": String(this.scanned.has(robot)) });
     const close = button("×", () => this.page.choose(null), { "aria-label": "Close" });
-    menu.replaceChildren(element("h2", {}, `Robot ${robot}`, close), element("div", { class: "row" }, ...deeds, scan));
+    menu.replaceChildren(element("h2", {}, `Robot ${robot}`, close), element("div", { class: "row" }, ...actions, scan));
     menu.hidden = false;
     const { width, height } = byId("stages").getBoundingClientRect();
     menu.style.left = `${Math.max(8, Math.min(at[0] + 24, width - 246))}px`;
     menu.style.top = `${Math.max(8, Math.min(at[1] - 40, height - menu.offsetHeight - 8))}px`;
   }
 
-  deed(deed, robot) {
-    this.fault(`${deed} ${robot}`);
+  action(action, robot) {
+    this.fault(`${action} ${robot}`);
     this.page.choose(null);
   }
 
@@ -168,7 +168,7 @@ export class Controls {
     const { page } = this;
     const stage = page.stages[0];
     const chosen = page.chosen;
-    const deed = DEEDS.find(([, , letter]) => letter.toLowerCase() === event.key.toLowerCase());
+    const action = ACTIONS.find(([, , letter]) => letter.toLowerCase() === event.key.toLowerCase());
     if (event.ctrlKey || event.metaKey || event.altKey || !stage) return false;
     if (event.key === " ") page.order({ do: this.state.playing ? "pause" : "play" });
     else if (event.key === ".") page.order({ do: "step" });
@@ -186,7 +186,7 @@ export class Controls {
     else if (event.key === "o" && this.draw) this.setTool(this.tool === "draw" ? "look" : "draw");
     else if (event.key === "l" && chosen !== null && this.engine === "virtual") this.scan(chosen);
     else if (event.key === "]" || event.key === "[") page.next(event.key === "]" ? 1 : -1);
-    else if (deed && chosen !== null) this.deed(deed[0], chosen);
+    else if (action && chosen !== null) this.action(action[0], chosen);
     else return false;
     return true;
   }

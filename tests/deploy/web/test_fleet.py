@@ -38,13 +38,13 @@ def page(fleet: Running) -> Iterator[Browser]:
         browser.open("about:blank")
 
 
-def do(page: Browser, robot: int, deed: str) -> None:
+def do(page: Browser, robot: int, action: str) -> None:
     """Follow a robot, so that it stays where it is clicked, and choose from its menu."""
     page.value(f"lfa.stages[0].chosen = {robot}, lfa.stages[0].following = true")
     page.wait_for(f"Math.abs(lfa.stages[0].camera.x - lfa.models[0].robots.get({robot}).x) < 0.2")
     page.click_at(*place(page, robot))
     page.wait_for(f"lfa.chosen === {robot}")
-    page.click(f"#do-{deed}")
+    page.click(f"#do-{action}")
 
 
 def test_a_robot_clicked_frozen_is_stopped_and_goes_on(page: Browser, fleet: Running) -> None:

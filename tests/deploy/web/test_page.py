@@ -59,7 +59,7 @@ def choose(page: Browser, robot: int) -> None:
     page.wait_for(f"lfa.chosen === {robot}")
 
 
-def deed(name: str, robot: int) -> Callable[[Browser], None]:
+def action(name: str, robot: int) -> Callable[[Browser], None]:
     def do(page: Browser) -> None:
         choose(page, robot)
         page.click(f"#do-{name}")
@@ -100,14 +100,14 @@ STEPPED = "lfa.models[0].t > window.t0 + 0.09 && lfa.models[0].t < window.t0 + 0
 THEME = "document.documentElement.dataset.theme"
 #            control             what is done                             the JavaScript that then becomes true
 CONTROLS: dict[str, tuple[list[Callable[[Browser], None]], str]] = {
-    "kill":            ([deed("kill", 3)],                        ROLE.format(3, "gone")),
-    "kill the leader": ([deed("kill", 1)],                        "lfa.models[0].leader === 2"),
-    "freeze":          ([deed("stop", 2)],                        ROLE.format(2, "stopped")),
-    "continue":        ([deed("stop", 3), deed("continue", 3)],   ROLE.format(3, "follower")),
-    "cut":             ([deed("cut", 4)],                         "lfa.models[0].robots.get(4).cut === 1"),
-    "heal":            ([deed("cut", 4), deed("heal", 4)],        "lfa.models[0].robots.get(4).cut === 0"),
-    "heal all":        ([deed("cut", 4), click("#healall")],      "lfa.models[0].robots.get(4).cut === 0"),
-    "restart":         ([deed("kill", 4), deed("restart", 4)],    ROLE.format(4, "follower")),
+    "kill":            ([action("kill", 3)],                        ROLE.format(3, "gone")),
+    "kill the leader": ([action("kill", 1)],                        "lfa.models[0].leader === 2"),
+    "freeze":          ([action("stop", 2)],                        ROLE.format(2, "stopped")),
+    "continue":        ([action("stop", 3), action("continue", 3)],   ROLE.format(3, "follower")),
+    "cut":             ([action("cut", 4)],                         "lfa.models[0].robots.get(4).cut === 1"),
+    "heal":            ([action("cut", 4), action("heal", 4)],        "lfa.models[0].robots.get(4).cut === 0"),
+    "heal all":        ([action("cut", 4), click("#healall")],      "lfa.models[0].robots.get(4).cut === 0"),
+    "restart":         ([action("kill", 4), action("restart", 4)],    ROLE.format(4, "follower")),
     "loss":            ([slide("loss", 0.3)],                     LOST),
     "range":           ([slide("range", 5)],                      "lfa.state.range === 5"),
     "formation":       ([click("#side-column")],                  COLUMN),
@@ -124,8 +124,8 @@ CONTROLS: dict[str, tuple[list[Callable[[Browser], None]], str]] = {
 @pytest.mark.parametrize("control", CONTROLS)
 def test_a_control_does_what_it_says(page: Browser, control: str) -> None:
     led(page)
-    deeds, seen = CONTROLS[control]
-    for do in deeds:
+    actions, seen = CONTROLS[control]
+    for do in actions:
         do(page)
     page.wait_for(seen)
 
@@ -151,7 +151,7 @@ def test_an_obstacle_on_a_robot_is_refused_in_one_line_and_the_run_goes_on(page:
 
 def test_what_was_clicked_is_in_the_link_and_in_the_saved_scenario(page: Browser) -> None:
     led(page)
-    deed("kill", 3)(page)
+    action("kill", 3)(page)
     page.wait_for(ROLE.format(3, "gone"))
     page.value("URL.createObjectURL = (blob) => { blob.text().then((text) => (window.saved = text)); return '#' }, 0")
     page.click("#save")

@@ -303,9 +303,9 @@ def test_a_plan_that_cannot_be_is_refused(options: Sequence[Any], words: str) ->
 def test_strangers_are_refused_and_nothing_changes(tmp_path: Path, names: list[str]) -> None:
     keys.make(tmp_path / "k", plan())
     before = contents(tmp_path / "k")
-    for deed in (keys.revoke, keys.rotate):
+    for action in (keys.revoke, keys.rotate):
         with pytest.raises(Refused, match="no member of fleet f"):
-            deed(tmp_path / "k", names)
+            action(tmp_path / "k", names)
     assert contents(tmp_path / "k") == before
 
 
