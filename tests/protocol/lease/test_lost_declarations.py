@@ -8,7 +8,7 @@ from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 from lfa.deploy.fuzz.schedules import FAIR, Schedule
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import PeerDown, PeerUp, RouterLost
-from lfa.protocol.transport.links import AGAIN_S_MAX, ANEW_S
+from lfa.protocol.transport.links import AGAIN_S, ANEW_S
 
 HOSTS: dict[int, tuple[tuple[int, ...], ...]] = {
     12: ((1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)),
@@ -17,7 +17,7 @@ HOSTS: dict[int, tuple[tuple[int, ...], ...]] = {
 """Who is on which host, by the number of robots; one more host has the world with the witness."""
 LOST_S, FLAP_S = 3.0, 8.0
 """Times [s] for which a host is away, and its routers' links flap afterwards: longer than any delay in ANEW_S."""
-JOINED_S = AGAIN_S_MAX + 3.0
+JOINED_S = AGAIN_S[1] + 3.0
 
 
 def _fleet(robots: int) -> AgentSimulation:
