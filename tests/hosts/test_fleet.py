@@ -42,7 +42,7 @@ def fleet() -> Iterator[Machines]:
 @pytest.fixture(scope="module")
 def up(fleet: Machines) -> tuple[Machines, float]:
     """The fleet, and how long `lfa up` took to say that all is well."""
-    done = fleet.lfa("up", str(fleet.fleet_file), "--json", "--wait", f"{START_S_MAX:g}")
+    done = fleet.lfa("up", str(fleet.fleet_file), "--json", "--wait", f"{START_S_MAX:g}", timeout_s=START_S_MAX + 60.0)
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
     assert sorted(facts["chain"]) == list(ROBOTS)
