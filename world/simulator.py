@@ -66,7 +66,7 @@ class Simulator(VirtualTime):
         self.reborn: Callable[[Node], Journal] = _unjournalled
         """Called with a node that goes on under a later number (E23), before it starts; returns its journal."""
         self._random = Random(f"air-{seed}")
-        self.air = LinkModel(radio, self._random)
+        self.link_model = LinkModel(radio, self._random)
         self.refused_leave = False
         """True if a node that cannot take part leaves, as its process would, in place of ending the simulation."""
         self.deaf: set[tuple[str, str]] = set()
@@ -237,7 +237,7 @@ class Simulator(VirtualTime):
         if message is None:
             return
         if isinstance(message, Truth):
-            self.air.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
+            self.link_model.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
         for tap in self.taps:
             tap(self.now, key, payload, message)
         routes = self._routes.get(key)
@@ -246,7 +246,7 @@ class Simulator(VirtualTime):
                 continue
             if self.deaf and (seat.node.name, sender.node.name) in self.deaf:
                 continue
-            for delay_s in LOCAL_DELAYS_S if link is None else self.air.delays(*link):
+            for delay_s in LOCAL_DELAYS_S if link is None else self.link_model.delays(*link):
                 self.at(self.now + delay_s, self._give, seat, key, message, payload)
 
     def _route(self, key: str) -> list[tuple[_SimulatedNode, Link | None]]:

@@ -20,7 +20,7 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
 from lfa.protocol.node import Node
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
-from lfa.protocol.transport.link_model import WEATHER, Radio
+from lfa.protocol.transport.link_model import LINK_CONDITIONS, Radio
 from lfa.protocol.witness import Witness
 from lfa.world.description.load import Scenario
 from lfa.world.physics.kinematics import Kinematic
@@ -90,7 +90,7 @@ def _live(scenario: Scenario, duration_s: float, loss: float) -> Watch:
     with Team(scenario) as team:
         team.await_chain(ROBOTS, START_S)
         if loss > 0.0:
-            team.order(WEATHER, radio={"loss": loss})
+            team.order(LINK_CONDITIONS, radio={"loss": loss})
         _look_on(team, WARM_UP_S)
         team.heard.events.clear()
         until = clock.now() + duration_s

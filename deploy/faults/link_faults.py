@@ -19,7 +19,7 @@ from lfa.protocol.mission import Side
 from lfa.protocol.names import robot_name, whole_number
 from lfa.protocol.node import Envelope
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import WEATHER, Link
+from lfa.protocol.transport.link_model import LINK_CONDITIONS, Link
 from lfa.world.description.scenario import PLACE_M_MAX, RADIUS_M_MAX, RADIUS_M_MIN
 
 WORLD_WORD = "w"
@@ -59,13 +59,13 @@ def order(action: str, target: int | str, robots: tuple[int, ...]) -> tuple[str,
     text = str(target)
     match action:
         case "cut":
-            return WEATHER, {"cut": links(text, robots)}
+            return LINK_CONDITIONS, {"cut": links(text, robots)}
         case "heal":
-            return WEATHER, {"mend": links(text, robots)} if text else {"heal": True}
+            return LINK_CONDITIONS, {"mend": links(text, robots)} if text else {"heal": True}
         case "loss":
-            return WEATHER, {"radio": {"loss": _share(text)}} if text else {"fair": True}
+            return LINK_CONDITIONS, {"radio": {"loss": _share(text)}} if text else {"fair": True}
         case "range":
-            return WEATHER, {"radio": {"range_m": _range_m(text)}}
+            return LINK_CONDITIONS, {"radio": {"range_m": _range_m(text)}}
         case "hang" | "resume":
             return action, _part(action, text, robots)
         case "formation":

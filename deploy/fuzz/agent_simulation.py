@@ -92,9 +92,9 @@ class AgentSimulation:
         return self.simulator.now
 
     @property
-    def air(self) -> LinkModel:
+    def link_model(self) -> LinkModel:
         """Link model between the hosts."""
-        return self.simulator.air
+        return self.simulator.link_model
 
     def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
         """Schedule the call `what(*arguments)` at true time `time` [s]."""
@@ -228,7 +228,7 @@ class AgentSimulation:
         self._cut_exactly(set())
 
     def _cut_exactly(self, pairs: set[tuple[int, int]]) -> None:
-        self.cuts, self.air.cuts = pairs, network.links(pairs)
+        self.cuts, self.link_model.cuts = pairs, network.links(pairs)
         self._report(Checker.parts, self.now, self.cuts)
 
     def lose_late(self, within_s: float) -> None:
@@ -245,7 +245,7 @@ class AgentSimulation:
         for process in self.processes.values():
             if not process.alive:
                 self._report(Checker.ends, self.now, process.member)
-        self._report(Checker.heals, self.now, 4.0 * self.air.radio.prompt_s + CONTROL_PERIOD_S)
+        self._report(Checker.heals, self.now, 4.0 * self.link_model.radio.prompt_s + CONTROL_PERIOD_S)
 
     def _start_world(self, world: World) -> None:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))

@@ -118,7 +118,7 @@ class Faults:
                 return bool(pairs)
             case kind if kind in RADIO_FIELDS:
                 field = RADIO_FIELDS[kind]
-                simulation.air.radio = _with(simulation.air.radio, field, fault.value)
+                simulation.link_model.radio = _with(simulation.link_model.radio, field, fault.value)
                 simulation.at(lasts, self._calm, field)
                 return True
         return False
@@ -133,8 +133,8 @@ class Faults:
         return there if fault.kind == "cut_one_way" else there | {(b, a) for a, b in there}
 
     def _calm(self, field: str) -> None:
-        air = self.simulation.air
-        air.radio = _with(air.radio, field, getattr(self._radio, field))
+        link_model = self.simulation.link_model
+        link_model.radio = _with(link_model.radio, field, getattr(self._radio, field))
 
     def _start(self, target: int) -> None:
         if not self.simulation.processes[target].alive:
@@ -172,8 +172,8 @@ class Faults:
         """
         simulation = self.simulation
         simulation.heal()
-        self._radio = simulation.air.radio = structs.replace(
-            simulation.air.radio, loss=0.0, duplication=0.0, tail=0.0, reorder=0.0
+        self._radio = simulation.link_model.radio = structs.replace(
+            simulation.link_model.radio, loss=0.0, duplication=0.0, tail=0.0, reorder=0.0
         )
         simulation.lose_late(self._radio.prompt_s)
         for robot_id in simulation.mission.robots:

@@ -169,7 +169,7 @@ class LeaseSimulation(Hosts):
 
     def tell_healed(self) -> None:
         """Notify the checkers that the last fault is over."""
-        self._report(Checker.heals, self.now, 4.0 * self.air.radio.prompt_s)
+        self._report(Checker.heals, self.now, 4.0 * self.link_model.radio.prompt_s)
 
     # --- queries of tests --------------------------------------------------------------------------------------
 

@@ -36,7 +36,7 @@ class Network(VirtualTime):
         super().__init__()
         self.random = Random(seed)
         self.ids = ids
-        self.air = LinkModel(radio, self.random)
+        self.link_model = LinkModel(radio, self.random)
         self.filter: Filter | None = None
         self.trace: Trace | None = None
         self.cuts: set[tuple[int, int]] = set()
@@ -74,7 +74,7 @@ class Network(VirtualTime):
         self._cut_exactly(set())
 
     def _cut_exactly(self, pairs: set[tuple[int, int]]) -> None:
-        self.cuts, self.air.cuts = pairs, links(pairs)
+        self.cuts, self.link_model.cuts = pairs, links(pairs)
         self._report(Checker.parts, self.now, self.cuts)
 
     # --- messages ----------------------------------------------------------------------------------------------
@@ -88,7 +88,7 @@ class Network(VirtualTime):
         there = to if to >= 0 else self.host_of_gateway(-to)
         if here == there:
             return (0.0001 + 0.0004 * self.random.random(),)
-        return self.air.delays(self._places[here], self._places[there])
+        return self.link_model.delays(self._places[here], self._places[there])
 
 
 def place(host: int) -> str:

@@ -35,7 +35,7 @@ class StopTraffic:
         self._team = team
         self._robots = robots
         self._random = Random(f"stops-{seed}")
-        self._air = LinkModel(team.air.radio, self._random)
+        self._link_model = LinkModel(team.link_model.radio, self._random)
         self._said: list[StopOrder] = []
         self._acknowledged: dict[int, StopWord] = {}
         """Greatest stop that each robot's gateway has acknowledged, as kept by its agent too."""
@@ -98,8 +98,8 @@ class StopTraffic:
     def _delays(self, here: int, there: int) -> list[float]:
         if here == there:
             return [LOCAL_S]
-        self._air.radio, self._air.cuts = self._team.air.radio, self._team.air.cuts
-        return self._air.delays(place(here), place(there))
+        self._link_model.radio, self._link_model.cuts = self._team.link_model.radio, self._team.link_model.cuts
+        return self._link_model.delays(place(here), place(there))
 
     # --- gateways and processes --------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope
 from lfa.protocol.topics import OPERATOR_NAME
-from lfa.protocol.transport.link_model import CLEAR, WEATHER, LinkModel
+from lfa.protocol.transport.link_model import CLEAR, LINK_CONDITIONS, LinkModel
 
 REPEAT_S = 2.0
 """Duration [s] for which the link conditions are repeated after a restart."""
@@ -63,7 +63,7 @@ class FaultExecution:
             case Event(kind="fault", data={"robot": robot, "deed": "kill" | "terminate"}):
                 if message.header.sender == OPERATOR_NAME and robot in self._mission.robots:
                     self.doomed.add(robot_name(robot))
-            case OperatorNote(command=command, arguments=arguments) if command == WEATHER:
+            case OperatorNote(command=command, arguments=arguments) if command == LINK_CONDITIONS:
                 self._links.obey(arguments)
             case OperatorNote(command=command, arguments={"robot": robot}) if command == RESTART:
                 if robot in self._mission.robots and self._time.known:
@@ -79,7 +79,7 @@ class FaultExecution:
             else:
                 self._undone.append(f"{action} {target}")
         if self._repeat_until > clock.now() and (self._links.cuts or self._links.radio != CLEAR):
-            self._publish(self._operator.command(WEATHER, clock.now(), **self._links.orders))
+            self._publish(self._operator.command(LINK_CONDITIONS, clock.now(), **self._links.orders))
 
     def repeat_links(self) -> None:
         """Repeat the link conditions for a while, for a process that has just been restarted."""

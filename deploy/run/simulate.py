@@ -33,7 +33,7 @@ from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import WEATHER, Radio
+from lfa.protocol.transport.link_model import LINK_CONDITIONS, Radio
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.description.load import Scenario, draw
@@ -162,7 +162,7 @@ class SimulatedRun:
     @property
     def radio(self) -> Radio:
         """Present link conditions."""
-        return self._simulator.air.radio
+        return self._simulator.link_model.radio
 
     @property
     def verdict(self) -> Verdict | None:
@@ -244,8 +244,8 @@ class SimulatedRun:
         now = self._simulator.now
         self._say("fault", deed=action, robot=target, t=now)
         said = note(self._operator, now, action, target, self._scenario.mission.robots)
-        if isinstance(said.message, OperatorNote) and said.message.command == WEATHER:
-            self._simulator.air.obey(said.message.arguments)
+        if isinstance(said.message, OperatorNote) and said.message.command == LINK_CONDITIONS:
+            self._simulator.link_model.obey(said.message.arguments)
             self._record(now, said.key, said.message)
         else:
             send(self._simulator, said)

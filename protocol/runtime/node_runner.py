@@ -30,7 +30,7 @@ from lfa.protocol.runtime.vital_signs import VitalSigns, keep_one_heap, settle
 from lfa.protocol.topics import OPERATOR_NAME, key, matches
 from lfa.protocol.transport.bus import Arrival, Inbox, Tokens, Wake
 from lfa.protocol.transport.credentials import Credentials
-from lfa.protocol.transport.link_model import WEATHER, Reception
+from lfa.protocol.transport.link_model import LINK_CONDITIONS, Reception
 from lfa.protocol.transport.links import Links
 from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
@@ -61,14 +61,14 @@ class Options(Struct, frozen=True):
 class _NodeRunner:
     """One node in the loop, with its session, inbox, node host and current subscriptions."""
 
-    def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal, weather_key: str | None) -> None:
-        """`weather_key` is the key of an operator's link conditions, None if they are not to be applied."""
+    def __init__(self, node: Node, bus: ZenohBus, inbox: Inbox, journal: Journal, conditions_key: str | None) -> None:
+        """`conditions_key` is the key of an operator's link conditions, None if they are not to be applied."""
         self.node = node
         self.host = NodeHost(node, journal)
         self.bus = bus
         self.inbox = inbox
         self._followed: frozenset[str] | None = None
-        self._weather_key = weather_key
+        self._conditions_key = conditions_key
         self._tokens = Tokens()
         self._links = Links()
         self._ticks_s: deque[float] = deque(maxlen=TICKS_KEPT)
@@ -81,7 +81,7 @@ class _NodeRunner:
     def step(self, now: float) -> float:
         """Deliver the arrivals and tick if due; return the lateness of the tick [s], negative if none was due."""
         host, node = self.host, self.node
-        for arrival in self._through_the_air(now):
+        for arrival in self._through_links(now):
             if isinstance(arrival.payload, bytes):
                 self._publish(host.message(arrival.at, arrival.key, arrival.payload))
             else:
@@ -112,30 +112,34 @@ class _NodeRunner:
         if wanted is self._followed:
             return False
         self._followed = wanted
-        self.bus.follow(wanted | self._weather_interest(wanted))
+        self.bus.follow(wanted | self._conditions_interest(wanted))
         return True
 
-    def _weather_interest(self, interests: frozenset[str]) -> frozenset[str]:
+    def _conditions_interest(self, interests: frozenset[str]) -> frozenset[str]:
         """Return the key of link conditions; empty if not applied or if the node subscribes to operators anyway."""
-        wanted = self._weather_key
+        wanted = self._conditions_key
         heard = wanted is None or any(matches(interest, wanted) for interest in interests)
         return frozenset() if wanted is None or heard else frozenset({wanted})
 
-    def _through_the_air(self, now: float) -> list[Arrival]:
+    def _through_links(self, now: float) -> list[Arrival]:
         """Return the arrivals after the link model; an operator's link conditions are applied and not passed on."""
         arrivals = self._tokens.debounce(self.inbox.take(), now)
-        if self._weather_key is None:
+        if self._conditions_key is None:
             return arrivals
-        if self._reception.is_clear and self._weather_key not in [arrival.key for arrival in arrivals]:
+        if self._reception.is_clear and self._conditions_key not in [arrival.key for arrival in arrivals]:
             return arrivals
         for arrival in arrivals:
-            if arrival.key != self._weather_key or not self._is_weather(arrival):
+            if arrival.key != self._conditions_key or not self._obeys_conditions(arrival):
                 self._reception.put(arrival)
         return self._reception.take(max([now, *(arrival.at for arrival in arrivals)]))
 
-    def _is_weather(self, arrival: Arrival) -> bool:
+    def _obeys_conditions(self, arrival: Arrival) -> bool:
         note = Decoder().message(arrival)
-        return isinstance(note, OperatorNote) and note.command == WEATHER and self._reception.air.obey(note.arguments)
+        return (
+            isinstance(note, OperatorNote)
+            and note.command == LINK_CONDITIONS
+            and self._reception.link_model.obey(note.arguments)
+        )
 
     def tell(self, event: Local, now: float) -> None:
         """Deliver a local event to the node."""
@@ -208,8 +212,8 @@ def _joined(node: Node, bus: ZenohBus, inbox: Inbox, options: Options, floor: in
     dead = refuse_double(bus, inbox, options.fleet, lease_s, node)
     started_with = {"fleet": options.fleet, **node.started_with}
     heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
-    weather_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
-    seat = _NodeRunner(node, bus, inbox, Journal(options.journal, heading), weather_key)
+    conditions_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
+    seat = _NodeRunner(node, bus, inbox, Journal(options.journal, heading), conditions_key)
     bus.announce(options.fleet, node.name, node.incarnation)
     refuse_twin(bus, options.fleet, lease_s, node, dead)
     return seat

@@ -22,11 +22,11 @@ from lfa.protocol.transport.bus import Arrival
 
 Link = tuple[str, str]
 """Directed link: sending place, receiving place."""
-WEATHER = "weather"
+LINK_CONDITIONS = "weather"
 """Operator command that sets link conditions; its arguments are those of `LinkModel.obey`."""
 WAITING_MAX = 4096
 """Maximum number of delayed messages at a live receiver."""
-_NOT_IN_THE_AIR = (OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
+_ON_NO_LINK = (OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
 
 
 class Radio(Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,7 +70,7 @@ def link_of(key: str, receiver: str) -> Link | None:
     A robot and its own hardware share a place; operator, recorder and ground truth never cross a link.
     """
     where = address(key)
-    if where is None or where.topic == "alive" or where.owner in _NOT_IN_THE_AIR:
+    if where is None or where.topic == "alive" or where.owner in _ON_NO_LINK:
         return None
     sender, place = _place(where.owner), _place(receiver)
     if where.to is not None and where.to.startswith("gateway"):
@@ -178,7 +178,7 @@ class Reception:
     """Link model in front of one process on a live bus: messages come out after their delay, or never."""
 
     def __init__(self, receiver: str, random: Random) -> None:
-        self.air = LinkModel(CLEAR, random)
+        self.link_model = LinkModel(CLEAR, random)
         self._receiver = receiver
         self._waiting: list[tuple[float, int, Arrival]] = []
         self._order = 0
@@ -186,12 +186,12 @@ class Reception:
     @property
     def is_clear(self) -> bool:
         """True if messages pass without a delay or a loss."""
-        return not self._waiting and not self.air.cuts and self.air.radio == CLEAR
+        return not self._waiting and not self.link_model.cuts and self.link_model.radio == CLEAR
 
     def put(self, arrival: Arrival) -> None:
         """Queue a message of the bus with its simulated delays; drop it if it is lost."""
         link = link_of(arrival.key, self._receiver)
-        delays = [0.0] if link is None else self.air.delays(*link)
+        delays = [0.0] if link is None else self.link_model.delays(*link)
         for delay_s in delays[: WAITING_MAX - len(self._waiting)]:
             self._order += 1
             due = structs.replace(arrival, at=arrival.at + delay_s) if delay_s > 0.0 else arrival

@@ -12,7 +12,7 @@ import pytest
 from lfa.deploy.bench.harness.team import Team
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.link_model import LINK_CONDITIONS
 from tests.rigs.live_team import check_terms, pass_time
 from tests.rigs.network_namespaces import ROBOTS, WORLD_HOST, Net, missing, team_on_hosts
 
@@ -58,12 +58,13 @@ class Faults:
         """Some do not hear some others, who hear them: at the receivers."""
         places = [*(robot_name(robot) for robot in chain), WORLD_NAME]
         deaf, mute = self._chance.sample(places, 2), self._chance.sample(places, 2)
-        self._team.order(WEATHER, cut=[(a, b) for a in mute for b in deaf if a != b])
+        self._team.order(LINK_CONDITIONS, cut=[(a, b) for a in mute for b in deaf if a != b])
         return self._team.heal
 
     def lose_messages(self, _chain: Sequence[int]) -> Undo:
         self._team.order(
-            WEATHER, radio={"loss": self._chance.uniform(0.1, 0.3), "loss_burst": self._chance.choice((1.0, 4.0))}
+            LINK_CONDITIONS,
+            radio={"loss": self._chance.uniform(0.1, 0.3), "loss_burst": self._chance.choice((1.0, 4.0))},
         )
         return self._team.heal
 

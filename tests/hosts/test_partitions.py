@@ -16,7 +16,7 @@ from lfa.deploy.bench.harness.team_history import REST_MPS
 from lfa.protocol import clock
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.link_model import LINK_CONDITIONS
 from tests.hosts.conftest import Figure
 from tests.rigs.live_team import WHOLE_S, check_minority, check_terms, leads, pass_time
 from tests.rigs.network_namespaces import ROBOTS, WORLD_HOST, Net, missing, team_on_hosts
@@ -79,7 +79,7 @@ def test_a_leader_with_half_a_link_is_replaced(whole: Whole, deaf: bool) -> None
     team, _, chain = whole
     others = [*(robot_name(robot) for robot in chain[1:]), WORLD_NAME]
     heard = [(other, robot_name(chain[0])) for other in others]
-    since = team.order(WEATHER, cut=heard if deaf else [pair[::-1] for pair in heard])
+    since = team.order(LINK_CONDITIONS, cut=heard if deaf else [pair[::-1] for pair in heard])
     team.wait_until(lambda: bool(set(leads(team, since)) & set(chain[1:])), "nobody else leads", WHOLE_S)
     team.heal()
     team.await_chain(ROBOTS, WHOLE_S)
@@ -89,7 +89,7 @@ def test_a_leader_with_half_a_link_is_replaced(whole: Whole, deaf: bool) -> None
 def test_a_leader_that_misses_one_voter_only_leads_on(whole: Whole, place: int | None) -> None:
     team, _, chain = whole
     pair = robot_name(chain[0]), WORLD_NAME if place is None else robot_name(chain[place])
-    since = team.order(WEATHER, cut=[pair, pair[::-1]])
+    since = team.order(LINK_CONDITIONS, cut=[pair, pair[::-1]])
     pass_time(team, 1.5)
     assert leads(team, since) in ([], [chain[0]])
     team.heal()
@@ -109,7 +109,7 @@ def test_a_healthy_leader_whose_links_are_reset_never_makes_two_leaders(whole: W
 @pytest.mark.parametrize("percent", [10, 30])
 def test_lost_messages_and_lost_packets_never_make_two_leaders(whole: Whole, percent: int) -> None:
     team, net, _ = whole
-    team.order(WEATHER, radio={"loss": percent / 100.0, "loss_burst": 3.0})
+    team.order(LINK_CONDITIONS, radio={"loss": percent / 100.0, "loss_burst": 3.0})
     pass_time(team, 2.0)
     team.heal()
     net.lose(percent)

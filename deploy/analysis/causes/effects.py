@@ -16,6 +16,7 @@ from lfa.deploy.recording import event_log
 from lfa.deploy.recording.event_log import Line
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.protocol.names import robot_name
+from lfa.protocol.transport.link_model import LINK_CONDITIONS
 
 STILL_MPS, DRIVES_MPS = 0.01, 0.05
 """Speeds [m/s]: below the first a robot stands, above the second it drives."""
@@ -26,7 +27,7 @@ APART_S = 0.2
 """Gap [s] up to which two stretches of standing are one stop."""
 CONTACTS_APART_S = 2.0
 """Time [s] within which further touches of the same two bodies belong to the first one."""
-ASIDE = ("hang", "resume", "weather")
+ASIDE = ("hang", "resume", LINK_CONDITIONS)
 """Commands on the operator's topic that only simulate a fault: none of them is an order."""
 
 

@@ -180,7 +180,7 @@ def speed_wave(scheme: Scheme, omega: float, followers: int) -> list[float]:
             mode=scheme.mode,
             delay_s=scheme.delay_s,
             trace=True,
-            weather=ChainLink(scheme.latency_s, scheme.jitter_s, scheme.loss),
+            link=ChainLink(scheme.latency_s, scheme.jitter_s, scheme.loss),
             extrapolation_max_s=scheme.extrapolation_max_s,
             judged=False,
         )
@@ -245,17 +245,17 @@ def lateral(mode: Mode) -> tuple[float, ...]:
 # --- a hundred robots on one path ---------------------------------------------------------------------------------
 
 
-def _trace_path(name: str, weather: ChainLink, delay_s: float) -> Case:
+def _trace_path(name: str, link: ChainLink, delay_s: float) -> Case:
     quantities = tuple(
         Quantity(f"robot {n} off the leader's path", "mm", 8.0 if n == TRACE_FOLLOWERS else None) for n in PLACES
     )
-    return Case(f"trace/figure_eight {name}", quantities, partial(trace_path, weather, delay_s))
+    return Case(f"trace/figure_eight {name}", quantities, partial(trace_path, link, delay_s))
 
 
-def trace_path(weather: ChainLink, delay_s: float) -> tuple[float, ...]:
+def trace_path(link: ChainLink, delay_s: float) -> tuple[float, ...]:
     """Return the rms distance [mm] of the robots at `PLACES` from the leader's path, over one lap of a figure-eight."""
     slots: tuple[Slot, ...] = slots_of(FormationSpec(side="column"), range(2, TRACE_FOLLOWERS + 2))
-    setup = Setup(slots, trace=True, delay_s=delay_s, weather=weather, judged=False)
+    setup = Setup(slots, trace=True, delay_s=delay_s, link=link, judged=False)
     chain = Chain(setup)
     leader = Leader(figure_eight(TRACE_LAP_M), (), setup.limits)
     # The last robot starts 120 m behind on a straight line, and must have reached the curve before it is measured.

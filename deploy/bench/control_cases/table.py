@@ -71,12 +71,12 @@ def slots(side: Side, followers: int = len(FOLLOWERS)) -> tuple[Slot, ...]:
 def setup_of(condition: str, formation: str, seed: int = 1) -> Setup:
     """Return the setup of the chain for one row of the table."""
     side, on_trace = FORMATIONS[formation]
-    weather = SLOW_NETWORK if condition == "network" else ChainLink()
+    link = SLOW_NETWORK if condition == "network" else ChainLink()
     noisy = condition == "noise"
     return Setup(
         slots(side),
         trace=on_trace,
-        weather=weather,
+        link=link,
         blur=Blur() if noisy else None,
         heading_filter_m=NOISE_FILTER_M if noisy else 0.0,
         seed=seed,

@@ -62,7 +62,7 @@ class Setup(Struct, frozen=True):
     heading_filter_m: float = 0.0
     cruise_mps: float = 0.5
     extrapolation_max_s: float = 0.5
-    weather: ChainLink = ChainLink()
+    link: ChainLink = ChainLink()
     blur: Blur | None = None
     clock_offset_s: float = 0.0
     """Offset [s] of each robot's clock from that of its predecessor."""
@@ -123,7 +123,7 @@ class Chain:
         self.robots = [ChainRobot(setup, index, pose) for index, pose in enumerate(poses)]
         self._chance = Random(setup.seed)
         self._errors: list[ChainErrors] = []
-        self._air: list[tuple[float, int, int, PoseStamped]] = []
+        self._in_flight: list[tuple[float, int, int, PoseStamped]] = []
         self._sent = 0
         self._slots_known = False
         self._knowing = None if setup.blur is None else [Knowing(setup.blur, self._chance) for _ in self.robots]
@@ -155,7 +155,7 @@ class Chain:
         if index < len(self.robots):
             heir = self.robots[index]
             heir.predecessor = Predecessor(index + 1 + len(self.setup.slots), trace=heir.predecessor.trace)
-        self._air.clear()
+        self._in_flight.clear()
         return gone
 
     def errors(self, index: int) -> ChainErrors:
@@ -206,23 +206,23 @@ class Chain:
         return now * (1.0 + self.setup.clock_drift * (place % 2)) + self.setup.clock_offset_s * place
 
     def _publish(self, now: float, known: list[tuple[Pose2D, Twist]]) -> None:
-        weather, chance = self.setup.weather, self._chance
+        link, chance = self.setup.link, self._chance
         for index in range(len(self.robots)):
-            if weather.loss > 0.0 and chance.random() < weather.loss:
+            if link.loss > 0.0 and chance.random() < link.loss:
                 continue
             pose, twist = known[index]
             header = Header(f"robot{index + 1}", 1, 0, self._clock(index, now))
             message = PoseStamped(header, pose.x, pose.y, 0.0, pose.theta, twist, 0.0, Role.FOLLOWER, NO_TERM)
-            arrives = now + weather.delay_s
-            if weather.jitter_s > 0.0:
-                arrives += chance.random() * weather.jitter_s
+            arrives = now + link.delay_s
+            if link.jitter_s > 0.0:
+                arrives += chance.random() * link.jitter_s
             self._sent += 1
-            heapq.heappush(self._air, (arrives, self._sent, index, message))
+            heapq.heappush(self._in_flight, (arrives, self._sent, index, message))
 
     def _deliver(self, now: float) -> None:
-        air, delay_s = self._air, self.setup.weather.delay_s
-        while air and air[0][0] <= now + 1e-9:
-            arrived, _, index, message = heapq.heappop(air)
+        in_flight, delay_s = self._in_flight, self.setup.link.delay_s
+        while in_flight and in_flight[0][0] <= now + 1e-9:
+            arrived, _, index, message = heapq.heappop(in_flight)
             predecessor = self.robots[index].predecessor
             local = self._clock(index + 1, arrived)
             predecessor.heard(message, local)

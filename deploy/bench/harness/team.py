@@ -28,7 +28,7 @@ from lfa.protocol.names import robot_name
 from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.credentials import Credentials
-from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.link_model import LINK_CONDITIONS
 from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import answers
@@ -177,11 +177,11 @@ class Team:
         inside = [robot_name(robot) for robot in robots]
         outside = [robot_name(r) for r in self.scenario.mission.robots if r not in robots] + [WORLD_NAME]
         pairs = [pair for a in inside for b in outside for pair in ((a, b), (b, a))]
-        return self.order(WEATHER, cut=pairs)
+        return self.order(LINK_CONDITIONS, cut=pairs)
 
     def heal(self) -> float:
         """Heal the partition; return the time [s] just before."""
-        return self.order(WEATHER, heal=True)
+        return self.order(LINK_CONDITIONS, heal=True)
 
     # --- what is heard of it ---------------------------------------------------------------------------------------
 

@@ -28,15 +28,15 @@ def _drive(
 ) -> list[float]:
     """Distance [m] of the sighting from the truth of `predecessor.delay_s` ago, 30 s on an arc; times are exact."""
     chance = Random(4)
-    air: list[tuple[float, PoseStamped]] = []
+    in_flight: list[tuple[float, PoseStamped]] = []
     errors = []
     for n in range(1500):
         now = n * DT
         if chance.random() >= loss:
             message = _message(now - clock_s, along_arc(Pose2D(), ARC, now))
-            air.append((now + delay_s + jitter_s * chance.random(), message))
-        due = sorted((a for a in air if a[0] <= now), key=lambda a: a[0])
-        air = [a for a in air if a[0] > now]
+            in_flight.append((now + delay_s + jitter_s * chance.random(), message))
+        due = sorted((a for a in in_flight if a[0] <= now), key=lambda a: a[0])
+        in_flight = [a for a in in_flight if a[0] > now]
         for at, message in due:
             predecessor.heard(message, at)
             predecessor.clock.reported(delay_s - clock_s, at)

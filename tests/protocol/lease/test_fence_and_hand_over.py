@@ -91,7 +91,7 @@ def test_e16_a_hand_over_to_one_that_just_died_ends_in_an_election() -> None:
 
 def test_e16_a_second_copy_of_a_hand_over_changes_nothing() -> None:
     team = Team()
-    team.air.radio = structs.replace(FAIR, duplication=1.0, duplication_lag_s=0.4)
+    team.link_model.radio = structs.replace(FAIR, duplication=1.0, duplication_lag_s=0.4)
     team.hand_over(1)
     team.run(3.0)
     assert team.leaders() == [2]

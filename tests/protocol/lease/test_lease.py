@@ -149,7 +149,7 @@ def test_bug_11_a_deaf_leader_does_not_keep_its_voters_bound() -> None:
 @pytest.mark.parametrize("loss", [0.1, 0.2])
 def test_l5_bug_15_loss_changes_neither_holder_nor_chain(loss: float) -> None:
     team = Team()
-    team.air.radio = structs.replace(FAIR, loss=loss)
+    team.link_model.radio = structs.replace(FAIR, loss=loss)
     version = team.lease_of(1).config.version
     team.run(21.0)
     assert team.changes() == []
@@ -161,7 +161,7 @@ def test_l5_in_ten_minutes_at_20_percent_loss_the_holder_never_changes() -> None
     steady = Steady(team.timing)
     team.start_all().run(1.0)
     team.listen([steady])
-    team.air.radio = structs.replace(FAIR, loss=0.2)
+    team.link_model.radio = structs.replace(FAIR, loss=0.2)
     team.run(601.0)
     assert steady.violations == []
     assert team.leaders() == [1]

@@ -1,4 +1,4 @@
-"""The air loses, delays and doubles as the weather says, and the same seed is the same weather."""
+"""The link model loses, delays and doubles messages as its conditions say; equal seeds give equal links."""
 
 from random import Random
 
@@ -10,8 +10,8 @@ from lfa.protocol.transport.link_model import REORDER_S, WAITING_MAX, LinkModel,
 
 
 def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:
-    air = LinkModel(radio, Random(seed))
-    return [air.delays("robot1", "robot2") for _ in range(count)]
+    model = LinkModel(radio, Random(seed))
+    return [model.delays("robot1", "robot2") for _ in range(count)]
 
 
 @pytest.mark.parametrize("burst", [1.0, 5.0])
@@ -63,7 +63,7 @@ def test_a_condition_that_is_off_changes_no_run() -> None:
     assert fates(plain, 500) == fates(structs.replace(plain, tail_mean_s=9.0), 500)
 
 
-def test_the_same_seed_is_the_same_weather() -> None:
+def test_equal_seeds_give_equal_delays() -> None:
     radio = Radio(jitter_s=0.01, loss=0.3, loss_burst=3.0, duplication=0.1)
     assert fates(radio, 500, seed=7) == fates(radio, 500, seed=7)
     assert fates(radio, 500, seed=7) != fates(radio, 500, seed=8)
@@ -87,36 +87,36 @@ def test_the_same_seed_is_the_same_weather() -> None:
         ("", "robot2", None),
     ],
 )
-def test_a_robot_and_its_own_hardware_do_not_speak_through_the_air(
+def test_a_robot_and_its_own_hardware_do_not_speak_over_a_link(
     key: str, receiver: str, link: tuple[str, str] | None
 ) -> None:
     assert link_of(key, receiver) == link
 
 
 def test_a_cut_is_of_one_direction_and_healing_ends_it() -> None:
-    air = LinkModel(Radio(), Random(1))
-    assert air.obey({"cut": [["robot1", "witness"]]})
-    assert air.obey({"cut": [["robot2", "robot3"]]})
-    assert air.delays("robot1", "world") == []
-    assert air.delays("robot2", "robot3") == []
-    assert len(air.delays("world", "robot1")) == len(air.delays("robot3", "robot2")) == 1
-    assert air.obey({"heal": True})
-    assert len(air.delays("robot1", "world")) == 1
+    model = LinkModel(Radio(), Random(1))
+    assert model.obey({"cut": [["robot1", "witness"]]})
+    assert model.obey({"cut": [["robot2", "robot3"]]})
+    assert model.delays("robot1", "world") == []
+    assert model.delays("robot2", "robot3") == []
+    assert len(model.delays("world", "robot1")) == len(model.delays("robot3", "robot2")) == 1
+    assert model.obey({"heal": True})
+    assert len(model.delays("robot1", "world")) == 1
 
 
 @pytest.mark.parametrize(
     "order", [{"cut": [["robot1"]]}, {"radio": {"lost": 0.2}}, {"radio": {"loss": "much"}}, {"x": 1}]
 )
 def test_an_order_that_is_none_changes_nothing(order: dict[str, object]) -> None:
-    air = LinkModel(Radio(), Random(1))
-    assert not air.obey(order)
-    assert (air.radio, air.cuts) == (Radio(), frozenset())
+    model = LinkModel(Radio(), Random(1))
+    assert not model.obey(order)
+    assert (model.radio, model.cuts) == (Radio(), frozenset())
 
 
 def test_what_comes_through_keeps_its_order_and_its_delay() -> None:
     reception = Reception("robot2", Random(1))
     early, late = Arrival(1.0, "lfa/f/robot1/pose", b"a"), Arrival(1.001, "lfa/f/robot2/sensors", b"b")
-    assert reception.air.obey({"radio": {"delay_s": 0.1}})
+    assert reception.link_model.obey({"radio": {"delay_s": 0.1}})
     reception.put(early)
     reception.put(late)
     assert reception.take(1.001) == [late]
@@ -124,25 +124,25 @@ def test_what_comes_through_keeps_its_order_and_its_delay() -> None:
     assert [(a.key, a.payload) for a in reception.take(1.2)] == [(early.key, b"a")]
 
 
-def test_fair_and_heal_each_bring_the_first_weather_back_and_only_heal_ends_cuts() -> None:
-    air = LinkModel(Radio(delay_s=0.01), Random(1))
+def test_fair_and_heal_each_bring_the_first_conditions_back_and_only_heal_ends_cuts() -> None:
+    model = LinkModel(Radio(delay_s=0.01), Random(1))
     for word, cuts_left in (("fair", 1), ("heal", 0)):
-        assert air.obey({"radio": {"loss": 0.5}, "cut": [["robot1", "robot2"]]})
-        assert air.obey({word: True})
-        assert air.radio == Radio(delay_s=0.01)
-        assert len(air.cuts) == cuts_left
+        assert model.obey({"radio": {"loss": 0.5}, "cut": [["robot1", "robot2"]]})
+        assert model.obey({word: True})
+        assert model.radio == Radio(delay_s=0.01)
+        assert len(model.cuts) == cuts_left
 
 
-def test_the_air_is_clear_without_weather_cuts_and_messages_on_their_way() -> None:
+def test_a_link_is_clear_without_conditions_cuts_and_messages_on_their_way() -> None:
     reception = Reception("robot2", Random(1))
     assert reception.is_clear
     reception.put(Arrival(1.0, "lfa/f/robot1/table", b""))
     assert not reception.is_clear
     reception.take(1.0)
     assert reception.is_clear
-    assert reception.air.obey({"cut": [["robot1", "robot2"]]})
+    assert reception.link_model.obey({"cut": [["robot1", "robot2"]]})
     assert not reception.is_clear
-    assert reception.air.obey({"heal": True, "radio": {"loss": 0.1}})
+    assert reception.link_model.obey({"heal": True, "radio": {"loss": 0.1}})
     assert not reception.is_clear
 
 
@@ -155,15 +155,15 @@ def test_of_messages_due_at_one_time_the_first_comes_first() -> None:
 
 def test_so_many_messages_wait_and_no_more() -> None:
     reception = Reception("robot2", Random(1))
-    reception.air.obey({"radio": {"delay_s": 1.0, "duplication": 1.0}})
+    reception.link_model.obey({"radio": {"delay_s": 1.0, "duplication": 1.0}})
     for _ in range(WAITING_MAX):
         reception.put(Arrival(1.0, "lfa/f/robot1/table", b""))
     assert len(reception.take(3.0)) == WAITING_MAX
 
 
 def test_robots_farther_apart_than_the_range_do_not_hear_each_other() -> None:
-    air = LinkModel(Radio(range_m=5.0), Random(1))
-    air.places = {"robot1": (0.0, 0.0), "robot2": (4.9, 0.0), "robot3": (0.0, 5.1)}
-    assert [len(air.delays("robot1", other)) for other in ("robot2", "robot3", "world")] == [1, 0, 1]
-    air.obey({"radio": {"range_m": 0.0}})
-    assert len(air.delays("robot1", "robot3")) == 1
+    model = LinkModel(Radio(range_m=5.0), Random(1))
+    model.places = {"robot1": (0.0, 0.0), "robot2": (4.9, 0.0), "robot3": (0.0, 5.1)}
+    assert [len(model.delays("robot1", other)) for other in ("robot2", "robot3", "world")] == [1, 0, 1]
+    model.obey({"radio": {"range_m": 0.0}})
+    assert len(model.delays("robot1", "robot3")) == 1

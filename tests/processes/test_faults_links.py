@@ -1,4 +1,4 @@
-"""Cuts and loss in the air of a live team, made at the receivers."""
+"""Cuts and loss on the links of a live team, made at the receivers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lfa.deploy.bench.harness.team import Team
 from lfa.deploy.bench.harness.team_history import REST_MPS
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import WEATHER
+from lfa.protocol.transport.link_model import LINK_CONDITIONS
 from tests.rigs.live_team import ROBOTS, WHOLE_S, check_minority, check_terms, leads, pass_time, team
 
 pytestmark = pytest.mark.processes
@@ -61,7 +61,7 @@ def test_a_leader_cut_off_is_replaced_and_comes_back_as_a_follower(live: Team) -
 def test_a_leader_that_hears_nobody_is_replaced_although_all_hear_it(live: Team) -> None:
     chain = live.await_chain(ROBOTS, WHOLE_S)
     others = [*(robot_name(robot) for robot in chain[1:]), WORLD_NAME]
-    since = live.order(WEATHER, cut=[(other, robot_name(chain[0])) for other in others])
+    since = live.order(LINK_CONDITIONS, cut=[(other, robot_name(chain[0])) for other in others])
     live.wait_until(lambda: bool(set(leads(live, since)) & set(chain[1:])), "nobody else leads", WHOLE_S)
     live.heal()
     live.await_chain(ROBOTS, WHOLE_S)
@@ -70,7 +70,7 @@ def test_a_leader_that_hears_nobody_is_replaced_although_all_hear_it(live: Team)
 def test_two_followers_that_do_not_hear_each_other_change_no_leader(live: Team) -> None:
     chain = live.await_chain(ROBOTS, WHOLE_S)
     pair = robot_name(chain[2]), robot_name(chain[3])
-    since = live.order(WEATHER, cut=[pair, pair[::-1]])
+    since = live.order(LINK_CONDITIONS, cut=[pair, pair[::-1]])
     pass_time(live, 1.0)
     live.heal()
     assert live.await_chain(ROBOTS, WHOLE_S)[0] == chain[0]
@@ -79,7 +79,7 @@ def test_two_followers_that_do_not_hear_each_other_change_no_leader(live: Team) 
 
 def test_a_tenth_of_all_messages_lost_changes_no_leader(live: Team) -> None:
     chain = live.await_chain(ROBOTS, WHOLE_S)
-    since = live.order(WEATHER, radio={"loss": 0.1})
+    since = live.order(LINK_CONDITIONS, radio={"loss": 0.1})
     pass_time(live, 3.0)
     assert leads(live, since) in ([], [chain[0]])
     live.heal()
