@@ -74,14 +74,14 @@ class Simulator(VirtualTime):
         its subscriptions again."""
         self.loses_declarations = False
         """True while routers lose all declarations, also those made again."""
-        self._seats: dict[str, _SimulatedNode] = {}
+        self._processes: dict[str, _SimulatedNode] = {}
         self._routes: dict[str, list[tuple[_SimulatedNode, Link | None]]] = {}
         """Receivers of each key, and the radio link to each (None: not over radio)."""
         self._wanted: dict[tuple[frozenset[str], str], bool] = {}
 
     @property
     def names(self) -> list[str]:
-        return list(self._seats)
+        return list(self._processes)
 
     def add(
         self, node: Node, journal: Journal, clock: LocalClock | None = None, observers: Sequence[NodeObserver] = ()
@@ -90,40 +90,40 @@ class Simulator(VirtualTime):
 
         `observers` hear each input of the node.
         """
-        seat = _SimulatedNode(NodeHost(node, journal, observers), clock or LocalClock())
-        self._seats[node.name] = seat
-        self._refresh(seat)
+        process = _SimulatedNode(NodeHost(node, journal, observers), clock or LocalClock())
+        self._processes[node.name] = process
+        self._refresh(process)
         self._announce(PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)
-        self._plan(seat)
-        self.at(self.now + VITALS_S, self._vitals, seat)
+        self._plan(process)
+        self.at(self.now + VITALS_S, self._vitals, process)
 
     def lives(self, node: Node) -> bool:
         """Return True if this incarnation of the node is running."""
-        seat = self._seats.get(node.name)
-        return seat is not None and seat.node is node
+        process = self._processes.get(node.name)
+        return process is not None and process.node is node
 
     def kill(self, name: str, *, hinted: bool = True) -> None:
         """Simulate SIGKILL: the process sends nothing more; if `hinted`, the others get PeerDown within 5 ms."""
-        seat = self._seats[name]
-        self._remove(seat)
+        process = self._processes[name]
+        self._remove(process)
         low, high = HINT_DELAY_S
         if hinted:
-            self._announce(PeerDown(name, seat.node.incarnation), low + (high - low) * self._random.random())
+            self._announce(PeerDown(name, process.node.incarnation), low + (high - low) * self._random.random())
 
     def hint(self, event: PeerUp | PeerDown | RouterLost, observers: Sequence[str]) -> None:
         """Deliver a liveliness event to `observers`, true or false."""
-        for seat in [self._seats[name] for name in observers if name in self._seats]:
-            self._give(seat, "", event, b"")
+        for process in [self._processes[name] for name in observers if name in self._processes]:
+            self._give(process, "", event, b"")
 
     def pause(self, name: str) -> None:
         """Simulate SIGSTOP: the process does nothing, and its messages are queued."""
-        self._seats[name].paused = True
+        self._processes[name].paused = True
 
     def resume(self, name: str, *, shuffled: bool = False) -> None:
         """Simulate SIGCONT: deliver the queued messages at once; of state topics only the newest, as a real inbox."""
-        seat = self._seats[name]
-        seat.paused = False
-        waiting, seat.waiting = seat.waiting, []
+        process = self._processes[name]
+        process.paused = False
+        waiting, process.waiting = process.waiting, []
         if shuffled:
             self._random.shuffle(waiting)
         newest = {key: index for index, (key, _, _) in enumerate(waiting) if key}
@@ -131,14 +131,14 @@ class Simulator(VirtualTime):
             where = address(key) if key else None
             if where is not None and TOPIC[where.topic].state and newest[key] != index:
                 continue
-            self._give(seat, key, message, payload)
-        self._tick(seat, seat.node.next_deadline())
+            self._give(process, key, message, payload)
+        self._tick(process, process.node.next_deadline())
 
     def terminate(self, name: str) -> None:
         """Simulate SIGTERM: the node gets Stop and may send for up to `FINISH_S_MAX` before it leaves."""
-        seat = self._seats[name]
-        seat.stop_by = self.now + FINISH_S_MAX
-        self._give(seat, "", Stop(), b"")
+        process = self._processes[name]
+        process.stop_by = self.now + FINISH_S_MAX
+        self._give(process, "", Stop(), b"")
 
     def lose_late(self, by: float) -> None:
         """Drop the messages in transit that would arrive later than true time `by` [s]."""
@@ -149,86 +149,86 @@ class Simulator(VirtualTime):
         message = decode(payload, TOPIC[key.split("/")[3]].type)
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        for seat, _ in self._route(key):
-            self.at(self.now + LOCAL_DELAY_S, self._give, seat, key, message, payload)
+        for process, _ in self._route(key):
+            self.at(self.now + LOCAL_DELAY_S, self._give, process, key, message, payload)
 
     # --- one call of one node ---------------------------------------------------------------------------------
 
-    def _give(self, seat: _SimulatedNode, key: str, message: Message | Local, payload: bytes) -> None:
-        if seat.gone:
+    def _give(self, process: _SimulatedNode, key: str, message: Message | Local, payload: bytes) -> None:
+        if process.gone:
             return
-        if seat.paused:
-            seat.waiting.append((key, message, payload))
+        if process.paused:
+            process.waiting.append((key, message, payload))
             return
-        now = seat.clock.local(self.now)
+        now = process.clock.local(self.now)
         if isinstance(message, Local):
-            seat.links.see(message, now)
-        self._after(seat, seat.host.deliver(now, key, message, payload))
+            process.links.see(message, now)
+        self._after(process, process.host.deliver(now, key, message, payload))
 
-    def _tick(self, seat: _SimulatedNode, deadline: float) -> None:
+    def _tick(self, process: _SimulatedNode, deadline: float) -> None:
         """Call the node's tick if `deadline` [s, its own clock], from its last call, has come; else plan again."""
-        if seat.gone or seat.paused:
+        if process.gone or process.paused:
             return
-        now = seat.clock.local(self.now)
+        now = process.clock.local(self.now)
         if now >= deadline - 1e-9:
-            self._after(seat, seat.host.tick(max(now, deadline)))
+            self._after(process, process.host.tick(max(now, deadline)))
         else:
-            self._plan(seat)
+            self._plan(process)
 
-    def _after(self, seat: _SimulatedNode, sent: Sent) -> None:
-        node = seat.node
+    def _after(self, process: _SimulatedNode, sent: Sent) -> None:
+        node = process.node
         for key, payload in sent:
-            self._publish(seat, key, payload)
-        if node.interests is not seat.interests:
-            self._refresh(seat)
+            self._publish(process, key, payload)
+        if node.interests is not process.interests:
+            self._refresh(process)
         if self.deaf:
-            self._declare_again(seat)
+            self._declare_again(process)
         if node.refusal is not None and not self.refused_leave:
             raise Refused(node.refusal)
         later = reborn(node)
-        if later is not None and seat.stop_by is None:
-            self._leave(seat)
-            self.add(later, self.reborn(later), seat.clock)
-        elif node.refusal is not None or node.finished or (seat.stop_by is not None and self.now > seat.stop_by):
-            self._leave(seat)
+        if later is not None and process.stop_by is None:
+            self._leave(process)
+            self.add(later, self.reborn(later), process.clock)
+        elif node.refusal is not None or node.finished or (process.stop_by is not None and self.now > process.stop_by):
+            self._leave(process)
         else:
-            self._plan(seat)
+            self._plan(process)
 
-    def _declare_again(self, seat: _SimulatedNode) -> None:
+    def _declare_again(self, process: _SimulatedNode) -> None:
         """Declare the node's subscriptions again when it is time, as a real process does."""
-        now = seat.clock.local(self.now)
-        seat.links.lacks(lacks_messages(seat.node), now)
-        if seat.links.due(now) and not self.loses_declarations:
-            self.deaf = {pair for pair in self.deaf if pair[0] != seat.node.name}
+        now = process.clock.local(self.now)
+        process.links.lacks(lacks_messages(process.node), now)
+        if process.links.due(now) and not self.loses_declarations:
+            self.deaf = {pair for pair in self.deaf if pair[0] != process.node.name}
 
-    def _plan(self, seat: _SimulatedNode) -> None:
-        deadline = seat.node.next_deadline()
-        if deadline == seat.deadline:
+    def _plan(self, process: _SimulatedNode) -> None:
+        deadline = process.node.next_deadline()
+        if deadline == process.deadline:
             return
-        seat.deadline = deadline
-        self.at(max(seat.clock.true(deadline), self.now), self._due, seat, deadline)
+        process.deadline = deadline
+        self.at(max(process.clock.true(deadline), self.now), self._due, process, deadline)
 
-    def _due(self, seat: _SimulatedNode, deadline: float) -> None:
-        if seat.deadline == deadline:
-            seat.deadline = None
-            self._tick(seat, deadline)
+    def _due(self, process: _SimulatedNode, deadline: float) -> None:
+        if process.deadline == deadline:
+            process.deadline = None
+            self._tick(process, deadline)
 
-    def _leave(self, seat: _SimulatedNode) -> None:
-        if not seat.gone:
-            self._remove(seat)
-            self._announce(PeerDown(seat.node.name, seat.node.incarnation), LOCAL_DELAY_S)
+    def _leave(self, process: _SimulatedNode) -> None:
+        if not process.gone:
+            self._remove(process)
+            self._announce(PeerDown(process.node.name, process.node.incarnation), LOCAL_DELAY_S)
 
-    def _remove(self, seat: _SimulatedNode) -> None:
-        del self._seats[seat.node.name]
-        seat.gone = True
-        seat.host.journal.close()
+    def _remove(self, process: _SimulatedNode) -> None:
+        del self._processes[process.node.name]
+        process.gone = True
+        process.host.journal.close()
         self._routes.clear()
 
-    def _vitals(self, seat: _SimulatedNode) -> None:
-        if not seat.gone:
-            if not seat.paused:
-                self._give(seat, "", Vitals(0.0, 0, seat.host.undecodable, 0.0, 0.0), b"")
-            self.at(self.now + VITALS_S, self._vitals, seat)
+    def _vitals(self, process: _SimulatedNode) -> None:
+        if not process.gone:
+            if not process.paused:
+                self._give(process, "", Vitals(0.0, 0, process.host.undecodable, 0.0, 0.0), b"")
+            self.at(self.now + VITALS_S, self._vitals, process)
 
     # --- between nodes ------------------------------------------------------------------------------------------
 
@@ -241,17 +241,17 @@ class Simulator(VirtualTime):
         for tap in self.taps:
             tap(self.now, key, payload, message)
         routes = self._routes.get(key)
-        for seat, link in self._route(key) if routes is None else routes:
-            if seat is sender and key.split("/", 4)[3] in NO_ECHO:
+        for process, link in self._route(key) if routes is None else routes:
+            if process is sender and key.split("/", 4)[3] in NO_ECHO:
                 continue
-            if self.deaf and (seat.node.name, sender.node.name) in self.deaf:
+            if self.deaf and (process.node.name, sender.node.name) in self.deaf:
                 continue
             for delay_s in LOCAL_DELAYS_S if link is None else self.link_model.delays(*link):
-                self.at(self.now + delay_s, self._give, seat, key, message, payload)
+                self.at(self.now + delay_s, self._give, process, key, message, payload)
 
     def _route(self, key: str) -> list[tuple[_SimulatedNode, Link | None]]:
-        hear = [seat for seat in self._seats.values() if self._wants(seat.interests, key)]
-        routes = self._routes[key] = [(seat, link_of(key, seat.node.name)) for seat in hear]
+        hear = [process for process in self._processes.values() if self._wants(process.interests, key)]
+        routes = self._routes[key] = [(process, link_of(key, process.node.name)) for process in hear]
         return routes
 
     def _wants(self, interests: frozenset[str], key: str) -> bool:
@@ -261,25 +261,25 @@ class Simulator(VirtualTime):
             known = self._wanted[interests, key] = any(matches(e, key) for e in interests)
         return known
 
-    def _refresh(self, seat: _SimulatedNode) -> None:
+    def _refresh(self, process: _SimulatedNode) -> None:
         """Apply the node's changed interests; it also gets liveliness events for tokens that already exist."""
-        new = seat.node.interests
-        added = sorted(new - seat.interests)
-        seat.interests = new
+        new = process.node.interests
+        added = sorted(new - process.interests)
+        process.interests = new
         self._routes.clear()
-        for other in list(self._seats.values()):
+        for other in list(self._processes.values()):
             token = _token(other.node)
-            if other is not seat and any(matches(e, token) for e in added):
-                self._hint_later(seat, PeerUp(other.node.name, other.node.incarnation), LOCAL_DELAY_S)
+            if other is not process and any(matches(e, token) for e in added):
+                self._hint_later(process, PeerUp(other.node.name, other.node.incarnation), LOCAL_DELAY_S)
 
     def _announce(self, event: PeerUp | PeerDown, delay_s: float) -> None:
-        for seat in list(self._seats.values()):
-            token = alive_key(_fleet(seat.node), event.name, event.incarnation)
-            if seat.node.name != event.name and any(matches(e, token) for e in seat.interests):
-                self._hint_later(seat, event, delay_s)
+        for process in list(self._processes.values()):
+            token = alive_key(_fleet(process.node), event.name, event.incarnation)
+            if process.node.name != event.name and any(matches(e, token) for e in process.interests):
+                self._hint_later(process, event, delay_s)
 
-    def _hint_later(self, seat: _SimulatedNode, event: PeerUp | PeerDown, delay_s: float) -> None:
-        self.at(self.now + delay_s, self._give, seat, "", event, b"")
+    def _hint_later(self, process: _SimulatedNode, event: PeerUp | PeerDown, delay_s: float) -> None:
+        self.at(self.now + delay_s, self._give, process, "", event, b"")
 
 
 def _unjournalled(node: Node) -> Journal:

@@ -164,7 +164,7 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
     keep_one_heap()
     wake = Wake()
     stop = _on_signals(wake)
-    seats: list[_NodeRunner] = []
+    runners: list[_NodeRunner] = []
     name = nodes[0].name
     try:
         for node in nodes:
@@ -174,33 +174,33 @@ def run(nodes: Sequence[Node], options: Options, floor: int) -> int:
                 write_line(f"{name}: ended, {stop.why}, before a router was there", sys.stdout)
                 return stop.code
             try:
-                seats.append(_joined(node, bus, inbox, options, floor))
+                runners.append(_joined(node, bus, inbox, options, floor))
             except Refused:
                 bus.close()
                 raise
         settle()
         write_line(f"{name}: ready, in fleet {options.fleet} at {options.endpoint}", sys.stdout)
-        _loop(seats, wake, stop, Notify(options.notify), lambda seat, node: _reborn(seat, node, options, floor))
+        _loop(runners, wake, stop, Notify(options.notify), lambda runner, node: _reborn(runner, node, options, floor))
         write_line(f"{name}: ended, {stop.why}", sys.stdout)
         return stop.code
     finally:
-        for seat in seats:
-            seat.bus.close()
-            seat.host.journal.close()
+        for runner in runners:
+            runner.bus.close()
+            runner.host.journal.close()
 
 
 def connect(options: Options, inbox: Inbox, stop: _StopRequest) -> ZenohBus | None:
     """Wait for a router and return a session with it; None if a stop is requested meanwhile."""
-    told = False
-    while not stop.told:
+    reported = False
+    while not stop.requested:
         try:
             return ZenohBus(options.endpoint, inbox, options.lease_ms, options.credentials)
         except RouterAbsent:
-            if not told:
+            if not reported:
                 why = "" if options.credentials is None else f", or none that lets {options.credentials.name} in"
                 text = f"no router at {options.endpoint}{why}: waiting for one (start it with: lfa-router)"
                 write_line(text, sys.stderr)
-                told = True
+                reported = True
             Notify(options.notify).alive()
             stop.wake.wait(CONNECT_RETRY_S)
     return None
@@ -213,28 +213,28 @@ def _joined(node: Node, bus: ZenohBus, inbox: Inbox, options: Options, floor: in
     started_with = {"fleet": options.fleet, **node.started_with}
     heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, floor, started_with)
     conditions_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
-    seat = _NodeRunner(node, bus, inbox, Journal(options.journal, heading), conditions_key)
+    runner = _NodeRunner(node, bus, inbox, Journal(options.journal, heading), conditions_key)
     bus.announce(options.fleet, node.name, node.incarnation)
     refuse_twin(bus, options.fleet, lease_s, node, dead)
-    return seat
+    return runner
 
 
-def _reborn(seat: _NodeRunner, node: Node, options: Options, floor: int) -> _NodeRunner:
-    """Replace the node in `seat` by `node`, which has the same name and a later number (E23); say so in one line.
+def _reborn(runner: _NodeRunner, node: Node, options: Options, floor: int) -> _NodeRunner:
+    """Replace the node in `runner` by `node`, which has the same name and a later number (E23); say so in one line.
 
     Raises Refused if a process of this name speaks: then the later incarnation runs elsewhere, and this one is left.
     """
-    why = f"the fleet knows a later incarnation than {seat.node.incarnation} (was the clock set back?)"
+    why = f"the fleet knows a later incarnation than {runner.node.incarnation} (was the clock set back?)"
     write_line(f"{node.name}: {why}: goes on as {node.incarnation}, at the tail", sys.stderr)
-    seat.host.journal.close()
-    seat.bus.withdraw()
-    seat.bus.follow(frozenset())
-    seat.inbox.take()
-    return _joined(node, seat.bus, seat.inbox, options, floor)
+    runner.host.journal.close()
+    runner.bus.withdraw()
+    runner.bus.follow(frozenset())
+    runner.inbox.take()
+    return _joined(node, runner.bus, runner.inbox, options, floor)
 
 
 def _loop(
-    seats: list[_NodeRunner],
+    runners: list[_NodeRunner],
     wake: Wake,
     stop: _StopRequest,
     notify: Notify,
@@ -246,24 +246,24 @@ def _loop(
     vitals = VitalSigns(now)
     waited_for = None
     while True:
-        deadline = min([seat.next_deadline() for seat in seats])
+        deadline = min([runner.next_deadline() for runner in runners])
         wake.wait(min(max(deadline - clock.now(), 0.0), WAIT_S_MAX))
         now = clock.now()
-        for place, seat in enumerate(seats):
-            vitals.lag(min(seat.step(now), now - began))  # a first deadline may lie far in the past
-            later = reborn(seat.node)
-            if later is not None and not stop.told:
-                seats[place] = replaced(seat, later)
+        for place, runner in enumerate(runners):
+            vitals.lag(min(runner.step(now), now - began))  # a first deadline may lie far in the past
+            later = reborn(runner.node)
+            if later is not None and not stop.requested:
+                runners[place] = replaced(runner, later)
         if vitals.due(now):
             notify.alive()
-            waited_for = _say_waits(seats[0].node, waited_for)
-            for seat in seats:
-                seat.tell(vitals.of(seat.inbox.dropped, seat.host.undecodable, seat.tick_p99_s()), now)
-        if stop.told and stop_by is None:
+            waited_for = _say_waits(runners[0].node, waited_for)
+            for runner in runners:
+                runner.tell(vitals.of(runner.inbox.dropped, runner.host.undecodable, runner.tick_p99_s()), now)
+        if stop.requested and stop_by is None:
             stop_by = now + STOP_GRACE_S
-            for seat in seats:
-                seat.tell(Stop(), now)
-        if _is_over(seats) or (stop_by is not None and now > stop_by):
+            for runner in runners:
+                runner.tell(Stop(), now)
+        if _is_over(runners) or (stop_by is not None and now > stop_by):
             return
 
 
@@ -275,13 +275,13 @@ def _say_waits(node: Node, before: str | None) -> str | None:
     return missing
 
 
-def _is_over(seats: Sequence[_NodeRunner]) -> bool:
+def _is_over(runners: Sequence[_NodeRunner]) -> bool:
     """Return True if all nodes have finished. Raises Refused if one of them cannot take part."""
     over = True
-    for seat in seats:
-        if seat.node.refusal is not None:
-            raise Refused(seat.node.refusal)
-        over = over and seat.node.finished
+    for runner in runners:
+        if runner.node.refusal is not None:
+            raise Refused(runner.node.refusal)
+        over = over and runner.node.finished
     return over
 
 
@@ -290,7 +290,7 @@ class _StopRequest:
 
     def __init__(self, wake: Wake) -> None:
         self.wake = wake
-        self.told = False
+        self.requested = False
         self.signal: signal.Signals | None = None
 
     @property
@@ -308,7 +308,7 @@ def _on_signals(wake: Wake) -> _StopRequest:
     stop = _StopRequest(wake)
 
     def order(signum: int, _frame: FrameType | None) -> None:
-        stop.told, stop.signal = True, signal.Signals(signum)
+        stop.requested, stop.signal = True, signal.Signals(signum)
         wake.set()
 
     signal.signal(signal.SIGTERM, order)

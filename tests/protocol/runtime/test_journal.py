@@ -107,8 +107,8 @@ class Witnessing:
 def test_what_is_said_was_journalled_before(tmp_path: Path) -> None:
     """Whoever is killed with a message on the wire has left the record that explains it (a PROPOSE its promises)."""
     bus = Witnessing(tmp_path / "witness-1.bin")
-    seat = _NodeRunner(
+    runner = _NodeRunner(
         Witness("f", 1, 1), bus, Inbox(), Journal(tmp_path, Heading(JOURNAL_VERSION, "witness", 1, 1, {})), None
     )
-    seat.step(0.5)
+    runner.step(0.5)
     assert set(bus.on_disk) == {1}
