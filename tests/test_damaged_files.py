@@ -128,9 +128,9 @@ def _summary(folder: Path) -> Path:
 
 def _read_events(path: Path) -> object:
     lines = event_log.lines(path.parent)
-    reigns = event_log.reigns(lines)
+    leader_terms = event_log.leader_terms(lines)
     event_log.places(lines, (1, 2), 5.0)
-    return event_log.failovers(lines, reigns), event_log.last_chain(lines), event_log.terms_that_went_back(lines)
+    return event_log.failovers(lines, leader_terms), event_log.last_chain(lines), event_log.terms_that_went_back(lines)
 
 
 def _recorded(folder: Path) -> Recorder:

@@ -97,7 +97,7 @@ class Simulator(VirtualTime):
         self._plan(process)
         self.at(self.now + VITALS_S, self._vitals, process)
 
-    def lives(self, node: Node) -> bool:
+    def runs(self, node: Node) -> bool:
         """Return True if this incarnation of the node is running."""
         process = self._processes.get(node.name)
         return process is not None and process.node is node

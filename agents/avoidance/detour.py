@@ -70,7 +70,7 @@ class Detour:
         """Present decision; None while the wanted motion is taken."""
         self._kept_m = NARROW_M
         """Kept clearance [m]: `NARROW_M`, or less where the robot is nearer to an obstacle already."""
-        self._thing = BlockingObstacle()
+        self._obstacle = BlockingObstacle()
         self._side = 0.0
         self._side_at = -inf
         self._acted_at = -inf
@@ -86,11 +86,11 @@ class Detour:
         wanted: Twist,
         speed_mps: float,
         now: float,
-        thing: Callable[[float], BlockingObstacle] = lambda free_m: BlockingObstacle(),
+        obstacle: Callable[[float], BlockingObstacle] = lambda free_m: BlockingObstacle(),
     ) -> Twist | None:
         """Return the twist of a detour towards `target` (both in `base_link`); None if the wanted twist may go on.
 
-        `thing(free_m)` returns what blocks the way after that distance [m]. It is called when the detour begins, and
+        `obstacle(free_m)` returns what blocks the way after that distance [m]. It is called when the detour begins, and
         while the robot creeps.
         """
         blocked_m = self._blocked(points, wanted)
@@ -99,9 +99,9 @@ class Detour:
                 return None
             self._since, self._clear_since = now, None
             self._side, self._crept_s = 0.0, 0.0
-            self._thing = thing(inf if blocked_m is None else blocked_m)
+            self._obstacle = obstacle(inf if blocked_m is None else blocked_m)
         elif self.decision.action is Action.CREEP and blocked_m is not None:
-            self._thing = thing(blocked_m)  # creeping is meant to show more of it
+            self._obstacle = obstacle(blocked_m)  # creeping is meant to show more of it
         elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
             return None
@@ -175,12 +175,12 @@ class Detour:
         nose_m = free_along(points, AHEAD, self._radius_m)
         # A bend towards what is already beside the robot does not tell how far the way straight ahead is free.
         ahead_m = self._radius_m + (nose_m if self._kept_m < NARROW_M else min(free_m, nose_m))
-        kind = "stationary" if self._thing.kind == "moving" else self._thing.kind
+        kind = "stationary" if self._obstacle.kind == "moving" else self._obstacle.kind
         return decide(
             Situation(
                 kind,
                 ahead_m,
-                self._thing.width_m,
+                self._obstacle.width_m,
                 left_m=inf if openings.left is not None else 0.0,
                 right_m=inf if openings.right is not None else 0.0,
                 rear_m=inf if openings.rear is not None else 0.0,
@@ -197,7 +197,7 @@ class Detour:
             left = first_open(points, towards, 1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             right = first_open(points, towards, -1.0, 0, ASIDE_STEPS, reach_m, half_width_m)
             if left is not None or right is not None:
-                unknown = self._thing.width_m == inf  # the table needs the rear opening as well
+                unknown = self._obstacle.width_m == inf  # the table needs the rear opening as well
                 return Openings(left, right, self._rear(points, towards, reach_m) if unknown else None)
         return Openings(None, None, self._rear(points, towards, reach_m))
 
@@ -246,7 +246,7 @@ class Detour:
             return
         self._acted_at = now
         condition, updates = ("", "") if row is None else (row.name, row.updates)
-        self.decision = Decision(action, free_m, bearing, self._thing.kind, condition, updates)
+        self.decision = Decision(action, free_m, bearing, self._obstacle.kind, condition, updates)
 
     def _towards(self, points: Sequence[Point], bearing: float, speed_mps: float) -> Twist:
         omega_max = self.omega_max_radps

@@ -21,20 +21,20 @@ LONG_CELLS, ROOM_CELLS_MAX = 12_000, 60_000
 largest region for which that is checked."""
 
 
-def search(footing: Costmap, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
+def search(costmap: Costmap, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
     """Search a way from `goal` to `start`; yield cells expanded, return True if there is one.
 
     Each `toward[cell]` becomes the number, from 1, of the step by which the cell was reached.
     """
     looked_at, asked = 0, False
-    for looked in _spread(footing, goal, start, toward):
+    for looked in _spread(costmap, goal, start, toward):
         looked_at += abs(looked)
         yield abs(looked)
         if looked < 0:
             return True
         if looked_at > LONG_CELLS and not asked:
             asked = True
-            if (yield from _closed_in(footing, start, goal)):
+            if (yield from _closed_in(costmap, start, goal)):
                 break
     return False
 
@@ -47,11 +47,11 @@ def chain(toward: bytearray, columns: int, start: int, goal: int) -> list[int]:
     return cells
 
 
-def _spread(footing: Costmap, goal: int, start: int, toward: bytearray) -> Iterator[int]:
+def _spread(costmap: Costmap, goal: int, start: int, toward: bytearray) -> Iterator[int]:
     """Expand A* from `goal`. `toward[cell]` becomes the number, from 1, of the step by which the cell was reached. The
     last number yielded is negative when `start` was reached; otherwise no cell is left.
     """
-    grid, near, prices = footing.grid, footing.near, footing.prices
+    grid, near, prices = costmap.grid, costmap.near, costmap.prices
     columns, scores = grid.columns, grid.scores
     steps = tuple(
         (number, offset, DIAGONAL if abs(offset) not in (1, columns) else STRAIGHT)
@@ -101,9 +101,9 @@ def _spread(footing: Costmap, goal: int, start: int, toward: bytearray) -> Itera
     yield looked
 
 
-def _closed_in(footing: Costmap, start: int, goal: int) -> Generator[int, None, bool]:
+def _closed_in(costmap: Costmap, start: int, goal: int) -> Generator[int, None, bool]:
     """Return whether the region around the robot ends before the goal, which a long search would find out last."""
-    near, prices, columns, rows = footing.near, footing.prices, footing.grid.columns, footing.grid.rows
+    near, prices, columns, rows = costmap.near, costmap.prices, costmap.grid.columns, costmap.grid.rows
     seen = bytearray(len(near))
     seen[start] = 1
     cells = [start]

@@ -132,50 +132,50 @@ class Planner:
 
     def _plan(self, mates: tuple[Pose2D, ...], needed: bool) -> Iterator[int]:
         """Search, then turn the cells into a route; set `route` or `unreachable`."""
-        footing = self._footing(mates)
-        goal, start = footing.settled(self.goal), footing.settled(self._pose)
+        costmap = self._costmap(mates)
+        goal, start = costmap.settled(self.goal), costmap.settled(self._pose)
         if goal is None:
             self._fail("no robot can stand at the goal", needed)
             return
         if start is None:
             self._fail("no way out of where the robot stands", needed)
             return
-        toward = bytearray(len(footing.near))
-        reached = yield from search(footing, start, goal, toward)
+        toward = bytearray(len(costmap.near))
+        reached = yield from search(costmap, start, goal, toward)
         if not reached and mates:
             yield from self._plan((), needed)
             return
         if not reached:
             self._fail("the goal is walled in: no way to it is left", needed)
             return
-        here = footing.settled(self._pose)  # the robot has driven on since the search began
+        here = costmap.settled(self._pose)  # the robot has driven on since the search began
         reachable = here is not None and (toward[here] or here == goal)
         cells = chain(toward, self._grid.columns, here if here is not None and reachable else start, goal)
         yield len(cells)
         rest = self.route[_nearest(self.route, self._pose) :]
-        old = inf if needed else sum(footing.price_of_line(a, b) for a, b in pairwise(rest))
-        if footing.price_of_cells(cells) <= IMPROVED * old:
-            yield from self._shape(footing, cells)
+        old = inf if needed else sum(costmap.price_of_line(a, b) for a, b in pairwise(rest))
+        if costmap.price_of_cells(cells) <= IMPROVED * old:
+            yield from self._shape(costmap, cells)
 
-    def _shape(self, footing: Costmap, cells: Sequence[int]) -> Iterator[int]:
+    def _shape(self, costmap: Costmap, cells: Sequence[int]) -> Iterator[int]:
         """Set `route` from the cells."""
         points: list[Point] = []
-        for looked, so_far in straightened(footing, cells):
+        for looked, so_far in straightened(costmap, cells):
             yield looked
             points = so_far
         points = [self._pose, *points[1:], self.goal] if len(points) > 2 else [self._pose, self.goal]
-        for rounder in smoothed(footing, points):
+        for rounder in smoothed(costmap, points):
             yield len(rounder) * 4
             points = rounder
         self.route, self.unreachable = tuple(points), None
         self.number += 1
 
-    def _footing(self, mates: tuple[Pose2D, ...]) -> Costmap:
+    def _costmap(self, mates: tuple[Pose2D, ...]) -> Costmap:
         """Return the costmap of the present map, without the keep-out areas and where team-mates are and drive to."""
-        footing = Costmap(self._grid, self._prices)
-        footing.bar_runs(self._keepout)
+        costmap = Costmap(self._grid, self._prices)
+        costmap.bar_runs(self._keepout)
         for place, _ in self._barred:
-            footing.bar(place, BARRED_M, self._pose)
+            costmap.bar(place, BARRED_M, self._pose)
         for mate in mates:
             apart = hypot(mate.x - self._pose[0], mate.y - self._pose[1])
             if apart < MATE_NEAR_M:
@@ -183,8 +183,8 @@ class Planner:
                 for n in range(int(ahead_m / MATE_STEP_M) + 1):
                     way = n * MATE_STEP_M
                     place = mate.x + way * cos(mate.theta), mate.y + way * sin(mate.theta)
-                    footing.bar(place, self._apart_m, self._pose)
-        return footing
+                    costmap.bar(place, self._apart_m, self._pose)
+        return costmap
 
     def _fail(self, why: str, needed: bool) -> None:
         if needed:

@@ -18,17 +18,17 @@ CUT_MAX = 48
 """Maximum number of path cells that one shortcut replaces."""
 
 
-def straightened(footing: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, list[Point]]]:
+def straightened(costmap: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, list[Point]]]:
     """Replace cells by straight shortcuts that do not cost more; yield the work and the points so far."""
-    grid = footing.grid
+    grid = costmap.grid
     at = 0
     points = [grid.center(cells[0])]
     while at < len(cells) - 1:
         looked, to, span = 0, at + 1, min(CUT_MAX, len(cells) - 1 - at)
         while span > 1:
             looked += 2 * span
-            straight = footing.price_of_line(grid.center(cells[at]), grid.center(cells[at + span]))
-            if straight <= footing.price_of_cells(cells[at : at + span + 1]) + 0.5 * FREE * STRAIGHT:
+            straight = costmap.price_of_line(grid.center(cells[at]), grid.center(cells[at + span]))
+            if straight <= costmap.price_of_cells(cells[at : at + span + 1]) + 0.5 * FREE * STRAIGHT:
                 to = at + span
                 break
             span //= 2
@@ -39,7 +39,7 @@ def straightened(footing: Costmap, cells: Sequence[int]) -> Iterator[tuple[int, 
         yield looked, points
 
 
-def smoothed(footing: Costmap, points: list[Point]) -> Iterator[list[Point]]:
+def smoothed(costmap: Costmap, points: list[Point]) -> Iterator[list[Point]]:
     """Move each point to the middle of its neighbours, as far as that does not bring it nearer to a wall; yield the
     points.
     """
@@ -47,6 +47,6 @@ def smoothed(footing: Costmap, points: list[Point]) -> Iterator[list[Point]]:
         for n in range(1, len(points) - 1):
             (ax, ay), (x, y), (bx, by) = points[n - 1 : n + 2]
             moved = 0.5 * x + 0.25 * (ax + bx), 0.5 * y + 0.25 * (ay + by)
-            if footing.price(moved) <= max(footing.price((x, y)), FREE + 6):
+            if costmap.price(moved) <= max(costmap.price((x, y)), FREE + 6):
                 points[n] = moved
         yield points

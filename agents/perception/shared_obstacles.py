@@ -36,17 +36,17 @@ class SharedObstacles:
         seen: list[Feature],
         here: Pose2D,
         now: float,
-        glimpsed: Callable[[float, float, float], bool] = lambda x, y, within_m: False,
+        seen_near: Callable[[float, float, float], bool] = lambda x, y, within_m: False,
     ) -> list[Feature]:
         """Return `seen` and the reported obstacles, extrapolated to `now` [s], less those that are robots.
 
-        `glimpsed(x, y, within_m)` returns whether this robot's scan shows anything near (x, y) in `map`.
+        `seen_near(x, y, within_m)` returns whether this robot's scan shows anything near (x, y) in `map`.
         """
         known = list(seen)
         for note, at in self._told.values():
             vx, vy = note.twist_map
             x, y = note.x + vx * (now - at), note.y + vy * (now - at)
-            if now - at <= REMOTE_TRACK_S or (now - at <= PARTIAL_TRACK_S and glimpsed(x, y, SAME_M)):
+            if now - at <= REMOTE_TRACK_S or (now - at <= PARTIAL_TRACK_S and seen_near(x, y, SAME_M)):
                 robots = (here, *self._robots(now))
                 ours = any(p is not None and hypot(x - p.x, y - p.y) < SAME_M for p in robots)
                 if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):

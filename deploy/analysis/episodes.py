@@ -103,7 +103,7 @@ def episodes(run: Run) -> list[Episode]:
         found += [Episode(robot, "formation", *span) for span in stretches(e.t, e.changing, APART_S)]
         found.append(Episode(robot, "start", float(e.t[0]), float(e.t[0]) + START_S))
     found += [Episode(None, "formation", at_s, at_s) for at_s in requests(run)]
-    found += [Episode(None, "switch", reign.from_s, reign.from_s) for reign in run.reigns[1:]]
+    found += [Episode(None, "switch", led.from_s, led.from_s) for led in run.leader_terms[1:]]
     return sorted(found, key=lambda one: one.from_s)
 
 

@@ -49,13 +49,13 @@ class Run:
         return {robot: of for robot, of in found.items() if of is not None}
 
     @cached_property
-    def reigns(self) -> list[event_log.LeaderTerm]:
-        return event_log.reigns(self.events)
+    def leader_terms(self) -> list[event_log.LeaderTerm]:
+        return event_log.leader_terms(self.events)
 
     def led(self, robot: int, t: Array) -> Mask:
         """Return a mask of the times `t` [s] at which `robot` was the leader."""
         led = np.zeros(t.size, dtype=bool)
-        for reign in self.reigns:
-            if reign.robot_id == robot:
-                led |= (t >= reign.from_s) & (t < (np.inf if reign.until_s is None else reign.until_s))
+        for term in self.leader_terms:
+            if term.robot_id == robot:
+                led |= (t >= term.from_s) & (t < (np.inf if term.until_s is None else term.until_s))
         return led

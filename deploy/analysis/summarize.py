@@ -44,7 +44,7 @@ def summary_of(
     for robot in robots:
         _fill_way(robot, seen, scenario)
     chain = event_log.last_chain(events)
-    reigns = event_log.reigns(events)
+    leader_terms = event_log.leader_terms(events)
     violations = event_log.terms_that_went_back(events)
     summary = Summary(
         scenario=about.scenario,
@@ -59,8 +59,8 @@ def summary_of(
         arrived_at_s=next((line["t"] for line in reversed(events) if line["kind"] == "goal"), None),
         robots=robots,
         left_behind=[robot.id for robot in robots if robot.alive and _left_behind(robot, chain)],
-        leaders=reigns,
-        failovers=event_log.failovers(events, reigns),
+        leaders=leader_terms,
+        failovers=event_log.failovers(events, leader_terms),
         faults=event_log.faults(events),
         assertions=[
             Assertion("no_violations", not violations),

@@ -94,11 +94,11 @@ def _task(team: Team) -> bare_process.BareTask:
     agent.tick(0.0)
     count: Counter[str] = Counter()
     size: Counter[str] = Counter()
-    with listen(team.fleet, frozenset({f"{name}/*", f"{name}/lease/*"}), every=True) as ear:
-        ear.take()
+    with listen(team.fleet, frozenset({f"{name}/*", f"{name}/lease/*"}), every=True) as subscriber:
+        subscriber.take()
         since = clock.now()
         pause(team, SETTLE_S)
-        for arrival, _ in ear.take():
+        for arrival, _ in subscriber.take():
             if isinstance(arrival.payload, bytes) and _of_agent(arrival.key):
                 count[arrival.key] += 1
                 size[arrival.key] += len(arrival.payload)
@@ -125,14 +125,14 @@ def _elsewhere(team: Team) -> str:
 
 def _first_pose_s(team: Team, robot: int) -> float:
     """Kill and restart an agent; return the time [s] from its start to its first pose."""
-    with listen(team.fleet, frozenset({f"{robot_name(robot)}/pose"})) as ear:
+    with listen(team.fleet, frozenset({f"{robot_name(robot)}/pose"})) as subscriber:
         team.signal(robot, signal.SIGKILL)
         at = clock.now()
         team.restart(robot)
         stamps: list[float] = []
 
         def spoke() -> bool:
-            stamps.extend(message.header.stamp for _, message in ear.take() if message.header.stamp >= at)
+            stamps.extend(message.header.stamp for _, message in subscriber.take() if message.header.stamp >= at)
             return bool(stamps)
 
         team.wait_until(spoke, f"no pose of {robot_name(robot)}")

@@ -54,15 +54,15 @@ def _rows() -> Iterator[list[BenchRow]]:
     with Team(endless(ROBOTS)) as team, tempfile.TemporaryDirectory() as place:
         team.await_chain(ROBOTS)
         pause(team, SETTLE_S)
-        with listen(team.fleet, frozenset({"*/status"}), every=True) as ear:
-            alone = _lags(team, ear, WATCHED_S)
+        with listen(team.fleet, frozenset({"*/status"}), every=True) as subscriber:
+            alone = _lags(team, subscriber, WATCHED_S)
             yield _recorder(team, Path(place))
             yield _watch(team)
             with started([*LFA, *_view(team.fleet)]) as viewer:
                 pause(team, SETTLE_S)
-                ear.take()
+                subscriber.take()
                 before, since = cpu_s(viewer), clock.now()
-                watched = _lags(team, ear, WATCHED_S)
+                watched = _lags(team, subscriber, WATCHED_S)
                 share = 100.0 * (cpu_s(viewer) - before) / (clock.now() - since)
     yield [row("viewer bridge", Quantity("share of a core", "%", 10.0), share)]
     yield [
@@ -163,9 +163,9 @@ def _took(words: Sequence[str]) -> float:
     return clock.now() - since
 
 
-def _lags(team: Team, ear: Subscriber, duration_s: float) -> float:
+def _lags(team: Team, subscriber: Subscriber, duration_s: float) -> float:
     """Return the median [ms] of the agents' loop lags, each the largest of one second."""
-    ear.take()
+    subscriber.take()
     pause(team, duration_s)
-    told = [message for _, message in ear.take() if isinstance(message, Status)]
+    told = [message for _, message in subscriber.take() if isinstance(message, Status)]
     return statistics.median(status.counters["loop_lag_ms"] for status in told if "loop_lag_ms" in status.counters)

@@ -57,18 +57,18 @@ def _bridge_rows(endpoint: str) -> Iterator[list[BenchRow]]:
     with Team(endless(ROBOTS)) as team:
         team.await_chain(ROBOTS)
         pause(team, SETTLE_S)
-        with listen(team.fleet, frozenset({"*/status", "robot1/sensors"}), every=True) as ear:
+        with listen(team.fleet, frozenset({"*/status", "robot1/sensors"}), every=True) as subscriber:
             pause(team, WATCHED_S)
-            alone = _lag_ms(ear, {})
+            alone = _lag_ms(subscriber, {})
             words = [*LFA, "ros", "--serve", "--ros", endpoint, "--fleet", team.fleet.name]
             words += ["--connect", team.fleet.endpoint]
             with started(words, stdout=subprocess.DEVNULL) as bridge:
                 pause(team, SETTLE_S)
-                yield from _with_bridge(team, ear, bridge, endpoint, alone)
+                yield from _with_bridge(team, subscriber, bridge, endpoint, alone)
 
 
 def _with_bridge(
-    team: Team, ear: Subscriber, bridge: subprocess.Popen[bytes], endpoint: str, alone: float
+    team: Team, subscriber: Subscriber, bridge: subprocess.Popen[bytes], endpoint: str, alone: float
 ) -> Iterator[list[BenchRow]]:
     session = _session(team, endpoint)
     try:
@@ -80,11 +80,11 @@ def _with_bridge(
         pause(team, SETTLE_S)
         raw: Arrivals = {}
         bridged: Arrivals = {}
-        _lag_ms(ear, raw)
+        _lag_ms(subscriber, raw)
         before, count, lags = cpu_s(bridge), 0, []
         for _ in range(round(WATCHED_S / STEP_S)):
             pause(team, STEP_S)
-            lags.append(_lag_ms(ear, raw))
+            lags.append(_lag_ms(subscriber, raw))
             count += _take(heard, bridged)
         share = 100.0 * (cpu_s(bridge) - before) / WATCHED_S
     finally:
@@ -119,10 +119,10 @@ def _session(team: Team, endpoint: str) -> RosSession:
             pause(team, STEP_S)
 
 
-def _lag_ms(ear: Subscriber, raw: Arrivals) -> float:
+def _lag_ms(subscriber: Subscriber, raw: Arrivals) -> float:
     """Return the median loop lag [ms] since the last call (nan for none); note arrivals of `sensors`."""
     lags = []
-    for arrival, message in ear.take():
+    for arrival, message in subscriber.take():
         if isinstance(message, Status) and "loop_lag_ms" in message.counters:
             lags.append(message.counters["loop_lag_ms"])
         elif isinstance(message, Sensors):

@@ -28,23 +28,23 @@ APPROACH_M = 0.8
 Points = tuple[tuple[float, float], ...]
 
 
-def order_fleet(ear: Subscriber, change: Change, *, paused: bool | None = None) -> OrderOutcome:
-    """Change the mission of the fleet of `ear`, and return who carries it out. Raises Refused for what does not fit.
+def order_fleet(subscriber: Subscriber, change: Change, *, paused: bool | None = None) -> OrderOutcome:
+    """Change the mission of `subscriber`'s fleet, and return who carries it out. Raises Refused for what does not fit.
 
     `paused`: whether the leader then stands; None: as before.
     """
-    operator = Operator(ear.fleet.name, incarnations.drawn())
+    operator = Operator(subscriber.fleet.name, incarnations.drawn())
     call = OrderCall(change, paused, clock.now())
     ask_at = clock.now()
     while True:
         now = clock.now()
         order = call.said(now)
         if order is not None:
-            send(ear.bus, operator.order(order, now))
+            send(subscriber.bus, operator.order(order, now))
         elif now >= ask_at:
             ask_at = now + ASK_S
-            send(ear.bus, operator.ask("mission", now), operator.ask(QUESTION, now))
-        for _, message in ear.take():
+            send(subscriber.bus, operator.ask("mission", now), operator.ask(QUESTION, now))
+        for _, message in subscriber.take():
             match message:
                 case MissionNote(mission=mission):
                     call.hear_mission(mission)
@@ -53,7 +53,7 @@ def order_fleet(ear: Subscriber, change: Change, *, paused: bool | None = None) 
         outcome = call.outcome(clock.now())
         if outcome is not None:
             return outcome
-        ear.wait(0.02)
+        subscriber.wait(0.02)
 
 
 def unchanged(mission: Mission, _first: Mission) -> Mission:
@@ -90,9 +90,9 @@ def to_goal(x: float, y: float, theta_deg: float | None) -> Points:
     return ((x - APPROACH_M * cos(theta), y - APPROACH_M * sin(theta)), (x, y))
 
 
-def walls_of(ear: Subscriber) -> tuple[tuple[float, float, float, float], ...]:
+def walls_of(subscriber: Subscriber) -> tuple[tuple[float, float, float, float], ...]:
     """Return the walls [m] of the fleet's world, where its scenario is known on this machine."""
-    scenario = scenario_of_fleet(ear.fleet)
+    scenario = scenario_of_fleet(subscriber.fleet)
     return () if scenario is None else scenario.world.walls_m
 
 

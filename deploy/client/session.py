@@ -87,7 +87,7 @@ class Subscriber:
         """Names with a liveliness token at the last call of `take`."""
         return {owner for owner, _ in self._tokens}
 
-    def lives(self, name: str) -> bool:
+    def is_alive(self, name: str) -> bool:
         """Return True if `name` had a liveliness token at the last call of `take`.
 
         The router is not queried: in a session that also subscribes to the tokens, some such queries return nothing.

@@ -17,21 +17,21 @@ TOPICS = frozenset({"*/stop_state", "*/mission"})
 WAIT_S = 0.01
 
 
-def stop_fleet(ear: Subscriber, *, stand: bool) -> StopOutcome:
-    """Let the fleet of `ear` stand, or go again, and return who did, and who did not.
+def stop_fleet(subscriber: Subscriber, *, stand: bool) -> StopOutcome:
+    """Let the fleet of `subscriber` stand, or go again, and return who did, and who did not.
 
     Raises Refused for a resume where nothing is stopped, or where nobody answers.
     """
-    operator = Operator(ear.fleet.name, incarnations.drawn())
+    operator = Operator(subscriber.fleet.name, incarnations.drawn())
     call = StopCall(stand, clock.now())
-    call.name(tuple(agent.robot for agent in ear.fleet.team), all_known=False)
-    send(ear.bus, operator.ask("mission", clock.now()))
+    call.name(tuple(agent.robot for agent in subscriber.fleet.team), all_known=False)
+    send(subscriber.bus, operator.ask("mission", clock.now()))
     while True:
         now = clock.now()
         said = call.said(now)
         if said is not None:
-            send(ear.bus, operator.stop(said.word, said.gateways, now))
-        for arrival, message in ear.take():
+            send(subscriber.bus, operator.stop(said.word, said.gateways, now))
+        for arrival, message in subscriber.take():
             where = address(arrival.key)
             robot = None if where is None else robot_id_of(where.owner)
             match message:
@@ -39,16 +39,19 @@ def stop_fleet(ear: Subscriber, *, stand: bool) -> StopOutcome:
                     call.hear(robot, message, clock.now())
                 case MissionNote(mission=mission):
                     call.name(mission.robots)
-        call.name(_living(ear), all_known=False)
+        call.name(_living(subscriber), all_known=False)
         outcome = call.outcome(clock.now())
         if outcome is not None:
             return outcome
-        ear.wait(WAIT_S)
+        subscriber.wait(WAIT_S)
 
 
-def _living(ear: Subscriber) -> tuple[int, ...]:
+def _living(subscriber: Subscriber) -> tuple[int, ...]:
     """Return the robots whose agent or driver runs."""
-    names = (name.replace(DRIVER_PREFIX, "robot", 1) if name.startswith(DRIVER_PREFIX) else name for name in ear.living)
+    names = (
+        name.replace(DRIVER_PREFIX, "robot", 1) if name.startswith(DRIVER_PREFIX) else name
+        for name in subscriber.living
+    )
     return tuple(robot for name in names if (robot := robot_id_of(name)))
 
 

@@ -84,8 +84,8 @@ def here() -> list[HostPlan]:
 class FleetView:
     """State of a fleet from the newest messages of its hosts and robots, updated by `hear`."""
 
-    def __init__(self, ear: Subscriber, seen: Seen) -> None:
-        self._ear = ear
+    def __init__(self, subscriber: Subscriber, seen: Seen) -> None:
+        self._subscriber = subscriber
         self.seen = seen
         self._outbox = Outbox(seen.name, OPERATOR_NAME, incarnations.drawn(), first=1)
         self._state = FleetState()
@@ -103,13 +103,13 @@ class FleetView:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the machines: from the fleet's file, else all with a liveliness token or a received status."""
-        there = {name.removeprefix(HOST_PREFIX) for name in self._ear.living if name.startswith(HOST_PREFIX)}
+        there = {name.removeprefix(HOST_PREFIX) for name in self._subscriber.living if name.startswith(HOST_PREFIX)}
         return self.seen.hosts or tuple(sorted(there | self.hosts.keys()))
 
     def hear(self) -> list[tuple[float, Message]]:
         """Take in all received messages and return them with their arrival times [s]."""
         heard = []
-        for arrival, message in self._ear.take():
+        for arrival, message in self._subscriber.take():
             heard.append((arrival.at, message))
             self._state.update(arrival.at, message)
         return heard
@@ -130,7 +130,7 @@ class FleetView:
         return HostOrder(self._outbox.header("order", clock.now()), action, target, lines)
 
     def say(self, order: HostOrder) -> None:
-        send(self._ear.bus, self._outbox.envelope("order", order))
+        send(self._subscriber.bus, self._outbox.envelope("order", order))
 
     def obeyed(self, order: HostOrder, host: str) -> bool:
         """Return True if the last status of `host` confirms the order."""
@@ -162,14 +162,14 @@ class FleetView:
         return True
 
     def living(self, host: str) -> bool:
-        return self._ear.lives(f"{HOST_PREFIX}{host}")
+        return self._subscriber.is_alive(f"{HOST_PREFIX}{host}")
 
 
 @contextmanager
 def open_view(seen: Seen, topics: frozenset[str] = TOPICS) -> Iterator[FleetView]:
     """Open a session and provide a view of the fleet. Raises Refused when no router answers."""
-    with listen(FleetAddress(seen.name, seen.endpoint, (), seen.keys), topics) as ear:
-        yield FleetView(ear, seen)
+    with listen(FleetAddress(seen.name, seen.endpoint, (), seen.keys), topics) as subscriber:
+        yield FleetView(subscriber, seen)
 
 
 def await_first_status(view: FleetView, within_s: float) -> None:

@@ -26,7 +26,7 @@ from lfa.deploy.recording.provenance import provenance
 from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import RUNS, SCENARIO, About, make, toml
 from lfa.deploy.recording.simulation_time import WorldTime
-from lfa.deploy.run.termination import Referee
+from lfa.deploy.run.termination import Termination
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
@@ -66,7 +66,7 @@ def command(
         raise Refused(f"--split-mb {split_mb:g} --keep {keep}: must be 0 or more")
     plan = None if hosts is None else load(hosts)
     found = find(fleet, connect, keys)
-    with listen(found, frozenset({"**"}), every=True) as ear, Interrupts() as interrupts:
+    with listen(found, frozenset({"**"}), every=True) as subscriber, Interrupts() as interrupts:
         world = world_of_fleet(found)
         folder = _folder(found, out, world[0] if world else None)
         name, seed = (world[0].name, world[1]) if world else (found.name, 0)
@@ -76,10 +76,10 @@ def command(
         write_line(f"records fleet {found.name} into {folder}", sys.stderr if as_json else sys.stdout)
         begun, seen = clock.now(), WorldTime()
         followed = _Followed(recorder, seen, begun, world[0] if world else None)
-        send(ear.bus, Operator(found.name, incarnations.drawn()).ask("mission", begun))
+        send(subscriber.bus, Operator(found.name, incarnations.drawn()).ask("mission", begun))
         while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
             clock.sleep(POLL_S)
-            followed.write(ear)
+            followed.write(subscriber)
         recording = recorder.close()
         lasted_s = clock.now() - begun
     came = journals.copy(kept | journals.of_processes(found.name), folder)
@@ -88,7 +88,8 @@ def command(
         came += fetched
         for line in wrong:
             print(f"lfa: {line}", file=sys.stderr)
-    recording.dropped, recording.missing, recording.holes = ear.dropped, followed.holes.missing, followed.holes.widest()
+    recording.dropped = subscriber.dropped
+    recording.missing, recording.holes = followed.holes.missing, followed.holes.widest()
     summary = followed.summarize(folder, about, recording, lasted_s)
     code = 0 if recording.messages and not recording.dropped and not recording.unwritten else 1
     for line in recording.losses():
@@ -117,17 +118,17 @@ class _Followed:
         self._scenario = scenario
         self._mission: Mission | None = None
         self.holes = Holes()
-        self._referee = None if scenario is None else Referee(scenario)
+        self._termination = None if scenario is None else Termination(scenario)
 
-    def write(self, ear: Subscriber) -> None:
+    def write(self, subscriber: Subscriber) -> None:
         """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
-        for arrival, message in ear.take():
+        for arrival, message in subscriber.take():
             if isinstance(message, Truth):
                 self._seen.see(arrival.at, message.time_s)
             elif isinstance(message, MissionNote):
                 self._mission = message.mission
-            if self._referee is not None:
-                self._referee.see(message)
+            if self._termination is not None:
+                self._termination.see(message)
             at_s = self._seen.of(arrival.at) if self._seen.known else arrival.at - self._begun
             self._recorder.record(at_s, arrival.key, message)
             self.holes.see(at_s, arrival.key, message.header)
@@ -139,7 +140,7 @@ class _Followed:
                 return None
             fleet = Scenario(title=f"Fleet {about.fleet}", mission=self._mission, time_limit_s=max(lasted_s, 1.0))
             (folder / SCENARIO).write_text(toml(fleet), encoding="utf-8")
-        verdict = (self._referee.verdict if self._referee is not None else None) or Verdict("recorded")
+        verdict = (self._termination.verdict if self._termination is not None else None) or Verdict("recorded")
         summary = summarize(folder, about, verdict, lasted_s, ())
         summary.recording, summary.warnings = recording, recording.losses()
         if not self._seen.known:

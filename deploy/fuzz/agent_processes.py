@@ -33,7 +33,7 @@ class AgentProcess:
     @property
     def alive(self) -> bool:
         """True while this incarnation runs in the simulator."""
-        return self.simulator.lives(self.node)
+        return self.simulator.runs(self.node)
 
     @property
     def lease(self) -> Lease | None:

@@ -37,8 +37,8 @@ def command(
 ) -> int:
     address = listen_address(listen_at)
     found = find(fleet, connect, keys)
-    with listen(found, TOPICS) as ear:
-        page = _Page(ear, FleetMetrics(found.name))
+    with listen(found, TOPICS) as subscriber:
+        page = _Page(subscriber, FleetMetrics(found.name))
         if once:
             page.hear(FIRST_S)
             write_line(page.text().rstrip("\n"), sys.stdout)
@@ -58,24 +58,24 @@ def listen_address(text: str) -> tuple[str, int]:
 class _Page:
     """The text, from the newest messages. The server's thread reads it while the main thread hears."""
 
-    def __init__(self, ear: Subscriber, metrics: FleetMetrics) -> None:
-        self._ear = ear
+    def __init__(self, subscriber: Subscriber, metrics: FleetMetrics) -> None:
+        self._subscriber = subscriber
         self._metrics = metrics
         self._lock = threading.Lock()
 
     def hear(self, duration_s: float) -> None:
         until = clock.now() + duration_s
         while (left_s := until - clock.now()) > 0.0:
-            self._ear.wait(min(left_s, POLL_S))
+            self._subscriber.wait(min(left_s, POLL_S))
             with self._lock:
-                for arrival, message in self._ear.take():
+                for arrival, message in self._subscriber.take():
                     size = len(arrival.payload) if isinstance(arrival.payload, bytes) else 0
                     self._metrics.update(arrival.at, arrival.key, size, message)
             clock.sleep(min(POLL_S, max(0.0, until - clock.now())))
 
     def text(self) -> str:
         with self._lock:
-            return openmetrics(FAMILIES, self._metrics.samples(clock.now(), self._ear.dropped))
+            return openmetrics(FAMILIES, self._metrics.samples(clock.now(), self._subscriber.dropped))
 
 
 def _serve(page: _Page, address: tuple[str, int], fleet: str) -> None:

@@ -34,19 +34,19 @@ def command(
     for robot in robots:
         if robot < 1:
             raise Refused(f"id {robot}: must be a robot's, from 1 upwards")
-    with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status", "*/mission"})) as ear:
-        send(ear.bus, Operator(ear.fleet.name, incarnations.drawn()).ask("mission", clock.now()))
-        leader, _, team = _listen(ear, LISTEN_S)
+    with listen(find(fleet, connect, keys), frozenset({"*/event", "*/pose", "*/status", "*/mission"})) as subscriber:
+        send(subscriber.bus, Operator(subscriber.fleet.name, incarnations.drawn()).ask("mission", clock.now()))
+        leader, _, team = _listen(subscriber, LISTEN_S)
         for robot in robots:
             if team and robot not in team:
                 raise Refused(f"id {robot}: must be one of the fleet's robots {', '.join(map(str, team))}")
-            if ear.lives(robot_name(robot)):
+            if subscriber.is_alive(robot_name(robot)):
                 raise Refused(f"robot {robot} lives: end its process first, or let it join")
         asked = leader is None
         waits = ""
         if asked:
-            _say(ear, robots)
-            leader, waits, _ = _listen(ear, ANSWER_S_MAX, until_led=True)
+            _say(subscriber, robots)
+            leader, waits, _ = _listen(subscriber, ANSWER_S_MAX, until_led=True)
     if as_json:
         print(msgspec.json.encode({"robots": robots, "asked": asked, "leader": leader}).decode())
     elif not asked:
@@ -58,15 +58,15 @@ def command(
     return 0 if leader is not None else 1
 
 
-def _say(ear: Subscriber, robots: list[int]) -> None:
+def _say(subscriber: Subscriber, robots: list[int]) -> None:
     """Publish the command; it covers every incarnation started before this moment, a later one may join."""
     number = incarnations.drawn()
-    operator = Operator(ear.fleet.name, number)
-    lives = [[robot, number] for robot in robots]
-    send(ear.bus, operator.command("forget", clock.now(), lives=lives))
+    operator = Operator(subscriber.fleet.name, number)
+    ended = [[robot, number] for robot in robots]
+    send(subscriber.bus, operator.command("forget", clock.now(), lives=ended))
 
 
-def _listen(ear: Subscriber, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:
+def _listen(subscriber: Subscriber, seconds: float, until_led: bool = False) -> tuple[int | None, str, tuple[int, ...]]:
     """Return the leader, the status of a robot that waits for others, and the mission's robots, as far as received.
 
     With `until_led`, return as soon as a robot leads.
@@ -75,8 +75,8 @@ def _listen(ear: Subscriber, seconds: float, until_led: bool = False) -> tuple[i
     waits, team = "", tuple[int, ...]()
     until = clock.now() + seconds
     while clock.now() < until and not (until_led and leader is not None):
-        ear.wait(0.05)
-        for _, message in ear.take():
+        subscriber.wait(0.05)
+        for _, message in subscriber.take():
             match message:
                 case PoseStamped(role=Role.LEADER) | Event(kind="lease", data={"change": "acquired"}):
                     leader = robot_id_of(message.header.sender)

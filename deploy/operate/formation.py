@@ -29,9 +29,9 @@ def command(
 ) -> int:
     """Ask the leader for the formation `side`; return 0 if it acknowledged, else 1. Raises Refused."""
     named(side, FormationSpec())
-    with listen(find(fleet, connect, keys), frozenset({"*/event"})) as ear:
+    with listen(find(fleet, connect, keys), frozenset({"*/event"})) as subscriber:
         clock.sleep(JOINED_S)
-        answer = ask(ear, side)
+        answer = ask(subscriber, side)
     if as_json:
         facts = {"side": side, "acknowledged": answer is not None}
         print(msgspec.json.encode(facts if answer is None else {**facts, "leader": answer.header.sender}).decode())
@@ -42,18 +42,18 @@ def command(
     return 0 if answer is not None else 1
 
 
-def ask(ear: Subscriber, side: str) -> Event | None:
+def ask(subscriber: Subscriber, side: str) -> Event | None:
     """Send the request to the fleet; return the leader's acknowledging event, or None if none comes in time."""
-    say(ear, side)
+    say(subscriber, side)
     until = clock.now() + ANSWER_S_MAX
     while clock.now() < until:
-        ear.wait(0.05)
-        for _, message in ear.take():
+        subscriber.wait(0.05)
+        for _, message in subscriber.take():
             if isinstance(message, Event) and message.kind == "formation" and message.data.get("by") == "operator":
                 return message
     return None
 
 
-def say(ear: Subscriber, side: str) -> None:
-    operator = Operator(ear.fleet.name, incarnations.drawn())
-    send(ear.bus, operator.command("formation", clock.now(), side=side))
+def say(subscriber: Subscriber, side: str) -> None:
+    operator = Operator(subscriber.fleet.name, incarnations.drawn())
+    send(subscriber.bus, operator.command("formation", clock.now(), side=side))

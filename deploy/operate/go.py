@@ -27,8 +27,10 @@ def command(
     """Change the team's goal; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
     points = _points(x, y, theta, route)
     if points is None:
-        return pause.say("go", lambda ear: unchanged, fleet, connect, keys, as_json, paused=False)
-    return pause.say("go", lambda ear: along(points, walls_of(ear)), fleet, connect, keys, as_json, paused=False)
+        return pause.say("go", lambda subscriber: unchanged, fleet, connect, keys, as_json, paused=False)
+    return pause.say(
+        "go", lambda subscriber: along(points, walls_of(subscriber)), fleet, connect, keys, as_json, paused=False
+    )
 
 
 def _points(x: float | None, y: float | None, theta: float | None, route: Path | None) -> Points | None:

@@ -22,8 +22,8 @@ def command(
 ) -> int:
     """Send the team to the mission's first way-point; return 0 if a leader has acknowledged it, else 1."""
 
-    def homewards(ear: Subscriber) -> Change:
-        walls = walls_of(ear)
+    def homewards(subscriber: Subscriber) -> Change:
+        walls = walls_of(subscriber)
 
         def change(mission: Mission, first: Mission) -> Mission:
             return along((first.leading.route_m[0],), walls)(mission, first)

@@ -21,7 +21,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
 ) -> int:
     """Pause the team; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
-    return say("pause", lambda ear: unchanged, fleet, connect, keys, as_json, paused=True)
+    return say("pause", lambda subscriber: unchanged, fleet, connect, keys, as_json, paused=True)
 
 
 def say(
@@ -35,8 +35,8 @@ def say(
     paused: bool | None = None,
 ) -> int:
     """Change a fleet's mission as `make` says, print what became of it, and return the exit code. Raises Refused."""
-    with listen(find(fleet, connect, keys), TOPICS) as ear:
-        outcome = order_fleet(ear, make(ear), paused=paused)
+    with listen(find(fleet, connect, keys), TOPICS) as subscriber:
+        outcome = order_fleet(subscriber, make(subscriber), paused=paused)
     if as_json:
         print(msgspec.json.encode(outcome).decode())
     elif outcome.leader is None:

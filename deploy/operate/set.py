@@ -29,7 +29,7 @@ def command(
 ) -> int:
     """Change the mission's values; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
     change = to_values(values)
-    return pause.say(f"set {' '.join(values)}", lambda ear: change, fleet, connect, keys, as_json)
+    return pause.say(f"set {' '.join(values)}", lambda subscriber: change, fleet, connect, keys, as_json)
 
 
 def to_values(values: list[str]) -> Change:

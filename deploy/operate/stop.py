@@ -24,8 +24,8 @@ def command(
 
 def say(fleet: str | None, connect: str | None, keys: Path | None, as_json: bool, *, stand: bool) -> int:
     """Say stop or resume to a fleet, print what became of it, and return the exit code. Raises Refused."""
-    with listen(find(fleet, connect, keys), TOPICS) as ear:
-        outcome = stop_fleet(ear, stand=stand)
+    with listen(find(fleet, connect, keys), TOPICS) as subscriber:
+        outcome = stop_fleet(subscriber, stand=stand)
     if as_json:
         print(msgspec.json.encode(outcome).decode())
     else:

@@ -39,19 +39,19 @@ def command(
         raise Refused(f"--speed {speed:g} --turn {turn:g}: must be above 0 [m/s, rad/s]")
     if not sys.stdin.isatty():
         raise Refused("teleop needs a terminal: its keys are read one by one")
-    with listen(find(fleet, connect, keys), frozenset()) as ear:
+    with listen(find(fleet, connect, keys), frozenset()) as subscriber:
         print(HELP)
         before = termios.tcgetattr(sys.stdin)
         tty.setcbreak(sys.stdin)
         try:
-            _drive(ear, speed, turn)
+            _drive(subscriber, speed, turn)
         finally:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
     return 0
 
 
-def _drive(ear: Subscriber, speed: float, turn: float) -> None:
-    operator = Operator(ear.fleet.name, incarnations.drawn())
+def _drive(subscriber: Subscriber, speed: float, turn: float) -> None:
+    operator = Operator(subscriber.fleet.name, incarnations.drawn())
     held, pressed_at = (0.0, 0.0), clock.now()
     while True:
         ready, _, _ = select.select([sys.stdin], [], [], PERIOD_S)
@@ -65,5 +65,5 @@ def _drive(ear: Subscriber, speed: float, turn: float) -> None:
             held = (0.0, 0.0)
         v, omega = speed * held[0], turn * held[1]
         drive = operator.command("teleop", now, v_mps=v, omega_radps=omega)
-        send(ear.bus, drive, operator.stop(None, (), now))
-    send(ear.bus, operator.command("teleop", clock.now(), v_mps=0.0, omega_radps=0.0))
+        send(subscriber.bus, drive, operator.stop(None, (), now))
+    send(subscriber.bus, operator.command("teleop", clock.now(), v_mps=0.0, omega_radps=0.0))

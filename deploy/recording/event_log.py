@@ -122,13 +122,13 @@ def asked_by_leader(line: Line) -> bool:
     return bool(line.get("by", "operator") != "operator")
 
 
-def reigns(events: Sequence[Line]) -> list[LeaderTerm]:
+def leader_terms(events: Sequence[Line]) -> list[LeaderTerm]:
     """Return the leaders' terms in order, from the leader commands accepted by all gateways."""
     found: list[LeaderTerm] = []
     done = endings(events)
     for line in of_kind(events, "leader_command"):
         term, robot, at_s = (line["term"][0], line["term"][1]), line["robot"], line["t"]
-        if any((reign.term, reign.robot_id) == (term, robot) for reign in found):
+        if any((led.term, led.robot_id) == (term, robot) for led in found):
             continue
         ended = _ending(done, found[-1], at_s) if found else None
         if found:
@@ -155,14 +155,14 @@ def places(events: Sequence[Line], robots: Sequence[int], end_s: float) -> dict[
     return {robot: [*known, (end_s, known[-1][1])] for robot, known in steps.items()}
 
 
-def failovers(events: Sequence[Line], reigns: Sequence[LeaderTerm]) -> list[Failover]:
+def failovers(events: Sequence[Line], leader_terms: Sequence[LeaderTerm]) -> list[Failover]:
     """Return one failover for each fault or death that ended a leader's term.
 
     None for durations that the run did not reach.
     """
     found = []
-    for reign, successor in zip_longest(reigns, reigns[1:]):
-        fault = next((f for f in endings(events) if _ended_by(f, reign) and f.at_s == reign.until_s), None)
+    for led, successor in zip_longest(leader_terms, leader_terms[1:]):
+        fault = next((f for f in endings(events) if _ended_by(f, led) and f.at_s == led.until_s), None)
         if fault is None:
             continue
         later = [line for line in events if line["t"] >= fault.at_s]
@@ -175,12 +175,12 @@ def failovers(events: Sequence[Line], reigns: Sequence[LeaderTerm]) -> list[Fail
         found.append(
             Failover(
                 cause=fault.kind,
-                victim=reign.robot_id,
+                victim=led.robot_id,
                 at_s=fault.at_s,
                 leader=leader,
                 lease_ms=_ms(fault.at_s, acquired[0] if acquired else None),
                 first_command_ms=_ms(fault.at_s, None if successor is None else successor.from_s),
-                chain_ms=_ms(fault.at_s, _chain_closed(later, reign.robot_id)),
+                chain_ms=_ms(fault.at_s, _chain_closed(later, led.robot_id)),
             )
         )
     return found
@@ -192,8 +192,8 @@ def last_chain(events: Sequence[Line]) -> list[int]:
     Events after `over` are ignored: when the run stops, the leader sees other robots leave before itself.
     """
     over_at = _over_at(events)
-    spoken = [line for line in of_kind(events, "chain") if line["term"] is not None and line["t"] <= over_at]
-    newest = max(spoken, key=lambda line: (line["term"], line.get("seq", 0)), default=None)
+    announced = [line for line in of_kind(events, "chain") if line["term"] is not None and line["t"] <= over_at]
+    newest = max(announced, key=lambda line: (line["term"], line.get("seq", 0)), default=None)
     return [] if newest is None else list(newest["chain"])
 
 
@@ -265,8 +265,8 @@ _SHAPES: dict[str, type[_LoggedEvent]] = {
 }
 
 
-def _ended_by(fault: FaultDone, reign: LeaderTerm) -> bool:
-    return fault.kind in ENDING_FAULTS and fault.target == reign.robot_id and fault.at_s >= reign.from_s
+def _ended_by(fault: FaultDone, led: LeaderTerm) -> bool:
+    return fault.kind in ENDING_FAULTS and fault.target == led.robot_id and fault.at_s >= led.from_s
 
 
 def _given_up(events: Sequence[Line], before: LeaderTerm, successor: int) -> str:
@@ -277,9 +277,9 @@ def _given_up(events: Sequence[Line], before: LeaderTerm, successor: int) -> str
     return next((str(e["change"]) for e in said if e.get("change") not in (None, "acquired")), "handover")
 
 
-def _ending(done: Sequence[FaultDone], reign: LeaderTerm, before_s: float) -> FaultDone | None:
+def _ending(done: Sequence[FaultDone], led: LeaderTerm, before_s: float) -> FaultDone | None:
     """Return the first fault until `before_s` [s] that can have ended the term."""
-    return next((fault for fault in done if _ended_by(fault, reign) and fault.at_s <= before_s), None)
+    return next((fault for fault in done if _ended_by(fault, led) and fault.at_s <= before_s), None)
 
 
 def _chain_closed(later: Sequence[Line], victim: int) -> float | None:

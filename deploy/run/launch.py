@@ -31,7 +31,7 @@ from lfa.deploy.run.progress import Progress, progress
 from lfa.deploy.run.progress_rows import ProgressRows
 from lfa.deploy.run.recorder_process import RecorderTask, RunResult
 from lfa.deploy.run.restarted_processes import RestartedProcesses
-from lfa.deploy.run.termination import Referee
+from lfa.deploy.run.termination import Termination
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
@@ -98,7 +98,7 @@ class _Launch:
         task = msgspec.json.encode(RecorderTask(str(folder), about, self._endpoint, str(sockets))).decode()
         self._rows = rows(folder, about, self._endpoint, drawn.mission, task)
         self._group = ProcessGroup(folder)
-        self._referee = Referee(drawn)
+        self._termination = Termination(drawn)
         self._state = FleetState()
         self._progress = ProgressRows(drawn.mission.robots, self._state)
         self._time = WorldTime()
@@ -136,17 +136,17 @@ class _Launch:
         try:
             self._start(interrupts)
             show_at = clock.now()
-            while verdict_of(interrupts) is None and self._referee.verdict is None:
+            while verdict_of(interrupts) is None and self._termination.verdict is None:
                 self._listen()
                 self._check(view)
-                self._faults.do_due(self._referee.leader, lambda text: view.note(self._progress, text))
+                self._faults.do_due(self._termination.leader, lambda text: view.note(self._progress, text))
                 if clock.now() >= show_at:
                     show_at += SHOW_EVERY_S
-                    view.show(self._progress, self._referee.leader)
+                    view.show(self._progress, self._termination.leader)
                 clock.sleep(STEP_S)
         except _Aborted as aborted:
             return verdict_of(interrupts) or Verdict("aborted", str(aborted))
-        return verdict_of(interrupts) or self._referee.verdict or Verdict("aborted")
+        return verdict_of(interrupts) or self._termination.verdict or Verdict("aborted")
 
     def _start(self, interrupts: Interrupts) -> None:
         """Start the router, then the recorder, so that it misses no message; then world and agents in any order."""
@@ -195,7 +195,7 @@ class _Launch:
             self._time.see(at, message.time_s)
             self._processes.report_restarts(message.time_s)
         self._faults.hear(message)
-        self._referee.see(message)
+        self._termination.see(message)
         self._state.update(at, message)
 
     # --- supervision -----------------------------------------------------------------------------------------------

@@ -146,10 +146,10 @@ class _Tape:
     def _heard(self, arrival: Arrival) -> Envelope | None:
         """Return key and message to record; a liveliness change becomes an event published by the recorder."""
         match arrival.payload:
-            case PeerUp(name=name, incarnation=life):
-                return self._token("peer_up", name, life)
-            case PeerDown(name=name, incarnation=life):
-                return self._token("peer_down", name, life)
+            case PeerUp(name=name, incarnation=incarnation):
+                return self._token("peer_up", name, incarnation)
+            case PeerDown(name=name, incarnation=incarnation):
+                return self._token("peer_down", name, incarnation)
         message = self._decoder.message(arrival)
         return None if message is None else Envelope(arrival.key, message)
 

@@ -24,7 +24,7 @@ from lfa.deploy.recording.run_folder import JOURNALS, About, make
 from lfa.deploy.recording.run_memory import RunMemory
 from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.finish import Ended, finish, verdict_of
-from lfa.deploy.run.termination import Referee
+from lfa.deploy.run.termination import Termination
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import OperatorNote
@@ -129,18 +129,18 @@ class SimulatedRun:
         self._journals: dict[str, Journal] = {}
         self._journal_folder = journals
         self._record = record
-        self._referee = Referee(drawn)
+        self._termination = Termination(drawn)
         self._schedule = FaultSchedule(faults)
         self._check_at = 0.0
         """Time [s] of the next look at the schedule: the same however the calls of `advance` fall."""
         self._operator = Operator(FLEET, 1)
-        self._lives: dict[str, int] = {}
+        self._incarnations: dict[str, int] = {}
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
         self._simulator.reborn = self._journal
         self._show_at = inf if journals is None else time.perf_counter() + SHOW_EVERY_S
         self._say("start", scenario=drawn.name, seed=seed)
-        self._add(World(FLEET, drawn, seed, self._next_life(WORLD_NAME), start_at=0.0))
+        self._add(World(FLEET, drawn, seed, self._next_incarnation(WORLD_NAME), start_at=0.0))
         if drawn.mission.witness:
             self._add(Witness(FLEET, 1, 1))
         for driver in drivers:
@@ -157,7 +157,7 @@ class SimulatedRun:
 
     @property
     def leader(self) -> int | None:
-        return self._referee.leader
+        return self._termination.leader
 
     @property
     def radio(self) -> Radio:
@@ -167,9 +167,9 @@ class SimulatedRun:
     @property
     def verdict(self) -> Verdict | None:
         """Outcome, once the run is over."""
-        if self._referee.verdict is None and self.now >= self._scenario.time_limit_s + SILENCE_S_MAX:
+        if self._termination.verdict is None and self.now >= self._scenario.time_limit_s + SILENCE_S_MAX:
             return Verdict("aborted", "the world fell silent")
-        return self._referee.verdict
+        return self._termination.verdict
 
     @property
     def faults_left(self) -> list[str]:
@@ -183,13 +183,13 @@ class SimulatedRun:
 
     def advance(self, until: float, over: Callable[[], bool] = lambda: False) -> None:
         """Go on to virtual time `until` [s], to the verdict, or until `over()`."""
-        referee, simulator = self._referee, self._simulator
+        termination, simulator = self._termination, self._simulator
         until = min(until, self._scenario.time_limit_s + SILENCE_S_MAX)
         while self.verdict is None and simulator.now < until and not over():
             if simulator.now >= self._check_at:
                 self._do_due()
             simulator.run(
-                min(until, self._check_at), over=lambda: self._shown() or referee.verdict is not None or over()
+                min(until, self._check_at), over=lambda: self._shown() or termination.verdict is not None or over()
             )
 
     def close(self, instead: Verdict | None = None) -> Verdict:
@@ -202,7 +202,7 @@ class SimulatedRun:
 
     def _do_due(self) -> None:
         now = self._simulator.now
-        for action, victim in self._schedule.due(now, self._referee.leader):
+        for action, victim in self._schedule.due(now, self._termination.leader):
             self._do(action, victim)
         next_s = self._schedule.pending[0].at_s if self._schedule.pending else inf
         self._check_at = next_s if next_s > now else now + LEADER_WAIT_S
@@ -211,7 +211,7 @@ class SimulatedRun:
         """Show the progress from time to time; return False, so that it stands beside conditions of an end."""
         if time.perf_counter() >= self._show_at:
             self._show_at = time.perf_counter() + SHOW_EVERY_S
-            leader = "no leader" if self._referee.leader is None else f"leader {self._referee.leader}"
+            leader = "no leader" if self._termination.leader is None else f"leader {self._termination.leader}"
             limit_s = self._scenario.time_limit_s
             write_line(f"{self._simulator.now:7.1f} s of at most {limit_s:g} s simulated, {leader}", sys.stderr)
         return False
@@ -252,7 +252,7 @@ class SimulatedRun:
 
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
         self._record(now, key, message)
-        self._referee.see(message)
+        self._termination.see(message)
 
     def _say(self, kind: str, **data: object) -> None:
         now = self._simulator.now
@@ -270,12 +270,12 @@ class SimulatedRun:
         return journal
 
     def _agent(self, robot_id: int) -> Agent:
-        life = self._next_life(robot_name(robot_id))
-        return Agent(robot_id, life, FLEET, life)
+        incarnation = self._next_incarnation(robot_name(robot_id))
+        return Agent(robot_id, incarnation, FLEET, incarnation)
 
-    def _next_life(self, name: str) -> int:
-        self._lives[name] = self._lives.get(name, 0) + 1
-        return self._lives[name]
+    def _next_incarnation(self, name: str) -> int:
+        self._incarnations[name] = self._incarnations.get(name, 0) + 1
+        return self._incarnations[name]
 
     def _flush(self) -> None:
         """Flush the journals now and every `JOURNAL_FLUSH_S`, to limit their use of memory."""

@@ -27,7 +27,7 @@ SLOT_SHARE = 0.5
 TRACKING_S_MAX = TOPIC["tracking"].timeout_s or 1.0
 
 
-class Referee:
+class Termination:
     """Judge of a run from every Truth and Event; `verdict` is None until the run is over.
 
     `chain` is the present chain, `leader` the robot whose leader command of the highest term was accepted last.

@@ -51,7 +51,7 @@ class FleetEngine:
         """Listen, and wait for the mission. Raises Refused for a fleet that says none."""
         self._fleet = fleet
         self._open = ExitStack()
-        self._ear: Subscriber = self._open.enter_context(listen(fleet, HEARD))
+        self._subscriber: Subscriber = self._open.enter_context(listen(fleet, HEARD))
         self._operator = Operator(fleet.name, incarnations.drawn())
         self._time = WorldTime()
         self._call: tuple[StopCall, bool] | None = None
@@ -72,11 +72,11 @@ class FleetEngine:
         return [self._picture]
 
     def _mission(self) -> Mission:
-        send(self._ear.bus, self._operator.ask("mission", clock.now()))
+        send(self._subscriber.bus, self._operator.ask("mission", clock.now()))
         until = clock.now() + MISSION_S
         while clock.now() < until:
-            self._ear.wait(0.05)
-            for _, message in self._ear.take():
+            self._subscriber.wait(0.05)
+            for _, message in self._subscriber.take():
                 if isinstance(message, MissionNote):
                     return message.mission
         self.close()
@@ -99,7 +99,7 @@ class FleetEngine:
     def advance(self) -> None:
         """Take in what came, say what is due, and repeat what has not been answered yet."""
         now = clock.now()
-        for arrival, message in self._ear.take():
+        for arrival, message in self._subscriber.take():
             where = address(arrival.key)
             if where is None:
                 continue
@@ -114,7 +114,7 @@ class FleetEngine:
         self._go_on_restarting(now)
         if now >= self._beat_at and self._call is None:
             self._beat_at = now + BEAT_S
-            send(self._ear.bus, self._operator.stop(None, (), now))
+            send(self._subscriber.bus, self._operator.stop(None, (), now))
 
     def _at(self, arrived: float) -> float:
         """Return the time [s] of the page: that of the world, without one since the page began to look."""
@@ -138,7 +138,7 @@ class FleetEngine:
         try:
             said = call.said(now)
             if said is not None:
-                send(self._ear.bus, self._operator.stop(said.word, said.gateways, now))
+                send(self._subscriber.bus, self._operator.stop(said.word, said.gateways, now))
             outcome = call.outcome(now)
         except Refused as refused:
             self._call = None
@@ -158,7 +158,7 @@ class FleetEngine:
                 self._tell(f"restart {robot}: no lfa run is there that starts it again", alarm=True)
             elif now >= again:
                 self._restarts[robot] = until, now + RESTART_EVERY_S
-                send(self._ear.bus, self._operator.command(RESTART, now, robot=robot))
+                send(self._subscriber.bus, self._operator.command(RESTART, now, robot=robot))
 
     def _tell(self, text: str, *, alarm: bool) -> None:
         """Add a line to what happens."""
@@ -196,7 +196,7 @@ class FleetEngine:
                 if agent.fleet != self._fleet.name or agent.robot != robot or identify(agent.identity.pid) is None:
                     continue
                 if not told:
-                    send(self._ear.bus, self._operator.event("fault", clock.now(), deed=action, robot=robot))
+                    send(self._subscriber.bus, self._operator.event("fault", clock.now(), deed=action, robot=robot))
                     clock.sleep(SENT_S)
                 told = True
                 if send_signal(agent.identity, SIGNALS[action]):
@@ -212,8 +212,11 @@ class FleetEngine:
         now = clock.now()
         said = note(self._operator, now, action, target, self._robots)
         robot = whole_number(target)
-        send(self._ear.bus, self._operator.event("fault", now, deed=action, robot=target if robot is None else robot))
-        send(self._ear.bus, said)
+        send(
+            self._subscriber.bus,
+            self._operator.event("fault", now, deed=action, robot=target if robot is None else robot),
+        )
+        send(self._subscriber.bus, said)
         return f"{action} {target}".strip()
 
     def close(self) -> None:

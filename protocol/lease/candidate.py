@@ -119,35 +119,35 @@ class Candidate:
         return {m.id: m for m in sorted(self._promised) if not superseded(m)}
 
     def full_house(
-        self, config: Config, universe: tuple[int, ...], superseded: Callable[[Member], bool]
+        self, config: Config, member_ids: tuple[int, ...], superseded: Callable[[Member], bool]
     ) -> tuple[Member, ...]:
         """Return the members of a unanimous start (E18): the newest incarnation of every id.
 
         Empty unless all ids have promised, without a quorum of `config`. Ids that this attempt forgets are not needed
         (E20).
         """
-        lives = self._answering(superseded)
+        answering = self._answering(superseded)
         forgotten = {m.id for m in self.forget}
-        if not all(i in lives or i in forgotten for i in universe) or self.has_quorum(config):
+        if not all(i in answering or i in forgotten for i in member_ids) or self.has_quorum(config):
             return ()
-        return tuple(lives[i] for i in universe if i in lives)
+        return tuple(answering[i] for i in member_ids if i in answering)
 
-    def blank_majority(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
-        """Return the newest incarnations of more than half of all ids, the witness (last of `universe`) included (E19).
+    def blank_majority(self, member_ids: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
+        """Return the newest incarnations of more than half of all ids, the witness (the last id) included (E19).
 
         Empty if there are too few, or if a single promiser remembers a config.
         """
-        lives = self._answering(superseded)
-        here = tuple(lives[i] for i in universe if i in lives)
-        fine = 2 * len(here) > len(universe) and universe[-1] in lives and not self._with_state
+        answering = self._answering(superseded)
+        here = tuple(answering[i] for i in member_ids if i in answering)
+        fine = 2 * len(here) > len(member_ids) and member_ids[-1] in answering and not self._with_state
         return here if fine else ()
 
-    def whoever_answers(self, universe: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
+    def any_answering(self, member_ids: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
         """Return the newest incarnations that promised (E21); the gateways of all other robots must be fenced first."""
-        lives = self._answering(superseded)
-        absent = (i for i in universe if i not in lives and i != WITNESS_ID)
+        answering = self._answering(superseded)
+        absent = (i for i in member_ids if i not in answering and i != WITNESS_ID)
         self._absent = frozenset(Grantee(NO_TERM, Member(i, ANY_LIFE)) for i in absent)
-        return tuple(lives[i] for i in universe if i in lives)
+        return tuple(answering[i] for i in member_ids if i in answering)
 
     def expects_nobody(self) -> None:
         """Clear the placeholders of absent robots: E21 does not apply (any more)."""

@@ -31,8 +31,8 @@ class Election:
         self._timing = timing
         majority = mission.cold_start == "majority" and mission.witness
         self._majority_from = now + COLD_START_S if majority else NEVER
-        self._lonely_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
-        self._lonely_from = now + self._lonely_s
+        self._quorum_loss_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
+        self._quorum_lost_from = now + self._quorum_loss_s
 
     def rank(self, config: Config, robot_id: int, peers: FailureDetector) -> int:
         return rank(config, robot_id, lambda other: other.id not in self.may_lead or peers.is_gone(other))
@@ -50,7 +50,7 @@ class Election:
 
     def held(self, now: float) -> None:
         """Record that a lease is held at `now` [s], which restarts the time to E21."""
-        self._lonely_from = now + self._lonely_s
+        self._quorum_lost_from = now + self._quorum_loss_s
 
     def forget(self, lost: tuple[Member, ...], now: float) -> None:
         self._forget, self.forget_until = lost, now + FORGET_GRANTS * self._timing.grant_s
@@ -62,10 +62,10 @@ class Election:
         self, candidate: Candidate, config: Config, peers: FailureDetector, now: float
     ) -> tuple[Member, ...]:
         """Return the members of a fresh config if no quorum of the known one answers (E18, E19, E21); else ()."""
-        lives = candidate.full_house(config, self.all_member_ids, peers.is_superseded)
-        if not lives and is_first(config) and now >= self._majority_from:
-            lives = candidate.blank_majority(self.all_member_ids, peers.is_superseded)
+        incarnations = candidate.full_house(config, self.all_member_ids, peers.is_superseded)
+        if not incarnations and is_first(config) and now >= self._majority_from:
+            incarnations = candidate.blank_majority(self.all_member_ids, peers.is_superseded)
         asked_all = now >= candidate.began_at + self._timing.heartbeat_s
-        if not lives and not is_first(config) and now >= self._lonely_from and asked_all:
-            lives = candidate.whoever_answers(self.all_member_ids, peers.is_superseded)
-        return lives
+        if not incarnations and not is_first(config) and now >= self._quorum_lost_from and asked_all:
+            incarnations = candidate.any_answering(self.all_member_ids, peers.is_superseded)
+        return incarnations

@@ -66,14 +66,14 @@ def led_by(config: Config, leader: Member, term: Term, gone: Gone, keep_leader: 
     return Config(Version(term, 0), config.voters, config.tie, config.previous, (leader, *rest))
 
 
-def unanimous_config(config: Config, leader: Member, term: Term, lives: tuple[Member, ...]) -> Config:
-    """Return a fresh config of all the incarnations `lives` that promised; each of them must accept it (E18)."""
-    line = [leader.id, *ids(config.chain), *ids(lives)]
-    known = {m.id: m for m in lives}
+def unanimous_config(config: Config, leader: Member, term: Term, incarnations: tuple[Member, ...]) -> Config:
+    """Return a fresh config of all the `incarnations` that promised; each of them must accept it (E18)."""
+    line = [leader.id, *ids(config.chain), *ids(incarnations)]
+    known = {m.id: m for m in incarnations}
     chain = tuple(known[i] for i in dict.fromkeys(line) if i in known and i != WITNESS_ID)
     tie = known.get(WITNESS_ID)
     voters = chosen((), chain, tie)
-    return Config(Version(term, 0), voters, tie, Electorate(lives, tie, "all"), chain)
+    return Config(Version(term, 0), voters, tie, Electorate(incarnations, tie, "all"), chain)
 
 
 def chosen(kept: tuple[Member, ...], chain: tuple[Member, ...], witness: Member | None) -> tuple[Member, ...]:

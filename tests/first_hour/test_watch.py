@@ -41,8 +41,8 @@ def test_the_keys_are_listed_in_sixty_columns() -> None:
 def test_a_kill_is_asked_for(monkeypatch: pytest.MonkeyPatch, answer: str, killed: list[str]) -> None:
     done: list[str] = []
     monkeypatch.setattr(watch.fault, "command", lambda action, target, **_: done.append(target))
-    ear = SimpleNamespace(fleet=SimpleNamespace(name="fleet", team=(1,)), bus=None)
-    hand = watch.KeyHandler(cast(Any, ear))
+    subscriber = SimpleNamespace(fleet=SimpleNamespace(name="fleet", team=(1,)), bus=None)
+    hand = watch.KeyHandler(cast(Any, subscriber))
     hand.press("1")
     hand.press("k")
     assert (done, hand.said) == ([], "kill the process of robot 1? y: yes, any other key: no")

@@ -42,7 +42,7 @@ def test_a_signal_ends_all_and_the_exit_code_says_which(tmp_path: Path, number: 
 def test_without_router_or_world_a_run_is_aborted(tmp_path: Path, victim: str) -> None:
     with running(tmp_path / "run", "straight") as run:
         run.wait_for("leader_command")
-        os.kill(run.crew()[victim].pid, signal.SIGKILL)
+        os.kill(run.group()[victim].pid, signal.SIGKILL)
         assert run.launcher.wait(patience_s()) == 1
         assert_nothing_is_left(run)
         assert run.summary()["outcome"] == "aborted"
@@ -53,7 +53,7 @@ def test_a_killed_launcher_takes_all_with_it_also_what_is_stopped(tmp_path: Path
     with running(tmp_path / "run", "straight") as run:
         run.wait_for("leader_command")
         for name in ("robot2", "recorder"):
-            os.kill(run.crew()[name].pid, signal.SIGSTOP)
+            os.kill(run.group()[name].pid, signal.SIGSTOP)
         run.launcher.kill()
         run.launcher.wait()
         assert_nothing_is_left(run)
@@ -65,7 +65,7 @@ def test_a_killed_recorder_aborts_the_run_and_leaves_all_but_its_last_second(tmp
     with running(tmp_path / "run", "straight") as run:
         run.wait_for("leader_command")
         eventually(lambda: mcap_reader.read(run.folder).end_s > 1.0, "no whole second was written")
-        os.kill(run.crew()["recorder"].pid, signal.SIGKILL)
+        os.kill(run.group()["recorder"].pid, signal.SIGKILL)
         assert run.launcher.wait(patience_s()) == 1
         assert_nothing_is_left(run)
         assert run.summary()["reason"] == "recorder ended (SIGKILL)"

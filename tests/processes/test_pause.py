@@ -22,7 +22,7 @@ END_S_MAX = 120.0
 def test_after_a_pause_of_all_but_the_recorder_the_summary_names_who_led_and_how_it_ended(tmp_path: Path) -> None:
     with running(tmp_path / "run", "straight", "--robots", "3") as run:
         run.wait_for("leader_command")
-        paused = [identity.pid for name, identity in run.crew().items() if name != "recorder"] + [run.launcher.pid]
+        paused = [identity.pid for name, identity in run.group().items() if name != "recorder"] + [run.launcher.pid]
         for pid in paused:
             os.kill(pid, signal.SIGSTOP)
         clock.sleep(PAUSE_S)

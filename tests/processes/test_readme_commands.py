@@ -133,7 +133,7 @@ def test_a_command_on_a_run_works_as_printed(command: str, run_folder: Path, tmp
 def test_a_command_on_a_running_fleet_works_as_printed(command: str, fleet: Running) -> None:
     words = shlex.split(command)[1:]
     more = {"watch": ("--once",), "topic": ("list", "--seconds", "1")}.get(words[0], ())
-    router = fleet.crew()["router"].arguments[-1]
+    router = fleet.group()["router"].arguments[-1]
     where = ("--fleet", f"straight-{fleet.launcher.pid}", *(() if words[0] == "fault" else ("--connect", router)))
     done = lfa(*words, *more, *where)
     assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"

@@ -99,7 +99,7 @@ def test_a_fault_by_hand_is_no_accident(tmp_path: Path) -> None:
 def test_an_agent_that_dies_by_itself_is_named_and_the_run_goes_on(tmp_path: Path) -> None:
     with running(tmp_path / "run", "straight", *SHORT) as run:
         run.wait_for("leader_command")
-        os.kill(run.crew()["robot4"].pid, 9)
+        os.kill(run.group()["robot4"].pid, 9)
         eventually(lambda: any(line["kind"] == "died" for line in run.events()), "robot 4's death was not told")
         assert run.launcher.wait(60.0) == 0
         assert [robot.alive for robot in read(run.folder).robots] == [True, True, True, False]
@@ -111,7 +111,7 @@ def test_junk_on_every_key_stops_nobody(tmp_path: Path) -> None:
     with running(tmp_path / "run", "straight", *SHORT, "--robots", "2") as run:
         run.wait_for("leader_command")
         fleet = f"straight-{run.launcher.pid}"
-        bus = ZenohBus(run.crew()["router"].arguments[-1], Inbox())
+        bus = ZenohBus(run.group()["router"].arguments[-1], Inbox())
         whole = encode(Clock(Header("sim", 1, 1, 0.0), 1.0))
         for owner in ("robot1", "robot2", "world", "witness", "operator", "sim", "robot99", "nobody"):
             for topic in TOPICS:

@@ -25,9 +25,9 @@ TOPICS = frozenset({"*/pose", "*/tracking", "*/host", "*/event", "*/status"})
 class Onlooker:
     """Poses as they arrive, with the longest silence of each robot since `begin`."""
 
-    def __init__(self, ear: Subscriber, robots: tuple[int, ...], keep: Callable[[], Path]) -> None:
+    def __init__(self, subscriber: Subscriber, robots: tuple[int, ...], keep: Callable[[], Path]) -> None:
         """`keep` stores what explains a failure, and returns its folder."""
-        self._ear = ear
+        self._subscriber = subscriber
         self._keep = keep
         self.robots = robots
         self.health = Health(robots, ())
@@ -36,7 +36,7 @@ class Onlooker:
         self._gaps: dict[int, float] = {}
 
     def listen(self) -> None:
-        for arrival, message in self._ear.take():
+        for arrival, message in self._subscriber.take():
             self.health.see(arrival.at, message)
             robot = robot_id_of(message.header.sender)
             if isinstance(message, PoseStamped) and robot is not None:
@@ -90,5 +90,5 @@ def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[O
     """Open an observer session at machine `at`'s router over its unix socket, without a network in between."""
     part = machines.part(at)
     eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at}")), f"no router answers at {at}")
-    with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS, every=True) as ear:
-        yield Onlooker(ear, robots, machines.keep)
+    with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS, every=True) as subscriber:
+        yield Onlooker(subscriber, robots, machines.keep)

@@ -37,7 +37,7 @@ class Running:
         self._known: dict[str, Identity] = {}
         self.sockets = Path()
 
-    def crew(self) -> dict[str, Identity]:
+    def group(self) -> dict[str, Identity]:
         """Return the launcher's children by name, including those known from earlier calls."""
         for identity in own_processes():
             if _parent(identity.pid) == self.launcher.pid and "-m" in identity.arguments:
@@ -50,7 +50,7 @@ class Running:
     def wait_for(self, kind: str) -> None:
         """Wait until an event of `kind` is in the run folder."""
         eventually(lambda: any(line["kind"] == kind for line in self.events()), f"no event {kind!r} came")
-        self.crew()
+        self.group()
 
     def events(self) -> list[dict[str, Any]]:
         path = self.folder / "events.jsonl"
@@ -77,7 +77,7 @@ def running(folder: Path, *arguments: str) -> Iterator[Running]:
     try:
         yield run
     finally:
-        run.crew()
+        run.group()
         run.launcher.kill()
         run.launcher.communicate()
         for identity in run._known.values():

@@ -47,7 +47,7 @@ def keep(run: Run) -> Kept:
         duration_s=run.summary.sim_duration_s,
         way_m=sum(float(np.hypot(*np.diff(rows[:, 1:3], axis=0).T).sum()) for rows in run.truth.values()),
         requests=len(episodes.requests(run)),
-        switches=sum(a.robot_id != b.robot_id for a, b in pairwise(run.reigns)),
+        switches=sum(a.robot_id != b.robot_id for a, b in pairwise(run.leader_terms)),
         spikes=tuple((spike.width_s, spike.peak, lasted_s) for spike, lasted_s in pooled if lasted_s > 0.0),
     )
 

@@ -52,7 +52,7 @@ def plateau(s: Subject) -> Measured:
 def dips(s: Subject) -> Measured:
     t, v = _leader_speed(s)
     cruise = s.run.scenario.mission.leading.cruise_mps
-    leader = s.run.reigns[0].robot_id if s.run.reigns else 0
+    leader = s.run.leader_terms[0].robot_id if s.run.leader_terms else 0
     spans = [span for span in episodes.avoidances(s.run, leader) if span[1] - span[0] >= DIP_S_MIN]
     dipped = sum(bool((v[(t >= a) & (t <= b)] < DIP * cruise).any()) for a, b in spans)
     return Measured(share(dipped, len(spans)), f"{dipped} of {len(spans)} avoidances of the leader")
@@ -94,7 +94,7 @@ def stops(s: Subject) -> Measured:
 
 
 def _leader_speed(s: Subject) -> tuple[Array, Array]:
-    rows = s.run.truth[s.run.reigns[0].robot_id if s.run.reigns else s.run.robots[0]]
+    rows = s.run.truth[s.run.leader_terms[0].robot_id if s.run.leader_terms else s.run.robots[0]]
     return rows[:, 0], rows[:, 4]
 
 

@@ -53,17 +53,17 @@ def bearings_explained(s: Subject) -> Measured:
 def after_switch(s: Subject) -> Measured:
     """Return the longest time [s] from a role switch to a follower's recovered bearing or to another disturbance."""
     worst, note = nan, "no role switch in this run"
-    for before, reign in pairwise(s.run.reigns):
+    for before, led in pairwise(s.run.leader_terms):
         for robot, e in s.run.errors.items():
             if robot == before.robot_id:  # it may return at the tail, which is a rejoin
                 continue
-            after = (e.t >= reign.from_s) & (e.t <= _undisturbed_until(s, robot, reign.from_s))
+            after = (e.t >= led.from_s) & (e.t <= _undisturbed_until(s, robot, led.from_s))
             off = after & (np.abs(e.bearing) >= episodes.BASE_RAD)
             if not after.any():
                 continue
-            took = float(e.t[np.flatnonzero(off)[-1]]) - reign.from_s if off.any() else 0.0
+            took = float(e.t[np.flatnonzero(off)[-1]]) - led.from_s if off.any() else 0.0
             if not took <= worst:
-                worst, note = took, f"robot {robot} after {reign.from_s:.1f} s"
+                worst, note = took, f"robot {robot} after {led.from_s:.1f} s"
     return Measured(worst, note)
 
 

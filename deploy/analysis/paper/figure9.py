@@ -48,17 +48,17 @@ def counts_differ(s: Subject) -> Measured:
 
 def on_new_trace(s: Subject) -> Measured:
     """Return the largest median offset [m] of a follower from the last new leader's path, less its slots' offset."""
-    if len(s.run.reigns) < 2:
+    if len(s.run.leader_terms) < 2:
         return Measured(nan, "no role switch in this run")
-    reign = s.run.reigns[-1]
-    path = s.run.truth[reign.robot_id]
-    path = path[path[:, 0] >= reign.from_s]
+    led = s.run.leader_terms[-1]
+    path = s.run.truth[led.robot_id]
+    path = path[path[:, 0] >= led.from_s]
     worst, note = nan, ""
     for robot, e in s.run.errors.items():
-        steady = e.steady & (e.t >= reign.from_s + SWITCH_S) & (np.abs(e.distance) < BASELINE_M)
+        steady = e.steady & (e.t >= led.from_s + SWITCH_S) & (np.abs(e.distance) < BASELINE_M)
         rows = s.run.truth[robot]
         rows = rows[np.isin(rows[:, 0], e.t[steady]) & (np.abs(rows[:, 5]) < STRAIGHT_RADPS)][::5]
-        off = [_beside(path, row) - _asked_beside(s, robot, reign.robot_id, float(row[0])) for row in rows]
+        off = [_beside(path, row) - _asked_beside(s, robot, led.robot_id, float(row[0])) for row in rows]
         off = [one for one in off if isfinite(one)]
         if off and not (middle := float(np.median(np.abs(off)))) <= worst:
             worst, note = middle, f"robot {robot}, median"

@@ -54,16 +54,16 @@ def map_of(run: Path, robot: int | None = None) -> Map:
 
     Raises Refused when the robot has no journal or kept no map.
     """
-    reigns = event_log.reigns(event_log.lines(run))
-    robot = robot if robot is not None else reigns[-1].robot_id if reigns else 1
-    lives = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
-    if not lives:
+    leader_terms = event_log.leader_terms(event_log.lines(run))
+    robot = robot if robot is not None else leader_terms[-1].robot_id if leader_terms else 1
+    paths = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
+    if not paths:
         raise Refused(f"{run}: no journal of {robot_name(robot)}: must be a run folder with that robot in it")
     try:
-        heading, entries = journal.read(lives[-1])
+        heading, entries = journal.read(paths[-1])
     except (OSError, ValueError) as error:
-        raise Refused(f"{lives[-1]}: cannot be read ({error})") from None
-    node = reexecution.node_of(lives[-1], heading)
+        raise Refused(f"{paths[-1]}: cannot be read ({error})") from None
+    node = reexecution.node_of(paths[-1], heading)
     host = NodeHost(node, Journal(None, heading))
     for entry in entries:
         reexecution.call(host, entry)

@@ -122,8 +122,8 @@ class AllInChain(_AfterFaults):
     def over(self, at: float) -> None:
         if self._complete_since > self.settled_by:
             chain = [shown(m) for m in self._chain()]
-            lives = [shown(m) for i, m in sorted(self.alive.items()) if i != WITNESS_ID]
-            self.broken(at, f"chain {chain} since {self._complete_since:.3f}, alive are {lives}")
+            alive = [shown(m) for i, m in sorted(self.alive.items()) if i != WITNESS_ID]
+            self.broken(at, f"chain {chain} since {self._complete_since:.3f}, alive are {alive}")
 
 
 class OneVersion(_AfterFaults):

@@ -42,13 +42,13 @@ def journals(folder: Path, robot: str) -> list[Path]:
     number = whole_number(robot)
     name = robot if number is None else robot_name(number)
     found = sorted((folder / "journal").glob("*.bin"))
-    lives = [path for path in found if name in ("all", path.stem.rpartition("-")[0])]
-    if not lives:
+    paths = [path for path in found if name in ("all", path.stem.rpartition("-")[0])]
+    if not paths:
         names = sorted({path.stem.rpartition("-")[0] for path in found})
         if not names:
             raise Refused(f"{folder}: holds no journal: must be a run folder")
         raise Refused(f"--robot {robot}: has no journal in {folder}, must be all or one of {', '.join(names)}")
-    return lives
+    return paths
 
 
 def _compare(folder: Path, robot: str, as_json: bool) -> int:

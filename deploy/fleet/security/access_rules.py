@@ -115,7 +115,7 @@ def sayable(name: str, plan: KeyPlan) -> list[str]:
         for topic in TOPICS
         if _speaks(kind, owner, topic)
     ]
-    alive = [owner for kind, owner in voices(name, plan) if owner != TRUTH_OWNER and _lives(kind, owner)]
+    alive = [owner for kind, owner in voices(name, plan) if owner != TRUTH_OWNER and _has_token(kind, owner)]
     return keys + [f"lfa/{plan.fleet}/{owner}/alive/*" for owner in alive]
 
 
@@ -128,7 +128,7 @@ def _speaks(kind: str, owner: str, topic: Topic) -> bool:
     return kind in topic.publishers
 
 
-def _lives(kind: str, owner: str) -> bool:
+def _has_token(kind: str, owner: str) -> bool:
     return kind != "driver" or owner.startswith(DRIVER_PREFIX)
 
 
@@ -159,10 +159,10 @@ def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, A
     for name in [*members, *neighbours]:
         if name not in common_names:
             continue
-        spoken = sayable(name, plan) if name in members else _through(name, plan, common_names)
+        publishes = sayable(name, plan) if name in members else _through(name, plan, common_names)
         own = [_rule(f"hear-{name}", "egress", HEAR, hearable(name, plan))]
-        if spoken:
-            own.append(_rule(f"say-{name}", "ingress", SAY, spoken))
+        if publishes:
+            own.append(_rule(f"say-{name}", "ingress", SAY, publishes))
         allowed += own
         seen = _subjects(name, common_names[name], joins=name in members)
         subjects += seen

@@ -150,10 +150,10 @@ def fits(stem: Path, ca: x509.Certificate, common_name: str, addresses: tuple[st
         said = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except (OSError, *DAMAGED, InvalidSignature, x509.ExtensionNotFound, x509.DuplicateExtension):
         return False
-    life = found.not_valid_after_utc - found.not_valid_before_utc
+    validity = found.not_valid_after_utc - found.not_valid_before_utc
     left = found.not_valid_after_utc - datetime.now(UTC)
     same = list(said) == _names(addresses or (common_name,)) and found.subject == _name(common_name)
-    return same and private.public_key() == public and left > min(RENEW_BEFORE, life / 2)
+    return same and private.public_key() == public and left > min(RENEW_BEFORE, validity / 2)
 
 
 def _pair(key: Path, certificate: Path) -> tuple[Any, Any, x509.Certificate]:

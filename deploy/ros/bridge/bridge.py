@@ -60,16 +60,16 @@ class Output(Protocol):
 class Bridge:
     """State of one bridge; `step` passes on what came in since the last call."""
 
-    def __init__(self, ear: Subscriber, output: Output, *, sim_time: bool, tf_per_robot: bool) -> None:
-        self._ear = ear
-        self._operator = Operator(ear.fleet.name, incarnations.drawn())
+    def __init__(self, subscriber: Subscriber, output: Output, *, sim_time: bool, tf_per_robot: bool) -> None:
+        self._subscriber = subscriber
+        self._operator = Operator(subscriber.fleet.name, incarnations.drawn())
         self._output = output
         self._mapping = FleetMapping(tf_per_robot=tf_per_robot, sim_time=sim_time, heard=output.heard)
         self._robots: tuple[int, ...] = ()
         """Robots of the mission; empty until it is known."""
         self._stops = StopCalls(self._say_stop)
         self._orders = OrderCalls(self._say_order, self._ask_orders)
-        scenario = scenario_of_fleet(ear.fleet)
+        scenario = scenario_of_fleet(subscriber.fleet)
         if scenario is not None:
             self._mapping.set_mission(scenario.mission)
             self._robots = scenario.mission.robots
@@ -82,7 +82,7 @@ class Bridge:
 
     def step(self, now: float) -> None:
         """Publish what the fleet said."""
-        arrivals = self._ear.take()
+        arrivals = self._subscriber.take()
         self._follow_robots()
         present = self._output.robots
         for arrival, message in arrivals:
@@ -113,7 +113,7 @@ class Bridge:
 
     def _follow_robots(self) -> None:
         """Declare robots whose tokens appeared, undeclare those whose tokens vanished."""
-        living = {robot for name in self._ear.living if (robot := robot_id_of(name))}
+        living = {robot for name in self._subscriber.living if (robot := robot_id_of(name))}
         for robot in living - self._output.robots:
             self._output.join(robot)
         for robot in self._output.robots - living:
@@ -122,7 +122,7 @@ class Bridge:
 
     def order(self, name: str, **arguments: object) -> None:
         """Send an operator's command to the fleet."""
-        send(self._ear.bus, self._operator.command(name, clock.now(), **arguments))
+        send(self._subscriber.bus, self._operator.command(name, clock.now(), **arguments))
 
     def stop(self, call: ServiceCall, now: float, *, stand: bool) -> None:
         """Say stop (`stand`) or resume to every gateway; `call` is answered by what became of it."""
@@ -140,16 +140,16 @@ class Bridge:
             if not success:
                 self.warn(f"goal ({x:g}, {y:g}): {text}")
 
-        self._orders.begin(along(points, walls_of(self._ear)), False, now, tell)
+        self._orders.begin(along(points, walls_of(self._subscriber)), False, now, tell)
 
     def _say_order(self, order: TeamOrder, now: float) -> None:
-        send(self._ear.bus, self._operator.order(order, now))
+        send(self._subscriber.bus, self._operator.order(order, now))
 
     def _ask_orders(self, now: float) -> None:
-        send(self._ear.bus, self._operator.ask("mission", now), self._operator.ask(QUESTION, now))
+        send(self._subscriber.bus, self._operator.ask("mission", now), self._operator.ask(QUESTION, now))
 
     def _say_stop(self, said: Said, now: float) -> None:
-        send(self._ear.bus, self._operator.stop(said.word, said.gateways, now))
+        send(self._subscriber.bus, self._operator.stop(said.word, said.gateways, now))
 
     def warn(self, words: str) -> None:
         """Print a warning, and publish it on /rosout."""

@@ -65,9 +65,9 @@ def command(
         graph = GraphFeed(space)
         check_graph(graph, distro, 0.0 if serve else GRAPH_S)
         sources = HEARD | {WORLD_TIME} if sim_time else HEARD
-        with Interrupts() as interrupts, listen(found, sources, every=True, wake=wake, eager=EAGER) as ear:
+        with Interrupts() as interrupts, listen(found, sources, every=True, wake=wake, eager=EAGER) as subscriber:
             output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
-            bridge = Bridge(ear, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
+            bridge = Bridge(subscriber, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
             orders = OperatorInput(output.node, bridge)
             foreign = ForeignNodes(graph, distro)
             how = "router at" if serve else "through"
@@ -80,7 +80,7 @@ def command(
                 foreign.warn(bridge.warn, now)
     finally:
         session.close()
-    facts = {**msgspec.to_builtins(space.counters), "fleet_dropped": ear.dropped}
+    facts = {**msgspec.to_builtins(space.counters), "fleet_dropped": subscriber.dropped}
     print(msgspec.json.encode(facts).decode() if as_json else ", ".join(f"{n} {name}" for name, n in facts.items()))
     return 0
 

@@ -43,10 +43,10 @@ def command(
         raise Refused(f"--port {port}: must be 0 to 65535")
     found = find(fleet, connect, keys)
     wake = Wake()
-    with Interrupts() as interrupts, listen(found, HEARD, every=True, wake=wake, eager=EAGER) as ear:
+    with Interrupts() as interrupts, listen(found, HEARD, every=True, wake=wake, eager=EAGER) as subscriber:
         output = FoxgloveOutput(host, port, (*SERVICES, *FORMATIONS), tf_per_robot=tf_per_robot)
         try:
-            bridge = Bridge(ear, output, sim_time=False, tf_per_robot=tf_per_robot)
+            bridge = Bridge(subscriber, output, sim_time=False, tf_per_robot=tf_per_robot)
             services = ServiceInput(bridge)
             print(f"fleet {found.name}: open ws://{host}:{output.port} in Foxglove or Lichtblick", flush=True)
             print(f"layout: {LAYOUT}", flush=True)

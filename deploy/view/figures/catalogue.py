@@ -74,16 +74,16 @@ def overview(run: Run) -> Figure:
 
 def _leader_timeline(figure: FigureBase, run: Run) -> None:
     axes, end_s = figure.subplots(), max(run.seen.end_s, 1.0)
-    terms = TermCount(reign.term[0] for reign in run.reigns)
-    for reign in run.reigns:
-        lasted_s = (end_s if reign.until_s is None else reign.until_s) - reign.from_s
-        colour = look(run, reign.robot_id)["color"]
-        axes.barh(reign.robot_id, lasted_s, left=reign.from_s, height=0.6, color=colour, edgecolor="white")
+    terms = TermCount(led.term[0] for led in run.leader_terms)
+    for led in run.leader_terms:
+        lasted_s = (end_s if led.until_s is None else led.until_s) - led.from_s
+        colour = look(run, led.robot_id)["color"]
+        axes.barh(led.robot_id, lasted_s, left=led.from_s, height=0.6, color=colour, edgecolor="white")
         if lasted_s > TERM_SHARE_MIN * end_s:
-            term = f"term {terms.number(reign.term[0])}"
-            axes.annotate(term, (reign.from_s, reign.robot_id), xytext=(4, 0), va="center",
+            term = f"term {terms.number(led.term[0])}"
+            axes.annotate(term, (led.from_s, led.robot_id), xytext=(4, 0), va="center",
                           textcoords="offset points", color="white")  # fmt: skip
-    for failover in event_log.failovers(run.events, run.reigns):
+    for failover in event_log.failovers(run.events, run.leader_terms):
         if failover.leader is not None and failover.first_command_ms is not None:
             axes.annotate(f"first command after {failover.first_command_ms:.0f} ms", (failover.at_s, failover.leader),
                           xytext=(4, 14), textcoords="offset points", fontsize="small")  # fmt: skip

@@ -83,7 +83,7 @@ def _unwrapped(t: Array, y: Array) -> tuple[Array, Array]:
 def marks(run: Run) -> list[tuple[float, str, str]]:
     """Return time [s], text and line style of each mark, in time; what happens together shares one text."""
     found = [(fault.at_s, f"{fault.kind} {fault.target}", ":") for fault in event_log.faults(run.events)]
-    found += [(reign.from_s, f"robot {reign.robot_id} leads", "-") for reign in run.reigns[1:]]
+    found += [(led.from_s, f"robot {led.robot_id} leads", "-") for led in run.leader_terms[1:]]
     asked = (line for line in event_log.of_kind(run.events, "formation") if event_log.asked_by_leader(line))
     found += [(float(line["t"]), f"to {line.get('side', '')}", "--") for line in asked]
     together: list[tuple[float, str, str]] = []

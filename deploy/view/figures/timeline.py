@@ -38,11 +38,11 @@ def draw(figure: FigureBase, run: Run) -> None:
 
 def _holders(axes: Axes, run: Run, end_s: float) -> None:
     """Draw a bar for each term; above it the cause of its start, and the faults."""
-    terms = TermCount(reign.term[0] for reign in run.reigns)
-    for reign in run.reigns:
-        until_s = end_s if reign.until_s is None else reign.until_s
-        _cell(axes, 0.0, reign.from_s, until_s, run, reign.robot_id, end_s)
-    began = [(reign.from_s, f"{_said(reign.cause)}, term {terms.number(reign.term[0])}") for reign in run.reigns]
+    terms = TermCount(led.term[0] for led in run.leader_terms)
+    for led in run.leader_terms:
+        until_s = end_s if led.until_s is None else led.until_s
+        _cell(axes, 0.0, led.from_s, until_s, run, led.robot_id, end_s)
+    began = [(led.from_s, f"{_said(led.cause)}, term {terms.number(led.term[0])}") for led in run.leader_terms]
     _labels(axes, began, 0.55, end_s)
     done = [(fault.at_s, f"{fault.kind} {fault.target}") for fault in event_log.faults(run.events)]
     top = 0.65 + LINE * LINES

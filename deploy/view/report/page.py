@@ -129,7 +129,7 @@ def _figure(name: str) -> Callable[[Run, Summary], str]:
 
 def _leaders(run: Run, s: Summary) -> str:
     terms = TermCount(r.term[0] for r in s.leaders)
-    reigns = table(
+    leader_terms = table(
         ("robot", "term", "from", "until", "because of"),
         [(r.robot_id, terms.number(r.term[0]), in_s(r.from_s), in_s(r.until_s), r.cause) for r in s.leaders],
         text=(4,),
@@ -150,7 +150,7 @@ def _leaders(run: Run, s: Summary) -> str:
         ],
     )
     timelines = _figure("leader_timeline")(run, s) + _figure("lease_timeline")(run, s)
-    return timelines + reigns + ("<h3>Failovers</h3>" + failovers if s.failovers else "")
+    return timelines + leader_terms + ("<h3>Failovers</h3>" + failovers if s.failovers else "")
 
 
 def _faults(run: Run, s: Summary) -> str:

@@ -171,17 +171,17 @@ def _draw(fleet: FleetAddress, stream: rerun.RecordingStream, scenario: Scenario
     if scenario is not None:
         scene.ground(scenario.world)
         scene.mission(scenario.mission)
-    with listen(fleet, frozenset(f"*/{topic}" for topic in TOPICS), every=True) as ear:
-        send(ear.bus, Operator(fleet.name, incarnations.drawn()).ask("mission", clock.now()))
+    with listen(fleet, frozenset(f"*/{topic}" for topic in TOPICS), every=True) as subscriber:
+        send(subscriber.bus, Operator(fleet.name, incarnations.drawn()).ask("mission", clock.now()))
         while until is None or clock.now() < until:
             clock.sleep(FLUSH_S)
-            for arrival, message in ear.take():
+            for arrival, message in subscriber.take():
                 if isinstance(message, Truth):
                     time.see(arrival.at, message.time_s)
                 where = address(arrival.key)
                 if where is not None:
                     scene.see(time.of(arrival.at), where.owner, where.topic, message)
             scene.flush()
-            if ear.dropped > lost:
-                lost = ear.dropped
+            if subscriber.dropped > lost:
+                lost = subscriber.dropped
                 print(f"{lost} messages lost: this machine is too busy to draw them", file=sys.stderr, flush=True)

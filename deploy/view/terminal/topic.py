@@ -81,13 +81,13 @@ def _echo(fleet: FleetAddress, wanted: frozenset[str], count: int, what: str) ->
     """Print every message as one line of JSON, with its channel."""
     left = count
     silent_at = clock.now() + SILENCE_S
-    with listen(fleet, wanted, every=True) as ear:
+    with listen(fleet, wanted, every=True) as subscriber:
         while True:
-            ear.wait(POLL_S)
+            subscriber.wait(POLL_S)
             if left == count and clock.now() > silent_at:
                 print(f"nothing is heard of {what} yet (lfa topic list)", file=sys.stderr, flush=True)
                 silent_at = inf
-            for arrival, message in ear.take():
+            for arrival, message in subscriber.take():
                 channel = msgspec.json.encode(arrival.key.split("/", 2)[2]).decode()
                 print(f'{{"channel":{channel},"message":{mcap_channels.encode(message).decode()}}}', flush=True)
                 left -= 1
@@ -97,11 +97,11 @@ def _echo(fleet: FleetAddress, wanted: frozenset[str], count: int, what: str) ->
 
 def _rates(fleet: FleetAddress, wanted: frozenset[str], seconds: float) -> list[Rate]:
     heard: dict[str, tuple[int, int]] = {}
-    with listen(fleet, wanted, every=True) as ear:
+    with listen(fleet, wanted, every=True) as subscriber:
         begun = clock.now()
         while clock.now() < begun + seconds:
-            ear.wait(min(POLL_S, seconds))
-            for arrival, _ in ear.take():
+            subscriber.wait(min(POLL_S, seconds))
+            for arrival, _ in subscriber.take():
                 channel = arrival.key.split("/", 2)[2]
                 number, size = heard.get(channel, (0, 0))
                 heard[channel] = (number + 1, size + len(arrival.payload))  # type: ignore[arg-type]

@@ -70,10 +70,10 @@ def command(
         _check_terminal()
     found = find(fleet, connect, keys)
     board = Board(tuple(agent.robot for agent in found.team))
-    with listen(found, TOPICS) as ear:
+    with listen(found, TOPICS) as subscriber:
         if not (once or as_json):
-            return _live(ear, board)
-        _hear_for(ear, board, FIRST_S)
+            return _live(subscriber, board)
+        _hear_for(subscriber, board, FIRST_S)
         rows = board.rows(clock.now())
     if as_json:
         print(msgspec.json.encode({"fleet": found.name, "robots": rows}).decode())
@@ -94,29 +94,29 @@ def _check_terminal() -> None:
         raise Refused(f"terminal of {size.columns} x {size.lines} characters: {right}")
 
 
-def _hear_for(ear: Subscriber, board: Board, duration_s: float) -> None:
+def _hear_for(subscriber: Subscriber, board: Board, duration_s: float) -> None:
     until = clock.now() + duration_s
     while clock.now() < until:
         clock.sleep(0.1)
-        _hear(ear, board)
+        _hear(subscriber, board)
 
 
-def _hear(ear: Subscriber, board: Board) -> None:
-    for arrival, message in ear.take():
+def _hear(subscriber: Subscriber, board: Board) -> None:
+    for arrival, message in subscriber.take():
         board.see(arrival.at, message)
     board.sample(clock.now())
 
 
-def _live(ear: Subscriber, board: Board) -> int:
+def _live(subscriber: Subscriber, board: Board) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    hand = KeyHandler(ear)
+    hand = KeyHandler(subscriber)
     console = Console()
     with _raw_keys(), Live(console=console, screen=True, auto_refresh=False) as live:
         while True:
-            _hear(ear, board)
-            live.update(_screen(ear, board, hand, console.width, console.height), refresh=True)
+            _hear(subscriber, board)
+            live.update(_screen(subscriber, board, hand, console.width, console.height), refresh=True)
             for key in hand.await_keys():
                 if key == "q":
                     return 0
@@ -126,21 +126,21 @@ def _live(ear: Subscriber, board: Board) -> int:
 class KeyHandler:
     """Handler of key presses: digits select a robot, letters act on it. `said` is the result of the last key."""
 
-    def __init__(self, ear: Subscriber) -> None:
-        self._ear = ear
+    def __init__(self, subscriber: Subscriber) -> None:
+        self._subscriber = subscriber
         self.chosen: int | None = None
-        self.said = "" if ear.fleet.team else "this fleet is not yours to command: keys other than q do nothing"
+        self.said = "" if subscriber.fleet.team else "this fleet is not yours to command: keys other than q do nothing"
         self._side = 0
         self._asked = False
         self.help = False
         """True while the list of keys is shown."""
-        self._operator = Operator(ear.fleet.name, incarnations.drawn())
+        self._operator = Operator(subscriber.fleet.name, incarnations.drawn())
 
     def await_keys(self) -> str:
         """Return the keys pressed, after `REFRESH_S` at most; meanwhile the fleet hears that an operator is there."""
         until, pressed = clock.now() + REFRESH_S, ""
         while not pressed and clock.now() < until:
-            send(self._ear.bus, self._operator.stop(None, (), clock.now()))
+            send(self._subscriber.bus, self._operator.stop(None, (), clock.now()))
             pressed = _keys(BEAT_S)
         return pressed
 
@@ -154,14 +154,14 @@ class KeyHandler:
             return
         if key in STOPS:
             self._stop(stand=STOPS[key])
-        if not self._ear.fleet.team:
+        if not self._subscriber.fleet.team:
             return
         if key.isdecimal():
             self.chosen = int(key)
             self.said = f"robot {key} is chosen"
         elif key == "f":
             self._side = (self._side + 1) % len(SIDES)
-            formation.say(self._ear, SIDES[self._side])
+            formation.say(self._subscriber, SIDES[self._side])
             self.said = f"formation {SIDES[self._side]} asked for"
         elif key == "k" and self.chosen is not None:
             self._asked = True
@@ -171,7 +171,7 @@ class KeyHandler:
 
     def _stop(self, *, stand: bool) -> None:
         try:
-            self.said = "; ".join(stop_fleet.told(stop_fleet.stop_fleet(self._ear, stand=stand), stand=stand))
+            self.said = "; ".join(stop_fleet.told(stop_fleet.stop_fleet(self._subscriber, stand=stand), stand=stand))
         except Refused as refused:
             self.said = str(refused)
 
@@ -183,14 +183,14 @@ class KeyHandler:
         told = io.StringIO()
         try:
             with contextlib.redirect_stdout(told):
-                fault.command(action, target, fleet=self._ear.fleet.name, as_json=False)
+                fault.command(action, target, fleet=self._subscriber.fleet.name, as_json=False)
         except Refused as refused:
             self.said = str(refused)
         else:
             self.said = told.getvalue().strip()
 
 
-def _screen(ear: Subscriber, board: Board, hand: KeyHandler, width: int, height: int) -> Group:
+def _screen(subscriber: Subscriber, board: Board, hand: KeyHandler, width: int, height: int) -> Group:
     from rich.console import Group
     from rich.text import Text
 
@@ -202,7 +202,7 @@ def _screen(ear: Subscriber, board: Board, hand: KeyHandler, width: int, height:
     more = f", {len(rows) - len(shown)} more robots" if len(shown) < len(rows) else ""
     events = list(board.events)[-left:] if left > 0 and not hand.help else []
     return Group(
-        Text(visible(f"fleet {ear.fleet.name}: {who}{more}"), style="bold", no_wrap=True),
+        Text(visible(f"fleet {subscriber.fleet.name}: {who}{more}"), style="bold", no_wrap=True),
         _table(shown, hand.chosen, width),
         _timeline(board, width),
         *(Text(visible(f" {_ago(e.at):>6} {e.who:<9} {e.what}"), no_wrap=True, overflow="ellipsis") for e in events),

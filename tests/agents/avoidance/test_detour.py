@@ -63,10 +63,10 @@ def test_the_nearer_side_is_taken() -> None:
     assert "right" in drive(circle(3.0, 0.2, 0.3), (6.0, 0.0))[2]
 
 
-def sides(begun: Detour, things: list[tuple[list[tuple[float, float]], tuple[float, float], float]]) -> list[str]:
+def sides(begun: Detour, obstacles: list[tuple[list[tuple[float, float]], tuple[float, float], float]]) -> list[str]:
     """Actions of a detour that sees points, a target in `base_link` and a time, one after the other."""
     found = []
-    for points, target, now in things:
+    for points, target, now in obstacles:
         begun.steer(points, target, Twist(0.5, 0.0), 0.5, now)
         found.append("" if begun.decision is None else "left" if begun._side > 0.0 else "right")
     return found
@@ -159,8 +159,8 @@ def test_a_robot_beside_which_something_stands_does_not_back_off_from_it() -> No
     a pocket would back into it and wedge there (paper_path1, seed 7).
     """
     detour = Detour(RADIUS_M, LIMITS)
-    thing = BlockingObstacle("wall", 0.5)
-    twist = detour.steer(circle(0.03, 0.35, 0.15), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: thing)
+    obstacle = BlockingObstacle("wall", 0.5)
+    twist = detour.steer(circle(0.03, 0.35, 0.15), (1.0, 1.0), Twist(0.15, 0.6), 0.5, 0.0, lambda _: obstacle)
     assert twist is not None
     assert twist.linear_x >= 0.0
 

@@ -17,19 +17,21 @@ HALF_M = 2.03
 """Half the side of a square room around (0, 0)."""
 
 
-def scan_of_room(pose: Pose2D, *, half_m: float = HALF_M, thing: tuple[float, float, float] | None = None) -> LaserScan:
-    """Exact ranges in the square room, with a round `thing` (x, y, radius) in it."""
+def scan_of_room(
+    pose: Pose2D, *, half_m: float = HALF_M, obstacle: tuple[float, float, float] | None = None
+) -> LaserScan:
+    """Exact ranges in the square room, with a round `obstacle` (x, y, radius) in it."""
     ranges = []
     for n in range(BEAMS):
         angle = pose.theta - pi + n * 2.0 * pi / BEAMS
         c, s = cos(angle), sin(angle)
         walls = [((half_m if d > 0 else -half_m) - p) / d for p, d in ((pose.x, c), (pose.y, s)) if abs(d) > 1e-12]
         r = min(walls)
-        if thing is not None:
-            dx, dy = thing[0] - pose.x, thing[1] - pose.y
+        if obstacle is not None:
+            dx, dy = obstacle[0] - pose.x, obstacle[1] - pose.y
             along, across = c * dx + s * dy, c * dy - s * dx
-            if along > 0.0 and abs(across) < thing[2]:
-                r = min(r, along - (thing[2] ** 2 - across**2) ** 0.5)
+            if along > 0.0 and abs(across) < obstacle[2]:
+                r = min(r, along - (obstacle[2] ** 2 - across**2) ** 0.5)
         ranges.append(r)
     return LaserScan(Header("world", 1, 1, 0.0), -pi, 2.0 * pi / BEAMS, 0.05, 8.0, tuple(ranges))
 
@@ -62,8 +64,8 @@ def test_what_is_occupied_is_within_one_cell_of_a_wall_and_all_four_walls_are_th
 
 def test_clearance_is_the_distance_to_the_nearest_occupied_cell_also_after_one_has_gone() -> None:
     pose = Pose2D(0.0, 0.0, 0.0)
-    with_thing = scan_of_room(pose, thing=(1.0, 0.4, 0.2))
-    scans = [(with_thing, pose)] * 2 + [(scan_of_room(pose), pose)] * 20
+    with_obstacle = scan_of_room(pose, obstacle=(1.0, 0.4, 0.2))
+    scans = [(with_obstacle, pose)] * 2 + [(scan_of_room(pose), pose)] * 20
     grid = mapped(scans).grid
     walls = [divmod(cell, grid.columns) for cell in range(len(grid.scores)) if grid.occupied(cell)]
     for cell in range(0, len(grid.near), 7):
@@ -74,15 +76,15 @@ def test_clearance_is_the_distance_to_the_nearest_occupied_cell_also_after_one_h
 
 def test_what_has_moved_on_is_forgotten() -> None:
     pose = Pose2D(0.0, 0.0, 0.0)
-    seen = mapped([(scan_of_room(pose, thing=(1.0, 0.4, 0.2)), pose)])
+    seen = mapped([(scan_of_room(pose, obstacle=(1.0, 0.4, 0.2)), pose)])
     assert any(hypot(x - 1.0, y - 0.4) < 0.3 for x, y in occupied(seen.grid))
-    later = mapped([(scan_of_room(pose, thing=(1.0, 0.4, 0.2)), pose)] + [(scan_of_room(pose), pose)] * 20)
+    later = mapped([(scan_of_room(pose, obstacle=(1.0, 0.4, 0.2)), pose)] + [(scan_of_room(pose), pose)] * 20)
     assert not any(hypot(x - 1.0, y - 0.4) < 0.3 for x, y in occupied(later.grid))
 
 
 def test_a_team_mate_is_no_obstacle() -> None:
     pose = Pose2D(0.0, 0.0, 0.0)
-    grid = mapped([(scan_of_room(pose, thing=(1.0, 0.4, 0.15)), pose)], mates=((1.1, 0.4),)).grid
+    grid = mapped([(scan_of_room(pose, obstacle=(1.0, 0.4, 0.15)), pose)], mates=((1.1, 0.4),)).grid
     assert not any(hypot(x - 1.0, y - 0.4) < 0.4 for x, y in occupied(grid))
 
 

@@ -12,41 +12,41 @@ BESIDE = [(0.05 * n, side * 0.4) for n in range(-60, 30) for side in (-1.0, 1.0)
 
 def driven_in() -> tuple[BackUp, Pose2D]:
     """A robot that came along a bend."""
-    retreat, pose = BackUp(), Pose2D()
+    back_up, pose = BackUp(), Pose2D()
     for _ in range(300):
         pose = along_arc(pose, AHEAD, DT)
-        retreat.keep(pose)
-    retreat.begin(pose)
-    return retreat, pose
+        back_up.keep(pose)
+    back_up.begin(pose)
+    return back_up, pose
 
 
 def test_it_goes_back_as_it_came_until_it_is_out() -> None:
-    retreat, pose = driven_in()
+    back_up, pose = driven_in()
     came_from, trap = along_arc(Pose2D(), AHEAD, 2.0), pose
     for _ in range(2000):
-        twist = retreat.step([], pose, 0.15)
+        twist = back_up.step([], pose, 0.15)
         if twist is None:
             break
         assert twist.linear_x < 0.0
         pose = along_arc(pose, twist, DT)
-    assert not retreat.under_way
-    assert retreat.trap == (trap.x, trap.y)
+    assert not back_up.under_way
+    assert back_up.trap == (trap.x, trap.y)
     assert hypot(pose.x - trap.x, pose.y - trap.y) > 0.9 * OUT_M
     assert hypot(pose.x - came_from.x, pose.y - came_from.y) < 0.2
 
 
 def test_it_waits_while_somebody_stands_behind() -> None:
-    retreat, pose = driven_in()
+    back_up, pose = driven_in()
     for _ in range(50):
-        assert retreat.step([(-0.20, 0.0)], pose, 0.15) == STILL
-    assert retreat.under_way
+        assert back_up.step([(-0.20, 0.0)], pose, 0.15) == STILL
+    assert back_up.under_way
 
 
 def test_walls_beside_the_way_do_not_hold_it() -> None:
-    retreat = BackUp()
+    back_up = BackUp()
     for n in range(30):
-        retreat.keep(Pose2D(0.1 * n, 0.0, 0.0))
-    retreat.begin(Pose2D(2.9, 0.0, 0.0))
-    twist = retreat.step(BESIDE, Pose2D(2.9, 0.0, 0.0), 0.15)
+        back_up.keep(Pose2D(0.1 * n, 0.0, 0.0))
+    back_up.begin(Pose2D(2.9, 0.0, 0.0))
+    twist = back_up.step(BESIDE, Pose2D(2.9, 0.0, 0.0), 0.15)
     assert twist is not None
     assert twist.linear_x < 0.0

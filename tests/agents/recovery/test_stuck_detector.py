@@ -41,11 +41,11 @@ def test_who_is_not_asked_to_move_is_not_stuck() -> None:
 
 
 def stood(seconds: float, *, leads: bool, speed_mps: float = 0.0) -> str | None:
-    """The plight of one that wants next to nothing, and says no other reason."""
-    plight = StuckMonitor()
+    """The state of one that wants next to nothing, and says no other reason."""
+    stuck = StuckMonitor()
     for n in range(round(seconds / 0.02)):
-        plight.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, Action.LEFT, None, 0.02 * n, leads=leads)
-    return plight.reason
+        stuck.watch(Pose2D(speed_mps * 0.02 * n, 0.0, 0.0), STILL, Action.LEFT, None, 0.02 * n, leads=leads)
+    return stuck.reason
 
 
 def test_S1_a_leader_that_is_to_go_stands_for_20_s_whatever_for() -> None:
@@ -114,36 +114,36 @@ def test_a_reset_forgets() -> None:
     assert stuck.watch(Pose2D(), AHEAD, None, None, 4.02) is None
 
 
-def in_a_plight() -> StuckMonitor:
-    plight = StuckMonitor()
+def while_stuck() -> StuckMonitor:
+    stuck = StuckMonitor()
     for n in range(150):
-        plight.watch(Pose2D(), STILL, Action.BLOCKED, None, 0.02 * n, leads=False)
-    assert plight.reason is not None
-    return plight
+        stuck.watch(Pose2D(), STILL, Action.BLOCKED, None, 0.02 * n, leads=False)
+    assert stuck.reason is not None
+    return stuck
 
 
 def test_who_is_stuck_is_so_until_it_is_half_a_metre_away() -> None:
-    plight = in_a_plight()
-    plight.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, None, 3.1, leads=False)
-    assert plight.reason is not None
-    plight.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, None, 3.2, leads=False)
-    assert plight.reason is None
+    stuck = while_stuck()
+    stuck.watch(Pose2D(0.8 * FREED_M, 0.0, 0.0), STILL, None, None, 3.1, leads=False)
+    assert stuck.reason is not None
+    stuck.watch(Pose2D(FREED_M, 0.0, 0.0), STILL, None, None, 3.2, leads=False)
+    assert stuck.reason is None
 
 
 def test_or_until_nothing_has_held_it_for_a_while() -> None:
-    plight = in_a_plight()
-    plight.rest(Pose2D(), 2.9 + CALM_S)
-    assert plight.reason is not None
-    plight.rest(Pose2D(), 3.1 + CALM_S)
-    assert plight.reason is None
+    stuck = while_stuck()
+    stuck.rest(Pose2D(), 2.9 + CALM_S)
+    assert stuck.reason is not None
+    stuck.rest(Pose2D(), 3.1 + CALM_S)
+    assert stuck.reason is None
 
 
 def test_a_stuck_leader_is_stuck_as_a_follower_and_a_new_leader_begins_anew() -> None:
-    plight = in_a_plight()
-    plight.begin(leading=False)
-    assert plight.reason is not None
-    plight.begin(leading=True)
-    assert plight.reason is None
+    stuck = while_stuck()
+    stuck.begin(leading=False)
+    assert stuck.reason is not None
+    stuck.begin(leading=True)
+    assert stuck.reason is None
 
 
 def test_a_robot_that_rests_is_watched_anew() -> None:

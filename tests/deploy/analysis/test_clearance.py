@@ -26,8 +26,8 @@ def seen(**truth: Array) -> RecordedRun:
     return RecordedRun(dict(enumerate(truth.values(), start=1)), {}, {}, {})
 
 
-def world(*things: str) -> Scenario:
-    return load("straight", [f"world.{thing}" for thing in things], robots=2)
+def world(*obstacles: str) -> Scenario:
+    return load("straight", [f"world.{obstacle}" for obstacle in obstacles], robots=2)
 
 
 def test_way_and_mean_speed_leave_out_the_rest_before_and_after() -> None:
@@ -38,15 +38,15 @@ def test_way_and_mean_speed_leave_out_the_rest_before_and_after() -> None:
 
 
 @pytest.mark.parametrize(
-    ("thing", "gap_m"),
+    ("obstacle", "gap_m"),
     [
         ("obstacles=[{center_m=[1.5,0.9], radius_m=0.3}]", 0.6),
         (f"obstacles=[{{center_m=[1.5,-1.2], corners_m={SQUARE}}}]", 0.7),
         ("walls_m=[[-1.0,0.4,9.0,0.4]]", 0.4),
     ],
 )
-def test_the_least_clearance_is_from_the_body_to_the_nearest_surface(thing: str, gap_m: float) -> None:
-    scenario = world(thing)
+def test_the_least_clearance_is_from_the_body_to_the_nearest_surface(obstacle: str, gap_m: float) -> None:
+    scenario = world(obstacle)
     body_m = scenario.mission.radius_m
     assert least_clearance_m(1, seen(own=straight()), scenario) == pytest.approx(gap_m - body_m, abs=0.01)
 

@@ -26,13 +26,13 @@ KILLED = [
 
 
 def test_a_reign_ends_when_its_holder_is_killed() -> None:
-    first, second = event_log.reigns(KILLED)
+    first, second = event_log.leader_terms(KILLED)
     assert (first.robot_id, first.from_s, first.until_s, first.cause) == (1, 0.3, 8.0, "start")
     assert (second.robot_id, second.from_s, second.until_s, second.cause) == (2, 8.12, None, "kill")
 
 
 def test_a_failover_counts_from_the_fault() -> None:
-    (failover,) = event_log.failovers(KILLED, event_log.reigns(KILLED))
+    (failover,) = event_log.failovers(KILLED, event_log.leader_terms(KILLED))
     assert failover == Failover("kill", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
 
 
@@ -44,7 +44,7 @@ def _killed_unannounced(*more: Line, kind: str = "peer_down") -> list[Line]:
 @pytest.mark.parametrize("kind", ["peer_down", "died"])
 def test_a_leader_that_dies_without_an_announced_fault_is_a_failover(kind: str) -> None:
     events = _killed_unannounced(kind=kind)
-    (failover,) = event_log.failovers(events, event_log.reigns(events))
+    (failover,) = event_log.failovers(events, event_log.leader_terms(events))
     assert failover == Failover("died", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
 
 
@@ -58,41 +58,41 @@ def test_a_leader_that_dies_without_an_announced_fault_is_a_failover(kind: str) 
 )
 def test_a_vanished_token_that_is_no_death_is_no_failover(more: Line) -> None:
     events = _killed_unannounced(more)
-    assert event_log.failovers(events, event_log.reigns(events)) == []
+    assert event_log.failovers(events, event_log.leader_terms(events)) == []
 
 
 def test_a_chain_that_not_all_have_closed_is_not_closed() -> None:
-    (failover,) = event_log.failovers(KILLED[:-1], event_log.reigns(KILLED[:-1]))
+    (failover,) = event_log.failovers(KILLED[:-1], event_log.leader_terms(KILLED[:-1]))
     assert failover.chain_ms is None
 
 
 def test_a_failover_that_never_came_is_told_as_such() -> None:
-    (failover,) = event_log.failovers(KILLED[:2], event_log.reigns(KILLED[:2]))
+    (failover,) = event_log.failovers(KILLED[:2], event_log.leader_terms(KILLED[:2]))
     assert (failover.leader, failover.first_command_ms) == (None, None)
 
 
 def test_a_fault_on_a_follower_is_no_failover() -> None:
     events = [KILLED[0], _line(5.0, 3, "fault", deed="kill")]
-    assert event_log.failovers(events, event_log.reigns(events)) == []
+    assert event_log.failovers(events, event_log.leader_terms(events)) == []
 
 
 def test_a_hand_over_is_no_failover() -> None:
     events = [KILLED[0], _line(6.0, 2, "leader_command", SECOND)]
-    reigns = event_log.reigns(events)
-    assert [reign.cause for reign in reigns] == ["start", "handover"]
-    assert reigns[0].until_s == 6.0
-    assert event_log.failovers(events, reigns) == []
+    leader_terms = event_log.leader_terms(events)
+    assert [led.cause for led in leader_terms] == ["start", "handover"]
+    assert leader_terms[0].until_s == 6.0
+    assert event_log.failovers(events, leader_terms) == []
 
 
 def test_a_lease_that_ran_out_is_named_as_the_cause() -> None:
     expired = _line(5.9, 1, "lease", FIRST, change="expired")
     events = [KILLED[0], expired, _line(6.0, 2, "leader_command", SECOND)]
-    assert event_log.reigns(events)[1].cause == "expired"
+    assert event_log.leader_terms(events)[1].cause == "expired"
 
 
 def test_the_same_robot_elected_again_is_no_hand_over() -> None:
     events = [KILLED[0], _line(6.0, 1, "leader_command", (3, 1, 1))]
-    assert [reign.cause for reign in event_log.reigns(events)] == ["start", "reelection"]
+    assert [led.cause for led in event_log.leader_terms(events)] == ["start", "reelection"]
 
 
 def test_I2_an_older_leader_command_after_a_newer_one_is_a_violation() -> None:

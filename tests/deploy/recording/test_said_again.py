@@ -46,7 +46,7 @@ def _said(tmp_path: Path, *, gateway: Term = SECOND) -> list[event_log.Line]:
 
 def test_a_leader_whose_events_were_missed_is_in_the_log_once(tmp_path: Path) -> None:
     events = _said(tmp_path)
-    assert [(reign.robot_id, reign.from_s) for reign in event_log.reigns(events)] == [(1, 1.1), (2, 9.0)]
+    assert [(reign.robot_id, reign.from_s) for reign in event_log.leader_terms(events)] == [(1, 1.1), (2, 9.0)]
     assert event_log.last_chain(events) == [2]
     assert [line["role"] for line in events if line["kind"] == "role"] == ["leader", "leader"]
     assert len([line for line in events if line.get("again")]) == 3
@@ -54,7 +54,7 @@ def test_a_leader_whose_events_were_missed_is_in_the_log_once(tmp_path: Path) ->
 
 def test_a_leader_that_no_gateway_obeys_is_not_written_down_as_one(tmp_path: Path) -> None:
     events = _said(tmp_path, gateway=FIRST)
-    assert [reign.robot_id for reign in event_log.reigns(events)] == [1]
+    assert [reign.robot_id for reign in event_log.leader_terms(events)] == [1]
 
 
 def test_any_missed_event_is_a_hole_and_of_states_a_long_gap_only() -> None:

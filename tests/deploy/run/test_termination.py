@@ -1,10 +1,10 @@
-"""When a run is over: one claim a rule of the referee."""
+"""When a run is over: one claim a rule."""
 
 from __future__ import annotations
 
 from msgspec.structs import replace
 
-from lfa.deploy.run.termination import REST_S, Referee
+from lfa.deploy.run.termination import REST_S, Termination
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Role, Term
@@ -45,14 +45,14 @@ IN_SLOT = _tracking()
 
 def _outcome(*messages: Message, waypoint: int = 1, tracking: Tracking | None = IN_SLOT) -> str | None:
     """The outcome after `messages`, where leader and follower report before each ground truth."""
-    referee = Referee(_scenario())
-    referee.see(_truth(8.5, 2.0, speed=0.5))
+    termination = Termination(_scenario())
+    termination.see(_truth(8.5, 2.0, speed=0.5))
     for message in messages:
         for said in (_row(waypoint), _row(waypoint, 2), tracking) if isinstance(message, Truth) else ():
             if said is not None:
-                referee.see(said)
-        referee.see(message)
-    return None if referee.verdict is None else referee.verdict.outcome
+                termination.see(said)
+        termination.see(message)
+    return None if termination.verdict is None else termination.verdict.outcome
 
 
 def test_all_at_rest_at_the_goal_for_half_a_second_is_the_goal() -> None:
@@ -79,9 +79,9 @@ def test_a_robot_that_reports_no_tracking_is_in_no_slot() -> None:
 
 
 def test_the_time_limits_reason_says_who_was_missing() -> None:
-    referee = Referee(_scenario())
-    referee.see(_row(1))
-    verdict = referee.see(_truth(20.0, 2.95))
+    termination = Termination(_scenario())
+    termination.see(_row(1))
+    verdict = termination.see(_truth(20.0, 2.95))
     assert verdict is not None
     assert verdict.reason == "not at the goal after 20 s: robot 2 is not in its slot"
 
@@ -122,33 +122,33 @@ def test_the_time_limit_is_the_worlds() -> None:
 
 
 def test_an_agent_that_gives_up_fails_the_run() -> None:
-    referee = Referee(_scenario())
-    verdict = referee.see(_event("failed", "robot2", None, reason="stuck at (1.0, 2.0)"))
+    termination = Termination(_scenario())
+    verdict = termination.see(_event("failed", "robot2", None, reason="stuck at (1.0, 2.0)"))
     assert verdict is not None
     assert (verdict.outcome, verdict.reason) == ("failed", "robot 2: stuck at (1.0, 2.0)")
 
 
 def test_events_with_foreign_data_do_no_harm() -> None:
-    referee = Referee(_scenario())
+    termination = Termination(_scenario())
     for data in ({}, {"chain": "all"}, {"chain": [None]}, {"robot": "x"}):
-        referee.see(_event("chain", "robot2", Term(9, 1, 1), **data))
-        referee.see(_event("leader_command", "world", Term(9, 1, 1), **data))
-    assert referee.chain == (1, 2)
-    assert referee.leader is None
+        termination.see(_event("chain", "robot2", Term(9, 1, 1), **data))
+        termination.see(_event("leader_command", "world", Term(9, 1, 1), **data))
+    assert termination.chain == (1, 2)
+    assert termination.leader is None
 
 
 def test_a_chain_whose_event_was_missed_is_learned_from_the_leaders_status() -> None:
     """Robot 1 is gone, and the event of the chain without it was lost: the run must not end by its time limit."""
     status = Status(Header("robot2", 1, 1, 0.0), Level.OK, "", Role.LEADER, Term(4, 2, 1), {}, (2,))
-    referee = Referee(_scenario())
-    referee.see(_event("chain", "robot1", Term(2, 1, 1), chain=[1, 2], seq=0))
+    termination = Termination(_scenario())
+    termination.see(_event("chain", "robot1", Term(2, 1, 1), chain=[1, 2], seq=0))
     for message in (status, _row(1, 2), _truth(9.0, 1.0, follower_x=2.95), _truth(9.0 + REST_S, 1.0, follower_x=2.95)):
-        referee.see(message)
-    assert (referee.chain, referee.leader) == ((2,), 2)
+        termination.see(message)
+    assert (termination.chain, termination.leader) == ((2,), 2)
 
 
 def test_a_leader_of_an_earlier_term_changes_no_chain() -> None:
-    referee = Referee(_scenario())
-    referee.see(_event("chain", "robot2", Term(4, 2, 1), chain=[2], seq=0))
-    referee.see(Status(Header("robot1", 1, 1, 0.0), Level.OK, "", Role.LEADER, Term(2, 1, 1), {}, (1, 2)))
-    assert referee.chain == (2,)
+    termination = Termination(_scenario())
+    termination.see(_event("chain", "robot2", Term(4, 2, 1), chain=[2], seq=0))
+    termination.see(Status(Header("robot1", 1, 1, 0.0), Level.OK, "", Role.LEADER, Term(2, 1, 1), {}, (1, 2)))
+    assert termination.chain == (2,)

@@ -34,7 +34,7 @@ def missed_m(done: Run) -> list[float]:
     """Distance [m] at which the leaders of the run passed each way-point, in the route's order."""
     path = [
         (float(t), float(x), float(y))
-        for reign in done.reigns
+        for reign in done.leader_terms
         for t, x, y in done.truth[reign.robot_id][:, :3]
         if reign.from_s <= t < (reign.until_s or 1e9)
     ]
@@ -78,7 +78,7 @@ def test_a_new_leader_drives_the_rest_of_a_lap_and_no_more(tmp_path: Path) -> No
     done, summary = driven(tmp_path / "run", LAP, faults=("kill leader at 20 s",), robots=3)
     assert summary.outcome == "goal_reached"
     assert max(missed_m(done)) <= 2.0 * PASSED_M
-    second = next(reign for reign in done.reigns if reign.robot_id == 2)
+    second = next(reign for reign in done.leader_terms if reign.robot_id == 2)
     led = done.truth[2][done.led(2, done.truth[2][:, 0])]
     assert second.from_s > 20.0
     assert min(hypot(x - 2.5, y) for _, x, y in led[:, :3]) > 1.0, (

@@ -50,7 +50,7 @@ def do(page: Browser, robot: int, action: str) -> None:
 def test_a_robot_clicked_frozen_is_stopped_and_goes_on(page: Browser, fleet: Running) -> None:
     do(page, 3, "stop")
     page.wait_for(ROLE.format(3, "stopped"))
-    pid = fleet.crew()["robot3"].pid
+    pid = fleet.group()["robot3"].pid
     eventually(lambda: Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T", "it is not stopped")
     do(page, 3, "continue")
     page.wait_for("['follower', 'leader'].includes(lfa.models[0].robots.get(3).role)")
@@ -79,7 +79,7 @@ def test_the_stop_button_stops_all_and_says_so(page: Browser) -> None:
 
 def test_a_robot_clicked_dead_dies_and_starts_again(page: Browser, fleet: Running) -> None:
     leader = page.wait_for("lfa.models[0].leader")
-    pid = fleet.crew()[f"robot{leader}"].pid
+    pid = fleet.group()[f"robot{leader}"].pid
     do(page, leader, "kill")
     page.wait_for(f"lfa.models[0].leads.some((lead) => lead.why === 'robot {leader} was killed')")
     eventually(lambda: not Path(f"/proc/{pid}/exe").exists(), "it is not killed")

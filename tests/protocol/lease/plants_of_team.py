@@ -64,9 +64,9 @@ def voters_change_without_a_joint_config(patch: pytest.MonkeyPatch) -> None:
 
 
 def full_house_of_a_majority(patch: pytest.MonkeyPatch) -> None:
-    def full_house(self: Candidate, config: Config, universe: tuple[int, ...], *_: object) -> Any:
+    def full_house(self: Candidate, config: Config, member_ids: tuple[int, ...], *_: object) -> Any:
         lives = tuple(sorted(self._promised))
-        return lives if 2 * len(lives) > len(universe) else ()
+        return lives if 2 * len(lives) > len(member_ids) else ()
 
     patch.setattr(Candidate, "full_house", full_house)
 

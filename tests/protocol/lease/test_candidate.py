@@ -12,7 +12,7 @@ from tests.rigs.lease_scenes import STD
 ME, SECOND, THIRD, WITNESS = Member(1, 1), Member(2, 1), Member(3, 1), Member(0, 1)
 TERM, OLD, OLDER = Term(5, 1, 1), Term(4, 2, 1), Term(3, 2, 1)
 CONFIG = Config(Version(OLD), (ME, SECOND, THIRD), None, None, (ME, SECOND, THIRD))
-UNIVERSE = (1, 2, 3, 0)
+MEMBER_IDS = (1, 2, 3, 0)
 
 
 def standing(*forget: Member) -> Candidate:
@@ -122,23 +122,23 @@ def test_e18_a_unanimous_start_needs_every_id_and_no_quorum_of_a_config() -> Non
     candidate = standing()
     for voter in (ME, SECOND, WITNESS):
         candidate.promised(voter, None, blank=True)
-    assert candidate.full_house(CONFIG, UNIVERSE, nobody) == ()
+    assert candidate.full_house(CONFIG, MEMBER_IDS, nobody) == ()
     candidate.promised(THIRD, None, blank=True)
-    assert candidate.full_house(CONFIG, UNIVERSE, nobody) == (ME, SECOND, THIRD, WITNESS)
+    assert candidate.full_house(CONFIG, MEMBER_IDS, nobody) == (ME, SECOND, THIRD, WITNESS)
     again = Member(3, 2)
     candidate.promised(again, None, blank=True)
-    assert candidate.full_house(CONFIG, UNIVERSE, nobody) == (ME, SECOND, again, WITNESS)
-    assert candidate.full_house(CONFIG, UNIVERSE, lambda member: member == again) == (ME, SECOND, THIRD, WITNESS)
+    assert candidate.full_house(CONFIG, MEMBER_IDS, nobody) == (ME, SECOND, again, WITNESS)
+    assert candidate.full_house(CONFIG, MEMBER_IDS, lambda member: member == again) == (ME, SECOND, THIRD, WITNESS)
     for voter in (ME, SECOND):
         candidate.promised(voter, None, blank=False)
-    assert candidate.full_house(CONFIG, UNIVERSE, nobody) == ()
+    assert candidate.full_house(CONFIG, MEMBER_IDS, nobody) == ()
 
 
 def test_e20_a_forgotten_id_is_not_waited_for() -> None:
     candidate = standing(THIRD)
     for voter in (ME, SECOND, WITNESS):
         candidate.promised(voter, None, blank=True)
-    assert candidate.full_house(CONFIG, UNIVERSE, nobody) == (ME, SECOND, WITNESS)
+    assert candidate.full_house(CONFIG, MEMBER_IDS, nobody) == (ME, SECOND, WITNESS)
 
 
 def test_e19_a_majority_starts_with_the_witness_more_than_half_and_without_memory() -> None:
@@ -146,7 +146,7 @@ def test_e19_a_majority_starts_with_the_witness_more_than_half_and_without_memor
         candidate = standing()
         for voter in voters:
             candidate.promised(voter, None, blank=blank)
-        return candidate.blank_majority(UNIVERSE, nobody)
+        return candidate.blank_majority(MEMBER_IDS, nobody)
 
     assert here(ME, SECOND, WITNESS) == (ME, SECOND, WITNESS)
     assert here(ME, WITNESS) == ()
@@ -157,7 +157,7 @@ def test_e19_a_majority_starts_with_the_witness_more_than_half_and_without_memor
 def test_e21_the_gateways_of_absent_robots_are_to_be_fenced_too_and_the_witness_has_none() -> None:
     candidate = standing()
     candidate.promised(ME, None, blank=False)
-    assert candidate.whoever_answers(UNIVERSE, nobody) == (ME,)
+    assert candidate.any_answering(MEMBER_IDS, nobody) == (ME,)
     named = candidate.unfenced(ME)
     assert [(lease.term, lease.holder.id) for lease in named] == [(NO_TERM, 2), (NO_TERM, 3)]
     candidate.fenced(2, NO_TERM)
