@@ -37,7 +37,7 @@ ORDER = (
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",
     "world/time_grid", "world/saved_state", "world/world", "world/checkpoint",
-    "world/virtual_time", "world/simulator", "world/cli",
+    "world/virtual_time", "world/routes", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/recording",
     "deploy/process", "deploy/campaign", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",

@@ -28,8 +28,9 @@ from lfa.protocol.node import (
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_host import NodeHost, Sent
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
-from lfa.protocol.transport.link_model import Link, LinkModel, Radio, link_of
+from lfa.protocol.transport.link_model import LinkModel, Radio
 from lfa.protocol.transport.links import Links
+from lfa.world.routes import Routes
 from lfa.world.virtual_time import LocalClock, VirtualTime
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
@@ -48,6 +49,7 @@ class _SimulatedNode:
         self.host = host
         self.node: Node = host.node
         self.clock = clock
+        self.token = alive_key(_fleet(self.node), self.node.name, self.node.incarnation)
         self.gone = False
         self.deadline: float | None = None
         self.interests: frozenset[str] = frozenset()
@@ -75,9 +77,7 @@ class Simulator(VirtualTime):
         self.loses_declarations = False
         """True while routers lose all declarations, also those made again."""
         self._processes: dict[str, _SimulatedNode] = {}
-        self._routes: dict[str, list[tuple[_SimulatedNode, Link | None]]] = {}
-        """Receivers of each key, and the radio link to each (None: not over radio)."""
-        self._wanted: dict[tuple[frozenset[str], str], bool] = {}
+        self._routes: Routes[_SimulatedNode] = Routes()
 
     @property
     def names(self) -> list[str]:
@@ -92,8 +92,9 @@ class Simulator(VirtualTime):
         """
         process = _SimulatedNode(NodeHost(node, journal, observers), clock or LocalClock())
         self._processes[node.name] = process
+        self._routes.add(process, node.name)
         self._refresh(process)
-        self._announce(PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)
+        self._announce(process.token, PeerUp(node.name, node.incarnation), LOCAL_DELAY_S)
         self._plan(process)
         self.at(self.now + VITALS_S, self._vitals, process)
 
@@ -108,7 +109,8 @@ class Simulator(VirtualTime):
         self._remove(process)
         low, high = HINT_DELAY_S
         if hinted:
-            self._announce(PeerDown(name, process.node.incarnation), low + (high - low) * self._random.random())
+            delay_s = low + (high - low) * self._random.random()
+            self._announce(process.token, PeerDown(name, process.node.incarnation), delay_s)
 
     def hint(self, event: PeerUp | PeerDown | RouterLost, observers: Sequence[str]) -> None:
         """Deliver a liveliness event to `observers`, true or false."""
@@ -149,7 +151,7 @@ class Simulator(VirtualTime):
         message = decode(payload, TOPIC[key.split("/")[3]].type)
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        for process, _ in self._route(key):
+        for process, _ in self._routes.of(key):
             self.at(self.now + LOCAL_DELAY_S, self._give, process, key, message, payload)
 
     # --- one call of one node ---------------------------------------------------------------------------------
@@ -216,13 +218,13 @@ class Simulator(VirtualTime):
     def _leave(self, process: _SimulatedNode) -> None:
         if not process.gone:
             self._remove(process)
-            self._announce(PeerDown(process.node.name, process.node.incarnation), LOCAL_DELAY_S)
+            self._announce(process.token, PeerDown(process.node.name, process.node.incarnation), LOCAL_DELAY_S)
 
     def _remove(self, process: _SimulatedNode) -> None:
         del self._processes[process.node.name]
         process.gone = True
         process.host.journal.close()
-        self._routes.clear()
+        self._routes.remove(process, process.interests)
 
     def _vitals(self, process: _SimulatedNode) -> None:
         if not process.gone:
@@ -240,42 +242,30 @@ class Simulator(VirtualTime):
             self.link_model.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        routes = self._routes.get(key)
-        for process, link in self._route(key) if routes is None else routes:
-            if process is sender and key.split("/", 4)[3] in NO_ECHO:
+        echoes = key.split("/", 4)[3] not in NO_ECHO
+        for process, link in self._routes.of(key):
+            if process is sender and not echoes:
                 continue
             if self.deaf and (process.node.name, sender.node.name) in self.deaf:
                 continue
             for delay_s in LOCAL_DELAYS_S if link is None else self.link_model.delays(*link):
                 self.at(self.now + delay_s, self._give, process, key, message, payload)
 
-    def _route(self, key: str) -> list[tuple[_SimulatedNode, Link | None]]:
-        hear = [process for process in self._processes.values() if self._wants(process.interests, key)]
-        routes = self._routes[key] = [(process, link_of(key, process.node.name)) for process in hear]
-        return routes
-
-    def _wants(self, interests: frozenset[str], key: str) -> bool:
-        """Return True if `interests` match `key`; cached, since every process start or end clears all routes."""
-        known = self._wanted.get((interests, key))
-        if known is None:
-            known = self._wanted[interests, key] = any(matches(e, key) for e in interests)
-        return known
-
     def _refresh(self, process: _SimulatedNode) -> None:
         """Apply the node's changed interests; it also gets liveliness events for tokens that already exist."""
-        new = process.node.interests
-        added = sorted(new - process.interests)
+        new, old = process.node.interests, process.interests
+        added = sorted(new - old)
         process.interests = new
-        self._routes.clear()
-        for other in list(self._processes.values()):
-            token = _token(other.node)
-            if other is not process and any(matches(e, token) for e in added):
+        self._routes.change(process, old - new, added)
+        tokens = [expression for expression in added if _hears_tokens(expression)]
+        for other in list(self._processes.values()) if tokens else ():
+            if other is not process and any(matches(e, other.token) for e in tokens):
                 self._hint_later(process, PeerUp(other.node.name, other.node.incarnation), LOCAL_DELAY_S)
 
-    def _announce(self, event: PeerUp | PeerDown, delay_s: float) -> None:
-        for process in list(self._processes.values()):
-            token = alive_key(_fleet(process.node), event.name, event.incarnation)
-            if process.node.name != event.name and any(matches(e, token) for e in process.interests):
+    def _announce(self, token: str, event: PeerUp | PeerDown, delay_s: float) -> None:
+        """Deliver the event of a `token` to all who hear of it, but for its owner."""
+        for process, _ in self._routes.of(token):
+            if process.node.name != event.name:
                 self._hint_later(process, event, delay_s)
 
     def _hint_later(self, process: _SimulatedNode, event: PeerUp | PeerDown, delay_s: float) -> None:
@@ -286,8 +276,9 @@ def _unjournalled(node: Node) -> Journal:
     return Journal(None, Heading(JOURNAL_VERSION, node.name, node.incarnation, node.incarnation, {}))
 
 
-def _token(node: Node) -> str:
-    return alive_key(_fleet(node), node.name, node.incarnation)
+def _hears_tokens(expression: str) -> bool:
+    """Return True if `expression` can match the key of a liveliness token."""
+    return expression.endswith("**") or expression.split("/")[3:4] in (["*"], ["alive"])
 
 
 def _fleet(node: Node) -> str:

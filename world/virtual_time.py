@@ -31,6 +31,7 @@ class VirtualTime:
 
     def __init__(self) -> None:
         self.now = 0.0
+        self._halted = False
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = 0
 
@@ -39,18 +40,22 @@ class VirtualTime:
         self._order += 1
         heappush(self._heap, (when, self._order, action, arguments))
 
-    def run(self, until: float, over: Callable[[], bool] | None = None) -> Self:
-        """Advance to true time `until` [s], or until `over()` holds."""
-        heap = self._heap
+    def run(self, until: float) -> Self:
+        """Advance to true time `until` [s], or up to the call during which `halt` was called."""
+        heap, self._halted = self._heap, False
         while heap and heap[0][0] <= until:
             when, _, action, arguments = heappop(heap)
             if when > self.now:
                 self.now = when
             action(*arguments)
-            if over is not None and over():
+            if self._halted:
                 return self
         self.now = max(self.now, until)
         return self
+
+    def halt(self) -> None:
+        """End the present `run` with the call under way; the next one goes on from there."""
+        self._halted = True
 
     def lose(self, by: float, actions: tuple[Callable[..., None], ...]) -> None:
         """Drop the scheduled calls of `actions` that are later than true time `by` [s]."""

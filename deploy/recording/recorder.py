@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_writer import ChunkWriter
-from lfa.deploy.recording.said_again import SaidAgain
+from lfa.deploy.recording.said_again import HEARD, SaidAgain
 from lfa.deploy.recording.sender_caps import SenderCaps
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
@@ -209,6 +209,8 @@ class EventLines:
 
     def lines(self, t: float, key: str, message: Message) -> bytes:
         """Return the lines that `message`, sent on `key` at `t` [s], adds."""
+        if type(message) not in HEARD:
+            return b""
         line = event_line(t, message) if isinstance(message, Event) else b""
         return line + b"".join(event_line(t, event) for event in self._said.late(key, message))
 

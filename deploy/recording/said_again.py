@@ -14,6 +14,9 @@ from lfa.protocol.messages.team import Event, Status
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.topics import address
 
+HEARD = frozenset({Event, Sensors, Status})
+"""Types of the messages that can say such a fact; a look-up spares all others, a recording's most, the rest."""
+
 
 class SaidAgain:
     """Memory of what the events so far have said; `late` returns the events that must have been missed."""

@@ -20,6 +20,18 @@ OWNERS_MAX = 128
 OTHERS = "others"
 
 
+class _Allowance:
+    """What one member may still have recorded: `left` bytes at the time `since` [s], negative after a large message."""
+
+    def __init__(self, owner: str, t: float) -> None:
+        self.owner = owner
+        self.rate = SIMULATED_BYTES_PER_S_MAX if owner in (WORLD_NAME, TRUTH_OWNER) else BYTES_PER_S_MAX
+        self.left = self.most = self.rate * BURST_S
+        self.since = t
+        self.keys = 0
+        """Number of keys admitted."""
+
+
 class SenderCaps:
     """Allowance of each member, by the owner of its keys: a bucket of bytes, and the keys seen.
 
@@ -27,42 +39,40 @@ class SenderCaps:
     """
 
     def __init__(self) -> None:
-        self._allowances: dict[str, tuple[float, float]] = {}
-        """Remaining bytes, negative after a message larger than what was left, and the time [s] of that number."""
-        self._channels: dict[str, set[str]] = {}
+        self._allowances: dict[str, _Allowance] = {}
+        self._of_key: dict[str, _Allowance] = {}
+        """Allowance of each key that has been admitted."""
         self.left_out: dict[str, int] = {}
 
     def admits(self, t: float, key: str) -> bool:
         """Return True if a message on `key` may be recorded at `t` [s]; otherwise count it."""
-        owner = self._owner(key)
-        rate = _rate(owner)
-        left, since = self._allowances.get(owner, (rate * BURST_S, t))
-        left = min(left + rate * max(t - since, 0.0), rate * BURST_S)
-        self._allowances[owner] = left, max(t, since)
-        channels = self._channels.setdefault(owner, set())
-        if left <= 0.0 or (key not in channels and len(channels) >= CHANNELS_MAX):
-            self._leave_out(owner)
+        known = self._of_key.get(key)
+        allowance = self._allowance(t, key) if known is None else known
+        if t > allowance.since:
+            left = allowance.left + allowance.rate * (t - allowance.since)
+            allowance.left = left if left < allowance.most else allowance.most
+            allowance.since = t
+        if allowance.left <= 0.0 or (known is None and allowance.keys >= CHANNELS_MAX):
+            self._leave_out(allowance)
             return False
-        channels.add(key)
+        if known is None:
+            allowance.keys += 1
+            self._of_key[key] = allowance
         return True
 
     def spend(self, key: str, count: int) -> None:
         """Take `count` bytes, which were recorded, from the allowance of the owner of `key`."""
-        owner = self._owner(key)
-        left, since = self._allowances[owner]
-        self._allowances[owner] = left - count, since
+        self._of_key[key].left -= count
 
-    def _owner(self, key: str) -> str:
+    def _allowance(self, t: float, key: str) -> _Allowance:
         owner = key.split("/", 3)[2]
-        known = owner in self._allowances or len(self._allowances) < OWNERS_MAX
-        return owner if known else OTHERS
+        if owner not in self._allowances and len(self._allowances) >= OWNERS_MAX:
+            owner = OTHERS
+        return self._allowances.setdefault(owner, _Allowance(owner, t))
 
-    def _leave_out(self, owner: str) -> None:
+    def _leave_out(self, allowance: _Allowance) -> None:
+        owner = allowance.owner
         if owner not in self.left_out:
-            limit = f"{_rate(owner) / 1e6:.1f} MB/s on {CHANNELS_MAX} keys"
+            limit = f"{allowance.rate / 1e6:.1f} MB/s on {CHANNELS_MAX} keys"
             write_line(f"{owner} sends more than {limit}: the rest is not recorded", sys.stderr)
         self.left_out[owner] = self.left_out.get(owner, 0) + 1
-
-
-def _rate(owner: str) -> float:
-    return SIMULATED_BYTES_PER_S_MAX if owner in (WORLD_NAME, TRUTH_OWNER) else BYTES_PER_S_MAX

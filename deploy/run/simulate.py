@@ -45,6 +45,7 @@ MODE = "simulated"
 JOURNAL_FLUSH_S = 1.0
 SILENCE_S_MAX = 1.0
 SHOW_EVERY_S = 5.0  # of wall-clock time
+LOOK_EVERY_S = 0.1  # of virtual time, between two looks at what may end a run from outside
 LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
 
 
@@ -182,15 +183,14 @@ class SimulatedRun:
             self._check_at = fault.at_s
 
     def advance(self, until: float, over: Callable[[], bool] = lambda: False) -> None:
-        """Go on to virtual time `until` [s], to the verdict, or until `over()`."""
-        termination, simulator = self._termination, self._simulator
+        """Go on to virtual time `until` [s], to the verdict, or until `over()`, which is asked every `LOOK_EVERY_S`."""
+        simulator = self._simulator
         until = min(until, self._scenario.time_limit_s + SILENCE_S_MAX)
         while self.verdict is None and simulator.now < until and not over():
+            self._show()
             if simulator.now >= self._check_at:
                 self._do_due()
-            simulator.run(
-                min(until, self._check_at), over=lambda: self._shown() or termination.verdict is not None or over()
-            )
+            simulator.run(min(until, self._check_at, simulator.now + LOOK_EVERY_S))
 
     def close(self, instead: Verdict | None = None) -> Verdict:
         """End the run with its verdict, or `instead`; close the journals."""
@@ -207,14 +207,13 @@ class SimulatedRun:
         next_s = self._schedule.pending[0].at_s if self._schedule.pending else inf
         self._check_at = next_s if next_s > now else now + LEADER_WAIT_S
 
-    def _shown(self) -> bool:
-        """Show the progress from time to time; return False, so that it stands beside conditions of an end."""
+    def _show(self) -> None:
+        """Show the progress from time to time."""
         if time.perf_counter() >= self._show_at:
             self._show_at = time.perf_counter() + SHOW_EVERY_S
             leader = "no leader" if self._termination.leader is None else f"leader {self._termination.leader}"
             limit_s = self._scenario.time_limit_s
             write_line(f"{self._simulator.now:7.1f} s of at most {limit_s:g} s simulated, {leader}", sys.stderr)
-        return False
 
     def _do(self, action: FaultAction, victim: int | str) -> None:
         """Execute a fault action; it has no effect on an absent robot, nor has a restart on a running one."""
@@ -252,7 +251,8 @@ class SimulatedRun:
 
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
         self._record(now, key, message)
-        self._termination.see(message)
+        if self._termination.see(message) is not None:
+            self._simulator.halt()
 
     def _say(self, kind: str, **data: object) -> None:
         now = self._simulator.now

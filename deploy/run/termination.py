@@ -26,6 +26,9 @@ SLOT_SHARE = 0.5
 """Distance of a robot at rest from its slot up to which it is in it, as a share of its commanded distance k^d."""
 TRACKING_S_MAX = TOPIC["tracking"].timeout_s or 1.0
 
+JUDGED = frozenset({Truth, TableRow, Tracking, Event, Status})
+"""Types of the messages that tell something about the end of a run; one in two is of another."""
+
 
 class Termination:
     """Judge of a run from every Truth and Event; `verdict` is None until the run is over.
@@ -51,7 +54,7 @@ class Termination:
 
     def see(self, message: Message) -> Verdict | None:
         """Update with a message and return the verdict, or None while the run goes on."""
-        if self.verdict is None:
+        if self.verdict is None and type(message) in JUDGED:
             match message:
                 case Truth():
                     self._now_s = message.time_s

@@ -133,3 +133,13 @@ def test_a_tap_hears_each_message_once_when_it_is_published() -> None:
     simulator.run(0.95)
     assert len(heard) == 20
     assert all(now == said.header.stamp for now, said in heard if not isinstance(said, Ask))
+
+
+def test_a_halt_ends_a_run_with_the_call_under_way_and_the_next_run_goes_on_from_there() -> None:
+    simulator, a, _ = pair()
+    simulator.taps.append(lambda now, *_: simulator.halt() if now >= 0.3 else None)
+    simulator.run(1.0)
+    assert (simulator.now, len(a.ticks)) == (pytest.approx(0.3), 4)
+    simulator.taps.clear()
+    simulator.run(1.0)
+    assert len(a.ticks) == 11

@@ -12,6 +12,7 @@ from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import draw
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event
+from lfa.protocol.names import robot_id_of
 
 ROBOTS = (1, 2, 3, 4)
 ROAD_M = 4.0
@@ -32,19 +33,21 @@ def _check(order: tuple[int, ...]) -> None:
     schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), radio=FAIR)
     team = AgentSimulation(schedule, ROAD_M)
     arrived: list[str] = []
+    left = list(ROBOTS)
 
     def hear(_now: float, _key: str, _payload: bytes, message: Message) -> None:
         if isinstance(message, Event) and message.kind == "goal":
             arrived.append(message.header.sender)
+            if left == [robot_id_of(message.header.sender)]:
+                team.simulator.halt()
 
     team.simulator.taps.append(hear)
     team.start_all().run(FIRST_S)
-    left = list(ROBOTS)
     for victim in order:
         team.kill(victim)
         left.remove(victim)
         team.run(team.now + EVERY_S)
         assert team.leaders() == left[:1], f"killed in the order {order}"
         assert [team.lease_of(robot).chain for robot in left] == [tuple(left)] * len(left), f"killed so far of {order}"
-    team.simulator.run(ARRIVED_S, over=lambda: f"robot{left[0]}" in arrived)
+    team.run(ARRIVED_S)
     assert f"robot{left[0]}" in arrived, f"robot {left[0]}, the last of {order}, does not arrive"
