@@ -7,7 +7,7 @@ from typing import Literal
 from msgspec import Struct
 
 from lfa.protocol.messages.consensus import Config, Hello, LeaseBody, Term
-from lfa.protocol.topics import TO_HELLO
+from lfa.protocol.topics import TO_ALL, TO_HELLO
 
 Cause = Literal["expired", "released", "deposed", "handed_over"]
 
@@ -21,7 +21,7 @@ class Send(Struct, frozen=True):
     @property
     def receiver(self) -> str:
         """Receiver's part of the key of the topic `lease`."""
-        return TO_HELLO if isinstance(self.body, Hello) else self.to
+        return TO_HELLO if isinstance(self.body, Hello) and self.to == TO_ALL else self.to
 
 
 class BecomeLeader(Struct, frozen=True):

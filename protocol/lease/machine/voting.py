@@ -144,7 +144,16 @@ def say_hello(m: LeaseMemory, now: float) -> None:
     on_time = now < m.hello_at + pause_s  # so that late ticks do not accumulate
     m.hello_at = (m.hello_at if on_time else now) + pause_s
     if m.is_out(now) and not m.pending_release.closing:
-        m.send("all", Hello(None if is_first(m.config) else m.config.version, m.agreed))
+        m.send(_greeted(m), Hello(None if is_first(m.config) else m.config.version, m.agreed))
+
+
+def _greeted(m: LeaseMemory) -> str:
+    """Return the receiver of a HELLO: all, or the leader alone that a robot in its chain without a vote follows.
+
+    Only that leader counts its silence. To all, a team of N robots would hear N squared of them, eight times a second.
+    """
+    in_place = m.me in m.config.chain and m.me not in m.config.voters
+    return "all" if m.leader is None or not in_place else robot_name(m.leader)
 
 
 def lose_leader(m: LeaseMemory, _now: float) -> None:

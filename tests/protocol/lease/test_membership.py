@@ -35,6 +35,21 @@ def test_e9_a_robot_that_was_out_returns_at_the_tail() -> None:
     assert team.changes() in ([], [(1, "BecomeLeader")]), "only the leader's own term may have been raised"
 
 
+def test_e9_a_robot_in_place_without_a_vote_says_hello_to_its_leader_alone_and_stays_in_the_chain() -> None:
+    """To all, a team of 30 would hear 6000 of them a second."""
+    team = Team(robots=9, led_by=3.0)
+    for leader, until in ((1, 4.0), (2, 6.0)):
+        team.run(until)
+        alive = range(leader, 10)
+        before = {robot: team.lease_of(robot).hello_of(9) for robot in alive}
+        team.run(until + 1.0)
+        assert [robot for robot in alive if team.lease_of(robot).hello_of(9) != before[robot]] == [leader]
+        assert team.lease_of(9).me not in team.lease_of(9).config.voters
+        assert team.lease_of(leader).chain == tuple(alive)
+        team.kill(leader)
+    assert team.safe()
+
+
 def test_e22_a_robot_left_out_stays_out_though_it_asks_and_returns_at_the_tail() -> None:
     team = Team()
     team.lease_of(1).left_out = frozenset({2})
