@@ -23,7 +23,8 @@ MAY: dict[str, set[str]] = {
 }  # fmt: skip
 
 ORDER = (
-    "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/clock",
+    "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/plug_in",
+    "protocol/clock",
     "protocol/incarnations",
     "protocol/names", "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages",
     "protocol/node", "protocol/topics", "protocol/outbox", "protocol/fleet_stop", "protocol/lease",

@@ -6,8 +6,8 @@ from math import isfinite
 from pathlib import Path
 
 from lfa.agents.following.controller import Controller, Reference
-from lfa.agents.following.plugin_error import told
 from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.plug_in import told
 
 
 class CheckedController:

@@ -12,10 +12,10 @@ from typing import Protocol
 from msgspec import Struct
 
 from lfa.agents.config import Gains
-from lfa.agents.following.plugin_error import told
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.mission import Limits
+from lfa.protocol.plug_in import told
 
 ENTRY_POINTS = "lfa.controllers"
 DEFAULT_CONTROLLER = "law"

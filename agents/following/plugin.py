@@ -10,14 +10,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import msgspec
-from msgspec import Struct
-
 from lfa.agents.config import Gains
 from lfa.agents.following.controller import Controller, add_controller, find_controller
-from lfa.agents.following.plugin_error import told
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Following, Limits, Parameter
+from lfa.protocol.plug_in import converted, parameters_of, told
 
 _files: dict[str, str] = {}
 """Absolute `FILE.py:Class` of each controller that was added from a file, by name."""
@@ -48,12 +45,6 @@ def file_of(name: str) -> str | None:
     return _files.get(name)
 
 
-def parameters_of(make: Any) -> type[Struct] | None:
-    """Return the type of a controller's own parameters, None for a controller without."""
-    kind = getattr(make, "Parameters", None)
-    return kind if isinstance(kind, type) and issubclass(kind, Struct) else None
-
-
 def make_controller(following: Following, gains: Gains, limits: Limits) -> Controller:
     """Return the controller that the mission chooses, with its parameters.
 
@@ -65,7 +56,11 @@ def make_controller(following: Following, gains: Gains, limits: Limits) -> Contr
     if kind is None and following.parameters:
         raise Refused(f"parameters = {{{_names(following.parameters)}}}: controller {following.controller} has none")
     try:
-        made: Controller = make(gains, limits) if kind is None else make(gains, limits, _convert(following, kind))
+        made: Controller = (
+            make(gains, limits)
+            if kind is None
+            else make(gains, limits, converted(following.parameters, kind, following.controller))
+        )
     except Refused:
         raise
     except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
@@ -88,22 +83,6 @@ def _module(path: Path, text: str) -> Any:
     except Exception as error:  # noqa: BLE001 - the file of a user may fail in any way
         raise Refused(f"--controller {text}: {told(error)}") from None
     return module
-
-
-def _convert(following: Following, kind: type[Struct]) -> Struct:
-    """Return the mission's parameters as `kind`. Raise `Refused` with the name and the type that would be right."""
-    known = {field.encode_name for field in msgspec.structs.fields(kind)}
-    unknown = sorted(set(following.parameters) - known)
-    if unknown:
-        raise Refused(f"parameters.{unknown[0]}: no such parameter of {following.controller}: known are "
-                      f"{', '.join(sorted(known)) or 'none'}")  # fmt: skip
-    try:
-        return msgspec.convert(following.parameters, kind)
-    except msgspec.ValidationError as error:
-        says, _, place = str(error).partition(" - at `$")
-        key = f"parameters{place.rstrip('`')}"
-        value = following.parameters.get(key.rpartition(".")[2])
-        raise Refused(f"{key}{'' if value is None else f' = {value}'}: {says}") from None
 
 
 def _names(parameters: dict[str, Parameter]) -> str:

@@ -1,4 +1,4 @@
-"""`lfa list`: print the shipped scenarios with team size and title."""
+"""`lfa list`: print the shipped scenarios with team size and title, and the plug-ins that are installed."""
 
 from __future__ import annotations
 
@@ -7,17 +7,36 @@ from typing import Annotated
 import msgspec
 import typer
 
+from lfa.agents.following.controller import installed_controllers
+from lfa.protocol.errors import Refused
+from lfa.world.description.generator import GENERATORS, title_of
 from lfa.world.description.load import titled
 
 
 def command(as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> int:
     rows = [
-        {"name": name, "robots": len(s.mission.robots), "time_limit_s": s.time_limit_s, "title": s.title}
+        {
+            "name": name, "kind": "scenario", "robots": len(s.mission.robots), "time_limit_s": s.time_limit_s,
+            "title": s.title,
+        }
         for name, s in titled().items()
-    ]
+    ]  # fmt: skip
+    plug_ins = [{"name": name, "kind": "scenario generator", "title": _title(name)} for name in GENERATORS.names()]
+    plug_ins += [{"name": name, "kind": "controller"} for name in installed_controllers()]
     if as_json:
-        print(msgspec.json.encode(rows).decode())
+        print(msgspec.json.encode([*rows, *plug_ins]).decode())
         return 0
     for row in rows:
         print(f"{row['name']:<16}{row['robots']:>3} robots  {row['title']}")
+    print()
+    for one in plug_ins:
+        print(f"{one['name']:<16}{one['kind']}{': ' if 'title' in one else ''}{one.get('title', '')}")
     return 0
+
+
+def _title(name: str) -> str:
+    """Return the title of a scenario generator, or why it cannot be loaded."""
+    try:
+        return title_of(name)
+    except Refused as refused:
+        return str(refused)

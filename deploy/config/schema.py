@@ -19,8 +19,8 @@ from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo, fields
 
 from lfa.agents.following.controller import find_controller, installed_controllers
-from lfa.agents.following.plugin import parameters_of
 from lfa.deploy.fleet.plan.fleet_file import FleetFile
+from lfa.protocol.plug_in import parameters_of
 from lfa.world.description.load import Scenario
 
 PARAMETERS = "mission.following.parameters"

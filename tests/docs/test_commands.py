@@ -24,7 +24,7 @@ SITE = ROOT / "deploy" / "docs"
 CAMPAIGNS = [" ".join(text.split()) for text in COMMANDS]
 TARGETS = set(" ".join(re.findall(r"^([a-z -]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)).split())
 OPTIONS = {row.command: {*row.options, "-v", "-f"} for row in words()}
-SCENARIOS = {*shipped(), "SCENARIO"}
+SCENARIOS = {*shipped(), "SCENARIO", "slalom"}  # slalom: the example's generator, installed
 RUN_S_MAX = 200.0
 
 #   command, in the order of the pages            what is added, to end sooner

@@ -25,6 +25,7 @@ SHOWN: dict[str, tuple[str, ...]] = {
     "06_driver":           (r"goal_reached: robot 2 was driven from \(-0\.6, 1\.04\) to \(3\.\d+, 1\.\d+\)",),
     "07_faults":           (r"injected: stop 1 at", r"led by robots 1, 2", r" 0 violations"),
     "08_formation_change": (r"asks for a column", r"robot 3: its slot moves until", r"path\.png"),
+    "09_own_generator":    (r"seed 1: goal_reached past posts at \(3, \S+\), \(6, \S+\)", r"seed 2: goal_reached"),
 }  # fmt: skip
 
 

@@ -25,6 +25,7 @@ from lfa.protocol.config_file.mistake import (
     apply_rules,
     overlap,
     spoiled,
+    wrong,
 )
 from lfa.protocol.config_file.toml_file import TomlFile, read_toml
 from lfa.protocol.errors import Refused
@@ -33,7 +34,8 @@ from lfa.protocol.names import whole_number
 from lfa.protocol.transport.link_model import Radio
 from lfa.world.description.checks import ROBOTS_MAX, SCENARIO_RULES
 from lfa.world.description.course_rules import COURSE_RULE, PLACES
-from lfa.world.description.placement import draw, starts_of
+from lfa.world.description.generator import GENERATORS, document_of, generated, refuse
+from lfa.world.description.placement import starts_of, varied
 from lfa.world.description.scenario import Body, Lidar, Noise, Obstacle, Outcome, Point, Scenario, Vary, WorldSpec
 
 __all__ = [
@@ -85,20 +87,55 @@ def load(
     `rules` are those of rooms that this one does not know. Raises RefusedFile with all mistakes: file, line, key,
     value, what would be valid.
     """
-    path = _path_of(name_or_path)
-    file = read_toml(path, "a scenario file")
+    file = _file_of(name_or_path)
+    path = file.path
     keys = [_override(file.document, override) for override in overrides]
     if robots is not None:
         _renumber(file.document, robots)
     scenario, mistakes = convert(file.document, Scenario)
+    scenario = replace(scenario, name=scenario.saved_from or path.stem)
+    if scenario.generator is not None:
+        mistakes += _beside_generator(scenario)
+        try:
+            if not mistakes:
+                _checked(scenario, scenario.seed, rules)
+                return scenario
+        except RefusedValue as refused:
+            mistakes.append(refused.mistake)
+        raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
     apply_rules(MISSION_RULES, scenario.mission, mistakes)
     apply_rules((*SCENARIO_RULES, *rules), scenario, mistakes)
-    scenario = replace(scenario, name=scenario.saved_from or path.stem)
     scenario = _on_map(scenario, path.parent, mistakes)
     apply_rules((COURSE_RULE,), scenario, mistakes)
     if mistakes:
         raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
     return scenario
+
+
+def draw(scenario: Scenario, seed: int) -> Scenario:
+    """Return `scenario` as its generator, if it has one, makes it for `seed`, and varied by the seed within its bounds.
+
+    Raises Refused for a generator that fails, and RefusedFile for what it makes wrong.
+    """
+    return varied(scenario if scenario.generator is None else _checked(scenario, seed), seed)
+
+
+def _checked(scenario: Scenario, seed: int, rules: Sequence[Rule[Scenario]] = ()) -> Scenario:
+    """Return what the generator of `scenario` makes for `seed`. Raises RefusedFile with all mistakes in that."""
+    assert scenario.generator is not None
+    drawn, mistakes = generated(scenario, seed)
+    apply_rules(MISSION_RULES, drawn.mission, mistakes)
+    apply_rules((*SCENARIO_RULES, *rules, COURSE_RULE), drawn, mistakes)
+    if mistakes:
+        raise refuse(scenario.generator.name, seed, mistakes)
+    return drawn
+
+
+def _beside_generator(scenario: Scenario) -> list[Mistake]:
+    """Return a mistake for each key that a scenario with a generator cannot have."""
+    world = scenario.world
+    given = {"world.map": world.map, "world.keepout": world.keepout, "world.start": world.start}
+    return [wrong(key, value, "left out with a generator") for key, value in given.items() if value is not None]
 
 
 def _on_map(scenario: Scenario, folder: Path, mistakes: list[Mistake]) -> Scenario:
@@ -122,6 +159,8 @@ def _error(file: TomlFile, mistake: Mistake, overridden: list[str], robots: int 
         return FileError(f"--robots {robots}", str(mistake), key=mistake.key)
     if overlap((mistake.key, *mistake.compared), overridden):
         return FileError(f"{file.path.name} with --set", str(mistake), key=mistake.key)
+    if not file.lines:  # what a generator's name stands for
+        return FileError(name, str(mistake), key=mistake.key)
     return file.error(mistake, name)
 
 
@@ -129,14 +168,19 @@ def _names() -> list[str]:
     return sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 
 
-def _path_of(name_or_path: str) -> Path:
+def _file_of(name_or_path: str) -> TomlFile:
+    """Return the scenario file of that path or shipped name, or the one that a generator's name stands for."""
     if name_or_path in _names():
-        return SCENARIOS / f"{name_or_path}.toml"
+        return read_toml(SCENARIOS / f"{name_or_path}.toml", "a scenario file")
     path = Path(name_or_path)
     if path.suffix == ".toml" or len(path.parts) > 1:
-        return path
-    close = get_close_matches(name_or_path, _names(), n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(_names())}; a file ends in .toml"
+        return read_toml(path, "a scenario file")
+    generators = GENERATORS.names()
+    if name_or_path in generators:
+        return TomlFile(path, document_of(name_or_path), {})
+    close = get_close_matches(name_or_path, [*_names(), *generators], n=1)
+    shown = f"shipped are {', '.join(_names())}; {'generators are ' if generators else ''}{', '.join(generators)}"
+    hint = f"did you mean {close[0]!r}?" if close else f"{shown.rstrip('; ')}; a file ends in .toml"
     raise Refused(f"no scenario {name_or_path!r}: {hint}")
 
 

@@ -52,7 +52,7 @@ def as_it_begins(obstacle: Obstacle) -> Obstacle:
     return replace(obstacle, center_m=way_of(obstacle).at(0.0)) if obstacle.moves else obstacle
 
 
-def draw(scenario: Scenario, seed: int) -> Scenario:
+def varied(scenario: Scenario, seed: int) -> Scenario:
     """Draw a concrete scenario from `scenario` and `seed`, with starts given and nothing left to vary.
 
     Each start and each obstacle has its own generator, so an added obstacle does not move the others. Raises Refused

@@ -11,7 +11,7 @@ from typing import Literal
 
 from msgspec import Struct, field
 
-from lfa.protocol.mission import Mission
+from lfa.protocol.mission import Mission, Parameter
 from lfa.protocol.transport.link_model import Radio
 from lfa.world.description.terrain import Bump, Ditch, Pothole
 
@@ -161,6 +161,15 @@ class Assert(Struct, frozen=True, forbid_unknown_fields=True):
     """Largest number of robots left behind; 0 for a run that reaches its goal, where it is not given."""
 
 
+class Generator(Struct, frozen=True, forbid_unknown_fields=True):
+    """Choice of a scenario generator, which `draw` calls."""
+
+    name: str
+    """Name of an installed scenario generator (entry point `lfa.scenarios`)."""
+    parameters: dict[str, Parameter] = {}
+    """Parameters of the generator itself, by the names and types that its class gives in `Parameters`."""
+
+
 class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     """Complete description of a run: `mission` is sent to the team, the rest configures the world around it."""
 
@@ -168,6 +177,8 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     mission: Mission
     time_limit_s: float
     world: WorldSpec = WorldSpec()
+    generator: Generator | None = None
+    """Generator that draws the course from the seed; a drawn scenario has none."""
     radio: Radio = Radio()
     restart: dict[str, Literal["never", "on-failure"]] = {}
     """Restart policy of `lfa run` for a failed process: keys `router`, `world`, `robots`, or one as `robot2`."""

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
-from lfa.world.description.load import Scenario, load
+from lfa.world.description.load import Scenario, draw, load
 from lfa.world.description.obstacle_motion import WALK_LEG_S, way_of
-from lfa.world.description.placement import draw
 from lfa.world.description.scenario import Lidar, Noise, Obstacle
 from lfa.world.description.terrain import Bump, Ditch, Pothole, features, patch_of
 from lfa.world.sensors.ground_sensor import Profiler

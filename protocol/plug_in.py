@@ -1,0 +1,121 @@
+"""Plug-ins: classes of a user's own, by name among the installed entry points of a group, or as a script added them.
+
+A plug-in with parameters of its own names their types in a `Struct` called `Parameters`. Code is loaded only by the
+name of an installed package or from the command line, never because a message or a scenario names a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import msgspec
+from msgspec import Struct
+
+from lfa.protocol.config_file.mistake import Mistake, RefusedValue
+from lfa.protocol.errors import Refused
+
+
+class PlugIns:
+    """Plug-ins of one `kind`, as `sensor`, whose packages name them in the entry points `group`."""
+
+    def __init__(self, kind: str, group: str) -> None:
+        self._kind, self._group = kind, group
+        self._added: dict[str, Any] = {}
+
+    def add(self, name: str, make: Any) -> None:
+        """Make `make` the plug-in called `name` in this process: for a script or a notebook that simulates."""
+        self._added[name] = make
+
+    def names(self) -> list[str]:
+        """Return the names of all installed and added plug-ins."""
+        return sorted({*self._entry_points(), *self._added})
+
+    def find(self, name: str) -> Any:
+        """Return the class called `name`. Raise `Refused` for an unknown one, and one whose package cannot be read."""
+        if name in self._added:
+            return self._added[name]
+        points = self._entry_points()
+        if name not in points:
+            known = ", ".join(self.names()) or "none is installed"
+            raise Refused(f"no {self._kind} {name!r}: must be one of the entry points {self._group}: {known}")
+        try:
+            return points[name].load()
+        except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
+            raise Refused(f"{self._kind} {name}: {points[name].value} cannot be loaded: {told(error)}") from None
+
+    def make(self, name: str, given: Mapping[str, Any], key: str, *arguments: Any) -> Any:
+        """Return a plug-in made with `arguments` and, if its class has `Parameters`, with `given` as these.
+
+        `key` is the table of a scenario that chooses it. Raise `RefusedValue` for an unknown one, for a parameter that
+        it has not or of another type, and for a class that raises.
+        """
+        try:
+            make = self.find(name)
+        except Refused as refused:
+            raise RefusedValue(Mistake(key, f": {refused}")) from None
+        kind = parameters_of(make)
+        if kind is None and given:
+            mistake = Mistake(f"{key}.parameters.{min(given)}", f": {self._kind} {name} has no parameters")
+            raise RefusedValue(mistake)
+        try:
+            own = () if kind is None else (converted(given, kind, name),)
+        except RefusedValue as refused:
+            mistake = refused.mistake
+            raise RefusedValue(mistake._replace(key=f"{key}.{mistake.key}")) from None
+        try:
+            return make(*arguments, *own)
+        except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
+            raise RefusedValue(Mistake(key, f": {self._kind} {name} cannot be made: {told(error)}")) from None
+
+    def _entry_points(self) -> dict[str, Any]:
+        # Imported here, for a name that is no default: it costs 3 MB of memory.
+        from importlib.metadata import entry_points
+
+        return {point.name: point for point in entry_points(group=self._group)}
+
+
+def parameters_of(make: Any) -> type[Struct] | None:
+    """Return the type of a plug-in's own parameters, None for a plug-in without."""
+    kind = getattr(make, "Parameters", None)
+    return kind if isinstance(kind, type) and issubclass(kind, Struct) else None
+
+
+def converted(given: Mapping[str, Any], kind: type[Struct], name: str) -> Struct:
+    """Return the parameters `given` to the plug-in `name` as `kind`.
+
+    Raise `RefusedValue` with the parameter and the type that would be right.
+    """
+    known = {field.encode_name for field in msgspec.structs.fields(kind)}
+    unknown = sorted(set(given) - known)
+    if unknown:
+        right = ", ".join(sorted(known)) or "none"
+        raise RefusedValue(Mistake(f"parameters.{unknown[0]}", f": no such parameter of {name}: known are {right}"))
+    hints = get_type_hints(kind)
+    try:
+        return msgspec.convert({name: _as_whole(value, hints.get(name)) for name, value in given.items()}, kind)
+    except msgspec.ValidationError as error:
+        says, _, place = str(error).partition(" - at `$")
+        key = f"parameters{place.rstrip('`')}"
+        value = given.get(key.rpartition(".")[2])
+        raise RefusedValue(Mistake(key, f"{'' if value is None else f' = {value}'}: {says}")) from None
+
+
+def _as_whole(value: Any, kind: Any) -> Any:
+    """Return `value`, or whole numbers for floats where `kind` takes these only: messages know floats alone."""
+    if isinstance(value, float) and value.is_integer() and {int} == {int, float} & {kind, *get_args(kind)}:
+        return int(value)
+    return [_as_whole(item, kind) for item in value] if isinstance(value, list | tuple) else value
+
+
+def told(error: Exception) -> str:
+    """Return an exception of a user's own code in one line, with file and line where it was raised."""
+    import traceback
+
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}: " if frames else ""
+    if isinstance(error, SyntaxError):
+        where = f"{Path(error.filename or '').name}:{error.lineno}: "
+        return f"{where}{type(error).__name__}: {error.msg}"
+    return f"{where}{type(error).__name__}: {' '.join(str(error).split())}"
