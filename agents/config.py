@@ -10,9 +10,8 @@ from math import inf, isfinite
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
-from lfa.protocol.mission import Limits
+from lfa.protocol.mission import CONTROL_HZ, Limits
 
-CONTROL_HZ = 50.0
 CONTROL_PERIOD_S = 1.0 / CONTROL_HZ
 
 

@@ -17,7 +17,6 @@ from lfa.agents.behaviors.back_out import BackOut
 from lfa.agents.behaviors.follow_slot import FollowSlot
 from lfa.agents.behaviors.lead_route import LeadRoute
 from lfa.agents.behaviors.team_mates import TeamMates
-from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.following.factory import follower_of, predecessor_of
 from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import Formation
@@ -61,7 +60,7 @@ class Navigator:
         self._obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
         self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
         self.scan_age = ScanAge()
-        self._detour = Detour(mission.radius_m, mission.limits)
+        self._detour = Detour(mission.radius_m, mission.limits, mission.control_period_s)
         self._crossing = Crossing(mission.radius_m)
         self._begin_roles(mission)
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
@@ -180,14 +179,15 @@ class Navigator:
         self._driven_at = now
         self._detour.decision = self._crossing.decision = None
         limits = self._mission.limits
-        self._last = safe(STILL, self._last, (), self._mission.radius_m, limits, CONTROL_PERIOD_S)
+        self._last = safe(STILL, self._last, (), self._mission.radius_m, limits, self._mission.control_period_s)
         self.follower.overridden(self._last)
         return self._last
 
     def drive(self, role: Role, chain: tuple[int, ...], pose: Pose2D, twist: Twist, now: float) -> Twist:
         """Return the command for the next control period."""
-        dt = CONTROL_PERIOD_S if self._driven_at is None else now - self._driven_at
-        dt = min(max(dt, DT_MIN_S), 2.0 * CONTROL_PERIOD_S)
+        period_s = self._mission.control_period_s
+        dt = period_s if self._driven_at is None else now - self._driven_at
+        dt = min(max(dt, DT_MIN_S), 2.0 * period_s)
         self._driven_at = now
         self._stuck_monitor.find_pose()
         if self._placeless_since is not None and self.was_placed:

@@ -15,7 +15,6 @@ from lfa.agents.attendance import Attendance
 from lfa.agents.avoidance.safety import obeyed
 from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
-from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
 from lfa.agents.stop_listener import StopListener
@@ -28,7 +27,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
 from lfa.protocol.lease.machine.lease import Lease, Observer
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
 from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, Sensors
@@ -43,9 +42,9 @@ from lfa.protocol.topics import OPERATOR_NAME
 
 HardwareMessage = Sensors | Localization | LaserScan | GroundProfile
 TeamMessage = PoseStamped | TableRow | ObstacleNote | FormationNote
-EASE_S = 2.0 * CONTROL_PERIOD_S
-"""Lease time [s] left beyond which a grant may wait for the next control step: each voter of a round would wake the
-leader."""
+EASE_PERIODS = 2.0
+"""Lease time left, in control periods, beyond which a grant may wait for the next control step: each voter of a round
+would wake the leader."""
 
 
 class RobotCore:
@@ -75,15 +74,17 @@ class RobotCore:
         self._team = TeamState()
         self.navigator = Navigator(robot_id, mission, self._team)
         me = Member(robot_id, outbox.incarnation)
-        self.lease = Lease(me, mission, timing_of(mission.profile), now, floor, observer)
+        timing = timing_for(mission)
+        self.lease = Lease(me, mission, timing, now, floor, observer)
         self._place = ChainPlace(robot_id, self.lease)
         self._stop_listener = StopListener(robot_id, mission.robots, outbox)
         self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place, self._stop_listener)
         self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
         self._team_orders = TeamOrders(outbox, mission)
-        self._reports = Reports(outbox, len(mission.robots))
+        self._reports = Reports(outbox, len(mission.robots), timing.deadman_s - mission.control_period_s)
         self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
+        self._period_s = mission.control_period_s
         self._next_control = now
         self._arrived = False
         self._spec = mission.formation
@@ -118,7 +119,7 @@ class RobotCore:
         """Do what is due at `now` [s]: the lease's part, then a control step."""
         step = now >= self._next_control
         if step:
-            self._next_control = _next_on_grid(self._next_control, now, CONTROL_PERIOD_S)
+            self._next_control = _next_on_grid(self._next_control, now, self._period_s)
         if step or now >= self.lease.next_deadline():
             self._apply(self.lease.tick(now, self._next_control), now)
         if step:
@@ -312,7 +313,7 @@ class RobotCore:
     def _control(self, now: float) -> None:
         """Run one control step: pose, role, command, then the reports."""
         lease, navigator = self.lease, self.navigator
-        self.defer_grants = lease.is_settled(now + EASE_S)
+        self.defer_grants = lease.is_settled(now + EASE_PERIODS * self._period_s)
         self._watch_inputs(now)
         self._stop_listener.step(now)
         if self._asks == self._stop_listener.memory.certain:

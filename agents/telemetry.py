@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Decision
@@ -27,12 +28,41 @@ TABLE_ROBOTS_FULL_RATE = 16
 """Number of robots up to which table rows keep their full rate. Larger teams publish their rows less often, because the
 table's traffic grows with the square of their number."""
 FAR_M = 99.0
+LATE_SECONDS = 3
+"""Number of seconds in a row in each of which the loop must have been late for a robot to say so: a single pause of the
+machine is no overload."""
+
+
+class Lateness:
+    """Whether the own loop keeps being so late that commands grow too old: its machine runs more than it can."""
+
+    def __init__(self, late_s: float) -> None:
+        """`late_s`: lateness [s] that is too much."""
+        self._late_s = late_s
+        self._lags_s: deque[float] = deque(maxlen=LATE_SECONDS)
+        self.worst_s = 0.0
+        """Largest lateness [s] of the last `LATE_SECONDS` seconds, while the loop is late; 0 otherwise."""
+
+    def update(self, lag_s: float) -> bool:
+        """Take the largest lateness [s] of one second; return True if the loop has become late, or no longer is."""
+        was_late = self.worst_s > 0.0
+        self._lags_s.append(lag_s)
+        if len(self._lags_s) == LATE_SECONDS and min(self._lags_s) > self._late_s:
+            self.worst_s = max(self._lags_s)
+        elif max(self._lags_s) <= self._late_s:
+            self.worst_s = 0.0
+        return was_late != (self.worst_s > 0.0)
+
+    def text(self) -> str:
+        """Return how late the loop is, in words; empty while it keeps time."""
+        return f"late: by up to {1000.0 * self.worst_s:.0f} ms, the machine is too busy" if self.worst_s > 0.0 else ""
 
 
 class Reports:
     """Publisher of one robot's reports, each at its own rate."""
 
-    def __init__(self, outbox: Outbox, robots: int) -> None:
+    def __init__(self, outbox: Outbox, robots: int, late_s: float) -> None:
+        """`robots`: size of the team; `late_s`: lateness [s] of the own loop that is too much."""
         self._outbox = outbox
         self._table_s = TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
         self._next_table = 0.0
@@ -40,6 +70,7 @@ class Reports:
         self._steps = 0
         self._arrived = False
         self._met: tuple[str, str] | None = None
+        self._lateness = Lateness(late_s)
 
     def step(
         self, navigator: Navigator, team: TeamState, near: tuple[int, ...], role: Role, term: Term,
@@ -133,6 +164,9 @@ class Reports:
         self, vitals: Vitals, navigator: Navigator, team: TeamState, lease: Lease, role: Role, outside: str, now: float
     ) -> None:
         """Publish the diagnostics (as in ROS); `outside` says who is there and not in the chain."""
+        if self._lateness.update(vitals.loop_lag_s):
+            worst_s = self._lateness.worst_s
+            self._outbox.event("late", now, lease.term, {"late": worst_s > 0.0, "lag_s": round(worst_s, 3)})
         counters = _counters(vitals, team.rows_heard, team.rows_lost)
         version = lease.config.version  # and so of the chain: an observer that missed the event learns it here
         counters |= {"config_n": version.term.n, "config_seq": version.seq}
@@ -140,7 +174,7 @@ class Reports:
         if navigator.predecessor is not None:
             counters["predecessor_clock_offset_s"] = navigator.predecessor.clock.offset(now)
             counters["predecessor_refused"] = navigator.predecessor.refused
-        text, level = _health(navigator, lease, role, outside, now)
+        text, level = _health(navigator, lease, role, (self._lateness.text(), outside), now)
         outbox = self._outbox
         header = outbox.header("status", now)
         outbox.publish("status", Status(header, level, text, role, lease.term, counters, lease.chain))
@@ -175,15 +209,18 @@ def _counters(vitals: Vitals, rows_heard: int, rows_lost: int) -> dict[str, floa
     }
 
 
-def _health(navigator: Navigator, lease: Lease, role: Role, outside: str, now: float) -> tuple[str, Level]:
-    """Return the text and level of the status: the robots that the first election waits for (E18) come first."""
+def _health(navigator: Navigator, lease: Lease, role: Role, others: tuple[str, ...], now: float) -> tuple[str, Level]:
+    """Return the text and level of the status: the robots that the first election waits for (E18) come first.
+
+    `others` are further warnings, the empty ones of which do not hold.
+    """
     if lease.missing:
         return f"waiting for {', '.join(robot_name(i) for i in lease.missing)}", Level.WARN
     lost = navigator.lost_input(now)
     if lost is None:
         slow_hz = navigator.scan_age.slow_hz
         slow = "" if slow_hz is None else f"slow: scans at {slow_hz:.1f} Hz"
-        warnings = [warning for warning in (slow, outside) if warning]
+        warnings = [warning for warning in (slow, *others) if warning]
         return ", ".join([role.value, *warnings]), Level.WARN if warnings else Level.OK
     if navigator.pose_lost:
         return f"{role.value}, own pose lost: no {lost}", Level.ERROR

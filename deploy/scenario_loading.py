@@ -75,7 +75,7 @@ def _faults(scenario: Scenario) -> Iterator[Mistake]:
 
 
 RULES: tuple[Rule[Scenario], ...] = (
-    Rule(_gains, ("mission.following", "mission.limits")),
+    Rule(_gains, ("mission.following", "mission.limits", "mission.control_hz")),
     Rule(_controller),
     Rule(_faults, ("mission.robots",)),
 )

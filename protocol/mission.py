@@ -16,6 +16,9 @@ KNOWN_MAX = 64
 ROUTE_M_MAX = 10_000.0
 """Maximum route length [m]: a leader stores one point per 0.1 m, so that a longer route would exhaust the memory."""
 
+CONTROL_HZ = 50.0
+"""Usual rate [Hz] of the robots' control steps."""
+
 Side = Literal["left", "right", "column", "zigzag"]
 Motion = Literal["path_following", "point_to_point", "trajectory", "reactive", "explore"]
 TieBreak = Literal["witness", "head", "none"]
@@ -116,6 +119,9 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     """Ids in the order of the first chain; the first leads."""
     witness: bool = True
     profile: Profile = "std"
+    control_hz: float = CONTROL_HZ
+    """Rate [Hz] of each robot's control steps, with its commands and poses, and of a simulated robot's odometry. A
+    lower rate lets a machine run more robots; the deadman D is never shorter than three control periods."""
     tiebreak: TieBreak = "witness"
     """Tie-breaker between two halves of the voters: the witness, the head of the chain, or none."""
     shrink: Shrink = "dynamic"
@@ -143,6 +149,11 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     """Silence [s] of all operators after which every robot stands, until one is there again; `lfa watch` shows that one
     is. None: a team needs no operator."""
     version: int = 1
+
+    @property
+    def control_period_s(self) -> float:
+        """Time [s] between two control steps of a robot."""
+        return 1.0 / self.control_hz
 
     @property
     def goal_m(self) -> tuple[float, float]:

@@ -7,8 +7,9 @@ from itertools import pairwise
 from math import hypot, inf, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, RefusedValue, Rule, apply_rules, out_of_range, wrong
-from lfa.protocol.mission import KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
+from lfa.protocol.mission import CONTROL_HZ, KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
 
+CONTROL_HZ_MIN = 20.0
 _ROBOTS, _ROUTE, _TIMES = "mission.robots", "mission.leading.route_m", "mission.leading.times_s"
 
 
@@ -106,6 +107,7 @@ def _ranges(mission: Mission) -> Iterator[Mistake]:
     apart_m, a_max = 2.0 * mission.radius_m + 0.1, limits.a_max_mps2
     return out_of_range((
         Range("mission.radius_m", mission.radius_m, 0.01, 5.0),
+        Range("mission.control_hz", mission.control_hz, CONTROL_HZ_MIN, CONTROL_HZ),
         Range("mission.formation.separation_m", formation.separation_m, apart_m, 100.0, "mission.radius_m"),
         Range("mission.formation.angle_rad", formation.angle_rad, 0.0, pi / 2),
         Range("mission.formation.heading_filter_m", formation.heading_filter_m, 0.0, 100.0),

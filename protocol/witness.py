@@ -7,7 +7,7 @@ import msgspec
 from lfa.protocol.incarnations import after
 from lfa.protocol.lease.effects import Effect, Send, StandAside
 from lfa.protocol.lease.machine.lease import Lease, Observer
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import NO_TERM, LeaseNote, Member, Role
 from lfa.protocol.messages.team import Ask, Level, MissionNote, Status
 from lfa.protocol.mission import Mission
@@ -107,7 +107,7 @@ class Witness:
 
     def _lease_at(self, now: float, mission: Mission) -> Lease:
         me = Member(WITNESS_ID, self.incarnation)
-        self._lease = Lease(me, mission, timing_of(mission.profile), now, self._floor, self.lease_observer)
+        self._lease = Lease(me, mission, timing_for(mission), now, self._floor, self.lease_observer)
         return self._lease
 
     def _hint(self, name: str, incarnation: int, up: bool, now: float) -> list[Envelope]:

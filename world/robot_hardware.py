@@ -7,7 +7,7 @@ from math import atan2
 from lfa.protocol.fleet_stop.answers import StopAnswers
 from lfa.protocol.geometry import TAU, Pose2D, Twist, wrap
 from lfa.protocol.lease.gateway import Gateway
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
 from lfa.protocol.messages.stop import StopOrder
@@ -35,7 +35,7 @@ class RobotHardware:
         self.gateway = Gateway(
             robot_id,
             incarnation,
-            timing_of(mission.profile),
+            timing_for(mission),
             now,
             mission.limits,
             mission.operator_timeout_s,

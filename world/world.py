@@ -256,7 +256,7 @@ class World:
                 sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
             sent.append(self._event("contact", None, data | {"t": self._time.elapsed_s}, stamp))
-        if self._samples(TOPIC["sensors"].rate_hz):
+        if self._samples(self._scenario.mission.control_hz):
             driven = [robot for _, robot in simulated if not robot.hangs("driver")]
             sent += [robot.sensors(stamp, now) for robot in driven]
             sent += [rests for robot in driven if (rests := robot.come_to_rest(now)) is not None]

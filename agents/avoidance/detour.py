@@ -60,9 +60,11 @@ IN_PLACE_RAD = 0.9
 class Detour:
     """Detour of one robot: its wanted motion or a way around an obstacle, by the decision table, with hysteresis."""
 
-    def __init__(self, radius_m: float, limits: Limits) -> None:
+    def __init__(self, radius_m: float, limits: Limits, period_s: float = CONTROL_PERIOD_S) -> None:
+        """Create a detour; `steer` is called each `period_s`."""
         self._radius_m = radius_m
         self._limits = limits
+        self._period_s = period_s
         self.omega_max_radps = limits.omega_max_radps
         """Maximum turn rate [rad/s]; a leader's is lower than its drive allows, since its followers' slots swing with
         it."""
@@ -158,7 +160,7 @@ class Detour:
             case Action.CREEP:
                 bearing = 0.0
                 twist = Twist(CREEP_MPS, 0.0) if free_m > CREEP_FREE_M else STILL
-                self._crept_s += CONTROL_PERIOD_S
+                self._crept_s += self._period_s
             case _:
                 action = Action.BLOCKED
         if action is Action.BLOCKED:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from lfa.agents.config import CONTROL_PERIOD_S, Gains, check_gains
+from lfa.agents.config import Gains, check_gains
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
@@ -20,7 +20,7 @@ def gains_of(mission: Mission) -> Gains:
     except msgspec.ValidationError as error:
         names = ", ".join(Gains.__struct_fields__)
         raise Refused(f"mission.following.gains: {error}; the names are {names}") from None
-    return check_gains(gains, mission.limits, CONTROL_PERIOD_S, allow_saturation=following.allow_saturation)
+    return check_gains(gains, mission.limits, mission.control_period_s, allow_saturation=following.allow_saturation)
 
 
 def follower_of(mission: Mission) -> Follower:
@@ -51,6 +51,7 @@ def predecessor_of(mission: Mission, robot: int, followers: int, previous: Prede
         mode="pose" if following.observer == "pose" else "velocity",
         extrapolation_max_s=0.0 if paper else gains_of(mission).dead_reckoning_max_s,
         delay_s=0.0 if paper else delay_s,
+        period_s=mission.control_period_s,
         trace_m=mission.formation.separation_m,
         trace=previous.trace if previous is not None else None,
     )

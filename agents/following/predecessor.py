@@ -10,6 +10,7 @@ from math import isfinite
 
 from msgspec import Struct
 
+from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.following.observer import Mode, Observer
 from lfa.agents.formation.pose_history import JitterBuffer, PoseHistory, Sample
 from lfa.agents.localization.clock_offset import ClockOffset
@@ -59,10 +60,12 @@ class Predecessor:
         mode: Mode = "velocity",
         extrapolation_max_s: float = 0.5,
         delay_s: float | None = 0.0,
+        period_s: float = CONTROL_PERIOD_S,
         trace_m: float = 4.0,
         trace: PoseHistory | None = None,
     ) -> None:
         """Create an estimate. `delay_s` 0 dead-reckons; None adapts a buffer to the measured ages of the messages.
+        `period_s` is the follower's control period.
 
         `trace` is the path of the former predecessor, when the chain closes over it.
         """
@@ -73,7 +76,7 @@ class Predecessor:
         self._mode: Mode = mode
         self._extrapolation_max_s = extrapolation_max_s
         self._observer = Observer(mode, extrapolation_max_s)
-        self._buffer = JitterBuffer(with_velocity=mode == "velocity")
+        self._buffer = JitterBuffer(with_velocity=mode == "velocity", period_s=period_s)
         self._automatic = delay_s is None
         self._delay_s = DELAY_MIN_S if delay_s is None else delay_s
         self._oldest = _WindowedMaximum()

@@ -32,8 +32,9 @@ class Sample(Struct, frozen=True, gc=False):
 class JitterBuffer:
     """Newest samples in the order of their stamps, for any order of arrival."""
 
-    def __init__(self, *, with_velocity: bool) -> None:
+    def __init__(self, *, with_velocity: bool, period_s: float = CONTROL_PERIOD_S) -> None:
         self._with_velocity = with_velocity
+        self._period_s = period_s
         self._samples: deque[Sample] = deque(maxlen=SAMPLES_MAX)
 
     def clear(self) -> None:
@@ -71,8 +72,8 @@ class JitterBuffer:
         sample = self._find(stamp)
         if self._with_velocity or sample is None:
             return sample
-        end = self._find(min(stamp + CONTROL_PERIOD_S, self._samples[-1].stamp))
-        if end is None or end.stamp - stamp < 0.5 * CONTROL_PERIOD_S:
+        end = self._find(min(stamp + self._period_s, self._samples[-1].stamp))
+        if end is None or end.stamp - stamp < 0.5 * self._period_s:
             return sample
         return Sample(stamp, sample.pose, _mean_twist(sample, end), sample.travelled_m)
 

@@ -48,7 +48,7 @@ class Leadership:
         self._mission = mission
         self._formation = formation
         self._team = team
-        self.lead = PathFollower(mission.leading, mission.limits, mission.radius_m)
+        self.lead = PathFollower(mission.leading, mission.limits, mission.radius_m, mission.control_period_s)
         self._planned: PlannedWay | None = None
         self._round: WayRound | None = None
         """Way round the present trap; None before the first one."""

@@ -28,10 +28,13 @@ CORNER_MPS = 0.1
 class PathFollower(RouteTracker):
     """Twist of one robot along its route when it leads."""
 
-    def __init__(self, leading: Leading, limits: Limits, radius_m: float = 0.15) -> None:
-        """Create a path follower; arguments as of `RouteTracker`."""
+    def __init__(
+        self, leading: Leading, limits: Limits, radius_m: float = 0.15, period_s: float = CONTROL_PERIOD_S
+    ) -> None:
+        """Create a path follower whose `step` is called each `period_s`; other arguments as of `RouteTracker`."""
         super().__init__(leading, radius_m)
         self._limits = limits
+        self._period_s = period_s
         self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
 
     def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
@@ -82,7 +85,7 @@ class PathFollower(RouteTracker):
         if self._planned:
             v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
         # This limit is last: a share of it would be taken again in each following step.
-        v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * CONTROL_PERIOD_S)
+        v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * self._period_s)
         if ends and near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing, slots)
         if abs(bearing) > IN_PLACE_RAD:

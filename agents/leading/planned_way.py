@@ -29,7 +29,7 @@ class PlannedWay:
         route_m = mission.leading.route_m if goal is None else (goal,)
         leading = replace(mission.leading, motion="explore", route_m=route_m)
         self.explore = Explore(replace(mission, leading=leading), mapping)
-        self.lead = PathFollower(leading, mission.limits, mission.radius_m)
+        self.lead = PathFollower(leading, mission.limits, mission.radius_m, mission.control_period_s)
         self._radius_m, self._omega_max_radps = mission.radius_m, mission.limits.omega_max_radps
         self._arcs = ArcPlanner(mission.radius_m, mission.limits)
         self._blocked_since: float | None = None

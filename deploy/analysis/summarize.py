@@ -10,13 +10,14 @@ import numpy as np
 
 from lfa.deploy.analysis import clearance, tracking_errors
 from lfa.deploy.analysis.assertions import judge
-from lfa.deploy.analysis.summary import Assertion, RobotSummary, Summary
+from lfa.deploy.analysis.summary import Assertion, Overload, RobotSummary, Summary
 from lfa.deploy.analysis.tracking_errors import TrackingErrors
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.event_log import Line
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About, scenario_of
+from lfa.protocol.names import robot_name
 from lfa.world.description.load import Scenario
 
 LEFT_BEHIND_M = 0.5
@@ -67,6 +68,7 @@ def summary_of(
             Assertion("all_faults_done", not faults_left, ", ".join(faults_left)),
         ],
         violations=violations,
+        overload=overload(events),
     )
     wanted = scenario.asserted
     if wanted.goal_reached and verdict.outcome != "recorded":
@@ -75,6 +77,24 @@ def summary_of(
     followed = (tracking_errors.of_follower(seen, robot.id) for robot in robots if robot.alive)
     summary.assertions += judge(wanted, summary, seen, [e for e in followed if e is not None])
     return summary
+
+
+def overload(events: Sequence[Line]) -> Overload | None:
+    """Return by what a run has shown that its machine did not keep up; None if by nothing."""
+    stood_still_s = sum(_number(line.get("stood_still_s")) for line in event_log.of_kind(events, "slowed"))
+    late_s: dict[str, float] = {}
+    for line in event_log.of_kind(events, "late"):
+        lag_s = _number(line.get("lag_s"))
+        if lag_s > 0.0 and isinstance(line["robot"], int):
+            name = robot_name(line["robot"])
+            late_s[name] = max(late_s.get(name, 0.0), lag_s)
+    found = stood_still_s > 0.0 or late_s
+    return Overload(stood_still_s=round(stood_still_s, 3), late_s=late_s) if found else None
+
+
+def _number(said: object) -> float:
+    """Return a finite number of an event's data, which any sender may have written; else 0."""
+    return float(said) if isinstance(said, int | float) and isfinite(said) else 0.0
 
 
 def _robot(robot: int, seen: RecordedRun, events: Sequence[Line]) -> RobotSummary:

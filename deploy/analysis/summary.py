@@ -54,6 +54,15 @@ class RobotSummary(Struct, kw_only=True):
     """Least distance [m] from its body to a wall, an obstacle or another robot's body; None in an empty world."""
 
 
+class Overload(Struct, kw_only=True):
+    """Signs that the machine did not keep up with a run."""
+
+    stood_still_s: float
+    """Time [s] for which the world's time stood still, because its process came too late."""
+    late_s: dict[str, float]
+    """Largest lateness [s] of each robot's loop that was late for seconds, by the robot's name."""
+
+
 class Summary(Struct, kw_only=True):
     """Results of one run."""
 
@@ -81,6 +90,8 @@ class Summary(Struct, kw_only=True):
     """What made the run; None in runs of versions that did not say."""
     recording: Recording | None = None
     """Counts of the recorder; None when the recorder died before it wrote them."""
+    overload: Overload | None = None
+    """None for a run that its machine kept up with, and for simulated ones."""
     warnings: list[str] = []
     """What the results may lack: holes in the recording that they were computed from."""
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from lfa.deploy.analysis.summary import RobotSummary, Summary
+from lfa.deploy.analysis.summary import Overload, RobotSummary, Summary
 from lfa.deploy.analysis.tracking_errors import SETTLED_M
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording.recorder import RECORDING
@@ -45,6 +45,7 @@ def text(summary: Summary, folder: Path | None, *, verbose: bool = False) -> str
             *(f"  {line}" for line in _notes(summary)),
             *(f"  {line}" for line in _leaders(summary, verbose)),
             *([f"  left behind: {behind}"] if behind else []),
+            *([] if summary.overload is None else [f"  {_overloaded(summary.overload)}"]),
             *(f"  not ok: {a.name} {a.text}".rstrip() for a in summary.assertions if not a.ok),
             *(f"  violation of {v.invariant} at {v.at_s:.3f} s: {v.text}" for v in summary.violations),
             *(f"  warning: {warning}" for warning in summary.warnings),
@@ -59,6 +60,15 @@ def _lasted(summary: Summary) -> str:
     if summary.mode == "recorded":
         took = f"recorded for {summary.duration_s:.1f} s, to {summary.sim_duration_s:.1f} s of its time"
     return f"{took}{arrived}"
+
+
+def _overloaded(overload: Overload) -> str:
+    """Return in one line that the machine did not keep up, and by how much."""
+    signs = [f"the world stood still for {overload.stood_still_s:.2f} s"] if overload.stood_still_s > 0.0 else []
+    if overload.late_s:
+        worst = max(overload.late_s, key=overload.late_s.__getitem__)
+        signs.append(f"{len(overload.late_s)} robots were late, {worst} by {overload.late_s[worst]:.2f} s")
+    return f"this machine did not keep up: {'; '.join(signs)}"
 
 
 def lfa() -> str:

@@ -16,7 +16,7 @@ from lfa.deploy.bench.harness.team import Team
 from lfa.deploy.process.identity import cpu_s
 from lfa.protocol import clock
 from lfa.protocol.geometry import Twist
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.codec import encode
 from lfa.protocol.messages.consensus import GatewayStamp, Term
 from lfa.protocol.messages.header import Header
@@ -62,7 +62,7 @@ def simulated(scenario: Scenario) -> float:
     world = World(FLEET, scenario, 1, 1, start_at=0.0)
     host = NodeHost(world, Journal(None, Heading(JOURNAL_VERSION, WORLD_NAME, 1, 0, {})))
     now, number = 0.0, 0
-    shut_s = timing_of(scenario.mission.profile).grant_s + COMMAND_S
+    shut_s = timing_for(scenario.mission).grant_s + COMMAND_S
     began: float | None = None
     while now < shut_s + SIMULATED_S:
         if began is None and now >= shut_s:

@@ -25,7 +25,7 @@ from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import BecomeLeader, Effect, StandAside
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
-from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_of
+from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_for, timing_of
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.robot import CmdVel
@@ -120,7 +120,7 @@ class AgentSimulation:
         With `mission`, it holds that one in place of the team's.
         """
         mission = mission or self.mission
-        self._agreed[robot_id] = digest(agreement_of(mission, timing_of(mission.profile)))
+        self._agreed[robot_id] = digest(agreement_of(mission, timing_for(mission)))
         if robot_id in self.processes:
             self.kill(robot_id)
         wall_ms = self.wall_ms.get(robot_id, 0)

@@ -14,7 +14,7 @@ from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.machine.lease import Lease
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Leading, Mission, Profile
 from lfa.protocol.names import WITNESS_ID
@@ -46,7 +46,7 @@ class LeaseSimulation(Hosts):
             leading=Leading(route_m=((1.0, 0.0),)),
         )
         ids = ((WITNESS_ID,) if self.mission.witness else ()) + self.mission.robots
-        timing, gateways_at = timing_of(self.mission.profile), WITNESS_ID if gateways_at_world else None
+        timing, gateways_at = timing_for(self.mission), WITNESS_ID if gateways_at_world else None
         super().__init__(seed, ids, radio, gateways_at, timing, rates or {}, gateway_type)
         self.wall_ms: dict[int, int] = {}
         """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
@@ -75,13 +75,13 @@ class LeaseSimulation(Hosts):
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         mission = mission or self.mission
-        lease = Lease(member, mission, timing_of(mission.profile), clock.local(self.now), floor, self.observed)
+        lease = Lease(member, mission, timing_for(mission), clock.local(self.now), floor, self.observed)
         process = Process(member, lease, clock, self.mission.robots)
         self.processes[robot_id] = process
         if self.trace is not None:
             self.trace(self.now, robot_id, f"starts, incarnation {member.incarnation}")
         self._report(Checker.lives, self.now, member)
-        self._report(Checker.holds, self.now, member, digest(agreement_of(mission, timing_of(mission.profile))))
+        self._report(Checker.holds, self.now, member, digest(agreement_of(mission, timing_for(mission))))
         self.tell_token(member, up=True)
         if robot_id != WITNESS_ID:
             self.at(self.now + self.random.uniform(0.0, FOLLOW_PERIOD_S), self.follow, process)

@@ -17,7 +17,7 @@ from lfa.deploy.robot.base import Base, Reading
 from lfa.protocol.fleet_stop.answers import StopAnswers
 from lfa.protocol.geometry import STILL
 from lfa.protocol.lease.gateway import Gateway
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, Sensors
@@ -95,7 +95,7 @@ class Driver:
                 self._gateway = Gateway(
                     self._robot_id,
                     self.incarnation,
-                    timing_of(mission.profile),
+                    timing_for(mission),
                     now,
                     mission.limits,
                     mission.operator_timeout_s,

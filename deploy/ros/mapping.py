@@ -26,7 +26,7 @@ NS = messages.NS
 TF_NS, MARKERS_NS, SECOND_NS = NS // 50, NS // 5, NS
 OBSTACLES_MAX = 64
 ROBOTS_MAX = 256
-WARNINGS = frozenset({"contact", "stuck", "slowed", "refused", "input", "left_out", "fault"})
+WARNINGS = frozenset({"contact", "stuck", "slowed", "late", "refused", "input", "left_out", "fault"})
 ERRORS = frozenset({"failed", "died"})
 
 

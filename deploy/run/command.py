@@ -29,10 +29,12 @@ from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario
 
 Run = Callable[[Scenario, int, Path | None, Sequence[Fault]], Ended]
+Fit = Callable[[Scenario, frozenset[str]], Scenario]
+"""Change of a scenario for the machine that runs it, of other keys than those that are set on the command line."""
 
 
-def scenario_command(run: Run, *, figures_by_default: bool) -> Callable[..., int]:
-    """Return the command that runs a scenario by `run` and exits with the code of its summary."""
+def scenario_command(run: Run, *, figures_by_default: bool, fit: Fit | None = None) -> Callable[..., int]:
+    """Return the command that runs a scenario by `run`, changed by `fit`, and exits with the code of its summary."""
 
     def command(
         scenario: ScenarioName,
@@ -55,6 +57,8 @@ def scenario_command(run: Run, *, figures_by_default: bool) -> Callable[..., int
         faults = parse_all(chosen.mission, chosen.faults, fault or ())
         if junit is not None:
             check_junit(junit)
+        if fit is not None:
+            chosen = fit(chosen, frozenset(word.partition("=")[0].strip() for word in overrides or ()))
         if record == "none" and out is not None:
             raise Refused(f"--record none with --out {out}: nothing is kept, must be one of the two")
         with kept_as(record, out) as place:

@@ -26,6 +26,7 @@ from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.fault_execution import FaultExecution
 from lfa.deploy.run.finish import Ended, finish, reread, verdict_of
+from lfa.deploy.run.machine_size import fitted
 from lfa.deploy.run.process_table import rows
 from lfa.deploy.run.progress import Progress, progress
 from lfa.deploy.run.progress_rows import ProgressRows
@@ -75,7 +76,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
         shutil.rmtree(sockets, ignore_errors=True)
 
 
-command = scenario_command(run, figures_by_default=True)
+command = scenario_command(run, figures_by_default=True, fit=fitted)
 
 
 def _socket_folder() -> Path:

@@ -11,11 +11,11 @@ from math import ceil
 
 from msgspec import Struct
 
-from lfa.protocol.mission import Profile
+from lfa.protocol.mission import CONTROL_HZ, Mission, Profile
 
 CLOCK_RATE_ERROR = 1e-3
 """Maximum rate error eps of a monotonic clock (rate within 1 +- eps); oscillators and NTP slewing stay below half."""
-CONTROL_PERIOD_S = 0.02
+CONTROL_PERIOD_S = 1.0 / CONTROL_HZ
 DEADMAN_PERIODS_MIN = 3
 
 
@@ -50,8 +50,13 @@ _PROFILES: dict[Profile, tuple[float, float, float, float, float, float]] = {
 }  # fmt: skip
 
 
-def timing_of(profile: Profile) -> Timing:
-    """Return the durations of a profile; the deadman is never shorter than three control periods."""
+def timing_of(profile: Profile, control_hz: float = CONTROL_HZ) -> Timing:
+    """Return the durations of a profile; the deadman is never shorter than three control periods at `control_hz`."""
     heartbeat_s, act_s, deadman_s, rank_step_s, chain_silence_s, remove_silence_s = _PROFILES[profile]
-    deadman_s = max(deadman_s, DEADMAN_PERIODS_MIN * CONTROL_PERIOD_S)
+    deadman_s = max(deadman_s, DEADMAN_PERIODS_MIN / control_hz)
     return Timing(heartbeat_s, act_s, deadman_s, rank_step_s, chain_silence_s, remove_silence_s)
+
+
+def timing_for(mission: Mission) -> Timing:
+    """Return the durations that all processes of a mission keep."""
+    return timing_of(mission.profile, mission.control_hz)

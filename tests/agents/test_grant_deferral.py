@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfa.agents.agent import Agent
-from lfa.agents.robot_core import EASE_S
+from lfa.agents.robot_core import EASE_PERIODS
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.transport.link_model import Radio
@@ -26,10 +26,11 @@ def test_only_a_leader_with_time_left_is_at_ease() -> None:
     for other in ("witness", "robot2", "robot3", "robot4"):
         simulator.kill(other, hinted=False)
     leader, last_at_ease, led_until = agents[1], 0.0, 0.0
+    ease_s = EASE_PERIODS * scenario.mission.control_period_s
     while simulator.now < 3.0:
         simulator.run(simulator.now + 0.001)
         if leader.lease is not None and leader.lease.role is Role.LEADER:
             led_until = simulator.now
         if leader.defer_grants:
             last_at_ease = simulator.now
-    assert 2.0 < last_at_ease < led_until - 0.5 * EASE_S < 2.5
+    assert 2.0 < last_at_ease < led_until - 0.5 * ease_s < 2.5

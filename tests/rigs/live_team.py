@@ -9,7 +9,7 @@ from lfa.deploy.analysis.verification.journals import obeyed
 from lfa.deploy.bench.harness.team import Team, endless
 from lfa.deploy.bench.harness.team_history import REST_MPS
 from lfa.protocol import clock
-from lfa.protocol.lease.timing import timing_of
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import Term
 from lfa.protocol.messages.team import Event
 from lfa.protocol.names import robot_name
@@ -73,7 +73,7 @@ def check_minority(live: Team, side: Sequence[int], others: Sequence[int], led: 
 
     With `led` the first robot is the leader; otherwise its predecessor is the last of `others`.
     """
-    timing = timing_of(live.scenario.mission.profile)
+    timing = timing_for(live.scenario.mission)
     stop_s = live.scenario.mission.limits.v_max_mps / live.scenario.mission.limits.a_max_mps2
     first = side[0]
     if led:

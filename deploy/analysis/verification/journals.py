@@ -25,7 +25,7 @@ from lfa.deploy.recording.run_folder import JOURNALS, scenario_of
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.gateway import Gateway
-from lfa.protocol.lease.timing import Timing, timing_of
+from lfa.protocol.lease.timing import Timing, timing_for
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Member
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.mission import Mission
@@ -66,7 +66,7 @@ def verify(folder: Path) -> JournalVerdict:
         raise Refused(f"{folder}: no journals, must be a run folder of lfa run or lfa sim")
     mission = scenario_of(folder).mission
     _refuse_lost({path.stem.rpartition("-")[0] for path in paths}, folder, mission)
-    timing = timing_of(mission.profile)
+    timing = timing_for(mission)
     happenings = sorted((h for path in paths for h in _happenings(path, timing)), key=lambda h: h.at)
     checkers = [checker(timing) for checker in SAFETY]
     group = CheckerGroup(checkers)
@@ -90,7 +90,7 @@ def _refuse_lost(journalled: set[str], folder: Path, mission: Mission) -> None:
 
 def obeyed(folder: Path) -> Iterator[tuple[float, CmdVel]]:
     """Yield time [s] and command of each command that a gateway accepted; works for an unfinished run, too."""
-    timing = timing_of(scenario_of(folder).mission.profile)
+    timing = timing_for(scenario_of(folder).mission)
     for path in sorted((folder / JOURNALS).glob(f"{WORLD_NAME}-*.bin")):
         for happening in _happenings(path, timing):
             if happening.fact is Checker.obeys:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot, summarize
+from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot, overload, summarize
 from lfa.deploy.analysis.summary import RobotSummary
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.outcome import Verdict
@@ -107,6 +107,21 @@ def test_an_obstacle_is_met_once_until_the_robot_resumes() -> None:
     robot = _robot(2, _run(LATE), events)
     assert {kind: n for kind, n in robot.obstacles_met.items() if n} == {"wall": 2, "moving": 1}
     assert robot.contacts == 1
+
+
+def test_a_machine_that_does_not_keep_up_is_summed_up_by_what_stood_still_and_who_was_late() -> None:
+    events = [
+        line("slowed", stood_still_s=0.5),
+        line("slowed", stood_still_s=0.75),
+        line("slowed", stood_still_s="long"),
+        line("late", late=True, lag_s=0.2),
+        line("late", late=True, lag_s=0.3),
+        line("late", late=False, lag_s=0.0),
+    ]
+    found = overload(events)
+    assert found is not None
+    assert (found.stood_still_s, found.late_s) == (1.25, {"robot2": 0.3})
+    assert overload([line("contact")]) is None
 
 
 def _at(distance_m: float | None) -> RobotSummary:

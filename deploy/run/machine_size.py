@@ -1,0 +1,88 @@
+"""How many robots this machine carries as processes in real time, and the rates at which it carries more.
+
+The costs were measured with `lfa bench agents`. A run of more robots than fit loses its lease now and then, and its
+followers their leader.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from lfa.protocol.mission import Mission
+from lfa.protocol.output import write_line
+from lfa.world.description.load import Scenario
+
+TEAM_CORES = 0.1
+"""Share of a core that a run takes apart from its robots: launcher, and what world, router and recorder take anyway."""
+ROBOT_CORES, STEP_CORES = 0.018, 0.0019
+"""Share of a core for each robot, and for each of its control steps a second; with its part of world, router and
+recorder."""
+USUAL_SHARE, PATIENT_SHARE = 0.75, 0.95
+"""Share of the machine that a run may take: the rest is what keeps processes in time. The profile `wifi` bears three
+times the lateness of the others."""
+SLOW_HZ, SLOW_PROFILE, FEW_BEAMS = 20.0, "wifi", 90
+_QUOTA = Path("/sys/fs/cgroup/cpu.max")
+
+
+def cores() -> float:
+    """Return the number of cores that this process may use: its affinity, or a container's quota if that is less."""
+    allowed = float(len(os.sched_getaffinity(0)))
+    try:
+        quota, period = _QUOTA.read_text().split()
+        return min(allowed, float(quota) / float(period))
+    except (OSError, ValueError):  # no such file, or no quota: `max`
+        return allowed
+
+
+def carried(mission: Mission, on_cores: float) -> int:
+    """Return how many robots with the rates of `mission` a machine with so many cores carries; at least 1."""
+    share = PATIENT_SHARE if mission.profile == SLOW_PROFILE else USUAL_SHARE
+    each = ROBOT_CORES + STEP_CORES * mission.control_hz
+    return max(1, int((share * on_cores - TEAM_CORES) / each))
+
+
+def fitted(scenario: Scenario, kept: frozenset[str]) -> Scenario:
+    """Return `scenario` with lower rates if this machine carries too few robots for it, and say so in a line.
+
+    `kept` are keys that the command line sets: they stay as they are.
+    """
+    fit, text = fit_to(scenario, kept, cores())
+    if text:
+        write_line(text, sys.stderr)
+    return fit
+
+
+def fit_to(scenario: Scenario, kept: frozenset[str], on_cores: float) -> tuple[Scenario, str]:
+    """Return `scenario` as it fits a machine of so many cores, and the line that says so; empty if nothing differs."""
+    robots, most = len(scenario.mission.robots), carried(scenario.mission, on_cores)
+    if robots <= most:
+        return scenario, ""
+    slower = _slower(scenario, kept)
+    then = carried(slower.mission, on_cores)
+    machine = f"this machine ({on_cores:g} cores) carries {most} robots at {scenario.mission.control_hz:g} Hz"
+    if slower != scenario:
+        machine += f", {then} with {_rates(slower)}"
+    if robots > then:
+        return slower, f"{machine}: {robots} robots will be late, and may lose their leader"
+    return slower, f"{machine}: {robots} robots run so (--set mission.control_hz=50 keeps that rate)"
+
+
+def _slower(scenario: Scenario, kept: frozenset[str]) -> Scenario:
+    mission, lidar = scenario.mission, scenario.world.lidar
+    if "mission.control_hz" not in kept:
+        mission = replace(mission, control_hz=min(mission.control_hz, SLOW_HZ))
+    if "mission.profile" not in kept:
+        mission = replace(mission, profile=SLOW_PROFILE)
+    if "world.lidar.beams" not in kept:
+        lidar = replace(lidar, beams=min(lidar.beams, FEW_BEAMS))
+    return replace(scenario, mission=mission, world=replace(scenario.world, lidar=lidar))
+
+
+def _rates(scenario: Scenario) -> str:
+    mission = scenario.mission
+    beams = scenario.world.lidar.beams
+    return f"control at {mission.control_hz:g} Hz, profile {mission.profile} and {beams} lidar beams"
