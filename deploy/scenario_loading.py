@@ -10,10 +10,12 @@ from lfa.agents.config import Gains
 from lfa.agents.following.controller import find_controller
 from lfa.agents.following.factory import gains_of
 from lfa.agents.following.plugin import add_controller_file, make_controller
+from lfa.deploy.faults.goals import check_goals
 from lfa.deploy.faults.script import parse
 from lfa.deploy.recording.run_folder import SCENARIO, scenario_of
 from lfa.protocol.config_file.mistake import Mistake, Rule
 from lfa.protocol.errors import Refused
+from lfa.world.description.course_rules import PLACES
 from lfa.world.description.load import Scenario, load
 
 
@@ -74,8 +76,17 @@ def _faults(scenario: Scenario) -> Iterator[Mistake]:
             yield Mistake(f"faults[{n}]", f" = {str(refused).strip()}")
 
 
+def _goals(scenario: Scenario) -> Iterator[Mistake]:
+    for n, text in enumerate(scenario.faults):
+        try:
+            check_goals(scenario, [parse(text, scenario.mission, "")])
+        except Refused as refused:
+            yield Mistake(f"faults[{n}]", f" = {text!r}: {refused}")
+
+
 RULES: tuple[Rule[Scenario], ...] = (
     Rule(_gains, ("mission.following", "mission.limits", "mission.control_hz")),
     Rule(_controller),
     Rule(_faults, ("mission.robots",)),
+    Rule(_goals, ("faults", *PLACES)),
 )

@@ -1,31 +1,20 @@
-"""Changes of a running fleet's mission over a session, for the commands and for bridges."""
+"""Changes of a running fleet's mission over a session, for the commands."""
 
 from __future__ import annotations
 
-from math import cos, hypot, isfinite, radians, sin
-
-from msgspec import structs
-
 from lfa.agents.team_orders import QUESTION
+from lfa.deploy.client.mission_changes import Walls
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome
 from lfa.deploy.client.session import Subscriber, scenario_of_fleet
 from lfa.protocol import clock, incarnations
-from lfa.protocol.errors import Refused
 from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.team import Event, MissionNote
-from lfa.protocol.mission import Mission
-from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.transport.message_bus import send
-from lfa.world.description.reachability import parted
 
 TOPICS = frozenset({"*/team_order", "*/event", "*/mission"})
 """Topics that a session must hear for `order_fleet`."""
 ASK_S = 0.2
-APPROACH_M = 0.8
-"""Distance [m] before a goal from which a team drives straight at it, in the heading that it is to have there."""
-
-Points = tuple[tuple[float, float], ...]
 
 
 def order_fleet(subscriber: Subscriber, change: Change, *, paused: bool | None = None) -> OrderOutcome:
@@ -56,49 +45,7 @@ def order_fleet(subscriber: Subscriber, change: Change, *, paused: bool | None =
         subscriber.wait(0.02)
 
 
-def unchanged(mission: Mission, _first: Mission) -> Mission:
-    """Change nothing: for a pause, and for its end."""
-    return mission
-
-
-def along(points: Points, walls: tuple[tuple[float, float, float, float], ...]) -> Change:
-    """Return the change to a route through `points` [m]. It raises Refused for one in or behind a wall."""
-
-    def change(mission: Mission, _first: Mission) -> Mission:
-        motion = "path_following" if mission.leading.motion == "trajectory" else mission.leading.motion
-        leading = structs.replace(mission.leading, route_m=points, motion=motion, times_s=(), orientations=())
-        changed = check_mission(structs.replace(mission, leading=leading))
-        for point in points:
-            if any(_distance(point, wall) < mission.radius_m for wall in walls):
-                right = f"must be {mission.radius_m:g} m clear of it"
-                raise Refused(f"goal ({point[0]:g}, {point[1]:g}): in a wall, {right}")
-        if parted((mission.leading.route_m[0], *points), walls):
-            x, y = points[-1]
-            raise Refused(f"goal ({x:g}, {y:g}): outside of the map or walled off, must be reachable from the route")
-        return changed
-
-    return change
-
-
-def to_goal(x: float, y: float, theta_deg: float | None) -> Points:
-    """Return the way-points to a goal [m, degrees]. Raises Refused for numbers that are none."""
-    if not all(map(isfinite, (x, y, theta_deg or 0.0))):
-        raise Refused(f"goal ({x:g}, {y:g}): must be finite numbers [m]")
-    if theta_deg is None:
-        return ((x, y),)
-    theta = radians(theta_deg)
-    return ((x - APPROACH_M * cos(theta), y - APPROACH_M * sin(theta)), (x, y))
-
-
-def walls_of(subscriber: Subscriber) -> tuple[tuple[float, float, float, float], ...]:
+def walls_of(subscriber: Subscriber) -> Walls:
     """Return the walls [m] of the fleet's world, where its scenario is known on this machine."""
     scenario = scenario_of_fleet(subscriber.fleet)
     return () if scenario is None else scenario.world.walls_m
-
-
-def _distance(point: tuple[float, float], wall: tuple[float, float, float, float]) -> float:
-    (px, py), (x1, y1, x2, y2) = point, wall
-    dx, dy = x2 - x1, y2 - y1
-    length = dx * dx + dy * dy
-    share = 0.0 if length == 0.0 else min(1.0, max(0.0, ((px - x1) * dx + (py - y1) * dy) / length))
-    return hypot(px - x1 - share * dx, py - y1 - share * dy)

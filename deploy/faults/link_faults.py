@@ -1,6 +1,6 @@
 """Parsing of the faults that an operator's message orders: links that a cut disables, the share of messages that is
-lost, the reach of the radio, the part of a robot that hangs, a formation, an obstacle. Sides are comma-separated ids;
-`w` is the world with its witness, which runs on no robot.
+lost, the reach of the radio, the part of a robot that hangs, a formation, an obstacle, a goal. Sides are
+comma-separated ids; `w` is the world with its witness, which runs on no robot.
 
     3       robot 3 from all others          1-2      1 and 2 from each other
     1,2     both of them from the rest       1,2-3,w  one side from the other
@@ -20,7 +20,7 @@ from lfa.protocol.names import robot_name, whole_number
 from lfa.protocol.node import Envelope
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import LINK_CONDITIONS, Link
-from lfa.world.description.scenario import PLACE_M_MAX, RADIUS_M_MAX, RADIUS_M_MIN
+from lfa.world.description.scenario import PLACE_M_MAX, RADIUS_M_MAX, RADIUS_M_MIN, Point
 
 WORLD_WORD = "w"
 RANGE_M_MAX = 1e4
@@ -72,6 +72,8 @@ def order(action: str, target: int | str, robots: tuple[int, ...]) -> tuple[str,
             return action, {"side": _side_of_team(text)}
         case "obstacle":
             return action, _obstacle(text)
+        case "goal":
+            return action, dict(zip("xy", goal_of(text), strict=True))
         case _:
             return action, {}
 
@@ -80,6 +82,14 @@ def note(operator: Operator, now: float, action: str, target: int | str, robots:
     """Return the operator's message for a fault, stamped `now` [s]. Raises Refused."""
     command, arguments = order(action, target, robots)
     return operator.command(command, now, **arguments)
+
+
+def goal_of(text: str) -> Point:
+    """Return the goal x, y [m] in `text`. Raises Refused."""
+    x, y = _numbers(text, 2) or (PLACE_M_MAX + 1.0, 0.0)
+    if max(abs(x), abs(y)) > PLACE_M_MAX:
+        raise Refused(f"goal {text!r}: must be x and y [m] from -{PLACE_M_MAX:g} to {PLACE_M_MAX:g}, such as 3,-1.5")
+    return x, y
 
 
 def _part(action: str, text: str, robots: tuple[int, ...]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from lfa.protocol.names import whole_number
 
 FaultAction = Literal[
     "kill", "stop", "continue", "terminate", "restart", "cut", "heal", "loss", "range", "handover", "hang", "resume",
-    "formation", "obstacle",
+    "formation", "obstacle", "goal",
 ]  # fmt: skip
 
 #            action        effect
@@ -39,6 +39,7 @@ FAULT_ACTIONS: dict[str, str] = {
     "resume":    "ends a hang of the same part",
     "formation": "the leader orders it, as lfa formation does: left, right, column or zigzag",
     "obstacle":  "a round obstacle is set down: its x, y and radius [m] as 5,1.5,0.3; not where a robot stands",
+    "goal":      "the team gets another goal, as by lfa go: its x and y [m] as 3,-1.5; not in or behind a wall",
 }  # fmt: skip
 
 SIGNALS: dict[str, signal.Signals] = {
@@ -48,8 +49,10 @@ SIGNALS: dict[str, signal.Signals] = {
     "terminate": signal.SIGTERM,
 }
 
-ORDERS = ("cut", "heal", "loss", "range", "handover", "hang", "resume", "formation", "obstacle")
+ORDERS = ("cut", "heal", "loss", "range", "handover", "hang", "resume", "formation", "obstacle", "goal")
 """Fault actions sent as an operator's message to all, not as a signal to one process."""
+GOAL: FaultAction = "goal"
+"""Fault action that changes the mission: an order that the leader must carry out (E32)."""
 LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "loss", "hang": "resume"}
 """Fault actions that may have a duration, and the action that ends each."""
 
@@ -66,7 +69,7 @@ TIME_S_MAX = 1e6
 """Longest time limit [s] of a scenario."""
 RIGHT = f"'kill leader at 20 s' or 'stop 2 at 5 s for 3 s' ({', '.join(FAULT_ACTIONS)})"
 _SENTENCE = re.compile(
-    r"(?P<action>\w+)(?: +(?!at )(?P<target>(?:(?:driver|localization|scanner) +)?[\w.,>-]+))?"
+    r"(?P<action>\w+)(?: +(?!at )(?P<target>(?:(?:driver|localization|scanner) +)?[\w.,>-]+(?: +-?[\d.]+)?))?"
     r"(?: +at +(?P<at>\d+(?:\.\d+)?) *s)?"
     r"(?: +for +(?P<duration>\d+(?:\.\d+)?) *s)?",
     re.ASCII,
@@ -158,6 +161,8 @@ def _ordered(action: str, word: str, text: str, mission: Mission, where: str) ->
         raise Refused(f"{where} {text!r}: only the leader hands over")
     if action == "handover" or (action == "cut" and word == LEADER):
         return LEADER
+    if action == GOAL:  # 3 -1.5 is 3,-1.5
+        word = ",".join(word.replace(",", " ").split())
     try:
         order(action, word, mission.robots)
     except Refused as refused:

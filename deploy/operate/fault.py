@@ -16,8 +16,9 @@ import typer
 from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agents, one_fleet, option, programs
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, LEADER, LIVE, ORDERS, RESTART, SIGNALS
+from lfa.deploy.faults.link_faults import goal_of, note
+from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, GOAL, LEADER, LIVE, ORDERS, RESTART, SIGNALS
+from lfa.deploy.operate import go
 from lfa.deploy.process.identity import Identity, own_processes, send_signal
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
@@ -41,7 +42,7 @@ def command(
         str,
         typer.Argument(
             help="A robot's id, leader, world, router; for cut: 3, 1-2, 1,2-3,w or 1>2; for loss: a share; "
-            "for obstacle: x,y,radius; for formation: a side."
+            "for obstacle: x,y,radius; for goal: x,y; for formation: a side."
         ),
     ] = "",
     fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
@@ -50,6 +51,8 @@ def command(
     """Inject a fault into a fleet that runs on this machine. Raises Refused."""
     if action not in LIVE:
         raise Refused(f"{action!r}: must be one of {', '.join(LIVE)}")
+    if action == GOAL:
+        return go.command(*goal_of(target), fleet=fleet, as_json=as_json)
     team = one_fleet(agents(), fleet)
     inbox = Inbox()
     bus = _bus(team[0], inbox)

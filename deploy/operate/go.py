@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from lfa.deploy.client.order_fleet import Points, along, to_goal, unchanged, walls_of
+from lfa.deploy.client.mission_changes import Points, along, to_goal, unchanged
+from lfa.deploy.client.order_fleet import walls_of
 from lfa.deploy.operate import pause
 from lfa.protocol.errors import Refused
 

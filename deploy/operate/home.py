@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from lfa.deploy.client.mission_changes import along
 from lfa.deploy.client.order_call import Change
-from lfa.deploy.client.order_fleet import along, walls_of
+from lfa.deploy.client.order_fleet import walls_of
 from lfa.deploy.client.session import Subscriber
 from lfa.deploy.operate import pause
 from lfa.protocol.mission import Mission

@@ -9,8 +9,9 @@ from typing import Annotated
 import msgspec
 import typer
 
+from lfa.deploy.client.mission_changes import unchanged
 from lfa.deploy.client.order_call import Change
-from lfa.deploy.client.order_fleet import TOPICS, order_fleet, unchanged
+from lfa.deploy.client.order_fleet import TOPICS, order_fleet
 from lfa.deploy.client.session import Subscriber, find, listen
 
 

@@ -9,8 +9,8 @@ import msgspec
 import typer
 from msgspec import structs
 
+from lfa.deploy.client.mission_changes import unchanged
 from lfa.deploy.client.order_call import Change
-from lfa.deploy.client.order_fleet import unchanged
 from lfa.deploy.operate import pause
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import FormationSpec, Leading, Mission

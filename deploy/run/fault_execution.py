@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from random import Random
 
+from lfa.deploy.client.mission_changes import Walls, along
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import ORDERS, RESTART, SIGNALS, Fault, FaultAction, FaultSchedule
+from lfa.deploy.client.order_calls import OrderCalls
+from lfa.deploy.faults.link_faults import goal_of, note
+from lfa.deploy.faults.script import GOAL, ORDERS, RESTART, SIGNALS, Fault, FaultAction, FaultSchedule
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.restarted_processes import RestartedProcesses
 from lfa.protocol import clock
 from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.team import Event, OperatorNote
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_name
@@ -29,6 +32,7 @@ class FaultExecution:
     def __init__(
         self,
         mission: Mission,
+        walls: Walls,
         faults: Sequence[Fault],
         processes: RestartedProcesses,
         time: WorldTime,
@@ -36,11 +40,13 @@ class FaultExecution:
         publish: Callable[[Envelope], None],
     ) -> None:
         self._mission = mission
+        self._walls = walls
         self._schedule = FaultSchedule(faults)
         self._processes = processes
         self._time = time
         self._operator = operator
         self._publish = publish
+        self._orders = OrderCalls(operator, publish, mission)
         self._undone: list[str] = []
         self._links = LinkModel(CLEAR, Random(0))
         """Link conditions as last ordered, by the script or by hand; they are repeated to a process that restarts."""
@@ -59,6 +65,8 @@ class FaultExecution:
 
     def hear(self, message: Message) -> None:
         """Take in an operator's message: a fault by hand, link conditions, or the order to restart a robot."""
+        if isinstance(message, OrderNote | Event):
+            self._orders.hear(message)
         match message:
             case Event(kind="fault", data={"robot": robot, "deed": "kill" | "terminate"}):
                 if message.header.sender == OPERATOR_NAME and robot in self._mission.robots:
@@ -78,6 +86,7 @@ class FaultExecution:
                 tell(f"fault: {action} {f'robot {target}' if isinstance(target, int) else target}")
             else:
                 self._undone.append(f"{action} {target}")
+        self._orders.step(clock.now())
         if self._repeat_until > clock.now() and (self._links.cuts or self._links.radio != CLEAR):
             self._publish(self._operator.command(LINK_CONDITIONS, clock.now(), **self._links.orders))
 
@@ -93,6 +102,9 @@ class FaultExecution:
         self._publish(
             self._operator.event("fault", clock.now(), deed=action, robot=target, t=self._time.of(clock.now()))
         )
+        if action == GOAL:
+            self._orders.begin(along((goal_of(str(target)),), self._walls), False, clock.now(), self._told)
+            return True
         if action in ORDERS:
             self._publish(note(self._operator, clock.now(), action, target, self._mission.robots))
             return True
@@ -104,3 +116,7 @@ class FaultExecution:
         if action in ("kill", "terminate"):
             self.doomed.add(name)
         return self._processes.group.signal(name, SIGNALS[action])
+
+    def _told(self, done: bool, text: str) -> None:
+        if not done:
+            self._publish(self._operator.event("order_refused", clock.now(), reason=text))

@@ -16,6 +16,7 @@ import msgspec
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
+from lfa.deploy.faults.goals import check_goals
 from lfa.deploy.faults.script import SIMULATED, Fault
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
@@ -62,6 +63,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
         what = "radio.range_m" if simulated is None else f"fault '{simulated}'"
         raise Refused(f"{what}: only in lfa sim, a live receiver does not know how far away its senders are")
     drawn = draw(scenario, seed)
+    check_goals(drawn, faults)
     folder = make(out, drawn)
     about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}", provenance())
     sockets = _socket_folder()
@@ -111,7 +113,15 @@ class _Launch:
         self._links = Links()
         self._bus: ZenohBus | None = None
         self._processes = RestartedProcesses(self._group, self._rows, drawn.restart, self._publish_event)
-        self._faults = FaultExecution(drawn.mission, faults, self._processes, self._time, self._operator, self._publish)
+        self._faults = FaultExecution(
+            drawn.mission,
+            drawn.world.walls_m,
+            faults,
+            self._processes,
+            self._time,
+            self._operator,
+            self._publish,
+        )
         self.summed_up = False
         """True once the recorder has written `summary.json`."""
 
@@ -156,7 +166,7 @@ class _Launch:
         self._await(router.name, lambda: answers(self._endpoint), interrupts)
         self._group.start(recorder)
         self._bus = bus = ZenohBus(self._endpoint, self._inbox)
-        topics = ("event", "tracking", "table", "status", "truth", "operator")
+        topics = ("event", "tracking", "table", "status", "truth", "operator", "team_order")
         fleet = self._about.fleet
         followed = frozenset(key(fleet, "*", topic) for topic in topics)
         bus.follow(followed)

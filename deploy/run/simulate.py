@@ -12,9 +12,12 @@ from typing import NamedTuple
 from lfa.agents.agent import Agent
 from lfa.deploy.analysis.summarize import summary_of
 from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.client.mission_changes import along
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import COMMON, ORDERS, Fault, FaultAction, FaultSchedule
+from lfa.deploy.client.order_calls import OrderCalls
+from lfa.deploy.faults.goals import check_goals
+from lfa.deploy.faults.link_faults import goal_of, note
+from lfa.deploy.faults.script import COMMON, GOAL, ORDERS, Fault, FaultAction, FaultSchedule
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.mcap_reader import RecordedRun
 from lfa.deploy.recording.outcome import Verdict
@@ -27,7 +30,8 @@ from lfa.deploy.run.finish import Ended, finish, verdict_of
 from lfa.deploy.run.termination import Termination
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.team import OperatorNote
+from lfa.protocol.messages.orders import OrderNote
+from lfa.protocol.messages.team import Event, OperatorNote
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
@@ -36,7 +40,7 @@ from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import LINK_CONDITIONS, Radio
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
-from lfa.world.description.load import Scenario, draw
+from lfa.world.description.load import Point, Scenario, draw
 from lfa.world.simulator import Simulator
 from lfa.world.world import World
 
@@ -47,6 +51,7 @@ SILENCE_S_MAX = 1.0
 SHOW_EVERY_S = 5.0  # of wall-clock time
 LOOK_EVERY_S = 0.1  # of virtual time, between two looks at what may end a run from outside
 LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
+ORDER_STEP_S = 0.02  # period in which an operator looks whether the team knows an order
 
 
 def run(
@@ -56,8 +61,8 @@ def run(
 
     `drivers` are the hardware of the scenario's real robots; nothing of them is journalled.
     """
-    refuse_common(faults)
     drawn = draw(scenario, seed)
+    refuse_faults(drawn, faults)
     folder = make(out, drawn)
     about = About(scenario.name, MODE, seed, FLEET, provenance())
     recorder = Recorder(folder, about.metadata())
@@ -77,8 +82,8 @@ def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Unre
     The summary is the one that `run` would write, but for durations of this machine's clock, which are 0. Raises
     Refused for a bad fault, and KeyboardInterrupt on a signal.
     """
-    refuse_common(faults)
     drawn, memory = draw(scenario, seed), RunMemory()
+    refuse_faults(drawn, faults)
     about = About(scenario.name, MODE, seed, FLEET)
     run = SimulatedRun(drawn, seed, faults, memory.record, None)
     with Interrupts() as interrupts:
@@ -90,11 +95,12 @@ def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Unre
     return UnrecordedRun(summary_of(drawn, seen, memory.events(), about, verdict, 0.0, run.faults_left), seen)
 
 
-def refuse_common(faults: Sequence[Fault]) -> None:
-    """Raise Refused for a fault of a process that a simulation does not have."""
+def refuse_faults(drawn: Scenario, faults: Sequence[Fault]) -> None:
+    """Raise Refused for a fault of a process that a simulation does not have, and for a goal that cannot be reached."""
     common = next((fault for fault in faults if fault.target in COMMON), None)
     if common is not None:
         raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
+    check_goals(drawn, faults)
 
 
 command = scenario_command(run, figures_by_default=False)
@@ -135,6 +141,7 @@ class SimulatedRun:
         self._check_at = 0.0
         """Time [s] of the next look at the schedule: the same however the calls of `advance` fall."""
         self._operator = Operator(FLEET, 1)
+        self._orders = OrderCalls(self._operator, lambda said: send(self._simulator, said), drawn.mission)
         self._incarnations: dict[str, int] = {}
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
@@ -242,6 +249,9 @@ class SimulatedRun:
         """Execute an operator command: link conditions go to the link model, other commands to all agents."""
         now = self._simulator.now
         self._say("fault", deed=action, robot=target, t=now)
+        if action == GOAL:
+            self._begin_order(goal_of(str(target)))
+            return
         said = note(self._operator, now, action, target, self._scenario.mission.robots)
         if isinstance(said.message, OperatorNote) and said.message.command == LINK_CONDITIONS:
             self._simulator.link_model.obey(said.message.arguments)
@@ -249,10 +259,27 @@ class SimulatedRun:
         else:
             send(self._simulator, said)
 
+    def _begin_order(self, goal: Point) -> None:
+        """Send the team to another goal [m], as an operator does by `lfa go`."""
+        change = along((goal,), self._scenario.world.walls_m)
+        self._orders.begin(change, False, self._simulator.now, self._told)
+        self._go_on_ordering()
+
+    def _go_on_ordering(self) -> None:
+        self._orders.step(self._simulator.now)
+        if self._orders.running:
+            self._simulator.at(self._simulator.now + ORDER_STEP_S, self._go_on_ordering)
+
+    def _told(self, done: bool, text: str) -> None:
+        if not done:
+            self._say("order_refused", reason=text)
+
     def _hear(self, now: float, key: str, _payload: bytes, message: Message) -> None:
         self._record(now, key, message)
         if self._termination.see(message) is not None:
             self._simulator.halt()
+        if isinstance(message, OrderNote | Event):
+            self._orders.hear(message)
 
     def _say(self, kind: str, **data: object) -> None:
         now = self._simulator.now

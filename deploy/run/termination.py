@@ -14,6 +14,7 @@ from lfa.agents.leading.free_place import FREE_WITHIN_M
 from lfa.deploy.recording.outcome import Verdict
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import NO_TERM, Role, Term
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.simulation import TrueRobot, Truth
 from lfa.protocol.messages.team import Event, RouteProgress, Status, TableRow, Tracking
 from lfa.protocol.names import robot_id_of
@@ -26,7 +27,7 @@ SLOT_SHARE = 0.5
 """Distance of a robot at rest from its slot up to which it is in it, as a share of its commanded distance k^d."""
 TRACKING_S_MAX = TOPIC["tracking"].timeout_s or 1.0
 
-JUDGED = frozenset({Truth, TableRow, Tracking, Event, Status})
+JUDGED = frozenset({Truth, TableRow, Tracking, Event, Status, OrderNote})
 """Types of the messages that tell something about the end of a run; one in two is of another."""
 
 
@@ -38,6 +39,10 @@ class Termination:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
+        self._leading = scenario.mission.leading
+        """Route and tolerances that hold: the scenario's, or as an operator changed them (E32)."""
+        self._order_version = self._route = 0
+        """Version of the order that holds, and of the one that gave the route."""
         self._term = NO_TERM
         self._led = NO_TERM
         self.chain: tuple[int, ...] = scenario.mission.robots
@@ -61,6 +66,10 @@ class Termination:
                     self.verdict = self._judge(message)
                 case TableRow(progress=RouteProgress() as progress):
                     self._progress[robot_id_of(message.header.sender) or 0] = progress
+                case OrderNote(term=Term(), order=order) if order.version > self._order_version:
+                    if order.route != self._route:
+                        self._place = None
+                    self._leading, self._order_version, self._route = order.leading, order.version, order.route
                 case Event(kind="waypoint_taken", data={"waypoint": int() as n, "x": float() as x, "y": float() as y}):
                     self._take_place(n, x, y)
                 case Tracking():
@@ -95,15 +104,16 @@ class Termination:
 
     def _missing(self, robots: tuple[TrueRobot, ...]) -> str | None:
         """Return what is missing until the team has arrived; None when nothing is."""
-        leading = self._scenario.mission.leading
+        leading = self._leading
         present = {robot.id: robot for robot in robots}
         chain = [present[robot] for robot in self.chain if robot in present]
         if not chain:
             return "no robot is in the chain"
         leader, points = chain[0], leading.route_m
         progress = self._progress.get(leader.id)
-        if progress is None or progress.waypoint < len(points):
-            return f"robot {leader.id} is on its way to way-point {1 + (progress.waypoint if progress else 0)}"
+        passed = 0 if progress is None or progress.route != self._route else progress.waypoint
+        if passed < len(points):
+            return f"robot {leader.id} is on its way to way-point {1 + passed}"
         places = [points[-1], *([] if self._place is None else [self._place])]
         if min(hypot(leader.x - x, leader.y - y) for x, y in places) > leading.goal_tolerance_m:
             return f"robot {leader.id} is off the goal"
@@ -115,8 +125,8 @@ class Termination:
 
     def _take_place(self, number: int, x: float, y: float) -> None:
         """Accept a place that replaces the goal, if it is no farther from the goal than such a place may be."""
-        goal_x, goal_y = self._scenario.mission.goal_m
-        if number == len(self._scenario.mission.leading.route_m) - 1 and hypot(x - goal_x, y - goal_y) <= FREE_WITHIN_M:
+        goal_x, goal_y = self._leading.route_m[-1]
+        if number == len(self._leading.route_m) - 1 and hypot(x - goal_x, y - goal_y) <= FREE_WITHIN_M:
             self._place = x, y
 
     def _in_slot(self, robot: TrueRobot, ahead: TrueRobot) -> bool:

@@ -10,26 +10,31 @@ from contextlib import ExitStack
 from typing import Any
 
 from lfa.deploy.client.discovery import agents
+from lfa.deploy.client.mission_changes import along
 from lfa.deploy.client.operator import Operator
+from lfa.deploy.client.order_calls import OrderCalls
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen, scenario_of_fleet
 from lfa.deploy.client.stop_call import StopCall
 from lfa.deploy.client.stop_fleet import TOPICS as STOP_TOPICS
 from lfa.deploy.client.stop_fleet import told
-from lfa.deploy.faults.link_faults import note
-from lfa.deploy.faults.script import LEADER, LIVE, ORDERS, RESTART, SIGNALS
+from lfa.deploy.faults.goals import check_goal
+from lfa.deploy.faults.link_faults import goal_of, note
+from lfa.deploy.faults.script import GOAL, LEADER, LIVE, ORDERS, RESTART, SIGNALS
 from lfa.deploy.process.identity import identify, send_signal
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.view.picture.ground import ground_of, ground_of_mission
 from lfa.deploy.view.picture.picture import TOPICS, Picture
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.stop import StopState
-from lfa.protocol.messages.team import MissionNote
+from lfa.protocol.messages.team import Event, MissionNote
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_id_of, whole_number
 from lfa.protocol.topics import address
 from lfa.protocol.transport.message_bus import send
+from lfa.world.description.scenario import Point
 
 HEARD = frozenset(f"*/{topic}" for topic in TOPICS - {"scan"}) | STOP_TOPICS
 MISSION_S = 2.0
@@ -61,9 +66,9 @@ class FleetEngine:
         self._beat_at = 0.0
         self._began = clock.now()
         mission = self._mission()
-        scenario = scenario_of_fleet(fleet)
+        scenario = self._scenario = scenario_of_fleet(fleet)
         self._ground = ground_of_mission(mission) if scenario is None else ground_of(scenario)
-        self._simulated = scenario is not None
+        self._orders = OrderCalls(self._operator, lambda envelope: send(self._subscriber.bus, envelope), mission)
         self._robots = mission.robots
         self._picture = Picture(mission.robots, late=True)
 
@@ -90,7 +95,7 @@ class FleetEngine:
             "panes": [self._ground],
             "stop": True,
             "faults": bool(self._fleet.team),
-            "simulated": self._simulated and bool(self._fleet.team),
+            "simulated": self._scenario is not None and bool(self._fleet.team),
         }
 
     def state(self) -> dict[str, Any]:
@@ -108,10 +113,13 @@ class FleetEngine:
             robot = robot_id_of(where.owner)
             if isinstance(message, StopState) and robot is not None and self._call is not None:
                 self._call[0].hear(robot, message, now)
+            if isinstance(message, OrderNote | Event):
+                self._orders.hear(message)
             if where.topic in TOPICS:
                 self._picture.see(self._at(arrival.at), where.owner, where.topic, message)
         self._go_on_stopping(now)
         self._go_on_restarting(now)
+        self._orders.step(now)
         if now >= self._beat_at and self._call is None:
             self._beat_at = now + BEAT_S
             send(self._subscriber.bus, self._operator.stop(None, (), now))
@@ -174,6 +182,8 @@ class FleetEngine:
             if self._picture.leader is None:
                 raise Refused(f"{text}: nobody leads at the moment")
             target = str(self._picture.leader)
+        if action == GOAL:
+            return self._go(goal_of(target))
         if action in ORDERS:
             return self._order(action, target)
         robot = whole_number(target)
@@ -202,6 +212,19 @@ class FleetEngine:
                 if send_signal(agent.identity, SIGNALS[action]):
                     return f"{action} {robot} (process {agent.identity.pid})"
         raise Refused(f"{action} {robot}: no process of yours here is robot {robot}")
+
+    def _go(self, goal: Point) -> str:
+        """Send the team to another goal [m] as `lfa go` does, and tell what becomes of it. Raises Refused."""
+        if self._scenario is not None:
+            check_goal(self._scenario, goal)
+        said = f"{GOAL} {goal[0]:g},{goal[1]:g}"
+        walls = () if self._scenario is None else self._scenario.world.walls_m
+
+        def tell(done: bool, text: str) -> None:
+            self._tell(f"{said}: {text}", alarm=not done)
+
+        self._orders.begin(along((goal,), walls), False, clock.now(), tell)
+        return said
 
     def _order(self, action: str, target: str) -> str:
         team = [agent for agent in agents() if agent.fleet == self._fleet.name]

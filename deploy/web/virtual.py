@@ -6,13 +6,14 @@ yet: the saved scenario then runs to the same events, byte for byte.
 
 from __future__ import annotations
 
-from math import floor, inf
+from math import floor, hypot, inf
 from time import perf_counter
 from typing import Any
 
-from lfa.deploy.faults.script import LEADER, Fault, parse, parse_all
+from lfa.deploy.faults.link_faults import goal_of
+from lfa.deploy.faults.script import GOAL, LEADER, Fault, parse, parse_all
 from lfa.deploy.recording.recorder import EventLines
-from lfa.deploy.run.simulate import SimulatedRun, refuse_common
+from lfa.deploy.run.simulate import SimulatedRun, refuse_faults
 from lfa.deploy.scenario_loading import load_scenario
 from lfa.deploy.view.picture.ground import ground_of
 from lfa.deploy.view.picture.picture import TOPICS, Picture
@@ -22,7 +23,7 @@ from lfa.deploy.web.share import FAULTS_MAX, Setting, fragment_of, saved, settin
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.topics import address
-from lfa.world.description.load import Scenario, draw, shipped
+from lfa.world.description.load import Point, Scenario, draw, shipped
 
 GRID_S = 0.01
 """Grid [s] of the times at which orders take effect."""
@@ -43,6 +44,7 @@ class _Team:
 
     def __init__(self, scenario: Scenario, seed: int, faults: list[Fault]) -> None:
         self.drawn = draw(scenario, seed)
+        refuse_faults(self.drawn, faults)
         self.picture = Picture(scenario.mission.robots)
         self._log = EventLines()
         self.events = bytearray()
@@ -101,7 +103,6 @@ class VirtualEngine:
             scenario = load_scenario(setting.scenario, (*setting.overrides, *more), setting.robots)
             seed = scenario.seed if setting.seed is None else setting.seed
             faults = parse_all(scenario.mission, scenario.faults, setting.faults)
-            refuse_common(faults)
             teams.append(_Team(scenario, seed, faults))
         self._teams, self._labels, self._setting, self._seed = teams, list(labels), setting, seed
         self._lecture = None if lesson is None else Lecture(lesson)
@@ -216,7 +217,8 @@ class VirtualEngine:
                 raise Refused(f"{text}: nobody leads at the moment")
             words[1] = str(picture.leader)
         fault = parse(f"{' '.join(words)} at {at_s:.2f} s", mission, "order")
-        refuse_common([fault])
+        for team in self._teams:
+            refuse_faults(team.drawn, [fault])
         if (
             fault.action in RUNNING_NEEDED
             and fault.target in mission.robots
@@ -227,6 +229,8 @@ class VirtualEngine:
             raise Refused(f"{text}: robot {fault.target} runs")
         if fault.action == "obstacle":
             self._check_free(str(fault.target))
+        if fault.action == GOAL:
+            self._check_uncovered(goal_of(str(fault.target)))
         for team in self._teams:
             team.run.add_fault(fault)
         self._done.append(str(fault))
@@ -239,6 +243,13 @@ class VirtualEngine:
             under = robot_under(team.picture, mission.robots, x, y, radius_m + mission.radius_m)
             if under is not None:
                 raise Refused(f"obstacle {target}: robot {under} stands there, must be on free ground")
+
+    def _check_uncovered(self, goal: Point) -> None:
+        x, y = goal
+        for team in self._teams:
+            radius_m = team.drawn.mission.radius_m
+            if any(hypot(x - at_x, y - at_y) < size_m + radius_m for at_x, at_y, size_m in team.picture.added):
+                raise Refused(f"goal ({x:g}, {y:g}): an obstacle was set down there, must be clear of it")
 
     def _may_open(self, scenario: str) -> None:
         if scenario not in shipped_titles() and scenario != self._allowed:

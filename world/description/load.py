@@ -104,9 +104,9 @@ def load(
             mistakes.append(refused.mistake)
         raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
     apply_rules(MISSION_RULES, scenario.mission, mistakes)
-    apply_rules((*SCENARIO_RULES, *rules), scenario, mistakes)
+    apply_rules(SCENARIO_RULES, scenario, mistakes)
     scenario = _on_map(scenario, path.parent, mistakes)
-    apply_rules((COURSE_RULE,), scenario, mistakes)
+    apply_rules((COURSE_RULE, *rules), scenario, mistakes)
     if mistakes:
         raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
     return scenario

@@ -12,7 +12,7 @@ from msgspec import structs
 
 from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.operate.commanded import CommandedTeam
-from lfa.deploy.client.order_fleet import along
+from lfa.deploy.client.mission_changes import along
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import ScheduledFault

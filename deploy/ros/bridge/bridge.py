@@ -7,14 +7,14 @@ import time
 from collections.abc import Iterable
 from typing import Protocol
 
-from lfa.agents.team_orders import QUESTION
+from lfa.deploy.client.mission_changes import along, to_goal, unchanged
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.client.order_fleet import along, to_goal, unchanged, walls_of
+from lfa.deploy.client.order_calls import OrderCalls
+from lfa.deploy.client.order_fleet import walls_of
 from lfa.deploy.client.session import Subscriber, scenario_of_fleet
 from lfa.deploy.client.stop_call import Said
 from lfa.deploy.ros import messages
 from lfa.deploy.ros.bridge.answers import answer
-from lfa.deploy.ros.bridge.order_calls import OrderCalls
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE
 from lfa.deploy.ros.bridge.sender_clocks import SenderClocks
 from lfa.deploy.ros.bridge.stop_calls import StopCalls
@@ -23,7 +23,7 @@ from lfa.deploy.ros.session import ServiceCall
 from lfa.deploy.ros.topics import SOURCES
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.orders import OrderNote, TeamOrder
+from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.stop import StopState
 from lfa.protocol.messages.team import Event, MissionNote
@@ -68,7 +68,7 @@ class Bridge:
         self._robots: tuple[int, ...] = ()
         """Robots of the mission; empty until it is known."""
         self._stops = StopCalls(self._say_stop)
-        self._orders = OrderCalls(self._say_order, self._ask_orders)
+        self._orders = OrderCalls(self._operator, lambda envelope: send(subscriber.bus, envelope))
         scenario = scenario_of_fleet(subscriber.fleet)
         if scenario is not None:
             self._mapping.set_mission(scenario.mission)
@@ -141,12 +141,6 @@ class Bridge:
                 self.warn(f"goal ({x:g}, {y:g}): {text}")
 
         self._orders.begin(along(points, walls_of(self._subscriber)), False, now, tell)
-
-    def _say_order(self, order: TeamOrder, now: float) -> None:
-        send(self._subscriber.bus, self._operator.order(order, now))
-
-    def _ask_orders(self, now: float) -> None:
-        send(self._subscriber.bus, self._operator.ask("mission", now), self._operator.ask(QUESTION, now))
 
     def _say_stop(self, said: Said, now: float) -> None:
         send(self._subscriber.bus, self._operator.stop(said.word, said.gateways, now))

@@ -8,7 +8,6 @@ from typing import Any, Protocol
 
 from lfa.agents.formation.formation import named
 from lfa.deploy.ros.bridge.answers import answer
-from lfa.deploy.ros.bridge.order_calls import GO, PAUSE
 from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
 from lfa.deploy.ros.quaternions import yaw_of
 from lfa.deploy.ros.session import NodeHandle, ServiceCall
@@ -17,6 +16,7 @@ from lfa.protocol.mission import FormationSpec
 
 GOAL = "/goal_pose"
 """Topic of RViz's button `2D Goal Pose`."""
+PAUSE, GO = "/lfa/pause", "/lfa/go"
 HANDOVER = "/lfa/handover"
 HANDOVER_S_MAX = 5.0
 """Time [s] within which another robot must lead after a hand-over was asked for."""

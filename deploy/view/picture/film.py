@@ -58,10 +58,9 @@ def _images(clip: dict[str, Any], most: int) -> Iterator[Image.Image]:
     frames = pane["frames"]
     step = -(-len(frames) // most)
     camera = _Camera(ground, frames)
-    leads = [item for item in pane["news"] if item["k"] == "lead"]
-    added = [item for item in pane["news"] if item["k"] == "obstacle"]
+    news = [item for item in pane["news"] if item["k"] in ("lead", "obstacle", "route")]
     for n in range(0, len(frames), step):
-        yield _image(camera, ground, frames, n, leads, added)
+        yield _image(camera, ground, frames, n, [item for item in news if item["at"] <= frames[n]["t"]])
 
 
 class _Camera:
@@ -92,20 +91,22 @@ def _image(
     ground: dict[str, Any],
     frames: list[dict[str, Any]],
     n: int,
-    leads: list[dict[str, Any]],
-    added: list[dict[str, Any]],
+    news: list[dict[str, Any]],
 ) -> Image.Image:
+    """Draw frame `n`, with what the news up to it say of leaders, routes and obstacles."""
     frame = frames[n]
     image = Image.new("RGB", (FINER * WIDTH, FINER * (camera.height + FOOT)), PAPER)
     pen = ImageDraw.Draw(image)
-    _draw_ground(pen, camera, ground, frame, [item for item in added if item["at"] <= frame["t"]])
+    routes = [item for item in news if item["k"] == "route"]
+    laid = {**ground, **routes[-1]} if routes else ground
+    _draw_ground(pen, camera, laid, frame, [item for item in news if item["k"] == "obstacle"])
     for row in frame["robots"]:
         past = [place for old in frames[max(0, n - TRAIL_FRAMES) : n + 1] for place in _places(old, row[0])]
         if len(past) > 1:
             pen.line([camera.at(*place) for place in past], fill=SOFT, width=FINER)
     for row in frame["robots"]:
         _draw_robot(pen, camera, dict(zip(COLUMNS, row, strict=True)), ground["radius"])
-    led = [lead for lead in leads if lead["at"] <= frame["t"]]
+    led = [item for item in news if item["k"] == "lead"]
     who = f"robot {led[-1]['robot']} leads: {led[-1]['why']}" if led else "nobody leads yet"
     font = ImageFont.load_default(13 * FINER)
     pen.text((10 * FINER, FINER * (camera.height + 8)), f"{frame['t']:5.1f} s   {who}", fill=INK, font=font)

@@ -21,7 +21,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import wrap
 from lfa.protocol.names import robot_id_of, robot_name
 
-TOPICS = frozenset({"pose", "tracking", "event", "status", "truth", "plan", "scan"})
+TOPICS = frozenset({"pose", "tracking", "event", "status", "truth", "plan", "scan", "team_order"})
 """Topics that a picture is drawn from."""
 COLUMNS = (
     "id", "x", "y", "theta", "speed", "role", "ahead", "slot_x", "slot_y", "distance", "bearing", "heading", "loss",
@@ -31,7 +31,7 @@ COLUMNS = (
 cut off from another robot."""
 TRACKED_S = 0.5
 """Age [s] up to which a follower's slot is drawn."""
-ALARMS = ("fault", "contact", "failed", "died", "slowed")
+ALARMS = ("fault", "contact", "failed", "died", "slowed", "order_refused")
 SILENT = ("leader_command",)
 """Events that the page tells otherwise: the change of a leader has a table of its own."""
 CM = 100.0
@@ -68,6 +68,8 @@ class Picture:
         self.decisions: dict[str, int] = {}
         """Number of decisions so far, by action."""
         self.contacts = 0
+        self.added: list[tuple[float, float, float]] = []
+        """Obstacles that were set down during the run: x, y, radius [m]."""
         self.sides: list[tuple[float, str]] = []
         """Formations that leaders have ordered, each with its time [s]."""
         self.chain: tuple[int, ...] = ()
@@ -75,6 +77,8 @@ class Picture:
         self._version = (0, 0, 0)
         self.loss_ordered = 0.0
         """Share of messages that an order lets every receiver lose."""
+        self._route = 0
+        """Version of the order that gave the route; 0: the mission's own."""
         self._ids = robots
         self._late = late
         self._robots = {robot: _Robot() for robot in robots}
@@ -160,6 +164,8 @@ class Picture:
                 self._plan(message)
             case "scan" if robot in self._robots:
                 self._scans[robot] = message
+            case "team_order" if message.term is not None:
+                self._order(message.order)
 
     def _truth(self, t: float, message: Any) -> None:
         self._true = True
@@ -203,6 +209,13 @@ class Picture:
         tile = {"k": "tile", "x": x, "y": y, "cell_m": float(message.cell_m), "columns": int(message.columns)}
         self.news.add({**tile, "cells": cells}, f"tile {x} {y}")
 
+    def _order(self, order: Any) -> None:
+        """Note another route or goal, once; a leader says its order again each second (E32)."""
+        route = [[round(float(x), 3), round(float(y), 3)] for x, y in order.leading.route_m]
+        if int(order.route) > self._route:
+            self._route = int(order.route)
+            self.news.add({"k": "route", "route": route, "goal": route[-1]}, "route")
+
     def _event(self, t: float, owner: str, message: Any) -> None:
         data, kind = dict(message.data), str(message.kind)
         said = data.get("robot")
@@ -242,6 +255,7 @@ class Picture:
     def _obstacle(self, data: dict[str, Any]) -> None:
         numbers = [data.get(name) for name in ("index", "x", "y", "radius_m")]
         if all(isinstance(number, int | float) for number in numbers):
+            self.added.append((float(data["x"]), float(data["y"]), float(data["radius_m"])))
             self.news.add({"k": "obstacle", **dict(zip(("index", "x", "y", "radius_m"), numbers, strict=True))})
 
     def _fault(self, action: str, target: Any) -> None:

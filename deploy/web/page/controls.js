@@ -3,11 +3,12 @@
 import { button, byId, element, say, seconds } from "./dom.js";
 
 const SPEEDS = [[0.1, "0.1 ×"], [0.25, "0.25 ×"], [0.5, "0.5 ×"], [1, "1 ×"], [2, "2 ×"], [5, "5 ×"], [10, "10 ×"], [1000, "as fast as it goes"]];
+export const OBSTACLE_M = 0.25;
 const SIDES = ["left", "right", "column", "zigzag"];
 const ACTIONS = [["kill", "Kill", "K"], ["stop", "Freeze", "S"], ["continue", "Continue", "C"], ["cut", "Cut radio", "X"], ["heal", "Heal radio", "H"], ["restart", "Restart", "R"]];
 export const KEYS = [
   ["Space", "play or pause"], [".", "one step"], ["[ ]", "choose a robot"], ["K S C X H R", "kill, freeze, continue, cut, heal, restart it"],
-  ["O", "set obstacles down"], ["L", "its laser scan"], ["+ − 0", "zoom in, out, show all"], ["arrows", "move the view"], ["F", "follow the leader, or the chosen robot"],
+  ["O", "set obstacles down"], ["G", "a goal or an obstacle in the middle of the view"], ["L", "its laser scan"], ["+ − 0", "zoom in, out, show all"], ["arrows", "move the view"], ["F", "follow the leader, or the chosen robot"],
   ["T", "light or dark"], ["Esc", "choose nothing"],
 ];
 
@@ -136,15 +137,32 @@ export class Controls {
 
   // The menu of a robot, beside it.
   menu(robot, at) {
-    const menu = byId("robotmenu");
     if (robot === null || this.rights !== "operate" || this.scene.faults === false) {
-      menu.hidden = true;
+      byId("menu").hidden = true;
       return;
     }
     const actions = ACTIONS.map(([action, text, key]) => button(text, () => this.action(action, robot), { id: `do-${action}`, title: key }));
     const scan = this.engine === "fleet" ? "" : button("Scan", () => this.scan(robot), { id: "do-scan", title: "L", "aria-pressed": String(this.scanned.has(robot)) });
     const close = button("×", () => this.page.choose(null), { "aria-label": "Close" });
-    menu.replaceChildren(element("h2", {}, `Robot ${robot}`, close), element("div", { class: "row" }, ...actions, scan));
+    this.#open(at, element("h2", {}, `Robot ${robot}`, close), element("div", { class: "row" }, ...actions, scan));
+  }
+
+  // The menu of a point of the ground [m], beside it.
+  spotMenu([x, y], at) {
+    const place = `${x.toFixed(2)},${y.toFixed(2)}`;
+    const then = (text) => () => {
+      this.page.choose(null);
+      this.fault(text);
+    };
+    const goal = button("Goal here", then(`goal ${place}`), { id: "do-goal" });
+    const obstacle = this.draw ? button("Obstacle here", then(`obstacle ${place},${OBSTACLE_M}`), { id: "do-obstacle" }) : "";
+    const close = button("×", () => this.page.choose(null), { "aria-label": "Close" });
+    this.#open(at, element("h2", {}, `${x.toFixed(2)}, ${y.toFixed(2)} m`, close), element("div", { class: "row" }, goal, obstacle));
+  }
+
+  #open(at, ...parts) {
+    const menu = byId("menu");
+    menu.replaceChildren(...parts);
     menu.hidden = false;
     const { width, height } = byId("stages").getBoundingClientRect();
     menu.style.left = `${Math.max(8, Math.min(at[0] + 24, width - 246))}px`;
@@ -183,6 +201,7 @@ export class Controls {
     else if (event.key === "t") page.theme();
     else if (event.key === "?") byId("keys").showModal();
     else if (event.key === "Escape") page.choose(null);
+    else if (event.key === "g") page.spot(stage, [stage.camera.x, stage.camera.y], true);
     else if (event.key === "o" && this.draw) this.setTool(this.tool === "draw" ? "look" : "draw");
     else if (event.key === "l" && chosen !== null && this.engine === "virtual") this.scan(chosen);
     else if (event.key === "]" || event.key === "[") page.next(event.key === "]" ? 1 : -1);

@@ -1,6 +1,6 @@
 // The page: joins source, models, stages, panels and controls.
 
-import { KEYS, Controls } from "./controls.js";
+import { KEYS, OBSTACLE_M, Controls } from "./controls.js";
 import { byId, element, say } from "./dom.js";
 import { LessonCard } from "./lesson.js";
 import { Model } from "./model.js";
@@ -9,7 +9,6 @@ import { ClipSource, LiveSource } from "./source.js";
 import { Stage } from "./stage.js";
 
 const PANELS_MS = 120;
-const OBSTACLE_M = 0.25;
 const DRAG_PX = 6;
 
 class Page {
@@ -118,9 +117,19 @@ class Page {
 
   choose(id) {
     this.chosen = id;
-    this.stages.forEach((stage) => (stage.chosen = id));
+    for (const stage of this.stages) [stage.chosen, stage.spot] = [id, null];
     const robot = this.models[0]?.robots.get(id);
     this.controls.menu(robot ? id : null, robot ? this.stages[0].toScreen(robot.x, robot.y) : [0, 0]);
+  }
+
+  // A point of the ground was clicked: once to choose no robot, then to do something there.
+  spot(stage, [x, y], byKey = false) {
+    const again = this.chosen !== null || this.stages.some((one) => one.spot);
+    this.choose(null);
+    if (again || this.rights !== "operate") return;
+    stage.spot = [x, y];
+    this.controls.spotMenu(stage.spot, stage.toScreen(x, y));
+    if (byKey) byId("do-goal").focus();
   }
 
   next(step) {
@@ -202,7 +211,7 @@ class Page {
       if (!fingers.delete(event.pointerId)) return;
       const place = at(event);
       if (stage.sketch) this.#setDown(stage);
-      else if (moved <= DRAG_PX && event.type === "pointerup") this.choose(stage.robotAt(...place));
+      else if (moved <= DRAG_PX && event.type === "pointerup") this.#touch(stage, place);
     };
     canvas.addEventListener("pointerup", up);
     canvas.addEventListener("pointercancel", up);
@@ -210,6 +219,12 @@ class Page {
       event.preventDefault();
       stage.zoom(Math.exp(-event.deltaY * 0.0015), at(event));
     }, { passive: false });
+  }
+
+  #touch(stage, place) {
+    const robot = stage.robotAt(...place);
+    if (robot === null) this.spot(stage, stage.toWorld(...place));
+    else this.choose(robot);
   }
 
   #setDown(stage) {

@@ -23,6 +23,8 @@ export class Model {
     this.moved = new Map();
     this.scans = {};
     this.added = [];
+    this.route = ground.route ?? [];
+    this.goal = ground.goal;
     this.trails = new Map();
     this.errors = new Map(); // id -> [[t, distance, bearing], ...]
     this.leads = [];
@@ -74,6 +76,7 @@ export class Model {
     for (const item of items) {
       if (item.k === "lead") this.leads.push(item);
       else if (item.k === "obstacle") this.added.push(item);
+      else if (item.k === "route") [this.route, this.goal] = [item.route, item.goal];
       else if (item.k === "plan") this.plan = item.route;
       else if (item.k === "tile") this.tiles.set(`${item.x} ${item.y}`, item);
       else if (item.k === "event") this.log.push(item);
@@ -97,7 +100,7 @@ export class Model {
 
   // The box around all that stands and drives, in metres.
   bounds() {
-    const points = [...(this.ground.route ?? []), ...(this.ground.goal ? [this.ground.goal] : [])];
+    const points = [...this.route, ...(this.goal ? [this.goal] : [])];
     for (const [x1, y1, x2, y2] of this.ground.walls) points.push([x1, y1], [x2, y2]);
     for (const obstacle of this.ground.obstacles) points.push(obstacle.at);
     for (const robot of this.robots.values()) points.push([robot.x, robot.y]);

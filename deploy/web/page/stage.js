@@ -14,6 +14,7 @@ export class Stage {
     this.following = false;
     this.chosen = null;
     this.sketch = null; // an obstacle that is being drawn: x, y, radius [m]
+    this.spot = null; // the point of the ground that was clicked: x, y [m]
     this.colours = {};
     this.readColours();
   }
@@ -98,6 +99,7 @@ export class Stage {
     this.#ground(c);
     this.#lines(c, at);
     for (const robot of model.robots.values()) this.#robot(c, robot, at);
+    if (this.spot) this.#cross(c, this.spot);
     if (this.sketch) this.#circle(c, this.sketch.x, this.sketch.y, this.sketch.radius, this.colours.accent, 2);
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.#names(c, at);
@@ -155,7 +157,7 @@ export class Stage {
   }
 
   #ground(c) {
-    const { ground, moved, added } = this.model;
+    const { ground, moved, added, route, goal } = this.model;
     for (const patch of ground.terrain) {
       this.#path(c, patch.outline);
       c.globalAlpha = 0.3;
@@ -164,15 +166,15 @@ export class Stage {
       c.globalAlpha = 1;
       this.#stroke(c, patch.rises ? this.colours.rise : this.colours.hole, 1.5);
     }
-    if (ground.route.length > 0) {
+    if (route.length > 0) {
       c.setLineDash([6 * this.pixel, 6 * this.pixel]);
       c.beginPath();
-      ground.route.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
+      route.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
       this.#stroke(c, this.colours.route, 2);
       c.setLineDash([]);
     }
-    if (ground.goal) {
-      const [x, y] = ground.goal;
+    if (goal) {
+      const [x, y] = goal;
       const r = Math.max(0.12, 7 * this.pixel);
       this.#circle(c, x, y, r, this.colours.leader, 2.5);
       this.#circle(c, x, y, r / 2, this.colours.leader, 2.5);
@@ -338,6 +340,16 @@ export class Stage {
     c.beginPath();
     points.forEach(([x, y], n) => (n ? c.lineTo(x, y) : c.moveTo(x, y)));
     c.closePath();
+  }
+
+  #cross(c, [x, y]) {
+    const d = 9 * this.pixel;
+    c.beginPath();
+    c.moveTo(x - d, y);
+    c.lineTo(x + d, y);
+    c.moveTo(x, y - d);
+    c.lineTo(x, y + d);
+    this.#stroke(c, this.colours.accent, 3);
   }
 
   #circle(c, x, y, radius, colour, width) {

@@ -34,6 +34,8 @@ MISSION = Mission()
         ("resume scanner 1 at 9 s", Fault("resume", "scanner 1", 9.0)),
         ("formation column at 9 s", Fault("formation", "column", 9.0)),
         ("obstacle -5,1.5,0.3 at 12345.67 s", Fault("obstacle", "-5,1.5,0.3", 12345.67)),
+        ("goal 3,-1.5 at 9 s", Fault("goal", "3,-1.5", 9.0)),
+        ("goal 3 -1.5 at 9 s", Fault("goal", "3,-1.5", 9.0)),
         ("range 2.5 at 0.01 s", Fault("range", "2.5", 0.01)),
     ],
 )
@@ -51,6 +53,8 @@ def test_a_sentence_is_a_fault(text: str, fault: Fault) -> None:
         "formation at 1 s", "formation up at 1 s", "range at 1 s", "range -1 at 1 s", "range far at 1 s",
         "obstacle 1,2 at 1 s", "obstacle 1,2,0.01 at 1 s", "obstacle 1,2,9 at 1 s", "obstacle 99999,0,1 at 1 s",
         "obstacle 1,2,3,4 at 1 s", "formation column at 1 s for 2 s",
+        "goal at 1 s", "goal 1 at 1 s", "goal 1,2,3 at 1 s", "goal 1 2 3 at 1 s", "goal nan,1 at 1 s",
+        "goal 99999,0 at 1 s", "goal leader at 1 s", "goal 1,2 at 1 s for 2 s",
         "handover 2 at 1 s", "heal at 1 s for 2 s", "cut leader-2 at 1 s", "kill 1,2 at 1 s", "kill at 1 s",
         "kill leader at 1 s or so", "kill \u0662 at 1 s", "kill leader at 1e3 s", f"kill {'9' * 5000} at 1 s",
         f"kill leader at {'9' * 400} s", f"cut {'9' * 5000} at 1 s",

@@ -9,9 +9,9 @@ import pytest
 from msgspec import structs
 
 from lfa.agents.team_orders import QUESTION
+from lfa.deploy.client.mission_changes import along, to_goal, unchanged
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome
-from lfa.deploy.client.order_fleet import along, to_goal, unchanged
 from lfa.deploy.fuzz.agent_simulation import FLEET, AgentSimulation
 from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import draw

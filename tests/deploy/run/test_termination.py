@@ -9,8 +9,10 @@ from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Role, Term
 from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.orders import OrderNote, TeamOrder
 from lfa.protocol.messages.simulation import TrueRobot, Truth
 from lfa.protocol.messages.team import Event, Level, RouteProgress, Status, TableRow, Tracking
+from lfa.protocol.mission import FormationSpec
 from lfa.world.description.load import Scenario, load
 
 
@@ -29,9 +31,9 @@ def _event(kind: str, sender: str, term: Term | None, **data: object) -> Event:
     return Event(Header(sender, 1, 1, 0.0), kind, term, data)
 
 
-def _row(waypoint: int, robot: int = 1) -> TableRow:
+def _row(waypoint: int, robot: int = 1, route: int = 0) -> TableRow:
     header = Header(f"robot{robot}", 1, 1, 0.0)
-    return TableRow(header, 0.0, 0.0, 0.0, 0.0, 0.0, Role.LEADER, progress=RouteProgress(waypoint, 0.0))
+    return TableRow(header, 0.0, 0.0, 0.0, 0.0, 0.0, Role.LEADER, progress=RouteProgress(waypoint, 0.0, route))
 
 
 def _tracking(error_m: float = 0.0, predecessor: int = 1) -> Tracking:
@@ -43,12 +45,14 @@ def _tracking(error_m: float = 0.0, predecessor: int = 1) -> Tracking:
 IN_SLOT = _tracking()
 
 
-def _outcome(*messages: Message, waypoint: int = 1, tracking: Tracking | None = IN_SLOT) -> str | None:
+def _outcome(*messages: Message, waypoint: int = 1, tracking: Tracking | None = IN_SLOT, route: int = 0) -> str | None:
     """The outcome after `messages`, where leader and follower report before each ground truth."""
     termination = Termination(_scenario())
     termination.see(_truth(8.5, 2.0, speed=0.5))
     for message in messages:
-        for said in (_row(waypoint), _row(waypoint, 2), tracking) if isinstance(message, Truth) else ():
+        for said in (
+            (_row(waypoint, 1, route), _row(waypoint, 2, route), tracking) if isinstance(message, Truth) else ()
+        ):
             if said is not None:
                 termination.see(said)
         termination.see(message)
@@ -61,6 +65,18 @@ def test_all_at_rest_at_the_goal_for_half_a_second_is_the_goal() -> None:
 
 def test_a_leader_that_has_not_driven_the_whole_route_has_not_arrived_wherever_it_stands() -> None:
     assert _outcome(_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95), waypoint=0) is None
+
+
+def test_a_goal_that_an_operator_gave_is_the_one_to_reach() -> None:
+    """E32: the leader carries another route; progress along the old one does not count."""
+    leading = replace(_scenario().mission.leading, route_m=((8.0, 0.0),))
+    order = OrderNote(Header("robot1", 1, 1, 0.0), TeamOrder(leading, FormationSpec(), 1, 1), Term(1, 1, 1))
+    old = (_truth(9.0, 2.95), _truth(9.0 + REST_S, 2.95))
+    assert _outcome(replace(order, term=None), *old) == "goal_reached", "nobody carries out what is only proposed"
+    assert _outcome(order, *old) is None
+    there = [_truth(t, 8.05, follower_x=7.3) for t in (9.0, 9.0 + REST_S)]
+    assert _outcome(order, *there) is None, "the progress is that of the old route"
+    assert _outcome(order, *there, route=1) == "goal_reached"
 
 
 def test_a_robot_at_rest_off_its_slot_keeps_the_run_going() -> None:

@@ -68,6 +68,14 @@ def test_orders_reach_the_fleet(page: Browser, fleet: Running) -> None:
     assert {"formation", "cut", "heal", "obstacle"} <= {e.get("deed") for e in fleet.events() if e["kind"] == "fault"}
 
 
+def test_a_clicked_goal_is_carried_out_and_an_impossible_one_refused(page: Browser) -> None:
+    page.value("lfa.order({do: 'fault', text: 'goal 20,2'})")
+    page.wait_for("lfa.models[0].goal.join() === '20,2'")
+    page.wait_for("lfa.models[0].log.some((e) => e.text.startsWith('goal 20,2: order 1 carried out by robot'))")
+    page.value("lfa.order({do: 'fault', text: 'goal 20,nan'})")
+    page.wait_for("document.getElementById('said').textContent.includes('must be x and y')")
+
+
 def test_the_stop_button_stops_all_and_says_so(page: Browser) -> None:
     page.wait_for(f"{SPEEDS}.some((speed) => speed > 0.05)")
     page.click("#stop")

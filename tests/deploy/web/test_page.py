@@ -121,6 +121,29 @@ CONTROLS: dict[str, tuple[list[Callable[[Browser], None]], str]] = {
 }  # fmt: skip
 
 
+def on_ground(x: float, y: float, button: str) -> Callable[[Browser], None]:
+    """Click the ground at a place [m] and choose from its menu; the run stands still meanwhile."""
+
+    def do(page: Browser) -> None:
+        page.value("lfa.order({do: 'pause'})")
+        page.wait_for("!lfa.state.playing")
+        page.click_at(*point(page, x, y))
+        page.click(button)
+        page.value("lfa.order({do: 'play'})")
+
+    return do
+
+
+GIVEN = "lfa.models[0].goal.join() === '3,2.5' && lfa.state.faults[0].startsWith('goal 3.00,2.50 at ')"
+TAKEN = f"{GIVEN} && lfa.models[0].log.some((e) => e.text.startsWith('order') && e.text.includes('by leader'))"
+FOCUSED = wait("document.activeElement.id === 'do-goal'")
+CONTROLS |= {
+    "goal":             ([on_ground(3.0, 2.5, "#do-goal")],       TAKEN),
+    "obstacle by menu": ([on_ground(3.0, 2.5, "#do-obstacle")],   "lfa.models[0].added[0].radius_m === 0.25"),
+    "goal by keys":     ([press("g"), FOCUSED, run("document.activeElement.click()")], "lfa.state.faults.length === 1"),
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("control", CONTROLS)
 def test_a_control_does_what_it_says(page: Browser, control: str) -> None:
     led(page)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from math import hypot
 from pathlib import Path
 from random import Random
 
 import pytest
+from msgspec.structs import replace
 
 from lfa.deploy.faults.script import parse_all
 from lfa.deploy.run import simulate
@@ -20,7 +23,8 @@ CLICKS = {
     1.1: ["obstacle 2.5,0.1,0.3", "formation column"],
     2.2: ["kill leader"],
     3.4: ["loss 0", "cut 4"],
-    4.1: ["heal 4", "range 2.5", "restart 1"],
+    3.8: ["goal 2 3"],
+    4.1: ["heal 4", "range 2.5", "restart 1", "goal 3,-2.5"],
     5.0: ["range 0", "hang scanner 2"],
 }
 """What is clicked once so much virtual time [s] has passed."""
@@ -53,7 +57,8 @@ def test_a_saved_session_runs_to_the_same_events_byte_for_byte(tmp_path: Path) -
     simulate.run(saved, saved.seed, tmp_path / "run", parse_all(saved.mission, saved.faults, ()))
     again = (tmp_path / "run" / "events.jsonl").read_bytes()
     assert again == engine.events[0], f"lfa sim {tmp_path / 'saved.toml'}"
-    assert all(word in again for word in (b'"deed":"obstacle"', b'"deed":"range"', b'"deed":"kill"', b'"index":0'))
+    deeds = (f'"deed":"{deed}"'.encode() for deed in ("obstacle", "goal", "range", "kill"))
+    assert all(word in again for word in (*deeds, b'"version":2', b'"index":0'))
 
 
 def test_a_shared_link_is_the_run() -> None:
@@ -88,6 +93,8 @@ ENGINE_REFUSES = [
     ({"do": "fault", "text": "restart 2"}, "robot 2 runs"),
     ({"do": "fault", "text": "obstacle 0,0,0.3"}, "robot 1 stands there"),
     ({"do": "fault", "text": "obstacle 3,0,nan"}, "must be x, y and"),
+    ({"do": "fault", "text": "goal 3,nan"}, "must be x and y"),
+    ({"do": "fault", "text": "goal here"}, "must be x and y"),
     ({"do": "fault", "text": "kill world"}, "only in lfa run"),
     ({"do": "fault", "text": "kill 1 at 3 s"}, "must be like"),
     ({"do": "fault", "text": ""}, "must be like"),
@@ -109,3 +116,42 @@ def test_a_bad_order_is_refused_in_one_line_and_the_run_goes_on(order: dict[str,
     number, before = engine.number, engine.now
     engine.obey({"do": "step"})
     assert engine.number == number and engine.now > before and engine.state()["faults"] == ["kill leader at 8 s"]
+
+
+WALLED = Setting("straight", overrides=(
+    "world.walls_m=[[-9, -9, 12, -9], [12, -9, 12, 9], [12, 9, -9, 9], [-9, 9, -9, -9], [3, 3, 5, 3]]",
+    "mission.leading.route_m=[[9, 0]]",
+    "world.obstacles=[{center_m=[5, -4], radius_m=1.0}]",
+))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("goal", "why"),
+    [("4,3", "in a wall"), ("13.5,0", "outside of the map or walled off"), ("5.5,-4", "on the obstacle at (5, -4)")],
+)
+def test_a_goal_that_cannot_be_reached_is_refused_in_one_line_clicked_or_written(goal: str, why: str) -> None:
+    engine = VirtualEngine(WALLED)
+    with pytest.raises(Refused, match=re.escape(why)) as refused:
+        engine.obey({"do": "fault", "text": f"goal {goal}"})
+    assert "\n" not in str(refused.value)
+    assert engine.state()["faults"] == []
+    with pytest.raises(Refused, match=re.escape(why)):
+        VirtualEngine(replace(WALLED, overrides=(*WALLED.overrides, f"faults=['goal {goal} at 3 s']")))
+    with pytest.raises(Refused, match=re.escape(why)):
+        VirtualEngine(replace(WALLED, faults=(f"goal {goal} at 3 s",)))
+
+
+def test_a_goal_on_an_obstacle_that_was_set_down_is_refused() -> None:
+    engine = VirtualEngine(WALLED)
+    engine.obey({"do": "fault", "text": "obstacle 4,4.5,0.5"})
+    for _ in range(2):
+        engine.obey({"do": "step"})
+    with pytest.raises(Refused, match="an obstacle was set down there"):
+        engine.obey({"do": "fault", "text": "goal 4.2,4.5"})
+
+
+def test_a_run_with_another_goal_ends_there() -> None:
+    engine = clicked(Setting("straight", overrides=("time_limit_s=60.0",)), {2.0: ["goal 3,2"]})
+    assert engine.state()["over"] == "goal_reached"
+    x, y = engine.pictures[0].where(1) or (0.0, 0.0)
+    assert hypot(x - 3.0, y - 2.0) < 0.15

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from msgspec import structs
 
+from lfa.deploy.client.mission_changes import along, unchanged
+from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import ANSWER_S
-from lfa.deploy.client.order_fleet import along, unchanged
-from lfa.deploy.ros.bridge.order_calls import OrderCalls
+from lfa.deploy.client.order_calls import OrderCalls
 from lfa.protocol.messages.consensus import Term
 from lfa.protocol.messages.orders import OrderNote, TeamOrder
-from lfa.protocol.messages.team import Event
+from lfa.protocol.messages.team import Ask, Event
 from lfa.protocol.mission import Mission
+from lfa.protocol.node import Envelope
 from tests.deploy.ros.test_mapping import header
 
 MISSION = Mission(robots=(1, 2, 3))
@@ -25,10 +27,14 @@ class Team:
         self.said: list[TeamOrder] = []
         self.asked = 0
         self.told: list[tuple[bool, str]] = []
-        self.calls = OrderCalls(lambda order, _now: self.said.append(order), self._ask)
+        self.calls = OrderCalls(Operator("f", 1), self._hear)
 
-    def _ask(self, _now: float) -> None:
-        self.asked += 1
+    def _hear(self, envelope: Envelope) -> None:
+        match envelope.message:
+            case OrderNote(order=order):
+                self.said.append(order)
+            case Ask(what="mission"):
+                self.asked += 1
 
     def tell(self, success: bool, text: str) -> None:
         self.told.append((success, text))
