@@ -6,7 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfa.agents.avoidance.safety import BRAKING_SHARE, SKIN_M, safe, sharing, within
+from lfa.agents.avoidance.safety import (
+    BRAKING_SHARE,
+    OBEYED_MPS,
+    OBEYED_RADPS,
+    SKIN_M,
+    TURNING_MPS,
+    obeyed,
+    safe,
+    sharing,
+    within,
+)
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.mission import Limits
 
@@ -130,3 +140,37 @@ def test_towards_a_team_mate_a_robot_uses_its_half_of_the_room_and_no_less(apart
 def test_a_slow_turn_does_not_make_a_team_mate_aside_one_ahead() -> None:
     mate = (0.5 * cos(1.4), 0.5 * sin(1.4))
     assert sharing(Twist(0.6, 0.5), [mate], 0.15, LIMITS) == Twist(0.6, 0.5)
+
+
+@pytest.mark.parametrize("ahead_m", [0.0002, 0.0005, 0.002])
+def test_what_stands_before_its_nose_does_not_hold_the_turn_that_frees_a_robot(ahead_m: float) -> None:
+    wanted = Twist(0.05, 1.0)
+    out = safe(wanted, wanted, [(0.15 + SKIN_M + ahead_m, 0.0)], 0.15, LIMITS, 1.0)
+    assert 0.0 < out.linear_x < TURNING_MPS
+    assert out.angular_z == pytest.approx(max(out.linear_x / wanted.linear_x, 1.0 - out.linear_x / TURNING_MPS))
+
+
+def test_before_a_far_obstacle_the_turn_slows_with_the_motion() -> None:
+    wanted = Twist(0.9, 0.1)
+    out = safe(wanted, wanted, [(0.6, 0.0)], 0.15, LIMITS, 1.0)
+    assert TURNING_MPS < out.linear_x < 0.9
+    assert out.angular_z == pytest.approx(0.1 * out.linear_x / 0.9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("off_mps", "off_radps", "obeys"),
+    [(0.9, 0.9, True), (-0.9, -0.9, True), (1.1, 0.0, False), (0.0, 1.1, False), (-1.1, 0.2, False)],
+)
+def test_the_published_twist_is_the_command_unless_the_wheels_do_something_else(
+    sign: float, off_mps: float, off_radps: float, obeys: bool
+) -> None:
+    command = Twist(sign * 0.4, sign * 0.8)
+    measured = Twist(command.linear_x + off_mps * OBEYED_MPS, command.angular_z + off_radps * OBEYED_RADPS)
+    assert obeyed(command, measured) == (command if obeys else measured)
+
+
+def test_towards_a_team_mate_the_path_keeps_its_shape() -> None:
+    out = sharing(Twist(0.6, 0.3), [(0.5, 0.0)], 0.15, LIMITS)
+    assert out.linear_x < 0.5
+    assert out.angular_z == pytest.approx(0.5 * out.linear_x)
