@@ -26,7 +26,7 @@ BEGIN, END = "<!-- begin: make planted -->\n", "<!-- end: make planted -->\n"
 HEAD = ("| in the design | planted bug | directed test | fuzz finds |", "| --- | --- | --- | --- |")
 SEEDS = 100
 SCHEDULE_S_MAX = 60
-"""A bug may keep a lease busy for ever at one moment of virtual time."""
+"""Processor time [s] of one schedule: a bug may keep a lease busy for ever at one moment of virtual time."""
 
 
 def found(bug: Bug, seeds: int) -> str:
@@ -45,16 +45,18 @@ def found(bug: Bug, seeds: int) -> str:
 
 @contextmanager
 def _patience(seconds: int) -> Iterator[None]:
+    """Raise TimeoutError after `seconds` of processor time: a busy machine changes no result."""
+
     def over(_signum: int, _frame: FrameType | None) -> None:
         raise TimeoutError
 
-    before = signal.signal(signal.SIGALRM, over)
-    signal.alarm(seconds)
+    before = signal.signal(signal.SIGPROF, over)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def begin_of(bug: Bug) -> str:
