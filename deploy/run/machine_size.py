@@ -61,17 +61,18 @@ def fit_to(scenario: Scenario, kept: frozenset[str], on_cores: float) -> tuple[S
     robots, most = len(scenario.mission.robots), carried(scenario.mission, on_cores)
     if robots <= most:
         return scenario, ""
-    slower = _slower(scenario, kept)
-    then = carried(slower.mission, on_cores)
+    lower = slower(scenario, kept)
+    then = carried(lower.mission, on_cores)
     machine = f"this machine ({on_cores:g} cores) carries {most} robots at {scenario.mission.control_hz:g} Hz"
-    if slower != scenario:
-        machine += f", {then} with {_rates(slower)}"
+    if lower != scenario:
+        machine += f", {then} with {_rates(lower)}"
     if robots > then:
-        return slower, f"{machine}: {robots} robots will be late, and may lose their leader"
-    return slower, f"{machine}: {robots} robots run so (--set mission.control_hz=50 keeps that rate)"
+        return lower, f"{machine}: {robots} robots will be late, and may lose their leader"
+    return lower, f"{machine}: {robots} robots run so (--set mission.control_hz=50 keeps that rate)"
 
 
-def _slower(scenario: Scenario, kept: frozenset[str]) -> Scenario:
+def slower(scenario: Scenario, kept: frozenset[str] = frozenset()) -> Scenario:
+    """Return `scenario` at the rates at which a machine carries more robots; keys in `kept` stay as they are."""
     mission, lidar = scenario.mission, scenario.world.lidar
     if "mission.control_hz" not in kept:
         mission = replace(mission, control_hz=min(mission.control_hz, SLOW_HZ))
