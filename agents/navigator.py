@@ -26,6 +26,7 @@ from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.localization.estimator import Estimator
 from lfa.agents.perception.obstacle_model import ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.agents.perception.own_readings import OwnReadings
 from lfa.agents.perception.scan import Point
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
 from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, StuckMonitor
@@ -60,6 +61,7 @@ class Navigator:
         self._obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
         self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
         self.scan_age = ScanAge()
+        self.own_readings = OwnReadings()
         self._detour = Detour(mission.radius_m, mission.limits, mission.control_period_s)
         self._crossing = Crossing(mission.radius_m)
         self._begin_roles(mission)
@@ -271,6 +273,7 @@ class Navigator:
     def _follow(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
         sighting = None if self.predecessor is None else self.predecessor.at(now)
         slot = self.formation.slot_of(self._id)
+        self.follower.own_readings = self.own_readings.at(now)
         wanted = self.follower.step(sighting, slot, pose, twist, dt, on_trace=self.formation.trace)
         explore = self.leading.explore
         mapping = None if explore is None else explore.mapping

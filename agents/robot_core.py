@@ -30,7 +30,7 @@ from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
 from lfa.protocol.messages.orders import OrderNote
-from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, SensorReading, Sensors
 from lfa.protocol.messages.stop import StopOrder, StopReport
 from lfa.protocol.messages.team import Ask, FormationNote, ObstacleNote, OperatorNote, PoseStamped, TableRow
 from lfa.protocol.mission import Mission
@@ -40,7 +40,7 @@ from lfa.protocol.node import PeerDown, PeerUp, Stop, Vitals
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import OPERATOR_NAME
 
-HardwareMessage = Sensors | Localization | LaserScan | GroundProfile
+HardwareMessage = Sensors | Localization | LaserScan | GroundProfile | SensorReading
 TeamMessage = PoseStamped | TableRow | ObstacleNote | FormationNote
 EASE_PERIODS = 2.0
 """Lease time left, in control periods, beyond which a grant may wait for the next control step: each voter of a round
@@ -131,7 +131,7 @@ class RobotCore:
         """Process a message or a local event."""
         lease, navigator = self.lease, self.navigator
         match message:
-            case Sensors() | Localization() | LaserScan() | GroundProfile():
+            case Sensors() | Localization() | LaserScan() | GroundProfile() | SensorReading():
                 self._hear_hardware(message, now)
             case LeaseNote():
                 source = robot_id_of(message.header.sender)
@@ -176,6 +176,8 @@ class RobotCore:
                 navigator.see(message, now)
             case GroundProfile():
                 navigator.update_ground(message, now)
+            case SensorReading():
+                navigator.own_readings.update(message, now)
 
     def _hear_robot(self, robot: int, message: TeamMessage, now: float) -> None:
         """Update the state from a message of another robot."""

@@ -19,6 +19,6 @@ def with_mission(fleet: str, own: str, predecessor: int | None, *, asks: bool) -
     topics = ("table", "formation", "obstacles", "stop", "ask", "team_order", *(("stop_known",) if asks else ()))
     others = {f"lfa/{fleet}/*/{topic}" for topic in topics}
     lease = {f"lfa/{fleet}/*/lease/{to}" for to in (TO_ALL, TO_HELLO, own)} | {alive_key(fleet, "*", "*")}
-    hardware = {key(fleet, own, topic) for topic in ("sensors", "localization", "scan", "ground")}
+    hardware = {key(fleet, own, topic) for topic in ("sensors", "localization", "scan", "ground", "reading")}
     pose = set() if predecessor is None else {f"lfa/{fleet}/{robot_name(predecessor)}/{TOPIC['pose'].name}"}
     return before_the_mission(fleet) | others | lease | hardware | pose

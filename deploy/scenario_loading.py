@@ -17,6 +17,7 @@ from lfa.protocol.config_file.mistake import Mistake, Rule
 from lfa.protocol.errors import Refused
 from lfa.world.description.course_rules import PLACES
 from lfa.world.description.load import Scenario, load
+from lfa.world.description.own_sensor import INSTALLED_RULE
 
 
 def load_scenario(scenario: str, overrides: Sequence[str] = (), robots: int | None = None) -> Scenario:
@@ -87,6 +88,7 @@ def _goals(scenario: Scenario) -> Iterator[Mistake]:
 RULES: tuple[Rule[Scenario], ...] = (
     Rule(_gains, ("mission.following", "mission.limits", "mission.control_hz")),
     Rule(_controller),
+    INSTALLED_RULE,
     Rule(_faults, ("mission.robots",)),
     Rule(_goals, ("faults", *PLACES)),
 )

@@ -23,6 +23,7 @@ from lfa.deploy.faults.script import parse_all
 from lfa.deploy.robot.driver import Driver, MakeBase
 from lfa.deploy.run import simulate
 from lfa.world.description.load import Scenario, load
+from lfa.world.description.own_sensor import INSTALLED_RULE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,7 +60,7 @@ def run(
     world does not simulate, by id: each is driven through a `Driver`. Raises Refused for a scenario that no world can
     be built from.
     """
-    chosen = load(scenario, set, robots) if isinstance(scenario, str) else scenario
+    chosen = load(scenario, set, robots, (INSTALLED_RULE,)) if isinstance(scenario, str) else scenario
     hardware = drivers or {}
     if hardware:
         world = replace(chosen.world, real_robots=tuple(sorted(hardware)))

@@ -15,7 +15,15 @@ from lfa.protocol.messages.codec import BadMessage, Message, decode
 from lfa.protocol.messages.consensus import LeaseNote
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.orders import OrderNote
-from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.robot import (
+    CmdVel,
+    Contact,
+    GroundProfile,
+    LaserScan,
+    Localization,
+    SensorReading,
+    Sensors,
+)
 from lfa.protocol.messages.simulation import Clock, Truth
 from lfa.protocol.messages.stop import StopOrder, StopReport, StopState
 from lfa.protocol.messages.team import (
@@ -90,6 +98,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("scan",         LaserScan,     ("driver",),           10.0, True,  False, "data",       0.35),
     Topic("ground",       GroundProfile, ("driver",),           20.0, True,  False, "data",       0.25),
     Topic("contact",      Contact,       ("driver",),           None, False, False, "data",       None),
+    Topic("reading",      SensorReading, ("driver",),           None, False, False, "data",       None),
     Topic("truth",        Truth,         ("world",),            50.0, False, False, "background", None),
     Topic("clock",        Clock,         ("world",),            1.0,  True,  False, "background", None),
     Topic("host",         HostStatus,    ("host",),             1.0,  True,  True,  "data",       3.0),
@@ -101,7 +110,7 @@ NO_ECHO = frozenset({"lease", "table", "formation", "obstacles"})
 """Topics that their publishers also subscribe to; own samples are filtered out: they would only wake it."""
 TOPIC: dict[str, Topic] = {topic.name: topic for topic in TOPICS}
 TRUTH_OWNER = "sim"
-HARDWARE = ("sensors", "localization", "scan", "ground", "contact")
+HARDWARE = ("sensors", "localization", "scan", "ground", "contact", "reading")
 
 
 def fleet_name(text: str) -> str:

@@ -89,6 +89,7 @@ def test_no_class_and_no_module_has_a_name_of_the_old_language() -> None:
 
 def test_no_class_name_stands_twice() -> None:
     names = Counter(n.name for _, tree in _trees() for n in ast.walk(tree) if isinstance(n, ast.ClassDef))
+    names.pop("Parameters")  # the type of a plug-in's own parameters is called so inside each plug-in
     assert {name: n for name, n in names.items() if n > 1} == {}
 
 

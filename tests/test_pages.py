@@ -15,6 +15,7 @@ from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.transport.link_model import CLEAR
+from lfa.world.description.own_sensor import SENSORS
 from lfa.world.simulator import Simulator
 from tests.test_paper_map import ROOT, names_of
 
@@ -88,11 +89,15 @@ def test_the_pages_scenario_runs_and_holds(tmp_path: Path) -> None:
     assert {a.name for a in summary.assertions} >= {"contacts_max", "distance_error_rms_m"}
 
 
-def test_the_pages_sensor_is_its_own_source_of_chance() -> None:
+def test_the_pages_sensor_measures_and_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names: dict[str, Any] = {}
     exec(_code(SCENARIO, "python"), names)
-    first, same, other = names["Battery"](7, 1), names["Battery"](7, 1), names["Battery"](7, 2)
-    assert first.read(100.0) == same.read(100.0) != other.read(100.0)
+    monkeypatch.setattr(SENSORS, "_added", {"battery": names["Battery"]})
+    sets = ["world.sensors.battery.rate_hz=2", "goal=2,0"]
+    done = run("straight", seed=7, robots=2, set=sets, out=tmp_path / "run")
+    charges = [values["charge"] for _, values in done.readings[2]["battery"]]
+    assert len(charges) > 8
+    assert all(0.9 < charge < 1.1 for charge in charges)
 
 
 def test_the_table_of_keys_is_the_one_that_the_types_give() -> None:

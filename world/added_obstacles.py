@@ -42,6 +42,11 @@ class AddedObstacles:
         """Obstacles set down since the first incarnation of the world."""
         return (*self._inherited, *self._added)
 
+    @property
+    def new(self) -> tuple[Obstacle, ...]:
+        """Obstacles set down since this incarnation began; the scenario's list has none of them."""
+        return tuple(self._added)
+
     def take(
         self, arguments: dict[str, Any], robots: Sequence[Pose2D]
     ) -> tuple[dict[str, Any], Obstacle | None] | None:

@@ -20,6 +20,7 @@ from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 from lfa.protocol.witness import Witness
 from lfa.world.description.load import draw, load
+from lfa.world.description.own_sensor import INSTALLED_RULE
 
 EXTRA = ("numpy", "pymunk", "PIL")
 EXAMPLE = "Example: lfa-world paper_path1 --seed 7 --set world.lidar.beams=90"
@@ -53,7 +54,7 @@ def start(
     from lfa.world.description.recorded_leader import with_leader
     from lfa.world.world import World
 
-    loaded = load(scenario, set_ or (), robots)
+    loaded = load(scenario, set_ or (), robots, (INSTALLED_RULE,))
     if leader_from is not None:
         loaded = with_leader(loaded, leader_from)
         check_mission(loaded.mission)

@@ -9,7 +9,15 @@ from lfa.protocol.geometry import TAU, Pose2D, Twist, wrap
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
-from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.robot import (
+    CmdVel,
+    Contact,
+    GroundProfile,
+    LaserScan,
+    Localization,
+    SensorReading,
+    Sensors,
+)
 from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Envelope
@@ -142,6 +150,10 @@ class RobotHardware:
             self._height_noise.apply(heights),
         )
         return self._outbox.envelope("ground", message)
+
+    def reading(self, stamp: float, sensor: str, values: dict[str, float]) -> Envelope:
+        """Return the message of what a sensor of a user's own has measured."""
+        return self._outbox.envelope("reading", SensorReading(self._outbox.header("reading", stamp), sensor, values))
 
     def contact(self, stamp: float, pose_map: Pose2D, x: float, y: float) -> Envelope:
         """Return the message of a bumper contact at (x, y) in `map`, as a bearing in `base_link`."""

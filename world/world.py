@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import inf
 
 import msgspec
+from msgspec.structs import replace
 
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.lease.gateway import Gateway
@@ -23,6 +24,7 @@ from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, 
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
 from lfa.world.added_obstacles import AddedObstacles
+from lfa.world.description.own_sensor import TrueState
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
@@ -30,6 +32,7 @@ from lfa.world.robot_hardware import PARTS, RobotHardware
 from lfa.world.saved_state import Memory, Remembered
 from lfa.world.sensors.ground_sensor import Profiler
 from lfa.world.sensors.lidar import Scanner
+from lfa.world.sensors.own_sensors import OwnSensors
 from lfa.world.time_grid import TimeGrid
 
 
@@ -69,6 +72,7 @@ class World:
         self._bodies = bodies(scenario)
         self._scanner = Scanner(scenario)
         self._profiler = Profiler(scenario)
+        self._own_sensors = OwnSensors(scenario, seed, scenario.mission.robots)
         self._robots: list[RobotHardware] = []
         self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
         self._place = {name: n for n, name in enumerate(self._names)}
@@ -270,11 +274,34 @@ class World:
             heights = self._profiler.profile(poses, self._bodies.standing_m())
             seeing = [(n, robot) for n, robot in simulated if not robot.hangs("driver")]
             sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in seeing]
+        for name, rate_hz in self._own_sensors.rates_hz.items():
+            if self._samples(rate_hz):
+                sent += self._readings(name, stamp)
         if self._samples(TOPIC["truth"].rate_hz):
             sent.append(self._truth(stamp))
         if self._samples(TOPIC["clock"].rate_hz):
             clock = Clock(self._truths.header("clock", stamp), self._time.elapsed_s)
             sent.append(self._truths.envelope("clock", clock))
+        return sent
+
+    def _readings(self, name: str, stamp: float) -> list[Envelope]:
+        """Return what the sensor `name` of each robot measures, and an event for the first that fails."""
+        poses, moved = self._bodies.poses, self._bodies.moved()
+        robots = {robot.id: pose for robot, pose in zip(self._robots, poses, strict=True)}
+        known = dict(enumerate((*self._scenario.world.obstacles, *self._added.new)))
+        places = {n: (pose.x, pose.y) for n, pose in moved.items()}
+        obstacles = tuple(replace(one, center_m=places.get(n, one.center_m)) for n, one in known.items())
+        sent: list[Envelope] = []
+        for n, robot in self._simulated:
+            if robot.hangs("driver"):
+                continue
+            twist, way_m = self._bodies.twists[n], robot.odometry.odometer_m
+            state = TrueState(robot.id, self._time.elapsed_s, poses[n], twist, way_m, robots, obstacles)
+            measured = self._own_sensors.measure(name, state)
+            if isinstance(measured, str):
+                sent.append(self._event("failed", None, {"robot": robot.id, "reason": measured}, stamp))
+            elif measured is not None:
+                sent.append(robot.reading(stamp, name, measured))
         return sent
 
     def _samples(self, rate_hz: float | None) -> bool:

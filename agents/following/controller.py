@@ -6,12 +6,14 @@ stop. A controller is found by name among the entry points `lfa.controllers`, or
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import cos, hypot, sin
 from typing import Protocol
 
 from msgspec import Struct
 
 from lfa.agents.config import Gains
+from lfa.agents.perception.own_readings import OwnReading
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.mission import Limits
@@ -47,6 +49,8 @@ class Reference(Struct, frozen=True, gc=False):
     phi: float
     guarded: bool
     """False while the bodies overlap, which is possible in simulation only."""
+    readings: Mapping[str, OwnReading] = {}
+    """Newest reading of each sensor of a user's own on this robot, by its name."""
 
     @property
     def speed(self) -> float:

@@ -7,6 +7,7 @@ finite and within the limits.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from math import atan2, cos, hypot, sin
 
@@ -19,6 +20,7 @@ from lfa.agents.following.observer import SlotVelocityObserver
 from lfa.agents.following.predecessor import Sighting
 from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.agents.localization.plausibility import plausible
+from lfa.agents.perception.own_readings import OwnReading
 from lfa.protocol.geometry import STILL, Pose2D, Twist, wrap
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Limits
@@ -103,6 +105,8 @@ class Follower:
         self._last = STILL
         self._error_m = 0.0
         self._state = State.HOLD
+        self.own_readings: Mapping[str, OwnReading] = {}
+        """Newest readings of the robot's own sensors, which the controller gets."""
         self.refused = 0
         """Number of steps whose input was not finite or was implausible."""
 
@@ -216,7 +220,7 @@ class Follower:
             self._guarded = apart >= self._gains.d_min_m
         return Reference(
             motion.x, motion.y, motion.vx, motion.vy, self._heading, motion.chi_rate, self._direction,
-            sighting.pose, sighting.twist, motion.separation_m, wrap(motion.phi), self._guarded,
+            sighting.pose, sighting.twist, motion.separation_m, wrap(motion.phi), self._guarded, self.own_readings,
         )  # fmt: skip
 
     def _stands(self, sighting: Sighting, wanted: Twist) -> bool:

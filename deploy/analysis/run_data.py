@@ -14,6 +14,7 @@ from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.event_log import Line
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.run_folder import scenario_of
+from lfa.protocol.names import robot_id_of
 from lfa.world.description.load import Scenario
 
 
@@ -47,6 +48,16 @@ class Run:
         """Tracking errors of every robot that ever followed, by its id."""
         found = {robot: tracking_errors.of_follower(self.seen, robot) for robot in self.robots}
         return {robot: of for robot, of in found.items() if of is not None}
+
+    @cached_property
+    def readings(self) -> dict[int, dict[str, list[tuple[float, dict[str, float]]]]]:
+        """Readings of the sensors of a user's own: by robot and sensor, time [s] and values of each."""
+        found: dict[int, dict[str, list[tuple[float, dict[str, float]]]]] = {}
+        for owner, _, t, message in mcap_reader.messages(self.folder, frozenset({"reading"})):
+            robot = robot_id_of(owner)
+            if robot is not None:
+                found.setdefault(robot, {}).setdefault(message.sensor, []).append((t, message.values))
+        return found
 
     @cached_property
     def leader_terms(self) -> list[event_log.LeaderTerm]:

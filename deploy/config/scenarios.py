@@ -11,6 +11,7 @@ from lfa.agents.following.controller import installed_controllers
 from lfa.protocol.errors import Refused
 from lfa.world.description.generator import GENERATORS, title_of
 from lfa.world.description.load import titled
+from lfa.world.description.own_sensor import SENSORS
 
 
 def command(as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> int:
@@ -23,6 +24,7 @@ def command(as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.
     ]  # fmt: skip
     plug_ins = [{"name": name, "kind": "scenario generator", "title": _title(name)} for name in GENERATORS.names()]
     plug_ins += [{"name": name, "kind": "controller"} for name in installed_controllers()]
+    plug_ins += [{"name": name, "kind": "sensor"} for name in SENSORS.names()]
     if as_json:
         print(msgspec.json.encode([*rows, *plug_ins]).decode())
         return 0

@@ -38,6 +38,8 @@ class Reading(Struct, frozen=True):
     scan: Scan | None = None
     contact: float | None = None
     """Bearing [rad] in `base_link` of a bumper contact."""
+    own: dict[str, dict[str, float]] = {}
+    """New measurements of sensors of your own: by the sensor's name, finite values by theirs."""
 
 
 class Base(Protocol):

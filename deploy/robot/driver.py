@@ -20,7 +20,7 @@ from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
-from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, Sensors
+from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, SensorReading, Sensors
 from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.messages.team import Ask, MissionNote
 from lfa.protocol.mission import Limits
@@ -178,6 +178,9 @@ class Driver:
         if reading.contact is not None:
             sent.append(Contact(self._hardware.header("contact", now), reading.contact))
             topics.append("contact")
+        for name, values in reading.own.items():
+            sent.append(SensorReading(self._hardware.header("reading", now), name, values))
+            topics.append("reading")
         said = [self._hardware.envelope(topic, message) for topic, message in zip(topics, sent, strict=True)]
         rests = self._answers.at_rest(gateway.stop, self._twist, now)
         return said if rests is None else [*said, rests]

@@ -76,7 +76,8 @@ class Termination:
                     self._tracking[robot_id_of(message.header.sender) or 0] = message, self._now_s
                 case Event(kind="failed"):
                     who = robot_id_of(message.header.sender)
-                    self.verdict = Verdict("failed", f"robot {who}: {message.data.get('reason', 'gives up')}")
+                    reason = str(message.data.get("reason", "gives up"))
+                    self.verdict = Verdict("failed", reason if who is None else f"robot {who}: {reason}")
                 case Event(kind="chain", term=Term() as term) if term >= self._term:
                     self._term = term
                     self.chain = _ids(message.data.get("chain")) or self.chain

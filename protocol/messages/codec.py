@@ -15,7 +15,15 @@ from lfa.protocol.messages.consensus import LeaseNote
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
 from lfa.protocol.messages.orders import OrderNote
-from lfa.protocol.messages.robot import CmdVel, Contact, GroundProfile, LaserScan, Localization, Sensors
+from lfa.protocol.messages.robot import (
+    CmdVel,
+    Contact,
+    GroundProfile,
+    LaserScan,
+    Localization,
+    SensorReading,
+    Sensors,
+)
 from lfa.protocol.messages.simulation import Clock, Truth
 from lfa.protocol.messages.stop import StopOrder, StopReport, StopState
 from lfa.protocol.messages.team import (
@@ -39,6 +47,7 @@ Message = (
     | LaserScan
     | GroundProfile
     | Contact
+    | SensorReading
     | CmdVel
     | PoseStamped
     | TableRow

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from lfa.protocol.geometry import Number, Pose2D, Twist
 from lfa.protocol.messages.consensus import GatewayStamp, Term
 from lfa.protocol.messages.header import Count, Header, Step
 from lfa.protocol.messages.stop import UNCERTAIN, StopKnowledge
+
+SENSOR_NAME_MAX, SENSOR_VALUES_MAX = 64, 64
+"""Longest name of a sensor of a user's own or of one of its values, and the largest number of its values."""
+SensorName = Annotated[str, Meta(max_length=SENSOR_NAME_MAX)]
 
 
 class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
@@ -72,6 +78,14 @@ class Contact(Struct, frozen=True, array_like=True, tag="contact"):
 
     header: Header
     bearing: Number
+
+
+class SensorReading(Struct, frozen=True, array_like=True, tag="reading"):
+    """Measurement of a sensor of a user's own, called `sensor`: its values by the names that its class gives them."""
+
+    header: Header
+    sensor: SensorName
+    values: Annotated[dict[SensorName, Number], Meta(max_length=SENSOR_VALUES_MAX)]
 
 
 class CmdVel(Struct, frozen=True, array_like=True, tag="cmd_vel"):

@@ -26,6 +26,7 @@ SHOWN: dict[str, tuple[str, ...]] = {
     "07_faults":           (r"injected: stop 1 at", r"led by robots 1, 2", r" 0 violations"),
     "08_formation_change": (r"asks for a column", r"robot 3: its slot moves until", r"path\.png"),
     "09_own_generator":    (r"seed 1: goal_reached past posts at \(3, \S+\), \(6, \S+\)", r"seed 2: goal_reached"),
+    "10_own_sensor":       (r"law +goal_reached, last reading .*: \(12\.\d+, {'lux': \S+}\)", r"careful +goal"),
 }  # fmt: skip
 
 

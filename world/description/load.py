@@ -35,6 +35,7 @@ from lfa.protocol.transport.link_model import Radio
 from lfa.world.description.checks import ROBOTS_MAX, SCENARIO_RULES
 from lfa.world.description.course_rules import COURSE_RULE, PLACES
 from lfa.world.description.generator import GENERATORS, document_of, generated, refuse
+from lfa.world.description.own_sensor import SENSOR_RULE
 from lfa.world.description.placement import starts_of, varied
 from lfa.world.description.scenario import Body, Lidar, Noise, Obstacle, Outcome, Point, Scenario, Vary, WorldSpec
 
@@ -104,7 +105,7 @@ def load(
             mistakes.append(refused.mistake)
         raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
     apply_rules(MISSION_RULES, scenario.mission, mistakes)
-    apply_rules(SCENARIO_RULES, scenario, mistakes)
+    apply_rules((*SCENARIO_RULES, SENSOR_RULE), scenario, mistakes)
     scenario = _on_map(scenario, path.parent, mistakes)
     apply_rules((COURSE_RULE, *rules), scenario, mistakes)
     if mistakes:
@@ -125,7 +126,7 @@ def _checked(scenario: Scenario, seed: int, rules: Sequence[Rule[Scenario]] = ()
     assert scenario.generator is not None
     drawn, mistakes = generated(scenario, seed)
     apply_rules(MISSION_RULES, drawn.mission, mistakes)
-    apply_rules((*SCENARIO_RULES, *rules, COURSE_RULE), drawn, mistakes)
+    apply_rules((*SCENARIO_RULES, SENSOR_RULE, *rules, COURSE_RULE), drawn, mistakes)
     if mistakes:
         raise refuse(scenario.generator.name, seed, mistakes)
     return drawn

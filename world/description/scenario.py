@@ -78,6 +78,15 @@ class Ground(Struct, frozen=True, forbid_unknown_fields=True):
     """Greatest depth [m] measured; a deeper floor is not seen."""
 
 
+class ChosenSensor(Struct, frozen=True, forbid_unknown_fields=True):
+    """Sensor of a user's own, on every simulated robot."""
+
+    rate_hz: float = 10.0
+    """Rate [Hz] at which each robot's sensor measures."""
+    parameters: dict[str, Parameter] = {}
+    """Parameters of the sensor itself, by the names and types that its class gives in `Parameters`."""
+
+
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     """Standard deviations and error probabilities of the sensors; with all at zero the sensors are exact."""
 
@@ -133,6 +142,8 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     lidar: Lidar = Lidar()
     ground: Ground = Ground()
     noise: Noise = Noise()
+    sensors: dict[str, ChosenSensor] = {}
+    """Sensors of a user's own by their names (entry points `lfa.sensors`)."""
     vary: Vary = Vary()
     physics_hz: float = 100.0
 
