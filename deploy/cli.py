@@ -41,8 +41,11 @@ COMMANDS = (
     Command("up", "lfa.deploy.fleet.up", "Start a fleet on its machines, over ssh; wait until all are in the chain.",
           "lfa up deploy/fleet.example.toml"),
     Command("export", "lfa.deploy.fleet.export.command",
-          "Write units or manifests of a fleet: for systemd, Quadlet, Compose, Kubernetes or Nomad.",
-          "lfa export compose deploy/fleet.example.toml --out convoy"),
+          "Write a fleet for systemd, Quadlet, Compose, Kubernetes or Nomad, or a scenario's world as SDF or ROS map.",
+          "lfa export compose deploy/fleet.example.toml --out convoy; lfa export sdf straight"),
+    Command("import", "lfa.deploy.worlds.import_command",
+          "Make a scenario of a world: IR-SIM YAML, MovingAI .map, SDF, an SVG drawing, a ROS map.",
+          "lfa import arena.map; lfa import hall.sdf --robots 3 --goal 12,-3; lfa import plan.svg --unit-m 0.01"),
     Command("ps", "lfa.deploy.fleet.ps", "List the processes of a fleet by machine.",
           "lfa ps --json"),
     Command("top", "lfa.deploy.fleet.top", "Show the machines and robots of a fleet on one screen, live.",
@@ -136,14 +139,14 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "run": RUNS, "sim": RUNS, "verify": RUNS, "map": RUNS, "record": RECORDINGS, "plot": (*RECORDINGS, "matplotlib"),
     "report": (*RECORDINGS, "matplotlib"), "view": (*RECORDINGS, "rerun"), "bag": (*ROS, "mcap"), "ros": ROS,
     "foxglove": (*ROS, "foxglove"), "up": ("cryptography",), "keys": ("cryptography",), "top": ("rich",),
-    "web": (*RUNS, "websockets"),
+    "web": (*RUNS, "websockets"), "import": (*RUNS, "yaml"),
 }  # fmt: skip
 """Modules outside the base install without which a command can do nothing."""
 TAKES_NUMBERS = frozenset({"go"})
 """Commands whose arguments may begin with a minus sign, as in `lfa go 3 -1.5`."""
 EXTRAS = {
-    "numpy": "world", "PIL": "world", "pymunk": "world", "matplotlib": "view", "mcap": "view", "rerun": "view",
-    "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
+    "numpy": "world", "PIL": "world", "pymunk": "world", "yaml": "world", "matplotlib": "view", "mcap": "view",
+    "rerun": "view", "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
     "pyarrow": "campaign", "submitit": "slurm", "distributed": "dask",
     "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove", "websockets": "web",
 }  # fmt: skip

@@ -41,7 +41,8 @@ ORDER = (
     "world/virtual_time", "world/routes", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/recording",
-    "deploy/process", "deploy/campaign", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/analysis",
+    "deploy/process", "deploy/campaign", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/worlds",
+    "deploy/analysis",
     "deploy/analysis/paper", "deploy/analysis/verification",
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/picture", "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal",

@@ -59,6 +59,8 @@ ELSEWHERE = {
     "lfa doctor": "tests/hosts/test_refused.py",
     "lfa up FILE --secure": "tests/deploy/fleet/security/test_secure.py",
     "lfa export compose FILE": "tests/deploy/fleet/export/test_export.py",
+    "lfa import FILE": "tests/deploy/worlds/test_import.py",
+    "lfa export sdf SCENARIO": "tests/deploy/worlds/test_import.py",
     "lfa keys revoke FILE robot3": "tests/deploy/fleet/security/test_secure.py",
     "lfa sim circle --controller carrot": "tests/agents/controllers/test_plug_in.py",
     "lfa doctor FILE": "tests/hosts/test_refused.py",

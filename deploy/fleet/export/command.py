@@ -1,4 +1,6 @@
-"""`lfa export`: write the units or manifests of a fleet file for an engine, with keys as its secrets."""
+"""`lfa export`: write the units or manifests of a fleet file for an engine, with keys as its secrets; or the world of a
+scenario, as SDF or as a ROS map.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +24,8 @@ from lfa.deploy.fleet.remote.key_distribution import bundles
 from lfa.deploy.fleet.security.private_files import private_folder, write_private
 from lfa.protocol.errors import Refused
 
+WORLDS = ("sdf", "map")
+"""What a scenario's world is exported as."""
 NEXT = {
     "systemd": "on each machine, in its folder: sh install.sh",
     "quadlet": "on each machine, in its folder: sh install.sh",
@@ -33,12 +37,15 @@ NEXT = {
 
 def command(
     engine: Annotated[
-        Literal["systemd", "quadlet", "compose", "kubernetes", "nomad"], typer.Argument(help="Engine to export for.")
+        Literal["systemd", "quadlet", "compose", "kubernetes", "nomad", "sdf", "map"],
+        typer.Argument(help="Engine to export for; sdf, map: the world of a scenario."),
     ],
-    file: Annotated[Path, typer.Argument(help="A fleet file (deploy/fleet.example.toml is one).")],
+    file: Annotated[Path, typer.Argument(help="A fleet file (deploy/fleet.example.toml is one), or a scenario.")],
     out: Annotated[Path | None, typer.Option(help="New or empty folder. Default: FLEET-ENGINE.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the written files as JSON.")] = False,
 ) -> int:
+    if engine in WORLDS:
+        return _world(engine, str(file), out, as_json)
     plan = secured(load(file))
     folder = out or Path(f"{plan.name}-{engine}")
     _check_empty(folder)
@@ -49,6 +56,16 @@ def command(
         print(msgspec.json.encode({"folder": str(folder), "files": sorted(files), "next": then}).decode())
     else:
         print(f"{len(files)} files in {folder}, private keys among them\nnext: {then}")
+    return 0
+
+
+def _world(kind: str, scenario: str, out: Path | None, as_json: bool) -> int:
+    """Write the world of a scenario. Raises Refused."""
+    from lfa.deploy.worlds.world_export import export_world  # needs the extra `world`
+
+    folder, files = export_world(kind, scenario, out)
+    facts = {"folder": str(folder), "files": files}
+    print(msgspec.json.encode(facts).decode() if as_json else f"{' and '.join(files)} in {folder}")
     return 0
 
 
