@@ -12,7 +12,7 @@ from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
 from lfa.agents.avoidance.moving_obstacle import Crossing, before, shadow
-from lfa.agents.avoidance.safety import safe, sharing
+from lfa.agents.avoidance.safety import safe, sharing, sharing_reach_m
 from lfa.agents.behaviors.back_out import BackOut
 from lfa.agents.behaviors.follow_slot import FollowSlot
 from lfa.agents.behaviors.lead_route import LeadRoute
@@ -213,7 +213,7 @@ class Navigator:
         if role is not Role.WAITING:
             wanted = self._crossing.give_way(moving, pose, wanted, now, still)
             wanted = self._ground_crossing.cross(wanted, now)
-            wanted = sharing(wanted, self._mates.strangers(pose, now), self._mission.radius_m, self._mission.limits)
+            wanted = self._share(wanted, pose, now)
             usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else self._mission.limits.v_max_mps
             wanted = slowed(self.scan_age.limited(wanted, now), self.scan_age.speed_max_mps(usual_mps))
             wanted = self.estimator.limited(wanted)
@@ -259,6 +259,12 @@ class Navigator:
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
         planned = self.leading.rounding or self._follow_slot.catches_up
         self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not planned)
+
+    def _share(self, wanted: Twist, pose: Pose2D, now: float) -> Twist:
+        """Return `wanted`, slowed towards team-mates that this robot does not follow."""
+        radius_m, limits = self._mission.radius_m, self._mission.limits
+        strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now)
+        return sharing(wanted, strangers, radius_m, limits)
 
     def _by_hand(self, pose: Pose2D, now: float) -> Twist | None:
         """Return the twist of an operator who drives this leader; None for the route, on which it begins anew then."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 
 from lfa.agents.localization.clock_offset import ClockOffset
@@ -80,6 +81,24 @@ class TeamState:
             return None
         row, (vx, vy), later = known[0], self._velocity[robot], min(now - known[1], GOES_ON_S)
         return Pose2D(row.x + vx * later, row.y + vy * later, row.theta)
+
+    def near(self, robots: Sequence[int], pose: Pose2D, within_m: float, now: float) -> list[tuple[int, Pose2D]]:
+        """Return those of `robots` that may be within `within_m` of `pose`, in their order, each with its pose.
+
+        Called at each control step: in a team of a hundred nearly all are passed over by the place in their last row.
+        """
+        x, y, table, found = pose.x, pose.y, self._table, []
+        for robot in robots:
+            known = table.get(robot)
+            if known is None:
+                continue
+            row, (vx, vy) = known[0], self._velocity[robot]
+            if abs(row.x - x) > within_m + GOES_ON_S * abs(vx) or abs(row.y - y) > within_m + GOES_ON_S * abs(vy):
+                continue
+            place = self.pose_of(robot, now)
+            if place is not None:
+                found.append((robot, place))
+        return found
 
     def poses(self, now: float) -> list[Pose2D | None]:
         """Return the poses in `map` of all robots in the table; None for a stale one."""

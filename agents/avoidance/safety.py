@@ -15,6 +15,7 @@ SKIN_M = 0.02
 """Distance [m] kept between the body and the nearest point when braking."""
 BRAKING_SHARE = 0.8
 """Share of the drive's deceleration that is planned with; the rest covers what a 10 Hz scan has not shown yet."""
+ROUNDING_M = 1e-6
 TURNING_MPS = 0.1
 """Speed [m/s] below which a turn is not slowed with the motion ahead."""
 
@@ -47,8 +48,10 @@ def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limi
     """
     v = wanted.linear_x
     sign = 1.0 if v >= 0.0 else -1.0
-    turn = wanted.angular_z * TURN_S
+    turn, reach_m = wanted.angular_z * TURN_S, sharing_reach_m(wanted, radius_m, limits)
     for x, y in mates:
+        if x * x + y * y > reach_m * reach_m:
+            continue
         bearing = atan2(sign * y, sign * x)
         if abs(bearing - max(min(turn, 0.0), min(max(turn, 0.0), bearing))) < SHARED_RAD:
             room_m = max(0.0, 0.5 * (hypot(x, y) - 2.0 * radius_m) - SKIN_M)
@@ -57,6 +60,12 @@ def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limi
                 wanted = Twist(sign * v_max, wanted.angular_z * v_max / abs(v))
                 v = wanted.linear_x
     return wanted
+
+
+def sharing_reach_m(wanted: Twist, radius_m: float, limits: Limits) -> float:
+    """Return the distance [m] of centres beyond which `sharing` slows `wanted` for no team-mate."""
+    stops_within_m = wanted.linear_x * wanted.linear_x / (2.0 * BRAKING_SHARE * limits.a_max_mps2)
+    return 2.0 * (radius_m + SKIN_M + stops_within_m) + ROUNDING_M
 
 
 def obeyed(command: Twist, measured: Twist) -> Twist:

@@ -26,13 +26,15 @@ class TeamMates:
             places.append(None if sighting is None else sighting.pose)
         return [place for place in places if place is not None]
 
-    def strangers(self, pose: Pose2D, now: float) -> list[Point]:
-        """Return those that this robot does not follow, in `base_link`: no controller keeps a distance to them."""
+    def strangers(self, pose: Pose2D, within_m: float, now: float) -> list[Point]:
+        """Return those that this robot does not follow, in `base_link`: no controller keeps a distance to them.
+
+        None within `within_m` is left out; others may be.
+        """
         ahead = None if self.predecessor is None else self.predecessor.robot
         c, s, mates = cos(pose.theta), sin(pose.theta), []
-        for robot in self._others:
-            place = None if robot == ahead else self._team.pose_of(robot, now)
-            if place is not None:
+        for robot, place in self._team.near(self._others, pose, within_m, now):
+            if robot != ahead:
                 dx, dy = place.x - pose.x, place.y - pose.y
                 mates.append((c * dx + s * dy, c * dy - s * dx))
         return mates

@@ -1,5 +1,8 @@
 """What a robot has heard of others is fresh, stale, or not believed."""
 
+from math import hypot
+from random import Random
+
 import pytest
 from msgspec.structs import replace
 
@@ -91,3 +94,18 @@ def test_what_another_saw_moving_is_believed_for_longer_where_something_is_seen(
     later = REMOTE_TRACK_S + 0.1
     assert team.obstacles.moving([], AWAY, later, lambda x, y, within_m: abs(x - 1.0 - 0.2 * later) < within_m)
     assert team.obstacles.moving([], AWAY, PARTIAL_TRACK_S + 0.1, lambda x, y, within_m: True) == []
+
+
+def test_nobody_near_is_passed_over_wherever_its_extrapolation_has_come() -> None:
+    """What is near is found by the last rows; a robot that drives on comes near between two of them."""
+    random, team, robots = Random(3), TeamState(), tuple(range(2, 30))
+    for seq, at in ((1, 0.0), (2, 0.5)):
+        for robot in robots:
+            team.hear_row(robot, replace(row(seq, random.uniform(-6.0, 6.0)), y=random.uniform(-6.0, 6.0)), at)
+    for now in (0.5, 0.8, 1.4, 3.0):
+        places = {robot: team.pose_of(robot, now) for robot in robots}
+        for within_m in (0.5, 1.5, 4.0):
+            found = dict(team.near(robots, Pose2D(), within_m, now))
+            inside = [robot for robot, at in places.items() if at is not None and hypot(at.x, at.y) <= within_m]
+            assert [robot for robot in inside if found.get(robot) != places[robot]] == []
+            assert list(found) == sorted(found)
