@@ -22,7 +22,7 @@ from lfa.deploy.analysis import summary as summaries
 from lfa.deploy.fleet.engine.engine import KnownProcess
 from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, ledger
 from lfa.deploy.fleet.plan import fleet_file, host_plan
-from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.fleet.security import authority, keys, registry
 from lfa.deploy.process.identity import Identity
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.recorder import EVENTS, RECORDING, Recorder
@@ -228,7 +228,7 @@ def _authority(folder: Path) -> Path:
 
 @_format("registry of keys (JSON)", lambda path: keys.show(path.parent, 0))
 def _registry(folder: Path) -> Path:
-    return _keys(folder) / keys.REGISTRY
+    return _keys(folder) / registry.REGISTRY
 
 
 @pytest.mark.parametrize("name", FORMATS)

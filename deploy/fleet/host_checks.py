@@ -6,7 +6,7 @@ import asyncio
 import socket
 
 from lfa.deploy.fleet.doctor import Diagnosis, judged, router_diagnosis
-from lfa.deploy.fleet.host.host import Found
+from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import HostPlan

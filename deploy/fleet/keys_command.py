@@ -13,7 +13,7 @@ import typer
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, is_fleet_file, load
 from lfa.deploy.fleet.plan.host_plan import store
 from lfa.deploy.fleet.remote.key_distribution import push
-from lfa.deploy.fleet.security import keys
+from lfa.deploy.fleet.security import keys, registry
 from lfa.deploy.fleet.security.access_rules import KeyPlan, host_name
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -91,7 +91,7 @@ def _change(
     else:
         keys.revoke(folder, chosen)
         changed, text = chosen, "revoked"
-    machines = [name for name in keys.load(folder).plan.hosts if name != lost]
+    machines = [name for name in registry.load(folder).plan.hosts if name != lost]
     wrong = [] if plan is None else asyncio.run(push(plan, lost))
     then = "routers opened anew" if plan is not None else "copy hosts/ again, then SIGHUP to the routers, one by one"
     facts: dict[str, object] = {"changed": changed, "hosts": machines, "pushed": plan is not None, "wrong": wrong}
@@ -117,7 +117,7 @@ def planned(fleet: str, hosts: str, robots: int, places: list[str], drivers: lis
 
 def _init(folder: Path, plan: KeyPlan, days: float, ca_cert: Path | None, as_json: bool) -> int:
     made = keys.make(folder, plan, days, ca_cert)
-    machines = {host: str(keys.folder_of(folder, host)) for host in plan.hosts}
+    machines = {host: str(registry.folder_of(folder, host)) for host in plan.hosts}
     lines = [f"{len(made)} certificates made, {len(plan.places)} in all: {folder}"]
     for host, path in machines.items():
         lines.append(f"machine {host}: {path}  (lfa-router --keys DIR --secure; {', '.join(plan.kept_at(host))})")

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from lfa.deploy.fleet import fleet_view
 from lfa.deploy.fleet.fleet_view import Seen
 from lfa.deploy.fleet.health import Health
-from lfa.deploy.fleet.host.host import Found
+from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
 from lfa.deploy.fleet.plan.host_plan import HostPlan, parts, store
 from lfa.deploy.fleet.remote.hosts import FleetHosts

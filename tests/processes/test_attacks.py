@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.fleet.security import authority, registry
 from lfa.protocol import clock
 from lfa.protocol.lease.term_window import FREE
 from lfa.protocol.messages.codec import decode
@@ -218,7 +218,7 @@ def test_ground_truth_is_not_heard_by_a_robot(fleet: Attacked) -> None:
 
 def test_a_neighbour_router_speaks_only_for_those_who_live_there(fleet: Attacked) -> None:
     """Machine b is taken over whole: its router has no rules any more, and passes on whatever it is told."""
-    endpoint, home = f"unixsock-stream/{fleet.folder / 'b.sock'}", keys.folder_of(fleet.keys, "b")
+    endpoint, home = f"unixsock-stream/{fleet.folder / 'b.sock'}", registry.folder_of(fleet.keys, "b")
     (home / ACCESS_FILE).write_text('{"access_control": {"enabled": false}}')
     command = [
         sys.executable,

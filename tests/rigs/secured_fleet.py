@@ -14,7 +14,7 @@ from typing import Any
 import zenoh
 
 from lfa.deploy.bench.harness.team import Team, endless
-from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.fleet.security import authority, keys, registry
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.protocol import clock
 from lfa.protocol.messages.codec import decode, encode
@@ -47,7 +47,7 @@ class Attacked:
         keys.make(self.keys, keys.spread(FLEET, {"a": (), "b": ()}, range(1, 6), places))
         shutil.copytree(self.keys / "issued", folder / "stolen")
         keys.revoke(self.keys, [REVOKED])
-        self.home = keys.folder_of(self.keys, "a")
+        self.home = registry.folder_of(self.keys, "a")
         self.team = Team(endless(ROBOTS), self._table, self._credentials(RECORDER_NAME), FLEET)
 
     def _credentials(self, name: str) -> Credentials:

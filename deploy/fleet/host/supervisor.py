@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import select
 import signal
-import subprocess
 import sys
 import threading
 from collections import OrderedDict
@@ -22,14 +21,12 @@ import msgspec
 from lfa.deploy.fleet.engine.engine import LogSource, ProcessEngine
 from lfa.deploy.fleet.engine.own import OwnEngine
 from lfa.deploy.fleet.engine.systemd import SystemdEngine
-from lfa.deploy.fleet.engine.watchdog import HangDetector, SignSocket
-from lfa.deploy.fleet.host.guardian import spawn
-from lfa.deploy.fleet.host.ledger import GUARD, GUARDIAN, LEDGER, WATCH, Ledger, ledger, living, sweep, watchers
+from lfa.deploy.fleet.host.guardian_watch import GuardianWatch
+from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, ledger, living, sweep
 from lfa.deploy.fleet.host.units_host import scope_of
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
-from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.restart_policy import REFUSED_CODE
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
@@ -47,7 +44,6 @@ from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, RouterAbsent
 from lfa.world.description.scenario import STATE
 
 TELL_S = 1.0
-SIGN_S = 1.0
 STEP_S = 0.1
 JOIN_S = 0.1
 LAST_WORDS_S = 0.1
@@ -71,7 +67,7 @@ class Supervisor:
         """Ledger on disk."""
         self._refused = False
         """True: the disk did not take the last ledger."""
-        self._guardian = None if engine.bound else _GuardianWatch(part)
+        self._guardian = None if engine.bound else GuardianWatch(part)
         self._sign = Notify(os.environ.get("NOTIFY_SOCKET", ""))
         self._ordered = False
         """True: an operator ordered the end."""
@@ -128,8 +124,8 @@ class Supervisor:
         if self._guardian is not None:
             self._guardian.step(now)
         self._join(now)
-        told = self._hear(now)
-        if changed or told or now >= self._tell_at:
+        ordered = self._hear(now)
+        if changed or ordered or now >= self._tell_at:
             self._tell(now)
         for name, tail in list(self._tails.items()):
             lines = tail.take(now)
@@ -186,7 +182,7 @@ class Supervisor:
         self._bus = bus
 
     def _hear(self, now: float) -> bool:
-        told = False
+        obeyed = False
         if self._bus is not None and self._links.due(now):
             self._bus.resubscribe()
         arrivals = self._inbox.take()
@@ -195,8 +191,8 @@ class Supervisor:
                 self._links.see(arrival.payload, now)
         for _, order in self._decoder.messages(arrivals):
             if isinstance(order, HostOrder):
-                told = self._obey(order, now) or told
-        return told
+                obeyed = self._obey(order, now) or obeyed
+        return obeyed
 
     def _obey(self, order: HostOrder, now: float) -> bool:
         """Execute each order once, however often it is repeated; return True when it is to be confirmed."""
@@ -236,50 +232,6 @@ class Supervisor:
     def _publish(self, topic: str, message: Message) -> None:
         if self._bus is not None:
             send(self._bus, self._outbox.envelope(topic, message))
-
-
-class _GuardianWatch:
-    """Watch over the guardian: signs of life to it, and a new one in place of one that ended or hangs."""
-
-    def __init__(self, part: HostPlan) -> None:
-        """Open the socket for its signs of life. Raises Refused."""
-        self._part = part
-        self._signs = SignSocket(part.folder / GUARD)
-        self._watchdog = HangDetector(part.restart.watchdog_s)
-        self._sign = Notify(str(part.folder / WATCH))
-        self._at = 0.0
-        self._known: Identity | None = None
-        self._spawned: subprocess.Popen[bytes] | None = None
-
-    def step(self, now: float) -> None:
-        if now >= self._at:
-            self._at = now + SIGN_S
-            self._sign.alive()
-            if self._spawned is not None:
-                self._spawned.poll()  # or its end would leave a zombie
-            if self._known is None or identity.identify(self._known.pid) != self._known:
-                self._find(now)
-        if self._known is not None and self._known.pid in self._signs.take():
-            self._watchdog.alive(GUARDIAN, now)
-        if self._known is not None and self._watchdog.hung(now):
-            write_line(f"the guardian hung: no sign of life for {self._watchdog.limit_s:g} s; killed", sys.stdout)
-            identity.send_signal(self._known, signal.SIGKILL)
-
-    def _find(self, now: float) -> None:
-        """Watch the guardian that runs, or start one."""
-        self._known = next(watchers(self._part.folder, GUARDIAN), None)
-        if self._known is None:
-            write_line("starts a guardian", sys.stdout)
-            self._spawned = spawn(GUARDIAN, self._part.folder / host_plan.PART)
-            self._known = identity.identify(self._spawned.pid)
-        self._watchdog.started(GUARDIAN, now)
-
-    def end(self) -> None:
-        """End the guardian: it would start a supervisor again that ended in order."""
-        for guardian in watchers(self._part.folder, GUARDIAN):
-            identity.send_signal(guardian, signal.SIGTERM)
-            identity.send_signal(guardian, signal.SIGCONT)
-        self._signs.close()
 
 
 def main() -> None:

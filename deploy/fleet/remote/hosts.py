@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
 
-from lfa.deploy.fleet.host.host import Found
+from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, reach

@@ -8,7 +8,7 @@ from __future__ import annotations
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import parts, store
 from lfa.deploy.fleet.remote.hosts import FleetHosts
-from lfa.deploy.fleet.security import keys
+from lfa.deploy.fleet.security import keys, registry
 from lfa.deploy.fleet.security.access_rules import KeyPlan, host_name
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.protocol import clock
@@ -45,7 +45,7 @@ def bundles(plan: FleetPlan) -> dict[str, Bundle]:
 
 
 def _bundles(plan: FleetPlan) -> dict[str, Bundle]:
-    folders = {name: keys.folder_of(store(plan), name) for name in plan.hosts}
+    folders = {name: registry.folder_of(store(plan), name) for name in plan.hosts}
     return {name: {path.name: path.read_text() for path in sorted(at.iterdir())} for name, at in folders.items()}
 
 

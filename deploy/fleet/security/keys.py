@@ -24,49 +24,22 @@ A process with `--keys /etc/lfa/keys` uses the certificate of its name (`protoco
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-import msgspec
 from msgspec import Struct, structs
 
 from lfa.deploy.fleet.security import authority
-from lfa.deploy.fleet.security.access_rules import (
-    PERSONS,
-    KeyPlan,
-    driver_of,
-    host_name,
-    person_of,
-    rules,
-    sayable,
-    stationed,
-)
+from lfa.deploy.fleet.security.access_rules import PERSONS, KeyPlan, driver_of, host_name, sayable, stationed
+from lfa.deploy.fleet.security.layout import addresses_of, lay_out, write_requests
 from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
+from lfa.deploy.fleet.security.registry import CA_KEY, REGISTRY, Registry, check_names, load
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json, read_text
 from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, PASSWORD_BYTES_MAX, USERS_FILE, validity
+from lfa.protocol.transport.credentials import CA_FILE, validity
 
-REGISTRY, HOSTS, CA_KEY, REQUESTS = "fleet.json", "hosts", "ca.key", "requests"
 DAYS = 365.0
-KINDS = ("pem", "key", "password")
-
-
-class Registry(Struct, frozen=True):
-    """Contents of `fleet.json`."""
-
-    plan: KeyPlan
-    common_names: dict[str, str] = {}
-    """Common names in the certificates of admitted members. A name is not reused after a revocation."""
-    outside: bool = False
-    """True: an outside authority signs, whose key is not here."""
-    revoked: dict[str, int] = {}
-    """Number of revocations of each member."""
-
-    def members(self) -> list[str]:
-        return list(self.plan.places)
 
 
 class Shown(Struct, frozen=True):
@@ -129,7 +102,7 @@ def make(folder: Path, plan: KeyPlan, days: float = DAYS, ca_cert: Path | None =
     keys before all are signed.
     """
     outside = None if ca_cert is None else authority.certificate_of(ca_cert)
-    authority.check_names(plan.fleet, {name: _addresses(name, plan) for name in plan.places})
+    authority.check_names(plan.fleet, {name: addresses_of(name, plan) for name in plan.places})
     try:
         private_folder(folder)
         known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
@@ -142,7 +115,7 @@ def make(folder: Path, plan: KeyPlan, days: float = DAYS, ca_cert: Path | None =
         elif not known.outside and not (folder / CA_KEY).exists():
             authority.found(folder / CA_FILE, folder / CA_KEY, plan.fleet)
         registry = structs.replace(known, plan=plan, outside=known.outside or outside is not None)
-        return _lay_out(folder, registry, days, renew=())
+        return lay_out(folder, registry, days, renew=())
     except OSError as error:
         raise _unwritable(folder, error) from None
 
@@ -157,11 +130,11 @@ def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[
     if registry.outside:
         raise Refused(f"{folder}: an outside authority signs: lfa keys csr {folder} NAMES, and init once it has")
     chosen = list(names) or [name for name in registry.members() if name in registry.common_names]
-    _check_names(registry, chosen)
+    check_names(registry, chosen)
     back = {name: f"{name}.{registry.revoked.get(name, 0) + 1}" for name in chosen if name not in registry.common_names}
     registry = structs.replace(registry, common_names=registry.common_names | back)
     try:
-        return _lay_out(folder, registry, days, renew=chosen)
+        return lay_out(folder, registry, days, renew=chosen)
     except OSError as error:
         raise _unwritable(folder, error) from None
 
@@ -172,11 +145,11 @@ def revoke(folder: Path, names: Sequence[str]) -> list[str]:
     Routers read the rules when they open: restart them.
     """
     registry = load(folder)
-    _check_names(registry, names)
+    check_names(registry, names)
     count = {name: registry.revoked.get(name, 0) + 1 for name in names if name in registry.common_names}
     left = {name: common for name, common in registry.common_names.items() if name not in names}
     try:
-        _lay_out(folder, structs.replace(registry, common_names=left, revoked=registry.revoked | count), DAYS, renew=())
+        lay_out(folder, structs.replace(registry, common_names=left, revoked=registry.revoked | count), DAYS, renew=())
     except OSError as error:
         raise _unwritable(folder, error) from None
     return list(registry.plan.hosts)
@@ -203,57 +176,6 @@ def show(folder: Path, now_ms: int) -> list[Shown]:
     return shown
 
 
-def folder_of(folder: Path, host: str) -> Path:
-    """Return the folder with all files that machine `host` needs."""
-    return folder / HOSTS / host
-
-
-def load(folder: Path) -> Registry:
-    """Return the registry in `folder`. Raises Refused when it holds no fleet's keys."""
-    path = folder / REGISTRY
-    try:
-        return read_json(path, Registry)
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}, make it with: lfa keys init {folder}") from None
-    except DamagedFile as error:
-        raise Refused(f"{path}: {error}, must be what `lfa keys` wrote") from None
-
-
-def _check_names(registry: Registry, names: Sequence[str]) -> None:
-    strange = [name for name in names if name not in registry.members()]
-    if strange:
-        raise Refused(f"{strange[0]}: no member of fleet {registry.plan.fleet}, must be like robot1, world or host-a")
-
-
-def _lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]) -> list[str]:
-    """Issue missing certificates, then rewrite every machine's folder; return the members with a new certificate."""
-    issued = folder / ISSUED
-    for inner in (issued, folder / HOSTS):
-        private_folder(inner)
-    write_private(issued / CA_FILE, (folder / CA_FILE).read_bytes())
-    fresh = {name: name for name in registry.members() if name not in registry.revoked}
-    registry = structs.replace(registry, common_names=fresh | registry.common_names)
-    if registry.outside:
-        _await_signatures(folder, registry, renew)
-    ca = None if registry.outside else authority.load(folder / CA_FILE, folder / CA_KEY)
-    made = []
-    for name in registry.members():
-        stem = issued / name
-        common = registry.common_names.get(name)
-        if common is None:
-            _remove(stem)
-            continue
-        addresses = _addresses(name, registry.plan)
-        if ca is not None and (name in renew or not authority.fits(stem, ca.certificate, common, addresses)):
-            authority.issue(stem, ca, common, addresses, days)
-            made.append(name)
-        _password(stem.with_name(f"{name}.password"), common)
-    for host in registry.plan.hosts:
-        _lay_out_host(folder, registry, host)
-    write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
-    return made
-
-
 def requested(folder: Path, names: Sequence[str] = ()) -> list[Path]:
     """Write requests for the members (all of `names`) whose certificate an outside authority has yet to sign.
 
@@ -262,72 +184,8 @@ def requested(folder: Path, names: Sequence[str] = ()) -> list[Path]:
     registry = load(folder)
     if not registry.outside:
         raise Refused(f"{folder}: signs by itself, requests are for an outside authority (lfa keys init --ca-cert)")
-    _check_names(registry, names)
-    return _requests(folder, registry, names)
-
-
-def _await_signatures(folder: Path, registry: Registry, renew: Sequence[str]) -> None:
-    """Write the requests that are open, and the registry. Raises Refused while there are some."""
-    write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
-    waiting = _requests(folder, registry, renew)
-    if waiting:
-        where = f"have {folder / REQUESTS}/*.csr signed, put the certificates into {folder / ISSUED}/NAME.pem"
-        raise Refused(f"{len(waiting)} certificates are not signed yet ({waiting[0].stem}, ...): {where}, and repeat")
-
-
-def _requests(folder: Path, registry: Registry, renew: Sequence[str]) -> list[Path]:
-    ca, waiting = authority.certificate_of(folder / CA_FILE), []
-    private_folder(folder / REQUESTS)
-    for name, common in registry.common_names.items():
-        stem, path = folder / ISSUED / name, folder / REQUESTS / f"{name}.csr"
-        addresses = _addresses(name, registry.plan)
-        if name not in renew and authority.fits(stem, ca, common, addresses):
-            path.unlink(missing_ok=True)
-            continue
-        authority.request(stem, path, common, addresses)
-        waiting.append(path)
-    return waiting
-
-
-def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
-    plan, here = registry.plan, folder_of(folder, host)
-    private_folder(here)
-    kept = [name for name in plan.kept_at(host) if name in registry.common_names]
-    files = {f"{person_of(name) or name}.{kind}": f"{name}.{kind}" for name in kept for kind in KINDS}
-    wanted = {CA_FILE, ACCESS_FILE, USERS_FILE, *files}
-    for path in here.iterdir():
-        if path.name not in wanted:
-            path.unlink()
-    write_private(here / CA_FILE, (folder / CA_FILE).read_bytes())
-    for file, source in files.items():
-        write_private(here / file, (folder / ISSUED / source).read_bytes())
-    joining = [name for name in (*plan.at(host), *map(host_name, plan.hosts)) if name in registry.common_names]
-    write_private(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
-    write_private(
-        here / ACCESS_FILE, msgspec.json.format(msgspec.json.encode(rules(plan, host, registry.common_names)))
-    )
-
-
-def _addresses(name: str, plan: KeyPlan) -> tuple[str, ...]:
-    """Return the addresses of a router, for its server certificate; empty for any other member."""
-    for host, addresses in plan.hosts.items():
-        if name == host_name(host):
-            return tuple(dict.fromkeys((host, *addresses, "localhost", "127.0.0.1", "::1")))
-    return ()
-
-
-def _password(path: Path, common_name: str) -> None:
-    try:
-        fits = read_text(path, PASSWORD_BYTES_MAX).startswith(f"{common_name}:")
-    except (OSError, DamagedFile):
-        fits = False
-    if not fits:
-        write_private(path, f"{common_name}:{secrets.token_urlsafe(24)}\n".encode())
-
-
-def _remove(stem: Path) -> None:
-    for kind in KINDS:
-        stem.with_name(f"{stem.name}.{kind}").unlink(missing_ok=True)
+    check_names(registry, names)
+    return write_requests(folder, registry, names)
 
 
 def _unwritable(folder: Path, error: OSError) -> Refused:

@@ -15,7 +15,7 @@ import yaml
 import zenoh
 
 from lfa.agents import cli as agent_cli
-from lfa.deploy.fleet.security import keys
+from lfa.deploy.fleet.security import keys, registry
 from lfa.deploy.robot import cli as driver_cli
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.zenoh_bus import ZenohBus
@@ -167,7 +167,7 @@ def test_zenoh_takes_the_configurations_and_lfa_talks_through_them(tmp_path: Pat
     configs = {}
     for name in ("router", "client"):
         text = (TEMPLATES / "zenoh" / f"{name}.json5").read_text()
-        text = text.replace("/etc/lfa/keys", str(keys.folder_of(tmp_path / "k", "a")))
+        text = text.replace("/etc/lfa/keys", str(registry.folder_of(tmp_path / "k", "a")))
         text = text.replace("/run/lfa/router.sock", str(tmp_path / "z.sock")).replace(
             "0.0.0.0:7447", f"127.0.0.1:{port}"
         )

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from lfa.deploy.fleet.keys_command import command, planned
-from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.fleet.security import authority, keys, registry
 from lfa.deploy.fleet.security.access_rules import KeyPlan, rules, sayable
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.protocol.errors import Refused
@@ -105,7 +105,7 @@ def test_every_rule_is_for_somebody_and_every_subject_has_rules() -> None:
 
 def test_a_machine_has_the_keys_of_those_who_run_there_and_no_others(tmp_path: Path) -> None:
     keys.make(tmp_path / "k", plan())
-    names = {path.stem for path in keys.folder_of(tmp_path / "k", "b").glob("*.key")}
+    names = {path.stem for path in registry.folder_of(tmp_path / "k", "b").glob("*.key")}
     assert names == {"host-b", "robot2", "operator", "recorder"}
     assert not list((tmp_path / "k" / "hosts").rglob("ca.key"))
 
@@ -118,7 +118,7 @@ def test_the_keys_of_persons_are_on_no_machine_and_each_machine_has_its_own(tmp_
             place: (folder / f"{person}.key").read_bytes()
             for place, folder in {
                 "issued": tmp_path / "k" / ISSUED,
-                **{host: keys.folder_of(tmp_path / "k", host) for host in "ab"},
+                **{host: registry.folder_of(tmp_path / "k", host) for host in "ab"},
             }.items()
         }
         assert len(set(held.values())) == len(held), f"the same key of the {person} in two places"
@@ -131,7 +131,7 @@ def test_what_lay_on_a_lost_machine_is_revoked_at_once_and_nothing_else(tmp_path
     assert set(lost) == {"host-b", "robot2", "operator-b", "recorder-b"}
     keys.revoke(folder, lost)
     for host in "ab":
-        rules, users = ((keys.folder_of(folder, host) / name).read_text() for name in (ACCESS_FILE, USERS_FILE))
+        rules, users = ((registry.folder_of(folder, host) / name).read_text() for name in (ACCESS_FILE, USERS_FILE))
         assert not [name for name in lost if f'"{name}"' in rules or f"{name}:" in users]
         assert '"operator"' in rules and '"operator-a"' in rules
     assert {one.name for one in keys.show(folder, 0) if one.state == "revoked"} == set(lost)
@@ -163,8 +163,8 @@ def test_making_again_keeps_everything(tmp_path: Path) -> None:
 def test_a_plan_that_grows_adds_and_a_robot_that_moves_takes_its_keys_along(tmp_path: Path) -> None:
     keys.make(tmp_path / "k", plan(2))
     assert keys.make(tmp_path / "k", plan(3, places={"robot1": ["b"]})) == ["robot3"]
-    assert not (keys.folder_of(tmp_path / "k", "a") / "robot1.key").exists()
-    assert (keys.folder_of(tmp_path / "k", "b") / "robot1.key").exists()
+    assert not (registry.folder_of(tmp_path / "k", "a") / "robot1.key").exists()
+    assert (registry.folder_of(tmp_path / "k", "b") / "robot1.key").exists()
 
 
 def test_what_expires_soon_or_serves_another_address_is_renewed(tmp_path: Path) -> None:
@@ -192,14 +192,14 @@ def test_a_revoked_robot_leaves_all_lists_and_comes_back_under_another_common_na
     keys.revoke(folder, ["robot3"])
     assert not list(folder.rglob("robot3.*"))
     for host in "ab":
-        access = json.loads((keys.folder_of(folder, host) / "access.json").read_text())["access_control"]
+        access = json.loads((registry.folder_of(folder, host) / "access.json").read_text())["access_control"]
         assert not [s for s in access["subjects"] if "robot3" in (s.get("cert_common_names"), *s.get("usernames", ()))]
         assert not [r for r in access["rules"] if "/robot3/cmd_vel" in str(r["key_exprs"])]
-        assert "robot3" not in (keys.folder_of(folder, host) / "users").read_text()
+        assert "robot3" not in (registry.folder_of(folder, host) / "users").read_text()
     assert keys.make(folder, plan()) == [], "making again must not let it in again"
     assert keys.rotate(folder, ["robot3"]) == ["robot3"]
-    assert keys.load(folder).common_names["robot3"] == "robot3.2"
-    assert (keys.folder_of(folder, "a") / "robot3.password").read_text().startswith("robot3.2:")
+    assert registry.load(folder).common_names["robot3"] == "robot3.2"
+    assert (registry.folder_of(folder, "a") / "robot3.password").read_text().startswith("robot3.2:")
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -230,7 +230,7 @@ def test_a_certificate_out_of_its_time_is_refused(tmp_path: Path, offset_days: i
 
 def test_a_key_that_others_may_read_is_refused(tmp_path: Path) -> None:
     keys.make(tmp_path / "k", plan(1))
-    home = keys.folder_of(tmp_path / "k", "a")
+    home = registry.folder_of(tmp_path / "k", "a")
     now_ms = int(validity(home / "robot1.pem")[0].timestamp() * 1000.0) + 1
     assert credentials(home, "robot1", now_ms).name == "robot1"
     (home / "robot1.key").chmod(0o640)
@@ -240,7 +240,7 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path) -> None:
 
 def test_credentials_that_are_printed_tell_no_secret(tmp_path: Path) -> None:
     keys.make(tmp_path / "k", plan(1))
-    home = keys.folder_of(tmp_path / "k", "a")
+    home = registry.folder_of(tmp_path / "k", "a")
     now_ms = int(validity(home / "robot1.pem")[0].timestamp() * 1000.0) + 1
     known = credentials(home, "robot1", now_ms)
     login = known.user_and_password()

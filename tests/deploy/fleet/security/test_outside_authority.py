@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from lfa.deploy.fleet.keys_command import command
-from lfa.deploy.fleet.security import authority, keys
+from lfa.deploy.fleet.security import authority, keys, registry
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -57,7 +57,7 @@ def company(tmp_path: Path) -> Company:
 def signed(folder: Path, company: Company) -> None:
     with pytest.raises(Refused, match="not signed yet"):
         keys.make(folder, PLAN, ca_cert=company.certificate)
-    for request in (folder / keys.REQUESTS).iterdir():
+    for request in (folder / registry.REQUESTS).iterdir():
         company.sign(request, folder / ISSUED / f"{request.stem}.pem")
 
 
@@ -66,8 +66,8 @@ def test_signed_requests_become_the_keys_of_the_machines(tmp_path: Path, company
     signed(folder, company)
     keys.make(folder, PLAN, ca_cert=company.certificate)
     for name in ("robot1", "robot2", "world", "host-a"):
-        credentials(keys.folder_of(folder, "a"), name, clock.wall_ms())
-    assert not (folder / keys.CA_KEY).exists()
+        credentials(registry.folder_of(folder, "a"), name, clock.wall_ms())
+    assert not (folder / registry.CA_KEY).exists()
     assert keys.requested(folder) == []
     openssl = ["openssl", "verify", "-CAfile", str(folder / "ca.pem"), str(folder / ISSUED / "robot1.pem")]
     assert subprocess.run(openssl, capture_output=True, check=False).returncode == 0
@@ -77,7 +77,7 @@ def test_nobody_gets_keys_before_all_are_signed(tmp_path: Path, company: Company
     folder = tmp_path / "keys"
     with pytest.raises(Refused, match=r"8 certificates are not signed yet .*requests/\*\.csr signed"):
         keys.make(folder, PLAN, ca_cert=company.certificate)
-    assert list((folder / keys.HOSTS).iterdir()) == []
+    assert list((folder / registry.HOSTS).iterdir()) == []
     assert len(keys.requested(folder)) == 8
 
 
@@ -85,7 +85,7 @@ def test_a_request_asks_for_the_routers_addresses_and_for_no_others(tmp_path: Pa
     folder = tmp_path / "keys"
     with pytest.raises(Refused):
         keys.make(folder, PLAN, ca_cert=company.certificate)
-    asked = {path.stem: x509.load_pem_x509_csr(path.read_bytes()) for path in (folder / keys.REQUESTS).iterdir()}
+    asked = {path.stem: x509.load_pem_x509_csr(path.read_bytes()) for path in (folder / registry.REQUESTS).iterdir()}
     text = {
         name: str(one.extensions.get_extension_for_class(x509.SubjectAlternativeName)) for name, one in asked.items()
     }
@@ -95,7 +95,7 @@ def test_a_request_asks_for_the_routers_addresses_and_for_no_others(tmp_path: Pa
 def test_a_certificate_of_another_authority_is_asked_for_again(tmp_path: Path, company: Company) -> None:
     folder = tmp_path / "keys"
     signed(folder, company)
-    request = folder / keys.REQUESTS / "robot1.csr"
+    request = folder / registry.REQUESTS / "robot1.csr"
     Company(tmp_path / "other").sign(request, folder / ISSUED / "robot1.pem")
     with pytest.raises(Refused, match=r"1 certificates are not signed yet \(robot1"):
         keys.make(folder, PLAN, ca_cert=company.certificate)
@@ -106,7 +106,7 @@ def test_a_revoked_member_is_off_the_lists_as_ever(tmp_path: Path, company: Comp
     signed(folder, company)
     keys.make(folder, PLAN)
     keys.revoke(folder, ["robot2"])
-    assert "robot2" not in (keys.folder_of(folder, "a") / "users").read_text()
+    assert "robot2" not in (registry.folder_of(folder, "a") / "users").read_text()
 
 
 def test_what_only_an_own_authority_can_do_is_refused(tmp_path: Path, company: Company) -> None:

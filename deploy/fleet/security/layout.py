@@ -1,0 +1,114 @@
+"""Writing of a fleet's keys: certificates, passwords and requests of all members, and one folder per machine."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+from msgspec import structs
+
+from lfa.deploy.fleet.security import authority
+from lfa.deploy.fleet.security.access_rules import KeyPlan, host_name, person_of, rules
+from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
+from lfa.deploy.fleet.security.registry import CA_KEY, HOSTS, REGISTRY, REQUESTS, Registry, folder_of
+from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_text
+from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, PASSWORD_BYTES_MAX, USERS_FILE
+
+KINDS = ("pem", "key", "password")
+
+
+def lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]) -> list[str]:
+    """Issue missing certificates, then rewrite every machine's folder; return the members with a new certificate."""
+    issued = folder / ISSUED
+    for inner in (issued, folder / HOSTS):
+        private_folder(inner)
+    write_private(issued / CA_FILE, (folder / CA_FILE).read_bytes())
+    fresh = {name: name for name in registry.members() if name not in registry.revoked}
+    registry = structs.replace(registry, common_names=fresh | registry.common_names)
+    if registry.outside:
+        _await_signatures(folder, registry, renew)
+    ca = None if registry.outside else authority.load(folder / CA_FILE, folder / CA_KEY)
+    made = []
+    for name in registry.members():
+        stem = issued / name
+        common = registry.common_names.get(name)
+        if common is None:
+            _remove(stem)
+            continue
+        addresses = addresses_of(name, registry.plan)
+        if ca is not None and (name in renew or not authority.fits(stem, ca.certificate, common, addresses)):
+            authority.issue(stem, ca, common, addresses, days)
+            made.append(name)
+        _password(stem.with_name(f"{name}.password"), common)
+    for host in registry.plan.hosts:
+        _lay_out_host(folder, registry, host)
+    write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
+    return made
+
+
+def _await_signatures(folder: Path, registry: Registry, renew: Sequence[str]) -> None:
+    """Write the requests that are open, and the registry. Raises Refused while there are some."""
+    write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
+    waiting = write_requests(folder, registry, renew)
+    if waiting:
+        where = f"have {folder / REQUESTS}/*.csr signed, put the certificates into {folder / ISSUED}/NAME.pem"
+        raise Refused(f"{len(waiting)} certificates are not signed yet ({waiting[0].stem}, ...): {where}, and repeat")
+
+
+def write_requests(folder: Path, registry: Registry, renew: Sequence[str]) -> list[Path]:
+    """Write a request for each member without a fitting certificate, and for `renew`; return the requests' paths."""
+    ca, waiting = authority.certificate_of(folder / CA_FILE), []
+    private_folder(folder / REQUESTS)
+    for name, common in registry.common_names.items():
+        stem, path = folder / ISSUED / name, folder / REQUESTS / f"{name}.csr"
+        addresses = addresses_of(name, registry.plan)
+        if name not in renew and authority.fits(stem, ca, common, addresses):
+            path.unlink(missing_ok=True)
+            continue
+        authority.request(stem, path, common, addresses)
+        waiting.append(path)
+    return waiting
+
+
+def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
+    plan, here = registry.plan, folder_of(folder, host)
+    private_folder(here)
+    kept = [name for name in plan.kept_at(host) if name in registry.common_names]
+    files = {f"{person_of(name) or name}.{kind}": f"{name}.{kind}" for name in kept for kind in KINDS}
+    wanted = {CA_FILE, ACCESS_FILE, USERS_FILE, *files}
+    for path in here.iterdir():
+        if path.name not in wanted:
+            path.unlink()
+    write_private(here / CA_FILE, (folder / CA_FILE).read_bytes())
+    for file, source in files.items():
+        write_private(here / file, (folder / ISSUED / source).read_bytes())
+    joining = [name for name in (*plan.at(host), *map(host_name, plan.hosts)) if name in registry.common_names]
+    write_private(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
+    write_private(
+        here / ACCESS_FILE, msgspec.json.format(msgspec.json.encode(rules(plan, host, registry.common_names)))
+    )
+
+
+def addresses_of(name: str, plan: KeyPlan) -> tuple[str, ...]:
+    """Return the addresses of a router, for its server certificate; empty for any other member."""
+    for host, addresses in plan.hosts.items():
+        if name == host_name(host):
+            return tuple(dict.fromkeys((host, *addresses, "localhost", "127.0.0.1", "::1")))
+    return ()
+
+
+def _password(path: Path, common_name: str) -> None:
+    try:
+        fits = read_text(path, PASSWORD_BYTES_MAX).startswith(f"{common_name}:")
+    except (OSError, DamagedFile):
+        fits = False
+    if not fits:
+        write_private(path, f"{common_name}:{secrets.token_urlsafe(24)}\n".encode())
+
+
+def _remove(stem: Path) -> None:
+    for kind in KINDS:
+        stem.with_name(f"{stem.name}.{kind}").unlink(missing_ok=True)

@@ -1,0 +1,51 @@
+"""Registry of a fleet's keys on disk: its members with their common names, and where each thing lies in the folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from msgspec import Struct
+
+from lfa.deploy.fleet.security.access_rules import KeyPlan
+from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
+
+REGISTRY, HOSTS, CA_KEY, REQUESTS = "fleet.json", "hosts", "ca.key", "requests"
+
+
+class Registry(Struct, frozen=True):
+    """Contents of `fleet.json`."""
+
+    plan: KeyPlan
+    common_names: dict[str, str] = {}
+    """Common names in the certificates of admitted members. A name is not reused after a revocation."""
+    outside: bool = False
+    """True: an outside authority signs, whose key is not here."""
+    revoked: dict[str, int] = {}
+    """Number of revocations of each member."""
+
+    def members(self) -> list[str]:
+        return list(self.plan.places)
+
+
+def load(folder: Path) -> Registry:
+    """Return the registry in `folder`. Raises Refused when it holds no fleet's keys."""
+    path = folder / REGISTRY
+    try:
+        return read_json(path, Registry)
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}, make it with: lfa keys init {folder}") from None
+    except DamagedFile as error:
+        raise Refused(f"{path}: {error}, must be what `lfa keys` wrote") from None
+
+
+def check_names(registry: Registry, names: Sequence[str]) -> None:
+    strange = [name for name in names if name not in registry.members()]
+    if strange:
+        raise Refused(f"{strange[0]}: no member of fleet {registry.plan.fleet}, must be like robot1, world or host-a")
+
+
+def folder_of(folder: Path, host: str) -> Path:
+    """Return the folder with all files that machine `host` needs."""
+    return folder / HOSTS / host
