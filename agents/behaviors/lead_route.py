@@ -15,6 +15,9 @@ from lfa.protocol.geometry import Pose2D, Twist
 
 ROUND_TRAP = Decision(Action.PLAN_ROUND, inf, 0.0, "wall", "no local way leads on", "angle")
 """Decision of a leader whose detour leads nowhere, for the log."""
+MEANT_MPS = 0.05
+"""Least speed [m/s] by which a leader's way is judged: where it is held at rest, the ramp of its acceleration begins
+anew in each step, and what it wants never tells how far it means to drive."""
 
 
 class LeadRoute:
@@ -35,9 +38,9 @@ class LeadRoute:
             if self._leading.rounding:
                 self._detour.decision = ROUND_TRAP
             return planned
-        target = self._leading.target(pose)
+        target, meant = self._leading.target(pose), _meant(wanted)
         around = self._detour.steer(
-            around_these, target, wanted, speed, now, lambda free_m: self._obstacles.blocking(pose, wanted, free_m, now)
+            around_these, target, meant, speed, now, lambda free_m: self._obstacles.blocking(pose, meant, free_m, now)
         )
         return wanted if around is None else around
 
@@ -48,3 +51,11 @@ class LeadRoute:
         ahead = partial(self._leading.lead.ahead, pose)
         gap_m = narrow_gap_m(self._obstacles.points(pose), ahead, self._radius_m)
         return None if gap_m is None else f"gap of {gap_m:.1f} m"
+
+
+def _meant(wanted: Twist) -> Twist:
+    """Return `wanted` without the ramp from rest: the same bend, at `MEANT_MPS` at least."""
+    v = abs(wanted.linear_x)
+    if not 0.0 < v < MEANT_MPS:
+        return wanted
+    return Twist(wanted.linear_x * MEANT_MPS / v, wanted.angular_z * MEANT_MPS / v)

@@ -28,6 +28,7 @@ LONG = (
     ("2_team_leader_killed/2_team_leader_killed.toml",              1),
     ("driving/c_head_0.3_expl.toml",                                10003),
     ("driving/c_over_0.6_path.toml",                                10004),
+    ("driving/d_04.toml",                                           10005),
     ("driving/c_stopgo_path.toml",                                  10006),
     ("driving/e_n8.toml",                                          10001),
     ("driving/e_door_path.toml",                                    10001),
