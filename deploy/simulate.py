@@ -8,6 +8,8 @@ t, x, y, theta, v, omega = done.truth[2].T       # numpy: s, m, m, rad, m/s, rad
 error_m = done.errors[2].distance                # of follower 2, at done.errors[2].t
 done.figure("fig07_distance_error")              # matplotlib; a notebook shows it
 ```
+
+`environment` makes the same runs into an environment for learners.
 """
 
 from __future__ import annotations
@@ -22,13 +24,17 @@ from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.faults.script import parse_all
 from lfa.deploy.robot.driver import Driver, MakeBase
 from lfa.deploy.run import simulate
+from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
 from lfa.world.description.own_sensor import INSTALLED_RULE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Result", "read", "run"]
+    from lfa.deploy.learn.robot_environment import RobotEnvironment
+    from lfa.deploy.learn.team_environment import TeamEnvironment
+
+__all__ = ["Result", "environment", "read", "robot_environment", "run"]
 
 
 class Result(Run):
@@ -77,3 +83,43 @@ def read(folder: Path) -> Result:
     Raises Refused for a folder that is none, or that another version wrote.
     """
     return Result(folder)
+
+
+def environment(
+    scenario: str | Scenario,
+    commanded: Sequence[int] | None = None,
+    *,
+    set: Sequence[str] = (),
+    robots: int | None = None,
+    faults: Sequence[str] = (),
+    step_s: float = 0.1,
+) -> TeamEnvironment:
+    """Return `scenario` as a PettingZoo `ParallelEnv` in virtual time, whose agents are the robots `commanded`.
+
+    `commanded` are ids, by default all; the agents' names are `robot1`, `robot2`, ... Actions are twists (m/s, rad/s),
+    held for `step_s` [s]; robots without one drive as always. `set`, `robots` and `faults` are those of `run`. Raises
+    Refused for a bad argument, and without the extra `learn`.
+    """
+    chosen = load(scenario, set, robots) if isinstance(scenario, str) else scenario
+    try:
+        from lfa.deploy.learn.team_environment import TeamEnvironment
+    except ModuleNotFoundError as error:
+        raise Refused(f"an environment needs {error.name}: install with: pip install 'lfa[learn]'") from None
+    ids = chosen.mission.robots if commanded is None else tuple(commanded)
+    return TeamEnvironment(chosen, ids, parse_all(chosen.mission, chosen.faults, faults), step_s)
+
+
+def robot_environment(
+    scenario: str | Scenario,
+    robot: int,
+    *,
+    set: Sequence[str] = (),
+    robots: int | None = None,
+    faults: Sequence[str] = (),
+    step_s: float = 0.1,
+) -> RobotEnvironment:
+    """Return `scenario` as a Gymnasium `Env` of the one robot `robot`; else as `environment`."""
+    team = environment(scenario, (robot,), set=set, robots=robots, faults=faults, step_s=step_s)
+    from lfa.deploy.learn.robot_environment import RobotEnvironment
+
+    return RobotEnvironment(team)

@@ -128,10 +128,12 @@ class SimulatedRun:
         record: Callable[[float, str, Message], None],
         journals: Path | None,
         drivers: Sequence[Node] = (),
+        make_agent: Callable[[int, int, str, int], Agent] = Agent,
     ) -> None:
         """Start the team. `journals` is the folder of the journals; None: there are none, and the run says nothing
-        about its progress.
+        about its progress. `make_agent` makes each agent, from the arguments of `Agent`.
         """
+        self._make_agent = make_agent
         self._scenario = drawn
         self._journals: dict[str, Journal] = {}
         self._journal_folder = journals
@@ -166,6 +168,11 @@ class SimulatedRun:
     @property
     def leader(self) -> int | None:
         return self._termination.leader
+
+    @property
+    def present(self) -> frozenset[str]:
+        """Names of the processes that run."""
+        return frozenset(self._simulator.names)
 
     @property
     def radio(self) -> Radio:
@@ -298,7 +305,7 @@ class SimulatedRun:
 
     def _agent(self, robot_id: int) -> Agent:
         incarnation = self._next_incarnation(robot_name(robot_id))
-        return Agent(robot_id, incarnation, FLEET, incarnation)
+        return self._make_agent(robot_id, incarnation, FLEET, incarnation)
 
     def _next_incarnation(self, name: str) -> int:
         self._incarnations[name] = self._incarnations.get(name, 0) + 1

@@ -27,6 +27,7 @@ SHOWN: dict[str, tuple[str, ...]] = {
     "08_formation_change": (r"asks for a column", r"robot 3: its slot moves until", r"path\.png"),
     "09_own_generator":    (r"seed 1: goal_reached past posts at \(3, \S+\), \(6, \S+\)", r"seed 2: goal_reached"),
     "10_own_sensor":       (r"law +goal_reached, last reading .*: \(12\.\d+, {'lux': \S+}\)", r"careful +goal"),
+    "11_learn":            (r"gains 0\.00, 0\.00: -9\.", r"best: .* with -0\.9"),
 }  # fmt: skip
 
 
