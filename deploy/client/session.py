@@ -40,12 +40,13 @@ class FleetAddress(Struct, frozen=True):
 
 def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> FleetAddress:
     """Return the address of a fleet that runs here, or of any given by name, router and keys. Raises Refused."""
-    running = agents()
-    if connect is None and running and (fleet is None or any(agent.fleet == fleet for agent in running)):
+    running = [agent for agent in agents() if connect in (None, agent.endpoint)]
+    if running and (fleet is None or any(agent.fleet == fleet for agent in running)):
         team = one_fleet(running, fleet)
         return FleetAddress(team[0].fleet, team[0].endpoint, tuple(team), keys or team[0].keys)
     if fleet is None:
-        raise Refused("no agent of yours runs on this machine: say --fleet NAME, and --connect for another router")
+        here = "runs on this machine" if connect is None else f"is at the router {connect}"
+        raise Refused(f"no agent of yours {here}: say --fleet NAME, and --connect for another router")
     return FleetAddress(fleet, connect or default_endpoint(), (), keys)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
@@ -30,7 +31,7 @@ def command(
     listen: Annotated[
         list[str] | None,
         typer.Option(
-            help=f"Endpoint to listen at; repeatable. Default: {default_endpoint()} and {DEFAULT_TCP}"
+            help=f"Endpoint to listen at; repeatable. Default: {default_endpoint()} and, if it is free, {DEFAULT_TCP}"
             f" ({DEFAULT_TLS} with --secure)."
         ),
     ] = None,
@@ -53,8 +54,7 @@ def command(
     if secure and keys is None:
         raise Refused("--secure: needs --keys, a folder that lfa keys init made (DIR/hosts/NAME)")
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDING | {signal.SIGHUP})  # before Zenoh starts threads, which inherit it
-    endpoints = listen or [default_endpoint(), DEFAULT_TLS if secure else DEFAULT_TCP]
-
+    endpoints = listen or default_endpoints(DEFAULT_TLS if secure else DEFAULT_TCP)
     close = open_router(endpoints, connect or (), LINK_LEASES_MS[link], _known(keys), secure)
     write_line(f"{LISTENS} {' '.join(endpoints)}{', secure' if secure else ''}: ready", sys.stdout)
     notify = Notify(os.environ.get("NOTIFY_SOCKET", ""))
@@ -75,6 +75,22 @@ def command(
     by_hand = came == signal.SIGINT
     write_line(f"router ended, by {'Ctrl-C' if by_hand else came.name}", sys.stdout)
     return 130 if by_hand else 0
+
+
+def default_endpoints(shared: str) -> list[str]:
+    """Return where a router without `--listen` listens: at this user's socket and, if it is free, at `shared`.
+
+    The port of `shared` is one for all users of a machine: a router of another user does not stop this one.
+    """
+    host, _, port = shared.partition("/")[2].rpartition(":")
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, int(port)))
+        except OSError:
+            write_line(f"{shared} is taken, as by another user's router: goes on without it", sys.stderr)
+            return [default_endpoint()]
+    return [default_endpoint(), shared]
 
 
 def _signal_within(timeout_s: float) -> signal.Signals | None:

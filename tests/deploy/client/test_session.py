@@ -1,0 +1,62 @@
+"""Which fleet a command means: one that it names by fleet or router, whatever else runs on the machine."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from lfa.deploy.client import session
+from lfa.deploy.client.discovery import Running
+from lfa.deploy.client.session import find
+from lfa.deploy.fleet.host.router import default_endpoints
+from lfa.deploy.process.identity import Identity
+from lfa.protocol.errors import Refused
+from lfa.protocol.transport.zenoh_config import default_endpoint
+
+MINE, OTHER, THIRD = "unixsock-stream//tmp/mine", "tcp/127.0.0.1:7999", "tcp/far:7450"
+
+
+@pytest.fixture
+def two_fleets(monkeypatch: pytest.MonkeyPatch) -> None:
+    running = [
+        Running(robot, fleet, endpoint, Identity(robot, 1, 0, ()))
+        for robot, fleet, endpoint in ((1, "mine", MINE), (2, "mine", MINE), (1, "other", OTHER))
+    ]
+    monkeypatch.setattr(session, "agents", lambda: running)
+
+
+@pytest.mark.parametrize(
+    ("fleet", "connect", "name", "endpoint", "robots"),
+    [
+        ("mine", None, "mine", MINE, 2),
+        (None, MINE, "mine", MINE, 2),
+        (None, OTHER, "other", OTHER, 1),
+        ("other", OTHER, "other", OTHER, 1),
+        ("far", THIRD, "far", THIRD, 0),
+        ("far", None, "far", default_endpoint(), 0),
+    ],
+)
+def test_another_fleet_does_not_stop_a_command_that_names_its_own(
+    two_fleets: None, fleet: str | None, connect: str | None, name: str, endpoint: str, robots: int
+) -> None:
+    found = find(fleet, connect)
+    assert (found.name, found.endpoint, len(found.team)) == (name, endpoint, robots)
+
+
+@pytest.mark.parametrize(
+    ("connect", "says"), [(None, "several fleets run here"), (THIRD, "no agent of yours is at the router tcp/far")]
+)
+def test_a_command_that_names_no_fleet_says_what_to_name(two_fleets: None, connect: str | None, says: str) -> None:
+    with pytest.raises(Refused, match=says):
+        find(None, connect)
+
+
+def test_the_router_of_another_user_does_not_stop_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as theirs:
+        theirs.bind(("127.0.0.1", 0))
+        theirs.listen()
+        shared = f"tcp/127.0.0.1:{theirs.getsockname()[1]}"
+        assert default_endpoints(shared) == [default_endpoint()]
+        assert f"{shared} is taken" in capsys.readouterr().err
+    assert default_endpoints(shared) == [default_endpoint(), shared]
