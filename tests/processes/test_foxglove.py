@@ -26,13 +26,14 @@ def test_foxgloves_client_sees_the_fleet_and_hands_over(tmp_path: Path) -> None:
             line = server.stdout.readline()
             address = re.search(r"ws://\S+", line)
             assert address is not None, line + server.communicate()[1]
-            client = start("foxglove", "foxglove_live.js", address[0], "5000", "/lfa/handover", home=tmp_path)
-            told = json.loads(answer(client))
             live = {"/tf", "/lfa/formation", "/diagnostics", "/lfa/leader", "/tf_static", "/robot1/trail"}
-            assert live | {f"/robot{n}/{topic}" for n in (1, 2, 3) for topic in ("odom", "scan", "pose")} <= set(
-                told["heard"]
-            )
-            assert "robot1/odom" in told["frames"]
+            live |= {f"/robot{n}/{topic}" for n in (1, 2, 3) for topic in ("odom", "scan", "pose")}
+            frames = {f"robot{n}/{frame}" for n in (1, 2, 3) for frame in ("odom", "base_link")}
+            wanted = json.dumps({"topics": sorted(live), "frames": sorted(frames)})
+            client = start("foxglove", "foxglove_live.js", address[0], "/lfa/handover", wanted, home=tmp_path)
+            told = json.loads(answer(client))
+            assert live <= set(told["heard"])
+            assert frames <= set(told["frames"])
             assert {"/lfa/stop", "/lfa/resume", "/lfa/handover", "/lfa/formation/column"} <= set(told["services"])
             assert told["called"]["success"], told["called"]
             assert re.fullmatch(r"robot [23] leads", told["called"]["message"])  # a loaded machine may change it before

@@ -1,17 +1,19 @@
-// Foxglove's own client on a live server: subscribes to all channels, decodes every message, presses a button.
-// foxglove_live.js URL MILLISECONDS SERVICE; prints JSON. The libraries are found through NODE_PATH.
+// Foxglove's own client on a live server: subscribes to all channels, decodes every message, and presses a button as
+// soon as it has heard the wanted topics and frames. foxglove_live.js URL SERVICE '{"topics": [], "frames": []}' prints
+// JSON when the button is answered, or what there is after a minute. The libraries are found through NODE_PATH.
 const { parse } = require("@foxglove/rosmsg");
 const { MessageReader, MessageWriter } = require("@foxglove/rosmsg2-serialization");
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const { WebSocket } = require("ws");
 
-const [url, wait, service] = process.argv.slice(2);
+const PATIENCE_MS = 60000;
+const [url, service, wanted] = process.argv.slice(2);
+const { topics, frames } = JSON.parse(wanted);
 const client = new FoxgloveClient({ ws: new WebSocket(url, ["foxglove.sdk.v1"]) });
 const channels = new Map();
 const heard = {};
-const last = {};
+const placed = new Set();
 const services = {};
-let called = null;
 
 client.on("advertise", (advertised) => {
   for (const one of advertised) {
@@ -21,7 +23,10 @@ client.on("advertise", (advertised) => {
 });
 client.on("message", ({ subscriptionId, data }) => {
   const { topic, reader } = channels.get(subscriptionId);
-  last[topic] = reader.readMessage(data);
+  const message = reader.readMessage(data);
+  if (topic === "/tf") {
+    message.transforms.forEach((one) => placed.add(one.child_frame_id)); // of the robots with news
+  }
   heard[topic] = (heard[topic] ?? 0) + 1;
 });
 client.on("advertiseServices", (offered) => {
@@ -30,18 +35,21 @@ client.on("advertiseServices", (offered) => {
   }
 });
 client.on("serviceCallResponse", ({ data }) => {
-  called = new MessageReader(parse("bool success\nstring message", { ros2: true })).readMessage(data);
+  finish(new MessageReader(parse("bool success\nstring message", { ros2: true })).readMessage(data));
 });
-setTimeout(() => {
-  if (services[service] !== undefined) {
-    const writer = new MessageWriter(parse("uint8 structure_needs_at_least_one_member", { ros2: true }));
-    const data = new DataView(writer.writeMessage({ structure_needs_at_least_one_member: 0 }).buffer);
-    client.sendServiceCallRequest({ serviceId: services[service].id, callId: 1, encoding: "cdr", data });
+const asking = setInterval(() => {
+  const complete = topics.every((one) => one in heard) && frames.every((one) => placed.has(one));
+  if (!complete || services[service] === undefined) {
+    return;
   }
-}, Number(wait));
-setTimeout(() => {
-  const big = (_, value) => (typeof value === "bigint" ? Number(value) : value);
-  const frames = (last["/tf"]?.transforms ?? []).map((one) => one.child_frame_id);
-  console.log(JSON.stringify({ heard, frames, services: Object.keys(services), called }, big));
+  clearInterval(asking);
+  const writer = new MessageWriter(parse("uint8 structure_needs_at_least_one_member", { ros2: true }));
+  const data = new DataView(writer.writeMessage({ structure_needs_at_least_one_member: 0 }).buffer);
+  client.sendServiceCallRequest({ serviceId: services[service].id, callId: 1, encoding: "cdr", data });
+}, 100);
+setTimeout(() => finish(null), PATIENCE_MS);
+
+function finish(called) {
+  console.log(JSON.stringify({ heard, frames: [...placed], services: Object.keys(services), called }));
   process.exit(0);
-}, Number(wait) + 9000);
+}
