@@ -22,7 +22,7 @@ from socket import socket
 import msgspec
 from msgspec.structs import replace
 
-from lfa.deploy.bench.harness.child_process import cpu_s, pause, started
+from lfa.deploy.bench.harness.child_process import LFA, cpu_s, pause, started
 from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Team, endless
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen
@@ -41,7 +41,6 @@ WATCHED_S = 20.0
 RUN_S = 120.0
 STARTS = 9
 MB = 1e6
-LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
 def run(as_json: bool) -> int:

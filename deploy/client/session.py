@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -69,6 +69,19 @@ class Subscriber:
     def dropped(self) -> int:
         return self._inbox.dropped
 
+    def follow(self, topics: frozenset[str], pulled: frozenset[str] = frozenset()) -> None:
+        """Subscribe to exactly the key expressions `topics` (as `*/pose`); those of `pulled` are read by `pull`."""
+        tokens = alive_key(self.fleet.name, "*", "*")
+        self.bus.follow(frozenset(map(self._key, topics)) | {tokens}, frozenset(map(self._key, pulled)))
+
+    def pull(self, topics: Iterable[str]) -> None:
+        """Let `take` return what came on the pulled key expressions `topics` since the last call."""
+        for topic in topics:
+            self.bus.pull(self._key(topic))
+
+    def _key(self, topic: str) -> str:
+        return f"lfa/{self.fleet.name}/{topic}"
+
     def wait(self, timeout_s: float) -> None:
         self._wake.wait(timeout_s)
 
@@ -126,8 +139,9 @@ def listen(
     except RouterAbsent:
         raise Refused(f"no router answers at {fleet.endpoint}: must be the router of fleet {fleet.name}") from None
     try:
-        bus.follow(frozenset(f"lfa/{fleet.name}/{topic}" for topic in topics) | {alive_key(fleet.name, "*", "*")})
-        yield Subscriber(fleet, bus, inbox, wake)
+        subscriber = Subscriber(fleet, bus, inbox, wake)
+        subscriber.follow(topics)
+        yield subscriber
     finally:
         bus.close()
 

@@ -20,7 +20,8 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_reader import look_into, recorded
-from lfa.deploy.ros.mapping import NS, FleetMapping, RosMessage
+from lfa.deploy.ros.cdr import NS
+from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.topics import SOURCES, RosTopic, fleet_topics, robot_topics
 from lfa.deploy.ros.types import to_cdr, typestore
 from lfa.deploy.ros.wire import Qos

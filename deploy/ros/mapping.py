@@ -7,12 +7,14 @@ clock. A message is only built when `heard(topic)` is True.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lfa.deploy.client.team_status import told
 from lfa.deploy.ros import markers, messages
+from lfa.deploy.ros.cdr import NS, CdrMessage
 from lfa.deploy.ros.explored import ExploredMap
 from lfa.deploy.ros.markers import ObstacleMark, RobotMark
+from lfa.deploy.ros.messages import Transform
 from lfa.deploy.ros.robot_view import STALE_NS, RobotView
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.codec import Message
@@ -22,8 +24,11 @@ from lfa.protocol.messages.team import Event, MissionNote, ObstacleNote, PlanNot
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_id_of
 
-NS = messages.NS
-TF_NS, MARKERS_NS, SECOND_NS = NS // 50, NS // 5, NS
+CLOCK_NS, MARKERS_NS, SECOND_NS = NS // 50, NS // 5, NS
+TF_NS = NS // 50
+"""Time [ns] after which transforms wait no longer for those of other robots."""
+TF_APART_NS = TF_NS * 3 // 4
+"""Least time [ns] between two messages of transforms, should odometry come faster than 50 Hz."""
 OBSTACLES_MAX = 64
 ROBOTS_MAX = 256
 WARNINGS = frozenset({"contact", "stuck", "slowed", "late", "refused", "input", "left_out", "fault"})
@@ -35,7 +40,7 @@ class RosMessage(NamedTuple):
 
     topic: str
     stamp_ns: int
-    message: Any
+    message: CdrMessage
 
 
 class FleetMapping:
@@ -56,6 +61,9 @@ class FleetMapping:
         self._leader: int | None = None
         self._static_changed = False
         self._described: set[int] = set()
+        self._tf_at = -TF_NS
+        self._tf_waits_since: int | None = None
+        """Time [ns] since which some robot's odometry is new."""
 
     @property
     def robots(self) -> tuple[int, ...]:
@@ -110,10 +118,10 @@ class FleetMapping:
     def tick(self, now_ns: int) -> list[RosMessage]:
         """Return what is due at `now_ns`: transforms, markers, trails, diagnostics, the leader, the map, the clock."""
         sent: list[RosMessage] = []
-        if self._every("tf", TF_NS, now_ns):
+        if self._transforms_due(now_ns):
             sent += self._transforms(now_ns)
-            if self._sim_time:
-                sent.append(RosMessage("/clock", now_ns, messages.clock(now_ns)))
+        if self._sim_time and self._every("clock", CLOCK_NS, now_ns) and self._heard("/clock"):
+            sent.append(RosMessage("/clock", now_ns, messages.clock(now_ns)))
         if self._every("markers", MARKERS_NS, now_ns):
             sent += self._leading(now_ns)
             if self._heard("/lfa/formation"):
@@ -125,7 +133,7 @@ class FleetMapping:
     # --- per message ------------------------------------------------------------------------------------------------
 
     def _sensors(self, stamp_ns: int, view: RobotView, message: Sensors) -> list[RosMessage]:
-        view.sensors, view.tf_due = (stamp_ns, message), True
+        view.move(stamp_ns, message)
         topic = f"{view.namespace}/odom"
         if not self._heard(topic):
             return []
@@ -170,6 +178,18 @@ class FleetMapping:
 
     # --- by time ----------------------------------------------------------------------------------------------------
 
+    def _transforms_due(self, now_ns: int) -> bool:
+        """Return True as soon as every robot has new odometry, or once the first that has waited for TF_NS."""
+        moving = [view for view in self._robots.values() if view.moves(now_ns)]
+        if not any(view.tf_due for view in moving) or now_ns - self._tf_at < TF_APART_NS:
+            return False
+        if self._tf_waits_since is None:
+            self._tf_waits_since = now_ns
+        if not all(view.tf_due for view in moving) and now_ns - self._tf_waits_since < TF_NS:
+            return False
+        self._tf_at, self._tf_waits_since = now_ns, None
+        return True
+
     def _transforms(self, now_ns: int) -> list[RosMessage]:
         """Return the transforms of all robots whose odometry is new, in one message or one per robot."""
         sent, of_all = [], []
@@ -179,9 +199,9 @@ class FleetMapping:
                 continue
             view.tf_due = False
             stamp_ns, sensors = view.sensors
-            transforms = [messages.transform(stamp_ns, view.odom, view.base, sensors.pose_odom)]
+            transforms = [Transform(stamp_ns, view.odom, view.base, sensors.pose_odom)]
             if view.map_odom is not None:
-                transforms.append(messages.transform(stamp_ns, "map", view.odom, view.map_odom))
+                transforms.append(Transform(stamp_ns, "map", view.odom, view.map_odom))
             if self._tf_per_robot:
                 sent.append(RosMessage(topic, now_ns, messages.tf(transforms)))
             of_all += transforms
@@ -207,7 +227,7 @@ class FleetMapping:
             sent.append(RosMessage(f"/robot{leader}/plan", now_ns, messages.path(now_ns, route)))
         return sent
 
-    def _formation(self, now_ns: int) -> Any:
+    def _formation(self, now_ns: int) -> CdrMessage:
         marks = []
         for robot, view in self._robots.items():
             if view.pose is None or now_ns - view.pose[0] > STALE_NS:
@@ -229,9 +249,9 @@ class FleetMapping:
             return []
         self._described |= new
         radius_m = self._mission.radius_m
-        sent, statics = [], [messages.transform(now_ns, "world", "map", Pose2D())]
+        sent, statics = [], [Transform(now_ns, "world", "map", Pose2D())]
         for robot, view in sorted(self._robots.items()):
-            static = messages.transform(now_ns, view.base, view.laser, Pose2D())
+            static = Transform(now_ns, view.base, view.laser, Pose2D())
             urdf = messages.text(messages.robot_description(view.base, radius_m))
             if robot in new:
                 sent.append(RosMessage(f"{view.namespace}/robot_description", now_ns, urdf))
@@ -247,10 +267,10 @@ class FleetMapping:
                 view.trail_changed = False
                 sent.append(RosMessage(f"{view.namespace}/trail", now_ns, messages.path_of(now_ns, list(view.trail))))
         if self._map.changed and (grid := self._map.grid()) is not None:
-            sent.append(RosMessage("/map", now_ns, messages.occupancy_grid(now_ns, *grid)))
+            sent.append(RosMessage("/map", now_ns, messages.occupancy_grid(now_ns, grid)))
         if self._heard("/diagnostics"):
             statuses = [
-                messages.diagnostic_status(f"robot{robot}", view.status, view.error_m(now_ns))
+                messages.diagnosis(f"robot{robot}", view.status, view.error_m(now_ns))
                 for robot, view in sorted(self._robots.items())
                 if view.status is not None
             ]

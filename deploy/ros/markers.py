@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
 from msgspec import Struct
 
-from lfa.deploy.ros import messages
-from lfa.deploy.ros.types import kind
+from lfa.deploy.ros.cdr import CdrMessage, CdrWriter
+from lfa.deploy.ros.messages import placed, shown_id
 from lfa.protocol.geometry import Pose2D
 
 LIFETIME_S = 1
@@ -25,6 +24,9 @@ OBSTACLE: Colour = (0.78, 0.24, 0.16, 0.8)
 NAME: Colour = (1.0, 1.0, 1.0, 1.0)
 HEIGHT_M = 0.1
 _ARROW, _CYLINDER, _LINES, _TEXT = 0, 3, 5, 9
+_UNLOCKED, _NO_MATERIALS = 0, 0
+_NO_TEXTURE = CdrWriter().int32(0).string("").time(0).string("", "").int32(0, 0).bytes()
+"""No colours, name, image and coordinates of a texture."""
 
 
 class RobotMark(Struct, frozen=True):
@@ -45,63 +47,52 @@ class ObstacleMark(Struct, frozen=True):
     radius_m: float
 
 
-def formation(stamp_ns: int, robots: list[RobotMark], obstacles: list[ObstacleMark]) -> Any:
+def formation(stamp_ns: int, robots: list[RobotMark], obstacles: list[ObstacleMark]) -> CdrMessage:
     """Return visualization_msgs/MarkerArray in `map`; ids are robots' ids, so that a marker replaces its last one."""
     places = {one.robot: one.at for one in robots}
     marks = []
     for one in robots:
         colour = ROLES.get(one.role, ROLES["waiting"])
-        size = messages.vector(0.4, 0.08, 0.08)
         name = f"{one.robot} {one.role}" if one.role != "follower" else str(one.robot)
-        marks.append(_marker(stamp_ns, "robots", one.robot, _ARROW, one.at, size, colour))
-        marks.append(_marker(stamp_ns, "names", one.robot, _TEXT, one.at, messages.vector(0, 0, 0.2), NAME, text=name))
+        marks.append(_Marker("robots", one.robot, _ARROW, one.at, (0.4, 0.08, 0.08), colour))
+        marks.append(_Marker("names", one.robot, _TEXT, one.at, (0.0, 0.0, 0.2), NAME, text=name))
         if one.slot is not None:
-            flat = messages.vector(0.2, 0.2, 0.02)
-            marks.append(_marker(stamp_ns, "slots", one.robot, _CYLINDER, one.slot, flat, SLOT))
+            marks.append(_Marker("slots", one.robot, _CYLINDER, one.slot, (0.2, 0.2, 0.02), SLOT))
         ahead = places.get(one.predecessor) if one.predecessor is not None else None
         if ahead is not None:
-            line = [messages.point(one.at.x, one.at.y), messages.point(ahead.x, ahead.y)]
-            thin = messages.vector(0.02, 0.0)
-            marks.append(_marker(stamp_ns, "predecessors", one.robot, _LINES, Pose2D(), thin, LINE, points=line))
+            line = ((one.at.x, one.at.y), (ahead.x, ahead.y))
+            marks.append(_Marker("predecessors", one.robot, _LINES, Pose2D(), (0.02, 0.0, 0.0), LINE, points=line))
     for n, body in enumerate(obstacles):
-        size = messages.vector(2.0 * body.radius_m, 2.0 * body.radius_m, HEIGHT_M)
-        marks.append(_marker(stamp_ns, "obstacles", n, _CYLINDER, Pose2D(body.x, body.y), size, OBSTACLE))
-    return kind("visualization_msgs/msg/MarkerArray")(markers=marks)
+        size = (2.0 * body.radius_m, 2.0 * body.radius_m, HEIGHT_M)
+        marks.append(_Marker("obstacles", n, _CYLINDER, Pose2D(body.x, body.y), size, OBSTACLE))
+    out = CdrWriter().int32(len(marks))
+    for mark in marks:
+        mark.write(out, stamp_ns)
+    return out.message("visualization_msgs/msg/MarkerArray")
 
 
-def _marker(
-    stamp_ns: int,
-    namespace: str,
-    number: int,
-    shape: int,
-    at: Pose2D,
-    scale: Any,
-    colour: Colour,
-    *,
-    points: list[Any] | None = None,
-    text: str = "",
-) -> Any:
-    nothing = np.empty(0, dtype=np.uint8)
-    place = messages.pose(at)
-    place.position.z = 3.0 * HEIGHT_M if text else HEIGHT_M
-    return kind("visualization_msgs/msg/Marker")(
-        header=messages.header(stamp_ns, "map"),
-        ns=namespace,
-        id=number,
-        type=shape,
-        action=0,
-        pose=place,
-        scale=scale,
-        color=kind("std_msgs/msg/ColorRGBA")(*colour),
-        lifetime=kind("builtin_interfaces/msg/Duration")(LIFETIME_S, 0),
-        frame_locked=False,
-        points=points or [],
-        colors=[],
-        texture_resource="",
-        texture=kind("sensor_msgs/msg/CompressedImage")(messages.header(0, ""), "", nothing),
-        uv_coordinates=[],
-        text=text,
-        mesh_resource="",
-        mesh_file=kind("visualization_msgs/msg/MeshFile")("", nothing),
-        mesh_use_embedded_materials=False,
-    )
+class _Marker(NamedTuple):
+    """Marker in `map`: namespace and id, shape, pose, size [m], colour; the ends of its lines [m], its text."""
+
+    namespace: str
+    number: int
+    shape: int
+    at: Pose2D
+    size: tuple[float, float, float]
+    colour: Colour
+    points: tuple[tuple[float, float], ...] = ()
+    text: str = ""
+
+    def write(self, out: CdrWriter, stamp_ns: int) -> None:
+        """Write the fields of visualization_msgs/Marker in their order; it has neither texture nor mesh."""
+        add, height = 0, 3.0 * HEIGHT_M if self.text else HEIGHT_M
+        x, y, *turn = placed(self.at)
+        out.time(stamp_ns).string("map", self.namespace).int32(shown_id(self.number), self.shape, add)
+        out.float64(x, y, height, 0.0, 0.0, *turn, *self.size)
+        out.float32(*self.colour).int32(LIFETIME_S, 0).int8(_UNLOCKED)
+        out.int32(len(self.points))
+        for end in self.points:
+            out.float64(*end, 0.0)
+        out.align(4).octets(_NO_TEXTURE)
+        no_mesh_bytes = 0
+        out.string(self.text, "", "").int32(no_mesh_bytes).int8(_NO_MATERIALS)

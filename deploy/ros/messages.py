@@ -1,167 +1,183 @@
-"""Builders of ROS messages from values of the fleet: units as in ROS (m, rad, s), times in UNIX nanoseconds. Pure."""
+"""Builders of ROS messages, encoded, from values of the fleet: units as in ROS (m, rad, s), times in UNIX ns. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from math import cos, sin
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
-
-from lfa.deploy.ros.types import kind
+from lfa.deploy.ros.cdr import CDR_LITTLE_ENDIAN, CdrMessage, CdrWriter, Form, floats
+from lfa.deploy.ros.explored import MapCells
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.team import Level, Status
 
-NS = 1_000_000_000
 UNKNOWN_VARIANCE = 1e6
 """Variance of height, roll and pitch: a planar robot does not measure them."""
 DRIFT_SHARE = 0.01
 """Standard deviation of wheel odometry as a share of the travelled distance [m/m], and of its yaw [rad/m]."""
 LEAST_VARIANCE = 1e-4
 TWIST_VARIANCE = 1e-3
+SCAN_S = 0.1
+"""Time [s] from one scan to the next."""
 LEVELS = {Level.OK: 0, Level.WARN: 1, Level.ERROR: 2, Level.STALE: 3}
 LOG_LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40}
+_FORMS_MAX = 2048
+"""Number of layouts kept: of eight messages and transforms for each of 256 robots."""
+
+# Numbers of a message as `struct` packs them; `x` is a zero byte.
+_VECTOR_X, _VECTOR_Z, _PLACE, _TURN = "d16x", "16xd", "2d8x", "16x2d"
+_COVARIANCE = "48x".join("d" * 6)
+_POSE = _PLACE + _TURN
+_TWIST = _VECTOR_X + _VECTOR_Z
+_UNKNOWN = (UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE)
+_TWIST_COVARIANCE = (TWIST_VARIANCE, TWIST_VARIANCE, *_UNKNOWN, TWIST_VARIANCE)
 
 
-def time_of(stamp_ns: int) -> Any:
-    return kind("builtin_interfaces/msg/Time")(sec=stamp_ns // NS, nanosec=stamp_ns % NS)
+@lru_cache(maxsize=_FORMS_MAX)
+def _form(numbers: str, *strings: str, align: int = 8, at: int = 0) -> Form:
+    return Form(strings, numbers, align=align, at=at)
 
 
-def header(stamp_ns: int, frame: str) -> Any:
-    return kind("std_msgs/msg/Header")(stamp=time_of(stamp_ns), frame_id=frame)
+def placed(at: Pose2D) -> tuple[float, float, float, float]:
+    """Return x, y [m] of a pose, and z, w of its rotation as a quaternion: what is not zero of it in ROS."""
+    return at.x, at.y, sin(0.5 * at.theta), cos(0.5 * at.theta)
 
 
-def point(x: float, y: float, z: float = 0.0) -> Any:
-    return kind("geometry_msgs/msg/Point")(x=x, y=y, z=z)
+def pose_stamped(stamp_ns: int, at: Pose2D) -> CdrMessage:
+    """Return geometry_msgs/PoseStamped in `map`."""
+    return CdrMessage("geometry_msgs/msg/PoseStamped", CDR_LITTLE_ENDIAN + waypoint(stamp_ns, at))
 
 
-def vector(x: float, y: float, z: float = 0.0) -> Any:
-    return kind("geometry_msgs/msg/Vector3")(x=x, y=y, z=z)
+def twist(of: Twist) -> CdrMessage:
+    numbers = (of.linear_x, 0.0, 0.0, 0.0, 0.0, of.angular_z)
+    return CdrWriter().float64(*numbers).message("geometry_msgs/msg/Twist")
 
 
-def quaternion(yaw: float) -> Any:
-    return kind("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=sin(0.5 * yaw), w=cos(0.5 * yaw))
+def twist_stamped(stamp_ns: int, of: Twist, frame: str) -> CdrMessage:
+    packed = _form(_TWIST, frame).pack(stamp_ns, of.linear_x, of.angular_z)
+    return CdrMessage("geometry_msgs/msg/TwistStamped", CDR_LITTLE_ENDIAN + packed)
 
 
-def pose(at: Pose2D) -> Any:
-    return kind("geometry_msgs/msg/Pose")(position=point(at.x, at.y), orientation=quaternion(at.theta))
-
-
-def pose_stamped(stamp_ns: int, at: Pose2D) -> Any:
-    return kind("geometry_msgs/msg/PoseStamped")(header=header(stamp_ns, "map"), pose=pose(at))
-
-
-def twist(of: Twist) -> Any:
-    return kind("geometry_msgs/msg/Twist")(linear=vector(of.linear_x, 0.0), angular=vector(0.0, 0.0, of.angular_z))
-
-
-def twist_stamped(stamp_ns: int, of: Twist, frame: str) -> Any:
-    return kind("geometry_msgs/msg/TwistStamped")(header=header(stamp_ns, frame), twist=twist(of))
-
-
-def odometry(stamp_ns: int, at: Pose2D, of: Twist, odometer_m: float, odom: str, base: str) -> Any:
+def odometry(stamp_ns: int, at: Pose2D, of: Twist, odometer_m: float, odom: str, base: str) -> CdrMessage:
     """Return nav_msgs/Odometry: pose in `odom`, twist in `base`, covariances of a planar robot that drifts."""
     drift = LEAST_VARIANCE + (DRIFT_SHARE * odometer_m) ** 2
-    of_pose = (drift, drift, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, drift)
-    of_twist = (TWIST_VARIANCE, TWIST_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, TWIST_VARIANCE)
-    return kind("nav_msgs/msg/Odometry")(
-        header=header(stamp_ns, odom),
-        child_frame_id=base,
-        pose=kind("geometry_msgs/msg/PoseWithCovariance")(pose=pose(at), covariance=_diagonal(of_pose)),
-        twist=kind("geometry_msgs/msg/TwistWithCovariance")(twist=twist(of), covariance=_diagonal(of_twist)),
-    )
+    form = _form(_POSE + _COVARIANCE + _TWIST + _COVARIANCE, odom, base)
+    of_twist = of.linear_x, of.angular_z
+    packed = form.pack(stamp_ns, *placed(at), drift, drift, *_UNKNOWN, drift, *of_twist, *_TWIST_COVARIANCE)
+    return CdrMessage("nav_msgs/msg/Odometry", CDR_LITTLE_ENDIAN + packed)
 
 
-def laser_scan(stamp_ns: int, scan: LaserScan, frame: str) -> Any:
+def laser_scan(stamp_ns: int, scan: LaserScan, frame: str) -> CdrMessage:
     """Return sensor_msgs/LaserScan; +inf, -inf and nan keep their meaning (REP-117)."""
-    return kind("sensor_msgs/msg/LaserScan")(
-        header=header(stamp_ns, frame),
-        angle_min=scan.angle_min,
-        angle_max=scan.angle_min + scan.angle_increment * max(0, len(scan.ranges_m) - 1),
-        angle_increment=scan.angle_increment,
-        time_increment=0.0,
-        scan_time=0.1,
-        range_min=scan.range_min_m,
-        range_max=scan.range_max_m,
-        ranges=np.array(scan.ranges_m, dtype=np.float32),
-        intensities=np.empty(0, dtype=np.float32),
-    )
+    count = len(scan.ranges_m)
+    angle_max = scan.angle_min + scan.angle_increment * max(0, count - 1)
+    span = scan.angle_min, angle_max, scan.angle_increment, 0.0, SCAN_S, scan.range_min_m, scan.range_max_m
+    head = _form("7fI", frame, align=4).pack(stamp_ns, *span, count)
+    no_intensities = bytes(4)
+    packed = head + floats(scan.ranges_m) + no_intensities
+    return CdrMessage("sensor_msgs/msg/LaserScan", CDR_LITTLE_ENDIAN + packed)
 
 
-def transform(stamp_ns: int, parent: str, child: str, at: Pose2D) -> Any:
-    return kind("geometry_msgs/msg/TransformStamped")(
-        header=header(stamp_ns, parent),
-        child_frame_id=child,
-        transform=kind("geometry_msgs/msg/Transform")(translation=vector(at.x, at.y), rotation=quaternion(at.theta)),
-    )
+class Transform(NamedTuple):
+    """Pose `at` of frame `child` in frame `parent`."""
+
+    stamp_ns: int
+    parent: str
+    child: str
+    at: Pose2D
 
 
-def tf(transforms: list[Any]) -> Any:
-    return kind("tf2_msgs/msg/TFMessage")(transforms=transforms)
+def tf(transforms: Sequence[Transform]) -> CdrMessage:
+    parts = [CDR_LITTLE_ENDIAN, len(transforms).to_bytes(4, "little")]
+    at = 4  # behind the count; each transform ends at a multiple of eight
+    for one in transforms:
+        parts.append(_form(_POSE, one.parent, one.child, at=at).pack(one.stamp_ns, *placed(one.at)))
+        at = 0
+    return CdrMessage("tf2_msgs/msg/TFMessage", b"".join(parts))
 
 
-def path(stamp_ns: int, poses: Iterable[Pose2D]) -> Any:
+def waypoint(stamp_ns: int, at: Pose2D) -> bytes:
+    """Return one pose in `map` with a stamp of its own, as a part of a path."""
+    return _form(_POSE, "map").pack(stamp_ns, *placed(at))
+
+
+def path(stamp_ns: int, poses: Iterable[Pose2D]) -> CdrMessage:
     """Return nav_msgs/Path in `map` of poses that are meant for now."""
-    return path_of(stamp_ns, [pose_stamped(stamp_ns, one) for one in poses])
+    return path_of(stamp_ns, [waypoint(stamp_ns, one) for one in poses])
 
 
-def path_of(stamp_ns: int, poses: list[Any]) -> Any:
-    """Return nav_msgs/Path in `map` of geometry_msgs/PoseStamped, each with a stamp of its own."""
-    return kind("nav_msgs/msg/Path")(header=header(stamp_ns, "map"), poses=poses)
+def path_of(stamp_ns: int, waypoints: Sequence[bytes]) -> CdrMessage:
+    """Return nav_msgs/Path in `map` of the parts that `waypoint` returned."""
+    out = CdrWriter().time(stamp_ns).string("map").int32(len(waypoints))
+    for one in waypoints[:1]:  # behind the count, its numbers lie four bytes later than those of all others
+        stamp_and_frame = len(one) - 7 * 8
+        out.octets(one[:stamp_and_frame]).align(8).octets(one[stamp_and_frame:])
+    return out.octets(b"".join(waypoints[1:])).message("nav_msgs/msg/Path")
 
 
-def occupancy_grid(stamp_ns: int, cell_m: float, corner: tuple[float, float], cells: Any) -> Any:
-    """Return nav_msgs/OccupancyGrid of int8 `cells`, row by row from the lower left `corner` [m] in `map`."""
-    rows, columns = cells.shape
-    return kind("nav_msgs/msg/OccupancyGrid")(
-        header=header(stamp_ns, "map"),
-        info=kind("nav_msgs/msg/MapMetaData")(
-            map_load_time=time_of(stamp_ns),
-            resolution=cell_m,
-            width=columns,
-            height=rows,
-            origin=pose(Pose2D(*corner)),
-        ),
-        data=cells.reshape(-1),
-    )
+def occupancy_grid(stamp_ns: int, grid: MapCells) -> CdrMessage:
+    """Return nav_msgs/OccupancyGrid in `map`."""
+    out = CdrWriter().time(stamp_ns).string("map").time(stamp_ns).float32(grid.cell_m).int32(grid.columns, grid.rows)
+    out.float64(*grid.corner, 0.0, 0.0, 0.0, 0.0, 1.0).int32(len(grid.cells)).octets(grid.cells)
+    return out.message("nav_msgs/msg/OccupancyGrid")
 
 
-def clock(stamp_ns: int) -> Any:
-    return kind("rosgraph_msgs/msg/Clock")(clock=time_of(stamp_ns))
+def clock(stamp_ns: int) -> CdrMessage:
+    return CdrWriter().time(stamp_ns).message("rosgraph_msgs/msg/Clock")
 
 
-def text(words: str) -> Any:
-    return kind("std_msgs/msg/String")(data=words)
+def text(words: str) -> CdrMessage:
+    return CdrWriter().string(words).message("std_msgs/msg/String")
 
 
-def number(value: int) -> Any:
-    return kind("std_msgs/msg/Int32")(data=value)
+def shown_id(robot: int) -> int:
+    """Return a robot's id as ROS messages carry it: its last 31 bits."""
+    return robot % 2**31
 
 
-def log(stamp_ns: int, level: str, name: str, words: str) -> Any:
-    return kind("rcl_interfaces/msg/Log")(
-        stamp=time_of(stamp_ns), level=LOG_LEVELS[level], name=name, msg=words, file="", function="", line=0
-    )
+def number(robot: int) -> CdrMessage:
+    """Return std_msgs/Int32 of a robot's id; 0 for none."""
+    return CdrWriter().int32(shown_id(robot)).message("std_msgs/msg/Int32")
 
 
-def diagnostics(stamp_ns: int, statuses: Sequence[Any]) -> Any:
-    return kind("diagnostic_msgs/msg/DiagnosticArray")(header=header(stamp_ns, ""), status=list(statuses))
+def log(stamp_ns: int, level: str, name: str, words: str) -> CdrMessage:
+    file, function, line = "", "", 0
+    out = CdrWriter().time(stamp_ns).int8(LOG_LEVELS[level]).string(name, words, file, function).int32(line)
+    return out.message("rcl_interfaces/msg/Log")
 
 
-def diagnostic_status(robot: str, status: Status, error_m: float | None) -> Any:
+def answer_of_trigger(success: bool, words: str) -> CdrMessage:
+    return CdrWriter().int8(success).string(words).message("std_srvs/msg/Trigger_Response")
+
+
+class RobotDiagnostics(NamedTuple):
+    """Diagnostics of one robot."""
+
+    robot: str
+    level: int
+    words: str
+    facts: dict[str, str]
+
+
+def diagnosis(robot: str, status: Status, error_m: float | None) -> RobotDiagnostics:
     """Return one robot's diagnostics: its level and sentence, its role and term, its error and all its counters."""
     facts = {"role": str(status.role), "term": str(status.term.n)}
     if error_m is not None:
         facts["error_m"] = f"{error_m:.4f}"
     facts |= {name: f"{value:g}" for name, value in status.counters.items()}
-    return kind("diagnostic_msgs/msg/DiagnosticStatus")(
-        level=LEVELS[status.level],
-        name=f"lfa: {robot}",
-        message=status.text,
-        hardware_id=robot,
-        values=[kind("diagnostic_msgs/msg/KeyValue")(key=name, value=value) for name, value in facts.items()],
-    )
+    return RobotDiagnostics(robot, LEVELS[status.level], status.text, facts)
+
+
+def diagnostics(stamp_ns: int, robots: Sequence[RobotDiagnostics]) -> CdrMessage:
+    no_frame = ""
+    out = CdrWriter().time(stamp_ns).string(no_frame).int32(len(robots))
+    for one in robots:
+        out.int8(one.level).string(f"lfa: {one.robot}", one.words, one.robot).int32(len(one.facts))
+        for name, value in one.facts.items():
+            out.string(name, value)
+    return out.message("diagnostic_msgs/msg/DiagnosticArray")
 
 
 def robot_description(base: str, radius_m: float) -> str:
@@ -177,9 +193,3 @@ def robot_description(base: str, radius_m: float) -> str:
   </link>
 </robot>
 """
-
-
-def _diagonal(values: Sequence[float]) -> Any:
-    covariance = np.zeros(36)
-    covariance[::7] = values
-    return covariance

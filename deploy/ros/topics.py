@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+
 from msgspec import Struct
 
 from lfa.deploy.ros.wire import DEFAULT, LATCHED, ROSOUT, SENSOR_DATA, Qos
@@ -25,7 +28,7 @@ ROBOT_TOPICS = (
     RosTopic("{ns}/odom",              "nav_msgs/msg/Odometry",              DEFAULT,     "sensors"),
     RosTopic("{ns}/scan",              "sensor_msgs/msg/LaserScan",          SENSOR_DATA, "scan"),
     RosTopic("{ns}/pose",              "geometry_msgs/msg/PoseStamped",      DEFAULT,     "pose"),
-    RosTopic("{ns}/cmd_vel",           "geometry_msgs/msg/TwistStamped",     DEFAULT,     "cmd_vel, as obeyed"),
+    RosTopic("{ns}/cmd_vel",           "geometry_msgs/msg/TwistStamped",     DEFAULT,     "cmd_vel, sensors"),
     RosTopic("{ns}/trail",             "nav_msgs/msg/Path",                  LATCHED,     "pose"),
     RosTopic("{ns}/plan",              "nav_msgs/msg/Path",                  LATCHED,     "plan, mission"),
     RosTopic("{ns}/robot_description", "std_msgs/msg/String",                LATCHED,     "mission"),
@@ -53,8 +56,21 @@ SOURCES = frozenset({
 """Key expressions, without the fleet's part, of all topics that the table is made from; votes are not among them."""
 WORLD_TIME = "sim/truth"
 """Source of `/clock` and of stamps in the world's time."""
+ON_DEMAND = frozenset({"*/sensors", "*/scan", "*/cmd_vel", "*/tracking"})
+"""Those of SOURCES whose topics are not latched: a bridge hears them while somebody hears what it makes of them."""
+_ROBOTS_KEPT = 512
 
 
+def sources_heard(robots: Iterable[int], heard: Callable[[str], bool], *, tf_per_robot: bool) -> frozenset[str]:
+    """Return those of ON_DEMAND that are needed for the topics of `robots` and of the fleet that somebody hears."""
+    rows = [*fleet_topics(tf_per_robot=tf_per_robot, sim_time=False)]
+    for robot in robots:
+        rows += robot_topics(robot, tf_per_robot=tf_per_robot)
+    needed = {row.source for row in rows if not row.qos.latched and heard(row.name)}
+    return ON_DEMAND & {f"*/{name}" for source in needed for name in source.split(", ")}
+
+
+@lru_cache(maxsize=_ROBOTS_KEPT)
 def robot_topics(robot: int, *, tf_per_robot: bool) -> tuple[RosTopic, ...]:
     """Return the topics of one robot."""
     rows = (*ROBOT_TOPICS, *TF) if tf_per_robot else ROBOT_TOPICS

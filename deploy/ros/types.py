@@ -1,23 +1,23 @@
 """ROS message types: their pinned hashes, and conversion to and from CDR.
 
-Standard types only, in the definitions of Jazzy, which Humble, Kilted and Lyrical share for each type listed here.
+Standard types only, in the definitions of Jazzy, which Humble, Kilted and Lyrical share for each type listed here. The
+library is loaded with the first message that is read: a bridge that only tells of its fleet does without its memory.
 """
 
 from __future__ import annotations
 
 import struct
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rosbags.serde.errors import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
-
+from lfa.deploy.ros.cdr import CdrMessage
 from lfa.deploy.ros.wire import HASHLESS, Distro
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 PAYLOAD_BYTES_MAX = 1024 * 1024
 """Largest payload that is decoded: a scan of 250 000 beams."""
-CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 HASHES: dict[str, str] = {
     "diagnostic_msgs/msg/DiagnosticArray": "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
@@ -48,7 +48,6 @@ _SERVICES = {
     "std_srvs/msg/SetBool_Response": "bool success\nstring message",
 }
 """Requests and responses of services; the library knows messages only."""
-_UNREADABLE = (SerdeError, struct.error, ValueError, AssertionError, IndexError, TypeError, OverflowError, MemoryError)
 
 
 class BadRosMessage(ValueError):
@@ -58,6 +57,8 @@ class BadRosMessage(ValueError):
 @cache
 def typestore() -> Typestore:
     """Return the store of all message types, services included."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, definition in _SERVICES.items():
         store.register(get_types_from_msg(definition, name))
@@ -76,7 +77,9 @@ def type_hash(name: str, distro: Distro = "jazzy") -> str:
 
 
 def to_cdr(message: Any) -> bytes:
-    """Return `message`, made by a class of `kind`, as CDR with its header, little endian."""
+    """Return `message` as CDR with its header, little endian: encoded already, or made by a class of `kind`."""
+    if isinstance(message, CdrMessage):
+        return message.payload
     return bytes(typestore().serialize_cdr(message, message.__msgtype__))
 
 
@@ -86,8 +89,17 @@ def from_cdr(payload: bytes, name: str) -> Any:
         raise BadRosMessage(f"{len(payload)} bytes, more than {PAYLOAD_BYTES_MAX}")
     try:
         return typestore().deserialize_cdr(payload, name)
-    except _UNREADABLE as error:
+    except _unreadable() as error:
         raise BadRosMessage(f"no {name}: {type(error).__name__}") from None
+
+
+@cache
+def _unreadable() -> tuple[type[Exception], ...]:
+    """Return what the library raises for bytes that are no message."""
+    from rosbags.serde.errors import SerdeError
+
+    known = (struct.error, ValueError, AssertionError, IndexError, TypeError, OverflowError, MemoryError)
+    return (SerdeError, *known)
 
 
 def request_type(service: str) -> str:

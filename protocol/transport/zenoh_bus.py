@@ -33,6 +33,10 @@ _PRIORITY = {
 }
 
 
+PULLED_MAX = 1024
+"""Number of samples of one subscription that wait for `pull`: 0.1 s of 200 robots. The oldest are dropped."""
+
+
 class ZenohBus:
     """Zenoh client session with declared publishers, subscriptions and one liveliness token."""
 
@@ -52,6 +56,7 @@ class ZenohBus:
             raise RouterAbsent(reason_of(error)) from None
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._followed: dict[str, Any] = {}
+        self._pulled: frozenset[str] = frozenset()
         self._spelled: dict[str, str] = {}
         """Spelling under which each followed key expression is declared at the moment; only its samples count."""
         self._random = Random()
@@ -82,12 +87,37 @@ class ZenohBus:
             publisher = self._publishers[key] = self._declare(key)
         publisher.put(payload)
 
-    def follow(self, interests: frozenset[str]) -> None:
+    def follow(self, interests: frozenset[str], pulled: frozenset[str] = frozenset()) -> None:
+        """Subscribe to exactly `interests` from now on. Samples of those in `pulled` wait for `pull`.
+
+        A sample that waits costs a third less than one whose callback runs at once: it takes the interpreter's lock
+        together with others.
+        """
+        self._pulled = pulled
         for key in sorted(self._followed.keys() - interests):
             self._followed.pop(key).undeclare()
         for key in sorted(interests - self._followed.keys()):
             self._spelled[key] = key
             self._followed[key] = self._subscribe(key)
+
+    def pull(self, key: str) -> None:
+        """Put the waiting samples of the pulled key expression `key` into the inbox, as arrivals of now.
+
+        Of a state topic, the newest value of each key. Does nothing for a key expression that is not followed.
+        """
+        subscriber = self._followed.get(key)
+        if subscriber is None:
+            return
+        now, newest = clock.now(), dict[str, zenoh.Sample]()
+        while (sample := subscriber.try_recv()) is not None:
+            name = str(sample.key_expr)
+            where = address(name)
+            if where is not None and TOPIC[where.topic].state:
+                newest[name] = sample
+            else:
+                self._inbox.put(Arrival(now, name, sample.payload.to_bytes()))
+        for name, sample in newest.items():
+            self._inbox.put(Arrival(now, name, sample.payload.to_bytes()))
 
     def resubscribe(self) -> None:
         """Declare all subscriptions to the router again, each in another spelling where it has one.
@@ -129,6 +159,8 @@ class ZenohBus:
         return self._declared(key, self._spelled[key])
 
     def _declared(self, key: str, spelling: str) -> Any:
+        if key in self._pulled:
+            return self._session.declare_subscriber(spelling, zenoh.handlers.RingChannel(PULLED_MAX))
         callback = zenoh.handlers.Callback(self._on_sample(key, spelling), indirect=False)
         return self._session.declare_subscriber(spelling, callback)
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 
 from lfa.deploy.bench.harness.team import Team
 from lfa.deploy.process import identity
 from lfa.protocol import clock
+
+LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
+"""Words that run `lfa` of this installation."""
 
 
 @contextlib.contextmanager

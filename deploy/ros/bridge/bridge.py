@@ -20,7 +20,7 @@ from lfa.deploy.ros.bridge.sender_clocks import SenderClocks
 from lfa.deploy.ros.bridge.stop_calls import StopCalls
 from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.session import ServiceCall
-from lfa.deploy.ros.topics import SOURCES
+from lfa.deploy.ros.topics import ON_DEMAND, SOURCES, WORLD_TIME, sources_heard
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.orders import OrderNote
@@ -28,13 +28,19 @@ from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.stop import StopState
 from lfa.protocol.messages.team import Event, MissionNote
 from lfa.protocol.names import robot_id_of
+from lfa.protocol.topics import address
 from lfa.protocol.transport.message_bus import send
 
 PERIOD_S = 0.02
+SLOW_S = 0.1
+"""Period [s] of what is shown ten times a second, and of looking who hears what."""
 EAGER = frozenset({"sensors", "scan"})
 """Topics that are passed on at once; all others within a period."""
-HEARD = SOURCES | {"*/stop_state", "*/team_order"}
-"""Topics that a bridge hears: what it shows, and the answers to a stop and to a change of the mission."""
+ALWAYS = (SOURCES - ON_DEMAND) | {"*/stop_state", "*/team_order"}
+"""Topics that a bridge always hears: what it keeps for latecomers, and answers to a stop and to a changed mission."""
+PULLED_FAST, PULLED_SLOWLY = frozenset({"*/cmd_vel"}), frozenset({"*/pose", "*/tracking"})
+"""Topics that wait until the bridge reads them, every PERIOD_S or every SLOW_S."""
+_WAITED = frozenset(topic.removeprefix("*/") for topic in PULLED_FAST | PULLED_SLOWLY)
 
 
 class Output(Protocol):
@@ -62,6 +68,10 @@ class Bridge:
 
     def __init__(self, subscriber: Subscriber, output: Output, *, sim_time: bool, tf_per_robot: bool) -> None:
         self._subscriber = subscriber
+        self._tf_per_robot = tf_per_robot
+        self._always = ALWAYS | {WORLD_TIME} if sim_time else ALWAYS
+        self._followed: frozenset[str] = frozenset()
+        self._look_at = self._pull_at = 0.0
         self._operator = Operator(subscriber.fleet.name, incarnations.drawn())
         self._output = output
         self._mapping = FleetMapping(tf_per_robot=tf_per_robot, sim_time=sim_time, heard=output.heard)
@@ -82,6 +92,7 @@ class Bridge:
 
     def step(self, now: float) -> None:
         """Publish what the fleet said."""
+        self._listen(now)
         arrivals = self._subscriber.take()
         self._follow_robots()
         present = self._output.robots
@@ -89,16 +100,36 @@ class Bridge:
             if isinstance(message, Truth):
                 self._clocks.see_world(arrival.at, message.time_s)
                 continue
-            owner = arrival.key.split("/", 3)[2]
-            robot = robot_id_of(owner)
+            where = address(arrival.key)
+            assert where is not None, "else it had not been decoded"
+            robot = robot_id_of(where.owner)
             self._hear_answer(robot, message, now)
             if self._clocks.ready and (not robot or robot in present):
-                stamp_ns = self._clocks.stamp_ns(message.header, arrival.at)
-                self._output.publish(self._mapping.update(stamp_ns, owner, message))
+                stamp_ns = self._clocks.stamp_ns(message.header, arrival.at, prompt=where.topic not in _WAITED)
+                self._output.publish(self._mapping.update(stamp_ns, where.owner, message))
         if self._clocks.ready:
             self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
         self._stops.step(now)
         self._orders.step(now)
+
+    def period_s(self) -> float:
+        """Return the time [s] after which `step` is due, whatever comes in: long while nobody hears what moves."""
+        return PERIOD_S if self._followed & ON_DEMAND or WORLD_TIME in self._always else SLOW_S
+
+    def _listen(self, now: float) -> None:
+        """Hear what somebody on the other side hears, and read what waits, when that is due."""
+        if now >= self._pull_at:
+            self._pull_at = _next(self._pull_at, PERIOD_S, now)
+            self._subscriber.pull(PULLED_FAST)
+        if now < self._look_at:
+            return
+        self._look_at = _next(self._look_at, SLOW_S, now)
+        output = self._output
+        wanted = self._always | sources_heard(output.robots, output.heard, tf_per_robot=self._tf_per_robot)
+        if wanted != self._followed:
+            self._followed = wanted
+            self._subscriber.follow(wanted, PULLED_FAST | PULLED_SLOWLY)
+        self._subscriber.pull(PULLED_SLOWLY)
 
     def _hear_answer(self, robot: int | None, message: Message, now: float) -> None:
         """Take what answers a stop or a change of the mission."""
@@ -150,3 +181,8 @@ class Bridge:
         print(f"lfa: {words}", file=sys.stderr, flush=True)
         stamp_ns = self._clocks.now_ns(clock.now())
         self._output.publish([RosMessage("/rosout", stamp_ns, messages.log(stamp_ns, "warn", BRIDGE_NODE, words))])
+
+
+def _next(due: float, period_s: float, now: float) -> float:
+    """Return when something is due again that was due at `due`; a pause is not made up for."""
+    return due + period_s if now < due + period_s else now + period_s

@@ -15,15 +15,14 @@ import typer
 
 from lfa.deploy.client.session import find, listen
 from lfa.deploy.process.signals import Interrupts
-from lfa.deploy.ros.bridge.bridge import EAGER, HEARD, PERIOD_S, Bridge
+from lfa.deploy.ros.bridge.bridge import EAGER, Bridge
 from lfa.deploy.ros.bridge.inward import OperatorInput
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE, RosOutput
 from lfa.deploy.ros.session import GraphFeed, RosSpace
-from lfa.deploy.ros.topics import WORLD_TIME
-from lfa.deploy.ros.types import typestore
 from lfa.deploy.ros.wire import Distro, check_domain
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
+from lfa.protocol.runtime.vital_signs import keep_one_heap, settle
 from lfa.protocol.transport.bus import Wake
 from lfa.protocol.transport.zenoh_ros import ros_session
 
@@ -57,23 +56,23 @@ def command(
     check_domain(domain)
     found = find(fleet, connect, keys)
     endpoint = ros or (SERVED if serve else ROUTER)
-    typestore()
+    keep_one_heap()
     wake = Wake()
     session = ros_session(endpoint, serve)
     try:
         space = RosSpace(session, domain, distro, wake)
         graph = GraphFeed(space)
         check_graph(graph, distro, 0.0 if serve else GRAPH_S)
-        sources = HEARD | {WORLD_TIME} if sim_time else HEARD
-        with Interrupts() as interrupts, listen(found, sources, every=True, wake=wake, eager=EAGER) as subscriber:
+        with Interrupts() as interrupts, listen(found, frozenset(), every=True, wake=wake, eager=EAGER) as subscriber:
             output = RosOutput(space, tf_per_robot=tf_per_robot, sim_time=sim_time)
             bridge = Bridge(subscriber, output, sim_time=sim_time, tf_per_robot=tf_per_robot)
             orders = OperatorInput(output.node, bridge)
             foreign = ForeignNodes(graph, distro)
             how = "router at" if serve else "through"
             print(f"fleet {found.name} is on ROS domain {domain}, {how} {endpoint}", file=sys.stderr, flush=True)
+            settle()
             while interrupts.signal is None:
-                wake.wait(PERIOD_S)
+                wake.wait(bridge.period_s())
                 now = clock.now()
                 bridge.step(now)
                 orders.step(bridge.leader, now)

@@ -12,7 +12,7 @@ import typer
 from lfa.deploy.client.session import find, listen
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.ros.bridge.answers import answer
-from lfa.deploy.ros.bridge.bridge import EAGER, HEARD, PERIOD_S, Bridge
+from lfa.deploy.ros.bridge.bridge import EAGER, Bridge
 from lfa.deploy.ros.bridge.foxglove_output import FoxgloveOutput
 from lfa.deploy.ros.bridge.inward import SERVICES, ServiceInput
 from lfa.protocol import clock
@@ -43,7 +43,7 @@ def command(
         raise Refused(f"--port {port}: must be 0 to 65535")
     found = find(fleet, connect, keys)
     wake = Wake()
-    with Interrupts() as interrupts, listen(found, HEARD, every=True, wake=wake, eager=EAGER) as subscriber:
+    with Interrupts() as interrupts, listen(found, frozenset(), every=True, wake=wake, eager=EAGER) as subscriber:
         output = FoxgloveOutput(host, port, (*SERVICES, *FORMATIONS), tf_per_robot=tf_per_robot)
         try:
             bridge = Bridge(subscriber, output, sim_time=False, tf_per_robot=tf_per_robot)
@@ -51,7 +51,7 @@ def command(
             print(f"fleet {found.name}: open ws://{host}:{output.port} in Foxglove or Lichtblick", flush=True)
             print(f"layout: {LAYOUT}", flush=True)
             while interrupts.signal is None:
-                wake.wait(PERIOD_S)
+                wake.wait(bridge.period_s())
                 now = clock.now()
                 bridge.step(now)
                 output.greet(time.time_ns())

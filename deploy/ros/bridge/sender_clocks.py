@@ -6,6 +6,8 @@ from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.protocol.messages.header import Header
 
 SENDERS_MAX = 1024
+AGE_S_MAX = 60.0
+"""Largest age [s] that a message is given: a sender whose clock jumps does not send ROS into the past."""
 NS = 1_000_000_000
 
 
@@ -32,16 +34,21 @@ class SenderClocks:
         """Take the world's time [s] that arrived at `at` [s]."""
         self._world.see(at, time_s)
 
-    def stamp_ns(self, header: Header, at: float) -> int:
-        """Return the time [ns] of a message that arrived at `at` [s]: when its sender stamped it."""
+    def stamp_ns(self, header: Header, at: float, *, prompt: bool = True) -> int:
+        """Return the time [ns] of a message that was taken in at `at` [s]: when its sender stamped it.
+
+        A message that is not `prompt` had waited for the loop, and tells of its sender's clock only if it waited less
+        than all others.
+        """
         sender = (header.sender, header.incarnation)
         known = self._senders.get(sender)
         if known is None:
             if len(self._senders) >= SENDERS_MAX:
                 self._senders.clear()
             known = self._senders[sender] = WorldTime()
-        known.see(at, header.stamp)
-        return self.now_ns(min(at, header.stamp + known.offset))
+        if prompt or not known.known or at - header.stamp < known.offset:
+            known.see(at, header.stamp)
+        return self.now_ns(max(at - AGE_S_MAX, min(at, header.stamp + known.offset)))
 
     def now_ns(self, at: float) -> int:
         """Return the time [ns] at `at` [s] of the observer's clock."""

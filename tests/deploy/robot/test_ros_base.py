@@ -16,12 +16,13 @@ from lfa.deploy.robot.ros_presets import PRESETS, RosPreset, load_preset
 from lfa.deploy.ros import messages
 from lfa.deploy.ros.graph import RosGraph
 from lfa.deploy.ros.session import NodeHandle, RosSpace
-from lfa.deploy.ros.types import kind, type_hash
+from lfa.deploy.ros.types import from_cdr, type_hash
 from lfa.deploy.ros.wire import DEFAULT, LATCHED, RosEndpoint, RosNode
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from tests.deploy.robot.test_ros_scan import scan
+from tests.rigs import ros_values
 from tests.rigs.ros_peers import awaited, ros_pair
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
@@ -93,7 +94,7 @@ def test_map_to_odom_on_tf_places_the_robot_in_map(robot: Robot) -> None:
     awaited(robot.tf.heard, "tf is heard")
 
     def placed() -> Any:
-        robot.tf.publish(messages.tf([messages.transform(0, "map", "odom", Pose2D(10.0, 5.0, pi / 2))]))
+        robot.tf.publish(messages.tf([messages.Transform(0, "map", "odom", Pose2D(10.0, 5.0, pi / 2))]))
         robot.moves(1.0)
         reading = robot.base.read(clock.now())
         return reading and reading.pose_map
@@ -104,10 +105,7 @@ def test_map_to_odom_on_tf_places_the_robot_in_map(robot: Robot) -> None:
 
 def test_a_latched_pose_of_the_localisation_places_it_too(robot: Robot) -> None:
     robot.reads()
-    covariant = kind("geometry_msgs/msg/PoseWithCovariance")(
-        messages.pose(Pose2D(3.0, 4.0, 0.0)), messages._diagonal([0.0] * 6)
-    )
-    robot.amcl.publish(kind("geometry_msgs/msg/PoseWithCovarianceStamped")(messages.header(0, "map"), covariant))
+    robot.amcl.publish(ros_values.pose_with_covariance(0, Pose2D(3.0, 4.0, 0.0), [0.0] * 36))
     pose = robot.reads("pose_map")
     assert (pose.x, pose.y) == pytest.approx((3.0, 4.0))
 
@@ -128,7 +126,7 @@ def test_a_scan_waits_for_the_mount_of_its_scanner_and_says_so(robot: Robot) -> 
 
     awaited(unplaced, "the missing mount is told")
     assert "no /tf_static leads from base" in robot.warned["mount"]
-    robot.tf_static.publish(messages.tf([messages.transform(0, "base", "laser", Pose2D(0.0, 0.0, pi / 2))]))
+    robot.tf_static.publish(messages.tf([messages.Transform(0, "base", "laser", Pose2D(0.0, 0.0, pi / 2))]))
 
     def placed() -> Any:
         robot.scans.publish(scan([1.0] * 4, -pi))
@@ -160,7 +158,8 @@ def test_frames_are_composed_over_a_common_ancestor_and_circles_end() -> None:
     tree = FrameTree()
     links = [("base_footprint", "base_link", Pose2D(0.0, 0.0, 0.0)), ("base_link", "scan", Pose2D(-0.1, 0.0, pi / 2)),
              ("base_link", "imu", Pose2D(0.1, 0.2, 0.0)), ("a", "b", Pose2D()), ("b", "a", Pose2D())]  # fmt: skip
-    tree.update(messages.tf([messages.transform(0, *link) for link in links]), 0.0)
+    told = messages.tf([messages.Transform(0, *link) for link in links])
+    tree.update(from_cdr(told.payload, told.type), 0.0)
     assert tree.between("base_footprint", "scan") == Pose2D(-0.1, 0.0, pi / 2)
     found = tree.between("imu", "/scan")
     assert found is not None

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfa.deploy.robot.ros_scan import BEAMS_MAX, converted
-from lfa.deploy.ros.messages import header
 from lfa.deploy.ros.types import kind
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
+from tests.rigs.ros_values import header
 
 TURN = 2.0 * pi
 

@@ -10,18 +10,19 @@ from typing import Any
 import pytest
 
 from lfa.deploy.ros import markers, messages
-from lfa.deploy.ros.mapping import NS
+from lfa.deploy.ros.cdr import NS
+from lfa.deploy.ros.explored import MapCells
 from lfa.deploy.ros.markers import ObstacleMark, RobotMark
-from lfa.deploy.ros.types import HASHES, from_cdr, kind, to_cdr, type_hash
+from lfa.deploy.ros.types import HASHES, from_cdr, to_cdr, type_hash
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.messages.team import Level, Status
 from tests.deploy.ros.test_mapping import TERM, header
+from tests.rigs import ros_values
 from tests.rigs.foreign_peers import answer, start
 
 pytestmark = pytest.mark.processes
-np = pytest.importorskip("numpy")
 T = 5 * NS + 7
 AT = Pose2D(1.0, -2.0, 0.3)
 NOT_IN_THE_WHEELS = {"tf2_msgs/msg/TFMessage"}
@@ -30,10 +31,7 @@ NOT_IN_THE_WHEELS = {"tf2_msgs/msg/TFMessage"}
 def examples() -> dict[str, Any]:
     """Return one filled message of each type that this project sends or reads."""
     scan = LaserScan(header(), -1.0, 0.5, 0.1, 10.0, (inf, 2.0, 3.0))
-    status = messages.diagnostic_status(
-        "robot3", Status(header(), Level.WARN, "waits", Role.WAITING, TERM, {"x": 1.0}), 0.1
-    )
-    covariant = kind("geometry_msgs/msg/PoseWithCovariance")(messages.pose(AT), np.arange(36.0))
+    status = messages.diagnosis("robot3", Status(header(), Level.WARN, "waits", Role.WAITING, TERM, {"x": 1.0}), 0.1)
     found = [
         messages.odometry(T, AT, Twist(0.5, 0.1), 2.0, "odom", "base_link"),
         messages.laser_scan(T, scan, "base_scan"),
@@ -41,19 +39,19 @@ def examples() -> dict[str, Any]:
         messages.twist(Twist(0.5, 0.1)),
         messages.twist_stamped(T, Twist(0.5, 0.1), "base_link"),
         messages.path(T, [AT, AT]),
-        messages.occupancy_grid(T, 0.05, (1.0, 2.0), np.array([[0, 100, -1]], dtype=np.int8)),
+        messages.occupancy_grid(T, MapCells(0.05, (1.0, 2.0), 3, bytes([0, 100, 255]))),
         messages.clock(T),
         messages.text("words"),
-        messages.number(-3),
+        messages.number(3),
         messages.log(T, "warn", "robot3", "contact"),
         messages.diagnostics(T, [status]),
-        messages.tf([messages.transform(T, "map", "odom", AT)]),
+        messages.tf([messages.Transform(T, "map", "odom", AT)]),
         markers.formation(
             T, [RobotMark(3, "follower", AT, AT, 2), RobotMark(2, "leader", AT)], [ObstacleMark(1, 2, 0.3)]
         ),
-        kind("geometry_msgs/msg/PoseWithCovarianceStamped")(messages.header(T, "map"), covariant),
     ]
-    return {message.__msgtype__: message for message in found}
+    located = ros_values.pose_with_covariance(T, AT, range(36))
+    return {message.type: message for message in found} | {located.__msgtype__: located}
 
 
 @pytest.fixture(scope="module")

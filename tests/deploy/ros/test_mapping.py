@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from lfa.deploy.ros import explored
 from lfa.deploy.ros.mapping import NS, FleetMapping, RosMessage
-from lfa.deploy.ros.topics import fleet_topics, robot_topics
-from lfa.deploy.ros.types import from_cdr, to_cdr
+from lfa.deploy.ros.topics import fleet_topics, robot_topics, sources_heard
+from lfa.deploy.ros.types import from_cdr
 from lfa.protocol.geometry import STILL, Pose2D, Twist, compose, wrap
 from lfa.protocol.messages.consensus import Config, GatewayStamp, LeaseNote, Member, Propose, Role, Term, Version
 from lfa.protocol.messages.header import Header
@@ -47,7 +47,7 @@ def command(term: Term = TERM, as_leader: bool = False) -> CmdVel:
 def on(topic: str, sent: list[RosMessage]) -> Any:
     """Return the only message on `topic` of `sent`, as a subscriber would decode it."""
     (one,) = [one for one in sent if one.topic == topic]
-    return from_cdr(to_cdr(one.message), one.message.__msgtype__)
+    return from_cdr(one.message.payload, one.message.type)
 
 
 def placed(transform: Any) -> Pose2D:
@@ -94,8 +94,73 @@ def test_one_message_carries_the_transforms_of_all_robots_fifty_times_a_second()
         at = T + step * NS // 100
         for robot in (1, 2, 3):
             mapping.update(at, f"robot{robot}", sensors())
-        counts += [len(one.message.transforms) for one in mapping.tick(at) if one.topic == "/tf"]
+        counts += [len(on("/tf", [one]).transforms) for one in mapping.tick(at) if one.topic == "/tf"]
     assert counts == [3] * 50
+
+
+@given(st.lists(st.integers(0, 19), min_size=1, max_size=5), st.integers(0, 3))
+def test_no_robots_transform_waits_longer_than_two_periods_whatever_the_phases(phases_ms: list[int], dead: int) -> None:
+    """Robots at 50 Hz, each at its own phase; one of them falls silent after a second."""
+    mapping = FleetMapping()
+    heard_ms: dict[str, int] = {}
+    for ms in range(2000):
+        at = T + ms * NS // 1000
+        for n, phase in enumerate(phases_ms):
+            if ms % 20 == phase and (ms < 1000 or n != dead):
+                mapping.update(at, f"robot{n + 1}", sensors())
+        for one in mapping.tick(at):
+            if one.topic == "/tf":
+                heard_ms |= {told.child_frame_id: ms for told in on("/tf", [one]).transforms}
+        living = [f"robot{n + 1}/base_link" for n in range(len(phases_ms)) if ms < 1000 or n != dead]
+        assert ms < 60 or all(ms - heard_ms[frame] <= 40 for frame in living)
+
+
+def test_transforms_of_robots_that_report_together_go_out_at_once_and_together() -> None:
+    mapping = FleetMapping()
+    for robot in (1, 2, 3):
+        mapping.update(T, f"robot{robot}", sensors())
+    assert len(on("/tf", mapping.tick(T)).transforms) == 3
+    for burst in range(1, 5):
+        at = T + burst * NS // 50
+        for robot in (1, 2):
+            mapping.update(at, f"robot{robot}", sensors())
+        assert all(one.topic != "/tf" for one in mapping.tick(at)), "robot 3 comes next"
+        mapping.update(at, "robot3", sensors())
+        assert len(on("/tf", mapping.tick(at)).transforms) == 3
+
+
+@pytest.mark.parametrize("robot", [2**31 - 1, 2**31, 10**18 - 1])
+def test_a_robot_of_any_id_that_a_name_can_carry_is_shown(robot: int) -> None:
+    mapping = FleetMapping()
+    mapping.update(T, f"robot{robot}", pose(ORIGIN, role=Role.LEADER))
+    ticked = mapping.tick(T)
+    (arrow, _) = on("/lfa/formation", ticked).markers
+    assert arrow.id == on("/lfa/leader", ticked).data == robot % 2**31
+    assert mapping.leader == robot
+
+
+def test_the_bridge_hears_only_what_the_topics_that_are_heard_are_made_of() -> None:
+    def heard(*topics: str) -> frozenset[str]:
+        return sources_heard((1, 2), lambda topic: topic in topics, tf_per_robot=False)
+
+    assert heard() == frozenset()
+    assert heard("/robot2/odom") == {"*/sensors"}
+    assert heard("/tf") == {"*/sensors"}
+    assert heard("/robot1/scan") == {"*/scan"}
+    assert heard("/robot1/cmd_vel") == {"*/cmd_vel", "*/sensors"}, "the gateway's state tells what it obeys"
+    assert heard("/lfa/formation") == {"*/tracking"}
+    assert heard("/robot3/odom") == frozenset(), "no such robot"
+    assert sources_heard((1,), lambda topic: topic == "/robot1/tf", tf_per_robot=True) == {"*/sensors"}
+
+
+def test_a_pose_is_compared_with_the_odometry_of_its_own_time() -> None:
+    """The bridge reads poses ten times a second: the newest odometry is of later."""
+    mapping = FleetMapping()
+    for n in range(6):
+        mapping.update(T + n * NS // 50, "robot3", sensors(Pose2D(0.01 * n * n, 0.0, 0.0)))
+    mapping.update(T + NS // 50, "robot3", pose(Pose2D(5.01, 0.0, 0.0)))
+    _, map_odom = on("/tf", mapping.tick(T + NS // 10)).transforms
+    assert placed(map_odom).x == pytest.approx(5.0)
 
 
 def test_with_tf_per_robot_the_frames_are_plain_and_the_topics_are_the_robots() -> None:
@@ -207,4 +272,4 @@ def test_a_tile_anywhere_leaves_a_map_of_bounded_size(x: float, y: float, cell_m
     map_.update(tile(0.0, 0.0, bytes(4), cell_m))
     map_.update(tile(x, y, bytes(4), cell_m))
     found = map_.grid()
-    assert found is None or found[2].size <= explored.CELLS_MAX
+    assert found is None or len(found.cells) <= explored.CELLS_MAX

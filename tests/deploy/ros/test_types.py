@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lfa.deploy.ros import types
+from lfa.deploy.ros.cdr import CDR_LITTLE_ENDIAN
 from lfa.deploy.ros.types import BadRosMessage, from_cdr, kind, request_type, response_type, to_cdr
 from lfa.deploy.ros.wire import ros_type
 from tests.deploy.ros.test_wire import GOLDEN
@@ -56,7 +57,7 @@ def test_a_genuine_query_and_reply_are_read() -> None:
 @settings(max_examples=400)
 @given(st.sampled_from([name for name in types.HASHES if "/msg/" in name]), st.binary(max_size=200))
 def test_any_bytes_are_a_message_or_refused(name: str, data: bytes) -> None:
-    for payload in (data, types.CDR_LITTLE_ENDIAN + data):
+    for payload in (data, CDR_LITTLE_ENDIAN + data):
         try:
             from_cdr(payload, name)
         except BadRosMessage:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 @contextmanager
-def _router() -> Iterator[str]:
+def router() -> Iterator[str]:
     """The endpoint of one that runs."""
     with tempfile.TemporaryDirectory(prefix="lfa-", dir="/tmp") as folder:
         endpoint = f"unixsock-stream/{Path(folder) / 'router.sock'}"
@@ -30,7 +30,7 @@ def _router() -> Iterator[str]:
 def _printed(script: str) -> str:
     """What `script` prints, given the endpoint of a router that runs, in a process with no wishes for its threads."""
     fresh = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
-    with _router() as endpoint:
+    with router() as endpoint:
         client = [sys.executable, "-c", script, endpoint]
         return subprocess.run(client, capture_output=True, text=True, timeout=60, check=True, env=fresh).stdout.strip()
 

@@ -16,7 +16,7 @@ from lfa.deploy.ros.bridge.inward import HANDOVER_S_MAX, OperatorInput
 from lfa.deploy.ros.bridge.outward import RosOutput
 from lfa.deploy.ros.bridge.stop_calls import RESUME, STOP
 from lfa.deploy.ros.session import GraphFeed, RosSpace, ServiceCall
-from lfa.deploy.ros.types import kind
+from lfa.deploy.ros.types import from_cdr, kind
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
 from tests.rigs.ros_peers import awaited, ros_pair
@@ -150,7 +150,7 @@ def test_of_a_resume_and_a_stop_that_wait_together_the_stop_is_the_last_word(pai
 
 
 def goal(x: float, y: float, yaw: float, frame: str = "map") -> Any:
-    message = messages.pose_stamped(0, Pose2D(x, y, yaw))
+    message = from_cdr(*reversed(messages.pose_stamped(0, Pose2D(x, y, yaw))))
     message.header.frame_id = frame
     return message
 

@@ -26,6 +26,23 @@ def test_a_stamp_becomes_the_time_of_sending_by_the_least_delay_seen(delays: lis
         assert abs(error_s - min(delays[: n + 1])) < 1e-3
 
 
+@given(st.lists(st.floats(0.0, 0.1), min_size=1, max_size=200))
+def test_messages_that_waited_for_the_loop_do_not_blur_a_senders_clock(waits: list[float]) -> None:
+    clocks = SenderClocks(WALL_NS, sim_time=False)
+    clocks.stamp_ns(header(0.0), 1.0)  # arrived at once
+    for n, wait in enumerate(waits):
+        sent = 1.0 + 0.02 * n
+        error_s = (clocks.stamp_ns(header(sent - 1.0), sent + wait, prompt=False) - WALL_NS) / NS - sent
+        assert abs(error_s) < 1e-6
+
+
+@given(st.lists(st.floats(-1e12, 1e12), min_size=1, max_size=5))
+def test_a_clock_that_jumps_dates_nothing_more_than_a_minute_back(stamps: list[float]) -> None:
+    clocks = SenderClocks(WALL_NS, sim_time=False)
+    for stamp in stamps:
+        assert 0 <= WALL_NS + 100 * NS - clocks.stamp_ns(header(stamp), 100.0) <= sender_clocks.AGE_S_MAX * NS
+
+
 def test_no_message_is_stamped_after_its_arrival() -> None:
     clocks = SenderClocks(WALL_NS, sim_time=False)
     clocks.stamp_ns(header(0.0), 10.0)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from lfa.deploy.client.stop_call import ANSWER_S, KEPT_S, KNOWN_S, Said
 from lfa.deploy.ros.bridge.stop_calls import StopCalls
+from lfa.deploy.ros.cdr import CdrMessage
 from lfa.deploy.ros.session import ServiceCall
+from lfa.deploy.ros.types import from_cdr
 from lfa.protocol.messages.stop import StopKnowledge, StopState, StopWord
 from tests.deploy.ros.test_mapping import header
 
@@ -28,7 +28,8 @@ class Service:
     def hear(self, robot: int, word: StopWord, now: float) -> None:
         self.calls.hear(robot, StopState(header(), StopKnowledge(word, True), at_rest=True, kept=True), now)
 
-    def _answer(self, response: Any) -> None:
+    def _answer(self, encoded: CdrMessage) -> None:
+        response = from_cdr(encoded.payload, encoded.type)
         self.answers.append((response.success, response.message))
 
 
