@@ -16,8 +16,8 @@ KNOWN_MAX = 64
 ROUTE_M_MAX = 10_000.0
 """Maximum route length [m]: a leader stores one point per 0.1 m, so that a longer route would exhaust the memory."""
 
-CONTROL_HZ = 50.0
-"""Usual rate [Hz] of the robots' control steps."""
+CONTROL_HZ, CONTROL_HZ_MIN = 50.0, 20.0
+"""Usual and least rate [Hz] of the robots' control steps."""
 
 Side = Literal["left", "right", "column", "zigzag"]
 Motion = Literal["path_following", "point_to_point", "trajectory", "reactive", "explore"]

@@ -7,9 +7,8 @@ from itertools import pairwise
 from math import hypot, inf, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, RefusedValue, Rule, apply_rules, out_of_range, wrong
-from lfa.protocol.mission import CONTROL_HZ, KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
+from lfa.protocol.mission import CONTROL_HZ, CONTROL_HZ_MIN, KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
 
-CONTROL_HZ_MIN = 20.0
 _ROBOTS, _ROUTE, _TIMES = "mission.robots", "mission.leading.route_m", "mission.leading.times_s"
 
 

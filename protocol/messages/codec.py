@@ -39,6 +39,7 @@ from lfa.protocol.messages.team import (
     TableRow,
     Tracking,
 )
+from lfa.protocol.mission import CONTROL_HZ, CONTROL_HZ_MIN
 
 Message = (
     LeaseNote
@@ -116,4 +117,13 @@ def _fitting_plan(message: PlanNote) -> bool:
     return message.columns > 0 and len(message.cells) % message.columns == 0
 
 
-_FITS: dict[type, Callable[[Any], bool]] = {GroundProfile: _fitting_ground, PlanNote: _fitting_plan}
+def _fitting_mission(message: MissionNote) -> bool:
+    """Return True if durations can be computed from it: witness and driver have no other check of a mission."""
+    return CONTROL_HZ_MIN <= message.mission.control_hz <= CONTROL_HZ
+
+
+_FITS: dict[type, Callable[[Any], bool]] = {
+    GroundProfile: _fitting_ground,
+    PlanNote: _fitting_plan,
+    MissionNote: _fitting_mission,
+}

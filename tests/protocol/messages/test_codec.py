@@ -25,7 +25,8 @@ from lfa.protocol.messages.consensus import (
 )
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX, Header
 from lfa.protocol.messages.robot import CmdVel, GroundProfile, LaserScan, Localization, Sensors
-from lfa.protocol.messages.team import Delay, Event, FormationNote, PlanNote, PoseStamped, Slot, TableRow
+from lfa.protocol.messages.team import Delay, Event, FormationNote, MissionNote, PlanNote, PoseStamped, Slot, TableRow
+from lfa.protocol.mission import Mission
 from lfa.protocol.topics import TOPICS
 
 HEADER = Header("robot1", 5, 7, 12.5)
@@ -152,6 +153,13 @@ def test_a_stamp_may_count_from_1970() -> None:
 def test_a_tile_of_a_map_is_a_whole_rectangle(columns: int) -> None:
     with pytest.raises(BadMessage):
         decode(encode(PlanNote(HEADER, (), 0.1, (0.0, 0.0), columns, bytes(4))), PlanNote)
+
+
+@pytest.mark.parametrize("control_hz", [0.0, -20.0, 1e-300, 19.9, 50.1, math.inf, math.nan])
+def test_a_mission_whose_control_rate_gives_no_durations_is_refused(control_hz: float) -> None:
+    """Witness and driver compute deadman and bond from it, and check nothing else of a mission."""
+    with pytest.raises(BadMessage):
+        decode(encode(MissionNote(HEADER, Mission(control_hz=control_hz))), MissionNote)
 
 
 def test_a_message_of_another_topic_is_refused() -> None:
