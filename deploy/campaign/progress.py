@@ -39,6 +39,10 @@ class CampaignProgress:
             self._shown_s = now
             self._show(now)
 
+    def counted(self) -> str:
+        """Return how many items are done, and how many of those that were done here failed."""
+        return f"{self._before + self._done} of {self._total} {self._said} are done, {self.failed} failed"
+
     def close(self) -> None:
         """Show the final state."""
         if self._done:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from lfa.deploy.campaign.progress import CampaignProgress
 from lfa.deploy.campaign.shard import WHOLE, Shard
 from lfa.deploy.version import code_line
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import write_line
 
 
 def campaign_of(kind: str, title: str, items: Sequence[Item], about: Any = None) -> Campaign:
@@ -26,7 +28,8 @@ def do_share(
 ) -> tuple[CampaignFolder, int]:
     """Do the missing items of the share; return the folder and the number of items that failed or could not be done.
 
-    Raises Refused, before anything is done, for a folder that does not belong to this campaign.
+    After Ctrl-C, say how many are done and where. Raises Refused, before anything is done, for a folder that does not
+    belong to this campaign.
     """
     if jobs < 1:
         raise Refused(f"--jobs {jobs}: must be at least 1")
@@ -42,6 +45,10 @@ def do_share(
                 kept.store(finished.item.name, finished.result)
             complaint = finished.reason if finished.result is None else finished.result.complaint
             progress.step(finished.item.label, complaint)
+    except KeyboardInterrupt:
+        write_line(f"interrupted: {progress.counted()}; they are in {folder}, and the same command does the rest",
+                   sys.stderr)  # fmt: skip
+        raise
     finally:
         progress.close()
     return kept, progress.failed + sum(bool(result.complaint) for result in before)

@@ -166,6 +166,22 @@ def test_a_worker_that_is_killed_loses_only_its_item_and_a_second_start_does_onl
     assert "5 of 6 runs are there already" in capsys.readouterr().err
 
 
+def _interrupt() -> ItemResult:
+    raise KeyboardInterrupt
+
+
+def test_after_ctrl_c_what_was_done_is_told_and_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT)  # a worker finds this module there
+    items = [*_items(tmp_path / "marks", 2), Item("last", "the last one", _interrupt)]
+    campaign = campaign_of("test", "a test", items)
+    with pytest.raises(KeyboardInterrupt):
+        do_share(tmp_path / "out", campaign, items)
+    assert f"interrupted: 2 of 3 runs are done, 0 failed; they are in {tmp_path / 'out'}" in capsys.readouterr().err
+    assert len(open_folder(tmp_path / "out", campaign).results()) == 2
+
+
 def test_shares_are_disjoint_and_together_the_whole() -> None:
     work_items = list(range(37))
     shares = [Shard(n, 5).share(work_items) for n in range(1, 6)]
