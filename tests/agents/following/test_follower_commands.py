@@ -7,10 +7,20 @@ from math import pi
 import pytest
 
 from lfa.agents.config import DEFAULT
-from lfa.agents.following.controller import Reference
-from lfa.agents.following.follower import DT_MAX_S, DT_MIN_S, IDLE_MPS, IDLE_RADPS, STOP_ERROR_M, Follower, State
+from lfa.agents.following.controller import SLOT_SPEED_MIN_MPS, Reference
+from lfa.agents.following.follower import (
+    DT_MAX_S,
+    DT_MIN_S,
+    IDLE_MPS,
+    IDLE_RADPS,
+    STOP_ERROR_M,
+    Follower,
+    PaperVelocity,
+    State,
+)
 from lfa.agents.following.predecessor import Sighting
 from lfa.agents.formation.pose_history import PoseHistory
+from lfa.agents.formation.slot_motion import SlotMotion
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Limits
@@ -191,3 +201,85 @@ def test_what_is_read_out_is_the_slot_with_its_bearing_between_minus_pi_and_pi()
     assert (readout.slot_map.x, readout.slot_map.y) == pytest.approx((-0.6, -1.2 * 3.0**0.5 / 2.0))
     assert readout.chi == 0.0
     assert readout.slot_map.theta == readout.heading
+
+
+def observed(theta: float, seconds: float = 6.0) -> tuple[PaperVelocity, SlotMotion]:
+    """Let a robot with heading `theta` stand while its slot moves at (0.3, -0.2) m/s, seen anew in each step."""
+    paper, motion, own = PaperVelocity(), SlotMotion(DEFAULT, LIMITS, 0.0), Pose2D(2.0, -3.0, theta)
+    for n in range(round(seconds / DT)):
+        motion.x, motion.y, motion.chi_rate = 2.5 + 0.3 * n * DT, -2.8 - 0.2 * n * DT, 0.1
+        paper.observe(motion, sighted(), own, STILL, DT)
+    return paper, motion
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7, -2.0])
+def test_the_papers_observer_finds_the_slots_velocity_in_the_map_whatever_the_robots_heading(theta: float) -> None:
+    _, motion = observed(theta)
+    assert (motion.vx, motion.vy) == pytest.approx((0.3, -0.2), abs=0.01)
+    assert motion.chi_rate == 0.0
+
+
+def test_while_sightings_only_grow_older_the_papers_observer_measures_nothing() -> None:
+    paper, motion = observed(0.7)
+    place = motion.x, motion.y
+    for n in range(1, 26):
+        motion.x, motion.y = place[0] + 0.5, place[1] + 0.5  # an extrapolated slot, wherever it is
+        paper.observe(motion, sighted(age_s=n * DT), Pose2D(2.0, -3.0, 0.7), STILL, DT)
+    assert (motion.vx, motion.vy) == pytest.approx((0.3, -0.2), abs=0.02)
+    motion.x, motion.y = place[0] + 0.3 * 26 * DT, place[1] - 0.2 * 26 * DT + 0.3
+    paper.observe(motion, sighted(age_s=20 * DT), Pose2D(2.0, -3.0, 0.7), STILL, DT)
+    assert motion.vy > -0.1, "a younger one is a measurement, though it is old"
+
+
+def test_a_reset_of_the_papers_observer_forgets_the_velocity() -> None:
+    paper, motion = observed(0.7)
+    paper.reset()
+    paper.observe(motion, sighted(), Pose2D(2.0, -3.0, 0.7), STILL, DT)
+    assert (motion.vx, motion.vy) == pytest.approx((0.0, 0.0), abs=0.05)
+
+
+def test_a_slot_that_moves_sideways_in_the_map_gives_the_heading_from_its_least_speed_on() -> None:
+    for share, heading in ((0.9, 0.3), (1.1, pi / 2)):
+        follower, controller = wanting(STILL)
+        ahead = Pose2D(0.0, 1.2, pi / 2)
+        twist = Twist(share * SLOT_SPEED_MIN_MPS, 0.0)
+        follower.step(sighted(twist, pose=ahead), BEHIND, Pose2D(0.0, 0.0, 0.3), STILL, DT)
+        assert controller.references[-1].heading == pytest.approx(heading)
+
+
+def test_an_idle_robot_far_from_its_slot_goes_as_soon_as_its_controller_wants_to() -> None:
+    follower, controller = wanting(STILL)
+    far = Pose2D(-1.5, 0.0, 0.0)
+    follower.step(sighted(), BEHIND, far, STILL, DT)
+    assert follower.readout.state is State.STAND
+    controller.twist = Twist(0.2, 0.0)
+    assert follower.step(sighted(), BEHIND, far, STILL, DT).linear_x > 0.0
+
+
+def test_a_predecessor_at_no_place_is_none() -> None:
+    follower, controller = wanting(Twist(0.3, 0.0))
+    assert follower.step(sighted(pose=Pose2D(float("nan"), 0.0, 0.0)), BEHIND, IN_SLOT, STILL, DT) == STILL
+    assert follower.readout.state is State.HOLD
+    assert controller.references == []
+
+
+def test_after_a_hold_the_target_begins_at_the_robot() -> None:
+    follower, controller = wanting(STILL)
+    follower.step(sighted(), BEHIND, IN_SLOT, STILL, DT)
+    follower.step(None, BEHIND, IN_SLOT, STILL, DT)
+    follower.step(sighted(pose=Pose2D(0.0, 0.0, 0.9)), BEHIND, Pose2D(-1.2, 0.0, 0.4), STILL, DT)
+    assert controller.references[-1].heading == 0.4
+
+
+class Failing(Wanting):
+    """Controller that fails in its first step."""
+
+    def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
+        raise ValueError("no way")
+
+
+@pytest.mark.parametrize(("name", "shown"), [("carrot", "controller carrot:"), ("", "controller Failing:")])
+def test_a_controller_that_fails_is_named_and_the_robot_brakes(name: str, shown: str) -> None:
+    follower = Follower(DEFAULT, LIMITS, Failing(STILL), name=name)
+    assert follower.step(sighted(Twist(0.5, 0.0)), BEHIND, IN_SLOT, STILL, DT) == STILL
+    assert (follower.failure or "").startswith(shown)

@@ -26,6 +26,17 @@ def test_bursts_have_the_given_mean_length() -> None:
     assert abs(sum(lost) / bursts - 5.0) < 0.7
 
 
+def test_losses_without_bursts_are_independent_of_each_other() -> None:
+    lost = [fate == [] for fate in fates(Radio(loss=0.5), 20_000)]
+    bursts = sum(now and not before for before, now in zip([False, *lost], lost, strict=False))
+    assert abs(sum(lost) / bursts - 2.0) < 0.1
+
+
+def test_a_link_begins_without_a_fade() -> None:
+    first = [fates(Radio(loss=0.2, loss_burst=5.0), 1, seed=seed) == [[]] for seed in range(300)]
+    assert sum(first) < 0.1 * len(first)
+
+
 def test_delays_lie_between_delay_and_delay_plus_jitter() -> None:
     radio = Radio(delay_s=0.01, jitter_s=0.02)
     delays = [delay for fate in fates(radio, 1000) for delay in fate]
