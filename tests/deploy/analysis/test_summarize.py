@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot, overload, summarize
-from lfa.deploy.analysis.summary import RobotSummary
+from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot, overload, summarize, summary_of
+from lfa.deploy.analysis.summary import RobotSummary, Summary
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About
@@ -164,3 +164,73 @@ def test_a_run_is_summed_up_with_its_times_and_judged_by_its_assertions(tmp_path
     assert summary.assertions[0].name == "goal_reached"
     assert [robot.role_at_end for robot in summary.robots] == ["leader", "follower"]
     assert summary.robots[0].final_distance_error_m is None and summary.robots[1].final_distance_error_m is not None
+
+
+def _summed(*events: dict[str, Any], verdict: Verdict | None = None, faults_left: tuple[str, ...] = ()) -> Summary:
+    """Sum up ten seconds in which robot 2 follows robot 1, and nobody saw robot 3; they took two seconds to compute."""
+    scenario = load("straight", ("mission.robots=[1,2,3]",))
+    about = About("straight", "simulated", 1, "fleet")
+    return summary_of(scenario, _run(LATE), list(events), about, verdict or Verdict("goal_reached"), 2.0, faults_left)
+
+
+def _chain(*robots: int, number: int) -> dict[str, Any]:
+    return line("chain", robot=1, term=[number, 1, 1], seq=0, chain=list(robots))
+
+
+def test_a_run_arrived_at_its_last_goal() -> None:
+    assert _summed(line("goal", t=3.0), line("goal", t=7.0), line("role", t=8.0, role="leader")).arrived_at_s == 7.0
+    assert _summed().arrived_at_s is None
+
+
+def test_time_is_counted_in_the_run_and_on_the_machine() -> None:
+    summary = _summed()
+    assert (summary.duration_s, summary.sim_duration_s) == (2.0, pytest.approx(T[-1]))
+    assert summary.real_time_factor == pytest.approx(T[-1] / 2.0, abs=0.01)
+
+
+def test_who_is_alive_and_out_of_the_newest_chain_is_left_behind() -> None:
+    old, new = _chain(1, 2, 3, number=1), _chain(1, 2, number=2)
+    assert _summed(old, new).left_behind == [3]
+    assert _summed(old).left_behind == []
+    assert _summed(new, line("died", robot=3)).left_behind == []
+
+
+def test_a_term_that_went_back_is_a_violation_and_fails_its_assertion() -> None:
+    commands = [line("leader_command", robot=1, term=[number, 1, 1]) for number in (2, 1)]
+    summary = _summed(*commands)
+    assert [violation.invariant for violation in summary.violations] == ["I2"]
+    judged = {assertion.name: assertion.ok for assertion in summary.assertions}
+    assert judged["no_violations"] is False and judged["all_faults_done"] is True
+
+
+def test_a_recording_of_a_fleet_is_not_judged_by_a_goal_and_a_run_is() -> None:
+    names = [assertion.name for assertion in _summed(verdict=Verdict("recorded")).assertions]
+    assert "goal_reached" not in names and names[:2] == ["no_violations", "all_faults_done"]
+    reached = _summed().assertions[0]
+    assert (reached.name, reached.ok, reached.text) == ("goal_reached", True, "")
+
+
+def test_a_robot_whose_controller_failed_has_kept_no_distance_and_one_that_failed_otherwise_has() -> None:
+    assert _robot(2, _run(LATE), [line("failed", controller="law: no way")]).final_distance_error_m is None
+    assert _robot(2, _run(LATE), [line("failed")]).final_distance_error_m is not None
+    assert _robot(2, _run(LATE), [line("failed", robot=1, controller="law: no way")]).final_distance_error_m is not None
+
+
+def test_a_leaders_own_requests_for_a_formation_are_counted_and_an_operators_are_not() -> None:
+    asked = [line("formation", by=by) for by in ("leader", "operator", "leader")]
+    assert _robot(2, _run(LATE), [*asked, line("formation", robot=1, by="leader")]).orientation_requests == 2
+
+
+def test_a_robot_that_was_seen_has_a_way_a_mean_speed_and_a_clearance() -> None:
+    first, _, unseen = _summed().robots
+    assert first.way_m == pytest.approx(0.5 * T[-1])
+    assert first.mean_speed_mps == pytest.approx(0.5, abs=0.01)
+    assert first.least_clearance_m == pytest.approx(K - 0.3, abs=0.01)
+    assert unseen.way_m is None and unseen.mean_speed_mps is None and unseen.least_clearance_m is None
+
+
+def test_errors_are_excused_while_a_robot_avoids_and_counted_in_seconds() -> None:
+    robot = _robot(2, _run(LATE, avoids_at_s=5.0), [])
+    assert robot.excused_s == pytest.approx(1.0, abs=0.05)
+    assert robot.formation_changes == 0
+    assert robot.final_pose is not None and robot.final_pose[2] == 0.0
