@@ -1,0 +1,128 @@
+"""Speed of simulated teams on one core: agents, world, codec, journals and recording, in processor time.
+
+Beside each in the same run: the bare cost of its messages, each encoded, decoded and recorded once more, while nobody
+sends or hears them. The summary that `lfa sim` computes at the end is no part of it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from math import log
+from pathlib import Path
+from time import process_time
+
+from msgspec import Struct
+
+from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
+from lfa.deploy.recording.recorder import Recorder
+from lfa.deploy.run.simulate import SimulatedRun
+from lfa.protocol.messages.codec import Message, decode, encode
+from lfa.world.description.load import draw, load
+
+SCENARIO, SEED, BEAMS = "straight", 1, 180
+"""A column of robots on a straight way: its density is the same for any number of robots."""
+FROM_S = 1.0
+"""Time [s] of a run from which it is measured: the leader leads, and the chain is closed."""
+EXPONENT_MAX = 1.1
+
+
+class SpeedCase(Struct, frozen=True):
+    """Team to simulate until `until_s` [s]; `times_min`: least factor over real time, None without a bar."""
+
+    robots: int
+    control_hz: float
+    until_s: float
+    times_min: float | None = None
+
+    @property
+    def name(self) -> str:
+        return f"{self.robots} robots at {self.control_hz:g} Hz"
+
+
+CASES = (
+    SpeedCase(4, 50.0, 21.0, 30.0),
+    SpeedCase(20, 50.0, 7.0, 5.0),
+    SpeedCase(50, 50.0, 3.0),
+    SpeedCase(20, 20.0, 7.0),
+    SpeedCase(50, 20.0, 4.0),
+    SpeedCase(100, 20.0, 3.0, 2.0),
+)
+GROWTH_HZ = 20.0
+"""Control rate [Hz] of the cases that the exponent is fitted to."""
+
+
+class Cost(Struct, frozen=True):
+    """Processor time [s] of one simulated second: of the whole run, and of its messages alone."""
+
+    run_s: float
+    messages_s: float
+
+
+def run(as_json: bool, rows: str = "*") -> int:
+    """Print the matching rows; return 0 if all hold, else 1."""
+    return show(([one for one in some if fnmatchcase(one.name, rows)] for some in _rows()), as_json)
+
+
+def _rows() -> Iterator[list[BenchRow]]:
+    costs: dict[int, float] = {}
+    for case in CASES:
+        cost = cost_of(case)
+        if case.control_hz == GROWTH_HZ:
+            costs[case.robots] = cost.run_s
+        yield [
+            row(case.name, Quantity("times real time", "1", case.times_min, "at least"), 1.0 / cost.run_s),
+            row(case.name, Quantity("times the bare cost of its messages", "1"), cost.run_s / cost.messages_s),
+        ]
+    yield [row("growth", Quantity("exponent of cost over robots", "1", EXPONENT_MAX), exponent(costs))]
+
+
+def cost_of(case: SpeedCase) -> Cost:
+    """Simulate and return the cost of one simulated second after `FROM_S`."""
+    drawn = draw(
+        load(SCENARIO, [f"mission.control_hz={case.control_hz}", f"world.lidar.beams={BEAMS}"], case.robots), SEED
+    )
+    said: list[tuple[float, str, Message]] = []
+    with tempfile.TemporaryDirectory(prefix="lfa-") as place:
+        recorder = Recorder(_folder(place, "run"), {})
+
+        def record(t: float, key: str, message: Message) -> None:
+            said.append((t, key, message))
+            recorder.record(t, key, message)
+
+        team = SimulatedRun(drawn, SEED, (), record, Path(place) / "journal")
+        team.advance(FROM_S)
+        said.clear()
+        began = process_time()
+        team.advance(case.until_s)
+        run_s = process_time() - began
+        team.close()
+        recorder.close()
+        messages_s = _bare_s(said, _folder(place, "bare"))
+    simulated_s = case.until_s - FROM_S
+    return Cost(run_s / simulated_s, messages_s / simulated_s)
+
+
+def exponent(costs: dict[int, float]) -> float:
+    """Return the exponent of cost over robots: the slope of the line of least squares through their logarithms."""
+    points = [(log(robots), log(cost)) for robots, cost in costs.items()]
+    x, y = (sum(values) / len(points) for values in zip(*points, strict=True))
+    return sum((a - x) * (b - y) for a, b in points) / sum((a - x) * (a - x) for a, _ in points)
+
+
+def _bare_s(said: Sequence[tuple[float, str, Message]], folder: Path) -> float:
+    """Return the processor time [s] to encode, decode and record the messages once more."""
+    recorder = Recorder(folder, {})
+    began = process_time()
+    for t, key, message in said:
+        recorder.record(t, key, decode(encode(message), type(message)))
+    spent_s = process_time() - began
+    recorder.close()
+    return spent_s
+
+
+def _folder(place: str, name: str) -> Path:
+    folder = Path(place) / name
+    folder.mkdir()
+    return folder

@@ -1,0 +1,25 @@
+"""`lfa bench sim`: its bars, what it measures, and the exponent that it prints."""
+
+from __future__ import annotations
+
+import pytest
+
+from lfa.deploy.bench.sim.speed import CASES, SpeedCase, cost_of, exponent
+
+
+def test_the_bars_are_those_of_four_twenty_and_a_hundred_robots() -> None:
+    assert {case.name: case.times_min for case in CASES if case.times_min} == {
+        "4 robots at 50 Hz": 30.0,
+        "20 robots at 50 Hz": 5.0,
+        "100 robots at 20 Hz": 2.0,
+    }
+
+
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0])
+def test_the_exponent_of_a_power_is_that_power(power: float) -> None:
+    assert exponent({robots: 0.3 * robots**power for robots in (20, 50, 100)}) == pytest.approx(power)
+
+
+def test_a_run_costs_more_than_its_messages() -> None:
+    cost = cost_of(SpeedCase(2, 20.0, 1.5))
+    assert cost.run_s > cost.messages_s > 0.0
