@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from math import log
 from pathlib import Path
+from statistics import mean
 from time import process_time
 
 from msgspec import Struct
@@ -106,9 +107,10 @@ def cost_of(case: SpeedCase) -> Cost:
 
 def exponent(costs: dict[int, float]) -> float:
     """Return the exponent of cost over robots: the slope of the line of least squares through their logarithms."""
-    points = [(log(robots), log(cost)) for robots, cost in costs.items()]
-    x, y = (sum(values) / len(points) for values in zip(*points, strict=True))
-    return sum((a - x) * (b - y) for a, b in points) / sum((a - x) * (a - x) for a, _ in points)
+    x, y = [log(robots) for robots in costs], [log(cost) for cost in costs.values()]
+    x_mean, y_mean = mean(x), mean(y)
+    together = sum((a - x_mean) * (b - y_mean) for a, b in zip(x, y, strict=True))
+    return together / sum((a - x_mean) * (a - x_mean) for a in x)
 
 
 def _bare_s(said: Sequence[tuple[float, str, Message]], folder: Path) -> float:
