@@ -22,6 +22,8 @@ from lfa.world.description.load import Scenario
 
 LEFT_BEHIND_M = 0.5
 """Distance error [m] at the end of a run above which a follower counts as left behind."""
+STILL_S_MAX = 0.5
+"""Time [s] for which a world may have stood still in a run that its machine kept up with: a few pauses."""
 OBSTACLE_CLASSES = ("stationary", "moving", "pothole", "bump", "wall", "ditch")
 
 
@@ -88,7 +90,7 @@ def overload(events: Sequence[Line]) -> Overload | None:
         if lag_s > 0.0 and isinstance(line["robot"], int):
             name = robot_name(line["robot"])
             late_s[name] = max(late_s.get(name, 0.0), lag_s)
-    found = stood_still_s > 0.0 or late_s
+    found = stood_still_s > STILL_S_MAX or late_s
     return Overload(stood_still_s=round(stood_still_s, 3), late_s=late_s) if found else None
 
 

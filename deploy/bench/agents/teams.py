@@ -34,7 +34,7 @@ SHARE_BARS = {50.0: 3.5, 20.0: 1.3}
 """Largest share of a core [%] of an agent, by its control rate [Hz]."""
 
 
-class Watched(Struct):
+class DrivingTeam(Struct):
     """What was seen of a team while it drove."""
 
     lags_ms: list[float]
@@ -95,11 +95,11 @@ def _measure(scenario: Scenario) -> list[float]:
     return [*shares, *_memory(prints), poses_s, agreed_s, _p99(watched.lags_ms), len(watched.leaders), watched.factor]
 
 
-def _watch(team: Team) -> Watched:
+def _watch(team: Team) -> DrivingTeam:
     """Listen to a team for `WATCHED_S`."""
     state, robots = team.heard.state, team.scenario.mission.robots
     heard: dict[tuple[str, int], float] = {}
-    watched = Watched([], set(), 0.0)
+    watched = DrivingTeam([], set(), 0.0)
     began = now = clock.now()
     world_s = _world_s(team)
     while now < began + WATCHED_S:

@@ -121,7 +121,7 @@ def test_a_machine_that_does_not_keep_up_is_summed_up_by_what_stood_still_and_wh
     found = overload(events)
     assert found is not None
     assert (found.stood_still_s, found.late_s) == (1.25, {"robot2": 0.3})
-    assert overload([line("contact")]) is None
+    assert overload([line("contact"), line("slowed", stood_still_s=0.06)]) is None
 
 
 def _at(distance_m: float | None) -> RobotSummary:
