@@ -31,7 +31,7 @@ from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.stop import StopState
 from lfa.protocol.messages.team import Event, MissionNote
 from lfa.protocol.mission import Mission
-from lfa.protocol.names import robot_id_of, whole_number
+from lfa.protocol.names import robot_id_of, robot_name, whole_number
 from lfa.protocol.topics import address
 from lfa.protocol.transport.message_bus import send
 from lfa.world.description.scenario import Point
@@ -137,6 +137,11 @@ class FleetEngine:
                 return {"said": f"{do}: said to all"}
             case {"do": "fault", "text": str(text)}:
                 return {"said": self._fault(text)}
+            case {"do": "scan", "robot": int() as robot, "on": bool(on)} if robot in self._robots:
+                wanted = self._picture.wanted_scans
+                (wanted.add if on else wanted.discard)(robot)
+                self._subscriber.follow(HEARD | {f"{robot_name(one)}/scan" for one in wanted})
+                return {}
         raise Refused(f"{str(order.get('do'))[:20]}: no such order for a running fleet")
 
     def _go_on_stopping(self, now: float) -> None:

@@ -18,15 +18,23 @@ from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
 from lfa.deploy.bench.harness.team import Team
 from lfa.deploy.client.discovery import agents
 from lfa.protocol import clock
+from lfa.protocol.names import robot_id_of
 from lfa.world.description.load import load
 
 ROBOTS, VIEWERS = 50, 5
 WATCHED_S = 4.0
+LAG_S, LOOK_S = 10.0, 0.2
+"""Time [s] for which the agents' loop lag is noted, and between two looks."""
+LAG_MS_LEAST = 1.0
+"""Loop lag [ms] below which the ratio says nothing: a machine's timer is no finer."""
 PAGE = Path(__file__).parents[2] / "web" / "page"
 FIRST = Quantity("first frame", "s", 1.0)
 SIZE = Quantity("size of the page", "MB", 1.0)
 FPS = Quantity("frames a second", "Hz", 50.0, "at least")
 COST = Quantity("server's CPU for each viewer", "%", 5.0)
+LAG = Quantity("loop lag, 5 viewers over nobody", "ratio", 1.5)
+ALONE = Quantity("loop lag, nobody looks", "ms", 20.0)
+LOOKED_AT = Quantity("loop lag, 5 viewers", "ms", 20.0)
 KILL = Quantity("click to SIGKILL", "ms", 100.0)
 SHOWN = "window.lfa && lfa.models.length && lfa.models[0].robots.size === {}"
 
@@ -55,6 +63,11 @@ def _rows() -> Iterator[list[BenchRow]]:
         yield [row(f"{VIEWERS} more viewers", COST, 100.0 * (together - alone) / VIEWERS)]
     with Team(load("straight")) as team:
         team.await_chain(len(team.scenario.mission.robots))
+        before_ms = _lag_ms(team)
+        with _served("--fleet", team.fleet.name) as (address, _), _viewers(address):
+            looked_at_ms = _lag_ms(team)
+        ratio = looked_at_ms / max(before_ms, LAG_MS_LEAST)
+        yield [row("fleet", ALONE, before_ms), row("fleet", LOOKED_AT, looked_at_ms), row("fleet", LAG, ratio)]
         with _served("--fleet", team.fleet.name) as (address, _), Browser() as browser:
             browser.open(address)
             browser.wait_for(SHOWN.format(len(team.scenario.mission.robots)))
@@ -87,6 +100,19 @@ def _cost(process: subprocess.Popen[bytes]) -> float:
     before, began = cpu_s(process), perf_counter()
     clock.sleep(WATCHED_S)
     return (cpu_s(process) - before) / (perf_counter() - began)
+
+
+def _lag_ms(team: Team) -> float:
+    """Return the median [ms] of the loop lags that a team's agents report for each second of `LAG_S`."""
+    heard: dict[tuple[str, int], float] = {}
+    until = clock.now() + LAG_S
+    while clock.now() < until:
+        team.listen()
+        for name, status in team.heard.state.status.items():
+            if robot_id_of(name):
+                heard[name, status.message.header.seq] = status.message.counters.get("loop_lag_ms", 0.0)
+        clock.sleep(LOOK_S)
+    return statistics.median(heard.values())
 
 
 @contextmanager

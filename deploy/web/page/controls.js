@@ -142,7 +142,7 @@ export class Controls {
       return;
     }
     const actions = ACTIONS.map(([action, text, key]) => button(text, () => this.action(action, robot), { id: `do-${action}`, title: key }));
-    const scan = this.engine === "fleet" ? "" : button("Scan", () => this.scan(robot), { id: "do-scan", title: "L", "aria-pressed": String(this.scanned.has(robot)) });
+    const scan = button("Scan", () => this.scan(robot), { id: "do-scan", title: "L", "aria-pressed": String(this.scanned.has(robot)) });
     const close = button("×", () => this.page.choose(null), { "aria-label": "Close" });
     this.#open(at, element("h2", {}, `Robot ${robot}`, close), element("div", { class: "row" }, ...actions, scan));
   }
@@ -203,7 +203,7 @@ export class Controls {
     else if (event.key === "Escape") page.choose(null);
     else if (event.key === "g") page.spot(stage, [stage.camera.x, stage.camera.y], true);
     else if (event.key === "o" && this.draw) this.setTool(this.tool === "draw" ? "look" : "draw");
-    else if (event.key === "l" && chosen !== null && this.engine === "virtual") this.scan(chosen);
+    else if (event.key === "l" && chosen !== null && this.rights === "operate") this.scan(chosen);
     else if (event.key === "]" || event.key === "[") page.next(event.key === "]" ? 1 : -1);
     else if (action && chosen !== null) this.action(action[0], chosen);
     else return false;

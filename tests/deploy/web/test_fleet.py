@@ -76,6 +76,13 @@ def test_a_clicked_goal_is_carried_out_and_an_impossible_one_refused(page: Brows
     page.wait_for("document.getElementById('said').textContent.includes('must be x and y')")
 
 
+def test_a_scan_is_shown_while_it_is_asked_for(page: Browser) -> None:
+    do(page, 2, "scan")
+    page.wait_for("lfa.models[0].scans[2]?.[2].length === 180")
+    page.value("lfa.controls.scan(2), 0")
+    page.wait_for("lfa.models[0].scans[2] === undefined")
+
+
 def test_the_stop_button_stops_all_and_says_so(page: Browser) -> None:
     page.wait_for(f"{SPEEDS}.some((speed) => speed > 0.05)")
     page.click("#stop")
