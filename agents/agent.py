@@ -29,13 +29,24 @@ class Agent:
 
     defer_hellos = True
 
-    def __init__(self, robot_id: int, incarnation: int, fleet: str, floor: int, mission: Mission | None = None) -> None:
+    def __init__(
+        self,
+        robot_id: int,
+        incarnation: int,
+        fleet: str,
+        floor: int,
+        mission: Mission | None = None,
+        *,
+        spare: bool = False,
+    ) -> None:
+        """Create without a mission, or with the `mission` given; a `spare` is none of its robots (E33)."""
         self.lease_observer: Observer | None = None
         """Told of every event of the lease; set before the mission is known."""
         self._id = robot_id
         self._outbox = Outbox(fleet, robot_name(robot_id), incarnation)
         self._floor = floor
         self._given = mission
+        self._spare = spare
         self._core: RobotCore | None = None
         self._next_ask = 0.0
         self._interests = before_the_mission(fleet)
@@ -52,7 +63,12 @@ class Agent:
 
     @property
     def started_with(self) -> dict[str, Any]:
-        return {"kind": "agent", "robot_id": self._id, "mission": msgspec.to_builtins(self._given)}
+        return {
+            "kind": "agent",
+            "robot_id": self._id,
+            "mission": msgspec.to_builtins(self._given),
+            "spare": self._spare,
+        }
 
     @property
     def interests(self) -> frozenset[str]:
@@ -106,7 +122,8 @@ class Agent:
         newest = None if self._core is None else self._core.superseded_by
         if newest is None:
             return None
-        return Agent(self._id, after(newest, self.incarnation), self._outbox.fleet, self._floor, self._given)
+        number = after(newest, self.incarnation)
+        return Agent(self._id, number, self._outbox.fleet, self._floor, self._given, spare=self._spare)
 
     def next_deadline(self) -> float:
         return self._next_ask if self._core is None else self._core.next_deadline()
@@ -138,6 +155,8 @@ class Agent:
     def _begin(self, mission: Mission, now: float) -> None:
         """Start with the mission: from here on this robot votes, follows and may lead."""
         try:
-            self._core = RobotCore(self._id, mission, self._outbox, self._floor, now, self.lease_observer)
+            self._core = RobotCore(
+                self._id, mission, self._outbox, self._floor, now, self.lease_observer, spare=self._spare
+            )
         except Refused as refused:
             self._refusal = str(refused)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from lfa.agents.team_state import ROW_S_MAX, TeamState
 from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.membership import team_of
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.names import robot_name
 
@@ -21,7 +20,7 @@ UNHEARD = "no HELLO is heard of it"
 class Attendance:
     """Attendance of the team at one robot, renewed once a second by `update`."""
 
-    def __init__(self, robot_id: int, robots: Sequence[int]) -> None:
+    def __init__(self, robot_id: int, robots: tuple[int, ...]) -> None:
         self._id = robot_id
         self._robots = robots
         self._since: dict[int, float] = {}
@@ -38,7 +37,8 @@ class Attendance:
             self.outside = {}
             self.lacks_messages = lease.leader is None or self._id not in chain or self._misses_rows(chain, team, now)
             return
-        outside = [robot for robot in self._robots if robot not in chain and _is_there(robot, lease, team, now)]
+        members = team_of(lease.config.roster, self._robots)
+        outside = [robot for robot in members if robot not in chain and _is_there(robot, lease, team, now)]
         self._since = {robot: self._since.get(robot, now) for robot in outside}
         late = [robot for robot in outside if now - self._since[robot] >= OUTSIDE_S]
         self.outside = {robot: _why_outside(robot, lease, now) for robot in late}

@@ -34,8 +34,10 @@ class ChainPlace:
         return Role.FOLLOWER if follows and self._id != self.first else Role.WAITING
 
     def ahead(self, stuck: bool) -> int | None:
-        """Return the robot to follow; None for none. A `stuck` robot left out of it tries to join the tail (E22)."""
-        chain = self.ids
+        """Return the robot to follow; None for none. A `stuck` robot left out of it tries to join the tail (E22), but
+        none that an operator has retired (E34).
+        """
+        chain, stuck = self.ids, stuck and self._id not in self._config.roster.retired
         if self._id not in chain:
             return chain[-1] if chain and stuck else None
         place = chain.index(self._id)

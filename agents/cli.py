@@ -52,7 +52,7 @@ def start(arguments: argparse.Namespace) -> int:
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
     fleet, wall_ms = fleet_name(arguments.fleet), clock.wall_ms()
-    node = _node(arguments.role, arguments.id, fleet, wall_ms, mission)
+    node = _node(arguments.role, arguments.id, fleet, wall_ms, mission, arguments.spare)
     known = None if arguments.keys is None else credentials(arguments.keys, node.name, wall_ms)
     lease_ms = LINK_LEASES_MS[arguments.link]
     notify = os.environ.get("NOTIFY_SOCKET", "")
@@ -79,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--link", choices=sorted(LINK_LEASES_MS), default="std",
         help="time after which a silent link counts as lost: fast (0.5 s), std (1 s) or wifi (2 s)")
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; without it, received over Zenoh")
+    add("--spare", action="store_true", help="a robot that the mission does not name: it waits for lfa join")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
     add("--controller", metavar="FILE.py:Class", help="a controller of your own, for a mission that chooses it")
     add("--faults", action="store_true", help="obey an operator's link conditions (lfa fault cut, loss): for tests")
@@ -86,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None) -> Node:
+def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None, spare: bool) -> Node:
     incarnation = incarnations.drawn()
     if role not in ROLES:
         raise Refused(f"--role {role}: must be one of {', '.join(ROLES)}")
@@ -97,9 +98,9 @@ def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None)
     robot = whole_number(id) or 0
     if not 1 <= robot <= 2**31:
         raise Refused(f"--id {id}: must be a robot's number, 1 or higher")
-    if mission is not None and robot not in mission.robots:
+    if mission is not None and robot not in mission.robots and not spare:
         raise Refused(f"--id {id}: not in the mission, which has robots {list(mission.robots)}")
-    return Agent(robot, incarnation, fleet, wall_ms, mission)
+    return Agent(robot, incarnation, fleet, wall_ms, mission, spare=spare)
 
 
 def read_mission(path: Path) -> Mission:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfa.agents.chain_place import ChainPlace
-from lfa.agents.stop_listener import StopListener
+from lfa.agents.orders.stop_listener import StopListener
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.machine.lease import Lease

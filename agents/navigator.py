@@ -57,7 +57,7 @@ class Navigator:
         self.formation = Formation.of(mission)
         self.follower = follower_of(mission)
         self.leading = Leadership(mission, self.formation, team)
-        self._mates = TeamMates(robot_id, mission.robots, team)
+        self._mates = TeamMates(robot_id, team)
         self._obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
         self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
         self.scan_age = ScanAge()

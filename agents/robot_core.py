@@ -17,10 +17,12 @@ from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
 from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
-from lfa.agents.stop_listener import StopListener
+from lfa.agents.orders.roster_orders import JOIN, RETIRE, RosterOrders
+from lfa.agents.orders.roster_orders import QUESTION as ROSTER
+from lfa.agents.orders.stop_listener import StopListener
+from lfa.agents.orders.team_orders import QUESTION, TeamOrders
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
-from lfa.agents.team_orders import QUESTION, TeamOrders
 from lfa.agents.team_state import TeamState
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
@@ -58,13 +60,15 @@ class RobotCore:
         floor: int,
         now: float,
         observer: Observer | None,
+        *,
+        spare: bool = False,
     ) -> None:
-        """Start with the mission. Raise `Refused` when it is invalid or has no robot `robot_id`.
+        """Start with the mission. Raise `Refused` when it is invalid, or has no robot `robot_id` which is no `spare`.
 
         `observer` is told of every event of the lease.
         """
         check_mission(mission)
-        if robot_id not in mission.robots:
+        if robot_id not in mission.robots and not spare:
             raise Refused(f"id {robot_id}: not in the mission, which has robots {list(mission.robots)}")
         self.defer_grants = False
         self.refusal: str | None = None
@@ -81,6 +85,7 @@ class RobotCore:
         self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place, self._stop_listener)
         self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
         self._team_orders = TeamOrders(outbox, mission)
+        self._roster_orders = RosterOrders(robot_id, mission, self.lease, outbox)
         self._reports = Reports(outbox, len(mission.robots), timing.deadman_s - mission.control_period_s)
         self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
@@ -149,13 +154,14 @@ class RobotCore:
                 self._obey(message, now)
             case StopOrder() | StopReport() | Ask():
                 self._stop_listener.receive(message, now)
-                if isinstance(message, Ask) and message.what == QUESTION and lease.role is Role.LEADER:
-                    self._team_orders.say(lease.term, now)
+                if isinstance(message, Ask) and lease.role is Role.LEADER:
+                    self._answer(message.what, now)
             case OrderNote():
                 self._take_order(message, now)
             case Vitals():
                 self._attendance.update(lease, self._team, now)
-                held = (self._stop_listener.text() if lease.chain else "") or self._attendance.text()
+                stopped = self._stop_listener.text() if lease.chain else ""
+                held = stopped or self._roster_orders.text() or self._attendance.text()
                 self._reports.status(message, navigator, self._team, lease, self._role(), held, now)
             case Stop():
                 self._stop(now)
@@ -210,6 +216,11 @@ class RobotCore:
         lease = self.lease
         if note.command == "forget":
             self._forget(note, now)
+        if note.command in (JOIN, RETIRE):
+            effects, hands_over = self._roster_orders.obey(note, now)
+            self._apply(effects, now)
+            if hands_over:
+                self._hand_over(now)
         if note.command == "teleop":
             self.navigator.hand_driving.hear(note.arguments, now)
         side = str(note.arguments.get("side"))
@@ -221,6 +232,13 @@ class RobotCore:
             self._formation_commands.order(side, "operator", lease.chain[1:], lease.term, now)
         elif note.command == "handover":
             self._hand_over(now)
+
+    def _answer(self, what: str, now: float) -> None:
+        """Answer an operator's question as leader."""
+        if what == QUESTION:
+            self._team_orders.say(self.lease.term, now)
+        elif what == ROSTER:
+            self._roster_orders.answer(now)
 
     def _take_order(self, note: OrderNote, now: float) -> None:
         """Process a change of the mission that an operator proposes, or that a leader carries (E32)."""

@@ -35,7 +35,6 @@ class StuckPolicy:
 
     def __init__(self, robot_id: int, mission: Mission, outbox: Outbox, team: TeamState) -> None:
         self._id = robot_id
-        self._robots = mission.robots
         self._outbox = outbox
         self._team = team
         self._said: str | None = None
@@ -77,7 +76,7 @@ class StuckPolicy:
             self._led_before = None
         chain = lease.chain
         waited_for = () if driver.leading.waited_out else [robot for robot in chain if self._waits_for(robot, now)]
-        stuck = {robot for robot in self._robots if robot not in waited_for and self._team.stuck(robot, now)}
+        stuck = {robot for robot in self._team.robots if robot not in waited_for and self._team.stuck(robot, now)}
         for robot in stuck.intersection(chain) - lease.left_out:
             self._event("left_out", now, lease, {"robot_left": robot})
         return frozenset(stuck)

@@ -42,6 +42,11 @@ class TeamState:
         self.progress: RouteProgress | None = None
         """Progress of the team on its route: the own one while this robot leads, else the leader's as last heard."""
 
+    @property
+    def robots(self) -> tuple[int, ...]:
+        """Robots of which a row was heard, in the order of their first one."""
+        return tuple(self._table)
+
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
         self.sensors, self.sensors_at = sensors, at
 

@@ -33,7 +33,7 @@ ORDER = (
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
     "agents/leading", "agents/behaviors", "agents/navigator", "agents/stuck_policy", "agents/telemetry",
-    "agents/attendance", "agents/chain_place", "agents/stop_listener", "agents/team_orders", "agents/command_publisher",
+    "agents/attendance", "agents/chain_place", "agents/orders", "agents/command_publisher",
     "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",
@@ -41,8 +41,8 @@ ORDER = (
     "world/virtual_time", "world/routes", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/recording",
-    "deploy/process", "deploy/campaign", "deploy/client", "deploy/faults", "deploy/scenario_loading", "deploy/worlds",
-    "deploy/analysis",
+    "deploy/process", "deploy/campaign", "deploy/client", "deploy/client/roster", "deploy/faults",
+    "deploy/scenario_loading", "deploy/worlds", "deploy/analysis",
     "deploy/analysis/paper", "deploy/analysis/verification",
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/picture", "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal",

@@ -44,17 +44,19 @@ def resumed(scenario: Scenario, memory: Memory) -> Scenario:
 
     Raises Refused for another team.
     """
-    robots = scenario.mission.robots
-    if set(robots) != {robot.id for robot in memory.robots}:
+    robots, world = scenario.mission.robots, scenario.world
+    if set(scenario.robots) != {robot.id for robot in memory.robots}:
         ids = sorted(robot.id for robot in memory.robots)
-        raise Refused(f"--resume: the state is of robots {ids}, the scenario has {list(robots)}")
-    at = {robot.id: robot.pose for robot in memory.robots}
-    starts = tuple((at[robot].x, at[robot].y, at[robot].theta) for robot in robots)
+        raise Refused(f"--resume: the state is of robots {ids}, the scenario has {list(scenario.robots)}")
+    at = {robot.id: (robot.pose.x, robot.pose.y, robot.pose.theta) for robot in memory.robots}
+    starts = tuple(at[robot] for robot in robots)
+    spares = tuple(replace(spare, start=at[spare.id]) for spare in world.spares)
     obstacles = tuple(
         obstacle if obstacle.mass_kg is None or n not in memory.things else _put(obstacle, memory.things[n])
-        for n, obstacle in enumerate(scenario.world.obstacles)
+        for n, obstacle in enumerate(world.obstacles)
     )
-    return replace(scenario, world=replace(scenario.world, starts=starts, obstacles=(*obstacles, *memory.added)))
+    world = replace(world, starts=starts, spares=spares, obstacles=(*obstacles, *memory.added))
+    return replace(scenario, world=world)
 
 
 def _put(obstacle: Obstacle, pose: Pose2D) -> Obstacle:

@@ -25,6 +25,7 @@ from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
 from lfa.world.added_obstacles import AddedObstacles
 from lfa.world.description.own_sensor import TrueState
+from lfa.world.description.placement import with_spares
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
@@ -67,7 +68,8 @@ class World:
             "memory": msgspec.to_builtins(memory),
         }
         self._fleet = fleet
-        self._scenario = scenario
+        self._announced = scenario.mission
+        self._scenario = scenario = with_spares(scenario)
         self._seed = seed
         self._bodies = bodies(scenario)
         self._scanner = Scanner(scenario)
@@ -319,7 +321,7 @@ class World:
         return self._truths.envelope("truth", truth)
 
     def _mission(self, now: float) -> Envelope:
-        note = MissionNote(self._outbox.header("mission", now), self._scenario.mission)
+        note = MissionNote(self._outbox.header("mission", now), self._announced)
         return self._outbox.envelope("mission", note)
 
     def _event(self, kind: str, term: Term | None, data: dict[str, object], stamp: float) -> Envelope:

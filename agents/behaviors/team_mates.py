@@ -11,16 +11,16 @@ from lfa.protocol.geometry import Pose2D
 
 
 class TeamMates:
-    """The other robots of a mission, and the one that this robot follows."""
+    """The other robots that tell where they are, and the one that this robot follows."""
 
-    def __init__(self, robot_id: int, robots: tuple[int, ...], team: TeamState) -> None:
-        self._others = tuple(robot for robot in robots if robot != robot_id)
+    def __init__(self, robot_id: int, team: TeamState) -> None:
+        self._id = robot_id
         self._team = team
         self.predecessor: Predecessor | None = None
 
     def places(self, now: float) -> list[Pose2D]:
         """Return the known poses in `map`: the predecessor's from its pose messages, the others' from the table."""
-        places = [self._team.pose_of(robot, now) for robot in self._others]
+        places = [self._team.pose_of(robot, now) for robot in self._others()]
         if self.predecessor is not None:
             sighting = self.predecessor.at(now)
             places.append(None if sighting is None else sighting.pose)
@@ -33,8 +33,11 @@ class TeamMates:
         """
         ahead = None if self.predecessor is None else self.predecessor.robot
         c, s, mates = cos(pose.theta), sin(pose.theta), []
-        for robot, place in self._team.near(self._others, pose, within_m, now):
+        for robot, place in self._team.near(self._others(), pose, within_m, now):
             if robot != ahead:
                 dx, dy = place.x - pose.x, place.y - pose.y
                 mates.append((c * dx + s * dy, c * dy - s * dx))
         return mates
+
+    def _others(self) -> list[int]:
+        return sorted(robot for robot in self._team.robots if robot != self._id)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from lfa.agents.team_orders import QUESTION
+from lfa.agents.orders.team_orders import QUESTION
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall
 from lfa.protocol.errors import Refused

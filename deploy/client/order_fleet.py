@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfa.agents.team_orders import QUESTION
+from lfa.agents.orders.team_orders import QUESTION
 from lfa.deploy.client.mission_changes import Walls
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome

@@ -38,7 +38,7 @@ from lfa.protocol.transport.link_model import LinkModel
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
-from lfa.world.description.scenario import Lidar, Scenario, WorldSpec
+from lfa.world.description.scenario import Lidar, Scenario, SpareRobot, WorldSpec
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.simulator import Simulator
 from lfa.world.virtual_time import LocalClock
@@ -46,6 +46,8 @@ from lfa.world.world import World
 
 FLEET = "whole"
 ROAD_M = 100.0
+ASIDE_M = 3.0
+"""Distance [m] of spares from the road and from each other."""
 
 
 class AgentSimulation:
@@ -62,13 +64,16 @@ class AgentSimulation:
         self.cuts: set[tuple[int, int]] = set()
         self.wall_ms: dict[int, int] = {}
         """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
-        self.ids = ((WITNESS_ID,) if schedule.witness else ()) + robots
+        spares = tuple(spare for spare in schedule.spares if spare not in robots)
+        self.robots = (*robots, *spares)
+        self.ids = ((WITNESS_ID,) if schedule.witness else ()) + self.robots
         self.rates = schedule.rates
         self.processes: dict[int, AgentProcess] = {}
         self.gateways: dict[int, WorldProcess] = {}
         self.accepted: list[tuple[float, CmdVel]] = []
         self.log: list[tuple[float, int, Effect]] = []
-        world = WorldSpec(lidar=Lidar(beams=8))
+        places = tuple(SpareRobot(spare, (-ASIDE_M * n, -ASIDE_M, 0.0)) for n, spare in enumerate(spares))
+        world = WorldSpec(lidar=Lidar(beams=8), spares=places)
         self._scenario = Scenario("A straight road", self.mission, 1e6, world=world, name=FLEET)
         self._operator = Operator(FLEET, 1)
         self._incarnations = 0
@@ -109,6 +114,7 @@ class AgentSimulation:
 
     def start_all(self) -> AgentSimulation:
         """Start the world with its gateways, then all other processes at once."""
+        self._report(Checker.names, self.now, self.mission.robots)
         self._start_world(World(FLEET, self._scenario, 1, self._next_incarnation(), start_at=None, bodies=Kinematic))
         for robot_id in self.ids:
             self.start(robot_id)
@@ -128,7 +134,7 @@ class AgentSimulation:
         node: Agent | Witness = (
             Witness(FLEET, number, floor, mission)
             if robot_id == WITNESS_ID
-            else Agent(robot_id, number, FLEET, floor, mission)
+            else Agent(robot_id, number, FLEET, floor, mission, spare=robot_id not in mission.robots)
         )
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         self._watch(node, robot_id, clock)
@@ -250,9 +256,9 @@ class AgentSimulation:
     def _start_world(self, world: World) -> None:
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(-1, 1.0))
         process = WorldProcess(world, clock)
-        self.gateways = dict.fromkeys(self.mission.robots, process)
+        self.gateways = dict.fromkeys(self.robots, process)
         self._say(WITNESS_ID, "world starts")
-        for robot_id in self.mission.robots:
+        for robot_id in self.robots:
             self._report(Checker.gateway_starts, self.now, robot_id, self.now + self.timing.grant_s / clock.rate)
         self._add(world, clock, GatewayObserver(self.simulator, world, self._report, self.accepted))
 

@@ -15,8 +15,10 @@ from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.fuzz.held_messages import MessageHolder
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
+from lfa.deploy.fuzz.roster_calls import RosterCalls
 from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
 from lfa.deploy.fuzz.stops import StopTraffic
+from lfa.protocol.lease.membership import team_of
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.mission import Mission
@@ -176,7 +178,7 @@ class Faults:
             simulation.link_model.radio, loss=0.0, duplication=0.0, tail=0.0, reorder=0.0
         )
         simulation.lose_late(self._radio.prompt_s)
-        for robot_id in simulation.mission.robots:
+        for robot_id in simulation.robots:
             self._start_gateway(robot_id)
         for target in list(simulation.processes):
             if simulation.processes[target].paused:
@@ -192,8 +194,10 @@ class Faults:
         living = [p for p in self.simulation.processes.values() if p.alive]
         configs = [p.lease.config for p in living if p.lease is not None]
         newest = max(configs, key=lambda c: c.version, default=None)
-        robots = any(p.id != WITNESS_ID for p in living)
-        return newest is not None and robots and is_quorum(newest, {p.member for p in living})
+        if newest is None or not is_quorum(newest, {p.member for p in living}):
+            return False
+        team = team_of(newest.roster, self.simulation.mission.robots)
+        return any(p.id in team for p in living)
 
 
 def play(schedule: Schedule, trace: Trace | None = None) -> Played:
@@ -217,6 +221,7 @@ def _lease_simulation(schedule: Schedule) -> Simulation:
         rates=schedule.rates,
         radio=schedule.radio,
         gateways_at_world=schedule.gateways_at_world,
+        spares=schedule.spares,
     )
 
 
@@ -228,9 +233,11 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
     faults = Faults(simulation, schedule)
     if isinstance(simulation, LeaseSimulation):
         simulation.filter = MessageHolder(simulation, schedule) if schedule.held else None
-        traffic = StopTraffic(simulation, simulation.mission.robots, schedule.seed)
+        traffic = StopTraffic(simulation, simulation.robots, schedule.seed)
         traffic.begin(schedule.stops)
         simulation.listen([*checkers, traffic.observer])
+        rosters = RosterCalls(simulation)
+        rosters.begin(schedule.rosters)
     simulation.start_all()
     simulation.run(DURATION_S)
     for checker in checkers:
@@ -243,7 +250,9 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
 def _checkers(schedule: Schedule) -> list[type[Checker]]:
     """Return the checkers of all invariants that apply to this schedule."""
     kinds = [*SAFETY, *AFTER_FAULTS, StopsWithoutQuorum]
-    if not schedule.faults and schedule.profile != "fast":  # 20 % loss may cost "fast" its leader (design, 7)
+    if (
+        not (schedule.faults or schedule.rosters) and schedule.profile != "fast"
+    ):  # 20 % loss may cost "fast" its leader (design, 7)
         kinds.append(Steady)
     if schedule.is_single:
         kinds.append(NextInChain)

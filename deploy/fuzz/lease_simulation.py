@@ -38,14 +38,17 @@ class LeaseSimulation(Hosts):
         radio: Radio = FAIR,
         gateways_at_world: bool = False,
         gateway_type: type[Gateway] = Gateway,
+        spares: tuple[int, ...] = (),
     ) -> None:
+        """Create the simulation; `spares` are robots that run and that the mission does not name."""
         self.mission = mission or Mission(
             robots=tuple(range(1, robots + 1)),
             witness=witness,
             profile=profile,
             leading=Leading(route_m=((1.0, 0.0),)),
         )
-        ids = ((WITNESS_ID,) if self.mission.witness else ()) + self.mission.robots
+        self.robots = (*self.mission.robots, *spares)
+        ids = ((WITNESS_ID,) if self.mission.witness else ()) + self.robots
         timing, gateways_at = timing_for(self.mission), WITNESS_ID if gateways_at_world else None
         super().__init__(seed, ids, radio, gateways_at, timing, rates or {}, gateway_type)
         self.wall_ms: dict[int, int] = {}
@@ -55,7 +58,8 @@ class LeaseSimulation(Hosts):
 
     def start_all(self, at: float = 0.0, gateways_shut_s: float = 0.0) -> LeaseSimulation:
         """Start all processes at true time `at` [s]; the gateways refuse commands until `gateways_shut_s` later."""
-        for robot_id in self.mission.robots:
+        self._report(Checker.names, at, self.mission.robots)
+        for robot_id in self.robots:
             self.start_gateway(robot_id, at - self.timing.grant_s + gateways_shut_s)
         for robot_id in self.ids:
             self.at(at, self.start, robot_id)

@@ -21,6 +21,9 @@ WARM_UP_S = 0.6
 FAULTS_MEAN = 30
 STOPS_MAX = 20
 """Maximum number of an operator's calls in a schedule, which follow on each other and overlap."""
+ROSTER_SHARE = 0.3
+"""Fraction of schedules with spares, and with operators who let robots join and retire."""
+ROSTER_CALLS_MAX = 6
 CALM_SHARE = 0.05
 """Fraction of schedules without a fault, in which no leader may step down (L5)."""
 SINGLE_SHARE = 0.05
@@ -69,12 +72,17 @@ class Schedule(Struct, frozen=True):
     stops: tuple[ScheduledFault, ...] = ()
     """Calls of operators, each at a host: `stop`, `resume`; and the `replay` of an earlier word to a robot."""
     held: tuple[HeldMessage, ...] = ()
+    spares: tuple[int, ...] = ()
+    """Robots that run and that the mission does not name (E33)."""
+    rosters: tuple[ScheduledFault, ...] = ()
+    """Calls of operators: `join` of an id, by `value` in the place of another, and `retire` of one."""
 
     @property
     def is_single(self) -> bool:
         """Schedule with perfect links and one fault: the leader is killed, and no message is held back."""
         kinds = [fault.kind for fault in self.faults]
-        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.radio == FAIR and not self.held
+        changed = self.held or self.rosters
+        return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.radio == FAIR and not changed
 
 
 KINDS: tuple[str, ...] = (
@@ -114,7 +122,8 @@ def draw(seed: int) -> Schedule:
     kinds = [kind for kind in KINDS if random.random() < 0.4 and (witness or kind != "witness")] or ["kill"]
     share = random.random()
     radio = _radio(random)
-    faults = [draw_fault(random, kinds, ids) for _ in range(_count(random, FAULTS_MEAN))]
+    spares, rosters = _rosters(Random(f"roster-{seed}"), ids)
+    faults = [draw_fault(random, kinds, ids + spares) for _ in range(_count(random, FAULTS_MEAN))]
     if share < CALM_SHARE:
         faults = []
     elif share < CALM_SHARE + SINGLE_SHARE:
@@ -129,6 +138,8 @@ def draw(seed: int) -> Schedule:
         faults=tuple(sorted(faults, key=_when)),
         radio=radio,
         stops=_stops(Random(f"operator-{seed}"), ids),
+        spares=spares,
+        rosters=rosters,
         revive_all=random.random() < 0.5,
     )
 
@@ -140,6 +151,21 @@ def _stops(random: Random, ids: tuple[int, ...]) -> tuple[ScheduledFault, ...]:
         ScheduledFault(at, random.choices(("stop", "resume", "replay"), (0.4, 0.3, 0.3))[0], (random.choice(ids),))
         for at in times
     )
+
+
+def _rosters(random: Random, ids: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[ScheduledFault, ...]]:
+    """Return spares and the calls that let robots join and retire; none in most schedules."""
+    if random.random() >= ROSTER_SHARE:
+        return (), ()
+    spares = tuple(range(ids[-1] + 1, ids[-1] + 1 + random.randint(1, 3)))
+    times = sorted(random.uniform(WARM_UP_S, FAULTS_UNTIL_S) for _ in range(random.randint(1, ROSTER_CALLS_MAX)))
+    calls: list[ScheduledFault] = []
+    for at in times:
+        kind = random.choices(("join", "retire"), (0.6, 0.4))[0]
+        robot = random.choice(spares if kind == "join" and random.random() < 0.8 else (*ids, *spares))
+        slot_of = random.choice((0, *ids))
+        calls.append(ScheduledFault(at, kind, (robot,), random.uniform(0.3, 1.5), float(slot_of)))
+    return spares, tuple(calls)
 
 
 def _count(random: Random, mean: float) -> int:

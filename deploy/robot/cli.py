@@ -55,7 +55,8 @@ def start(arguments: argparse.Namespace) -> int:
         return SimulatedBase(start_map or Pose2D(), limits, now)
 
     watchdog = () if arguments.stop_command is None else (_watchdog(arguments.stop_command).alive,)
-    return _run(Driver(fleet, arguments.id, incarnations.drawn(), make_base, *watchdog), arguments, fleet)
+    driver = Driver(fleet, arguments.id, incarnations.drawn(), make_base, *watchdog, spare=arguments.spare)
+    return _run(driver, arguments, fleet)
 
 
 def _start_ros(arguments: argparse.Namespace, fleet: str, start_map: Pose2D | None) -> int:
@@ -78,7 +79,8 @@ def _start_ros(arguments: argparse.Namespace, fleet: str, start_map: Pose2D | No
         start_map,
     )
     try:
-        driver = Driver(fleet, arguments.id, incarnations.drawn(), robot.make_base, robot.alive)
+        number, spare = incarnations.drawn(), arguments.spare
+        driver = Driver(fleet, arguments.id, number, robot.make_base, robot.alive, spare=spare)
         return _run(driver, arguments, fleet)
     finally:
         robot.close()
@@ -136,6 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--id", required=True, type=int, help="the robot's id in the mission")
     add("--at", metavar="X,Y,THETA", help="start pose in map [m, m, rad]; default 0,0,0, with --ros none")
+    add("--spare", action="store_true", help="a robot that the mission does not name: it waits for lfa join")
     add("--fleet", default="fleet", help="name of the fleet, part of every key (default: %(default)s)")
     add("--connect", metavar="ENDPOINT", help="router, as tcp/127.0.0.1:7450; a,b: tried in turn")
     add("--keys", type=Path, metavar="DIR", help="this machine's key folder from `lfa keys`")

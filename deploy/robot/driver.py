@@ -48,8 +48,13 @@ class Driver:
         incarnation: int,
         make_base: MakeBase,
         alive: Callable[[float], None] = lambda now: None,
+        *,
+        spare: bool = False,
     ) -> None:
-        """Create a driver; `alive(now)` is called after each control period in which the hardware answered."""
+        """Create a driver; `alive(now)` is called after each control period in which the hardware answered.
+
+        A `spare` is none of the mission's robots (E33).
+        """
         self.name = f"{DRIVER_PREFIX}{robot_id}"
         self.incarnation = incarnation
         self.finished = False
@@ -66,6 +71,7 @@ class Driver:
             }
         )
         self._robot_id = robot_id
+        self._spare = spare
         self._make_base = make_base
         self._alive = alive
         self._base: Base | None = None
@@ -89,7 +95,7 @@ class Driver:
         now, gateway = received.at, self._gateway
         match received.message:
             case MissionNote(mission=mission) if gateway is None:
-                if self._robot_id not in mission.robots:
+                if self._robot_id not in mission.robots and not self._spare:
                     self.refusal = f"id {self._robot_id}: not in the mission, which has robots {list(mission.robots)}"
                     return []
                 self._gateway = Gateway(

@@ -95,15 +95,15 @@ class _Launch:
     """One run: its processes, the observed state, and the faults that are still due."""
 
     def __init__(self, drawn: Scenario, folder: Path, about: About, sockets: Path, faults: Sequence[Fault]) -> None:
-        self._mission = drawn.mission
+        self._robots = drawn.robots
         self._about = about
         self._endpoint = f"unixsock-stream/{sockets / 'router.sock'}"
         task = msgspec.json.encode(RecorderTask(str(folder), about, self._endpoint, str(sockets))).decode()
-        self._rows = rows(folder, about, self._endpoint, drawn.mission, task)
+        self._rows = rows(folder, about, self._endpoint, drawn, task)
         self._group = ProcessGroup(folder)
         self._termination = Termination(drawn)
         self._state = FleetState()
-        self._progress = ProgressRows(drawn.mission.robots, self._state)
+        self._progress = ProgressRows(drawn.robots, self._state)
         self._time = WorldTime()
         self._heard_at = clock.now()
         self._began_at: float | None = None
@@ -216,7 +216,7 @@ class _Launch:
         for name in (ROUTER_NAME, RECORDER_NAME, WORLD_NAME):
             if not self._revives(name, view):
                 self._needs(name)
-        for robot_id in self._mission.robots:
+        for robot_id in self._robots:
             name = robot_name(robot_id)
             if self._revives(name, view):
                 continue
@@ -228,7 +228,7 @@ class _Launch:
                 view.note(self._progress, str(how))
                 if name not in self._faults.doomed:
                     self._publish_event("died", robot=robot_id, how=how)
-        if len(self._progress.gone) == len(self._mission.robots) and not self._faults.pending:
+        if len(self._progress.gone) == len(self._robots) and not self._faults.pending:
             raise _Aborted("no agent is left")
         starts = not self._time.known or self._processes.restarting
         if clock.now() > self._heard_at + (START_S_MAX if starts else SILENCE_S_MAX):

@@ -10,10 +10,12 @@ from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, About
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_name
 from lfa.protocol.topics import RECORDER_NAME, WORLD_NAME
+from lfa.world.description.scenario import Scenario
 
 
-def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_task: str) -> list[ProcessSpec]:
+def rows(folder: Path, about: About, endpoint: str, scenario: Scenario, recorder_task: str) -> list[ProcessSpec]:
     """Return the processes of a run in the order in which they are started."""
+    mission = scenario.mission
     own_code = file_of(mission.following.controller)
     controller = () if own_code is None else ("--controller", own_code)
     team = ("--fleet", about.fleet, "--connect", endpoint, "--journal", str(folder / JOURNALS), "--faults")
@@ -23,8 +25,8 @@ def rows(folder: Path, about: About, endpoint: str, mission: Mission, recorder_t
         ProcessSpec(RECORDER_NAME, ("lfa.deploy.run.recorder_process", recorder_task), outlives_launcher=True),
         ProcessSpec(WORLD_NAME, world, restart_args=("--resume", str(folder))),
         *(ProcessSpec(robot_name(i), ("lfa.agents.cli", "--role", _role(i, mission), "--id", str(i), *team,
-                                          *controller))
-          for i in mission.robots),
+                                          *controller, *(() if i in mission.robots else ("--spare",))))
+          for i in scenario.robots),
     ]  # fmt: skip
 
 

@@ -156,7 +156,7 @@ class SimulatedRun:
         for driver in drivers:
             heading = Heading(JOURNAL_VERSION, driver.name, driver.incarnation, driver.incarnation, {})
             self._simulator.add(driver, Journal(None, heading))
-        for robot_id in drawn.mission.robots:
+        for robot_id in drawn.robots:
             self._add(self._agent(robot_id))
         self._flush()
 
@@ -305,6 +305,8 @@ class SimulatedRun:
 
     def _agent(self, robot_id: int) -> Agent:
         incarnation = self._next_incarnation(robot_name(robot_id))
+        if robot_id not in self._scenario.mission.robots:
+            return Agent(robot_id, incarnation, FLEET, incarnation, spare=True)
         return self._make_agent(robot_id, incarnation, FLEET, incarnation)
 
     def _next_incarnation(self, name: str) -> int:

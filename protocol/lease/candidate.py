@@ -124,13 +124,14 @@ class Candidate:
         """Return the members of a unanimous start (E18): the newest incarnation of every id.
 
         Empty unless all ids have promised, without a quorum of `config`. Ids that this attempt forgets are not needed
-        (E20).
+        (E20), nor are spares: with them, every quorum holds an id of the mission. Those that promise take part (E33).
         """
         answering = self._answering(superseded)
         forgotten = {m.id for m in self.forget}
         if not all(i in answering or i in forgotten for i in member_ids) or self.has_quorum(config):
             return ()
-        return tuple(answering[i] for i in member_ids if i in answering)
+        spares = (spare.id for spare in config.roster.spares)
+        return tuple(answering[i] for i in (*member_ids, *spares) if i in answering)
 
     def blank_majority(self, member_ids: tuple[int, ...], superseded: Callable[[Member], bool]) -> tuple[Member, ...]:
         """Return the newest incarnations of more than half of all ids, the witness (the last id) included (E19).

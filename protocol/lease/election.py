@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lfa.protocol.lease.candidate import Candidate
 from lfa.protocol.lease.failure_detector import FailureDetector
-from lfa.protocol.lease.membership import all_member_ids, is_first, rank
+from lfa.protocol.lease.membership import all_member_ids, is_first, is_spare, rank
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Member
 from lfa.protocol.mission import Mission
@@ -20,7 +20,8 @@ class Election:
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float) -> None:
         self.me = me
         self.all_member_ids = all_member_ids(mission)
-        self.may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
+        self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
+        self._spares_lead = mission.can_lead is None
         self.at = NEVER
         """Time [s] to stand for election."""
         self.base = now
@@ -34,13 +35,23 @@ class Election:
         self._quorum_loss_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
         self._quorum_lost_from = now + self._quorum_loss_s
 
+    def may_lead(self, config: Config, robot_id: int) -> bool:
+        """Return True if the mission allows this robot to lead, and `config` has it in its team (E33, E34)."""
+        named = robot_id in self._may_lead or (self._spares_lead and is_spare(config.roster, robot_id))
+        return named and robot_id not in config.roster.retired
+
+    def takes_in(self, config: Config, robot_id: int) -> bool:
+        """Return True if this id is of the team by the mission and the roster of `config`, the witness included."""
+        known = robot_id in self.all_member_ids or is_spare(config.roster, robot_id)
+        return known and robot_id not in config.roster.retired
+
     def rank(self, config: Config, robot_id: int, peers: FailureDetector) -> int:
-        return rank(config, robot_id, lambda other: other.id not in self.may_lead or peers.is_gone(other))
+        return rank(config, robot_id, lambda other: not self.may_lead(config, other.id) or peers.is_gone(other))
 
     def after(self, at: float, config: Config, peers: FailureDetector) -> None:
         """Schedule the candidacy for `at` [s] plus this robot's rank times `rank_step_s` (E6)."""
         self.base = at
-        if self.me.id not in self.may_lead:
+        if not self.may_lead(config, self.me.id):
             self.at = NEVER
             return
         # A robot without a vote stands last: it is needed only when no voter can lead.
@@ -67,5 +78,6 @@ class Election:
             incarnations = candidate.blank_majority(self.all_member_ids, peers.is_superseded)
         asked_all = now >= candidate.began_at + self._timing.heartbeat_s
         if not incarnations and not is_first(config) and now >= self._quorum_lost_from and asked_all:
-            incarnations = candidate.any_answering(self.all_member_ids, peers.is_superseded)
+            everybody = (*self.all_member_ids, *(spare.id for spare in config.roster.spares))
+            incarnations = candidate.any_answering(everybody, peers.is_superseded)
         return incarnations

@@ -45,14 +45,33 @@ class Electorate(Struct, frozen=True, array_like=True):
     """Quorum rule: `half` (majority, or one half with the tie-breaker) or `all` (unanimous start, lease.md 3.9)."""
 
 
+class Spare(Struct, frozen=True, array_like=True, order=True, gc=False):
+    """Robot that the mission does not name, and that an operator has admitted (E33)."""
+
+    id: Count
+    slot_of: Count = 0
+    """Robot of the mission whose place in the chain it takes, when that one is not there; 0: the tail."""
+
+
+class Roster(Struct, frozen=True, array_like=True):
+    """What operators have changed of the mission's robots (E33, E34). A spare that is retired remains a spare."""
+
+    spares: tuple[Spare, ...] = ()
+    retired: tuple[Count, ...] = ()
+
+
+NO_CHANGE = Roster()
+
+
 class Config(Struct, frozen=True, array_like=True):
-    """Versioned record of voters and chain, written by the holder of a term. `chain[0]` leads."""
+    """Versioned record of voters, chain and roster, written by the holder of a term. `chain[0]` leads."""
 
     version: Version
     voters: tuple[Member, ...]
     tie: Member | None
     previous: Electorate | None
     chain: tuple[Member, ...]
+    roster: Roster = NO_CHANGE
 
 
 class GatewayStamp(Struct, frozen=True, array_like=True, gc=False):

@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 
 from lfa.protocol.geometry import NUMBER_MAX
 
-WIRE_VERSION = 4
+WIRE_VERSION = 5
 """Version of the messages, agreed on like the mission (E25): it grows with each change of a message's fields."""
 MESSAGE_BYTES_MAX = 64 * 1024
 Count = Annotated[int, Meta(ge=0, le=2**53)]

@@ -19,9 +19,12 @@ PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
 
 
 def _robots(scenario: Scenario) -> Iterator[Mistake]:
-    robots, world = scenario.mission.robots, scenario.world
+    robots, world = scenario.robots, scenario.world
     if len(robots) > ROBOTS_MAX:
         yield wrong("mission.robots", f"{len(robots)} ids", f"at most {ROBOTS_MAX} ids")
+    for n, spare in enumerate(world.spares):
+        if spare.id < 1 or robots.index(spare.id) != len(scenario.mission.robots) + n:
+            yield wrong(f"world.spares[{n}].id", spare.id, "an id, 1 or higher, of no other robot")
     strange = [robot for robot in world.real_robots if robot not in robots]
     if strange:
         yield wrong("world.real_robots", strange, f"ids among {list(robots)}", "mission.robots")
@@ -38,7 +41,7 @@ def _saved_from(scenario: Scenario) -> Iterator[Mistake]:
 
 
 def _restarts(scenario: Scenario) -> Iterator[Mistake]:
-    processes = ("router", "world", "robots", *map(robot_name, scenario.mission.robots))
+    processes = ("router", "world", "robots", *map(robot_name, scenario.robots))
     for name, policy in scenario.restart.items():
         if name not in processes:
             close = get_close_matches(name, processes, n=1)

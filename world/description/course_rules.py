@@ -7,7 +7,7 @@ from math import hypot
 
 from lfa.protocol.config_file.mistake import Mistake, Rule, wrong
 from lfa.protocol.geometry import Pose2D
-from lfa.world.description.placement import as_it_begins, gap_to, starts_of, to_segment
+from lfa.world.description.placement import as_it_begins, gap_to, starts_of, to_segment, with_spares
 from lfa.world.description.reachability import parted
 from lfa.world.description.scenario import Point, Scenario
 from lfa.world.description.terrain import features, patch_of
@@ -23,8 +23,9 @@ def _starts(scenario: Scenario) -> Iterator[Mistake]:
     if starts is not None and len(starts) != len(mission.robots):
         yield wrong("world.starts", f"{len(starts)} poses", f"one pose for each of the {len(mission.robots)} robots")
         return
+    scenario = with_spares(scenario)
     poses = starts_of(scenario)
-    for robot_id, pose in zip(mission.robots, poses, strict=True):
+    for robot_id, pose in zip(scenario.mission.robots, poses, strict=True):
         place = f"the start of robot {robot_id} at ({pose.x:.2f}, {pose.y:.2f})"
         yield from _covered(scenario, (pose.x, pose.y), place)
     if not scenario.world.starts_coincide:
@@ -77,7 +78,8 @@ def _covered(scenario: Scenario, place: Point, whose: str) -> Iterator[Mistake]:
 
 PLACES = (
     "mission.robots", "mission.formation", "mission.radius_m", "mission.leading", "world.starts", "world.start",
-    "world.map", "world.keepout", "world.obstacles", "world.potholes", "world.bumps", "world.ditches", "world.walls_m",
+    "world.spares", "world.map", "world.keepout", "world.obstacles", "world.potholes", "world.bumps", "world.ditches",
+    "world.walls_m",
 )  # fmt: skip
 """Keys from which it follows where robots, obstacles and the goal are."""
 COURSE_RULE: Rule[Scenario] = Rule(_course, PLACES)

@@ -35,6 +35,16 @@ def starts_of(scenario: Scenario) -> tuple[Pose2D, ...]:
     return tuple(poses)
 
 
+def with_spares(scenario: Scenario) -> Scenario:
+    """Return a scenario whose mission has the spares as robots, each at its start: the bodies of the whole world."""
+    spares = scenario.world.spares
+    if not spares:
+        return scenario
+    starts = (*((pose.x, pose.y, pose.theta) for pose in starts_of(scenario)), *(spare.start for spare in spares))
+    mission = replace(scenario.mission, robots=scenario.robots)
+    return replace(scenario, mission=mission, world=replace(scenario.world, starts=starts, spares=()))
+
+
 def slot_bearing(mission: Mission, hop: int) -> float:
     """Return phi^d [rad] of follower number `hop` in its predecessor's `base_link` (control.md section 4)."""
     left = pi - mission.formation.angle_rad

@@ -116,6 +116,14 @@ class Vary(Struct, frozen=True, forbid_unknown_fields=True):
     """Draw each moving obstacle's initial phase, and its speed within 20 %."""
 
 
+class SpareRobot(Struct, frozen=True, forbid_unknown_fields=True):
+    """Robot that stands in the world, and that the mission does not name: `lfa join` takes it into the team."""
+
+    id: int
+    start: tuple[float, float, float]
+    """Start x [m], y [m], theta [rad] in `map`."""
+
+
 class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     """Simulated world: starts, walls, obstacles, terrain, bodies, sensors and their noise."""
 
@@ -125,6 +133,8 @@ class WorldSpec(Struct, frozen=True, forbid_unknown_fields=True):
     """Starts may overlap, as the paper's do: such robots collide with and see each other only after they separated."""
     start: tuple[float, ...] | None = None
     """Start x, y [m] and optionally theta [rad] of the first robot; the others stand behind it where walls permit."""
+    spares: tuple[SpareRobot, ...] = ()
+    """Robots beside the mission's, for `lfa join`."""
     real_robots: tuple[int, ...] = ()
     """Ids of robots with a driver of their own (`lfa-driver`): not simulated, their bodies follow reported poses, and
     drive on as last reported when their driver falls silent."""
@@ -203,6 +213,11 @@ class Scenario(Struct, frozen=True, forbid_unknown_fields=True):
     """Seed of a run for which the command line gives none."""
     saved_from: str = ""
     """Name of the scenario that this file is a saved session of (`lfa web`): its runs bear that name."""
+
+    @property
+    def robots(self) -> tuple[int, ...]:
+        """Ids of all robots in the world: those of the mission, then the spares."""
+        return (*self.mission.robots, *(spare.id for spare in self.world.spares))
 
 
 Outcome = Literal["goal_reached", "failed", "time_limit", "aborted", "interrupted", "recorded"]

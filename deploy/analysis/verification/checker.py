@@ -71,6 +71,9 @@ class Checker:
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None: ...
 
+    def names(self, at: float, robots: tuple[int, ...]) -> None:
+        """Record the robots that the mission names; others take part if they are admitted (E33)."""
+
     def lives(self, at: float, who: Member) -> None:
         """Record that the process of incarnation `who` started."""
 

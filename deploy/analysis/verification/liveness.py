@@ -7,6 +7,7 @@ for how long, are in `leadership.py`.
 from __future__ import annotations
 
 from lfa.deploy.analysis.verification.checker import LONG_AGO, Checker, shown
+from lfa.protocol.lease.membership import team_of
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
 from lfa.protocol.messages.consensus import Config, Member, Version
 from lfa.protocol.messages.robot import CmdVel
@@ -33,6 +34,30 @@ class _AfterFaults(Checker):
         self.healed_at = NEVER
         self._corrected_by = NEVER
         self._step_s = timing.rank_step_s
+        self._named: tuple[int, ...] | None = None
+        """Robots that the mission names; None: all that are alive."""
+        self._configs: dict[Member, Config] = {}
+
+    def names(self, at: float, robots: tuple[int, ...]) -> None:
+        self._named = robots
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        self._configs[who] = config
+
+    @property
+    def newest(self) -> Config | None:
+        """Newest config that a live process knows."""
+        return max(self._configs.values(), key=_version, default=None)
+
+    @property
+    def team(self) -> dict[int, Member]:
+        """Robots that are alive and in the team of the newest config (E33, E34)."""
+        newest = self.newest
+        robots = {i: m for i, m in self.alive.items() if i != WITNESS_ID}
+        if newest is None:
+            return robots
+        team = team_of(newest.roster, tuple(robots) if self._named is None else self._named)
+        return {i: m for i, m in robots.items() if i in team}
 
     def lives(self, at: float, who: Member) -> None:
         self.alive[who.id] = who
@@ -41,6 +66,7 @@ class _AfterFaults(Checker):
 
     def ends(self, at: float, who: Member) -> None:
         self.alive.pop(who.id, None)
+        self._configs.pop(who, None)
 
     def heals(self, at: float, step_s: float) -> None:
         self.healed_at, self._step_s = at, max(step_s, self._step_s)
@@ -87,17 +113,16 @@ class OneActs(_AfterFaults):
 
 
 class AllInChain(_AfterFaults):
-    """Checker of L2: the newest chain holds exactly the robots that are alive."""
+    """Checker of L2: the newest chain holds exactly the robots of the team that are alive."""
 
     name = "L2"
 
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)
-        self._config: dict[Member, Config] = {}
         self._complete_since = NEVER
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
-        self._config[who] = config
+        super().adopts(at, who, config)
         self._look(at)
 
     def lives(self, at: float, who: Member) -> None:
@@ -106,24 +131,24 @@ class AllInChain(_AfterFaults):
 
     def ends(self, at: float, who: Member) -> None:
         super().ends(at, who)
-        self._config.pop(who, None)
         self._look(at)
 
     def _look(self, at: float) -> None:
-        robots = {m for i, m in self.alive.items() if i != WITNESS_ID}
-        complete = set(self._chain()) == robots
+        complete = set(self._chain()) == set(self.team.values())
         self._complete_since = min(self._complete_since, at) if complete else NEVER
 
     def _chain(self) -> tuple[Member, ...]:
-        """Return the newest chain that a live process knows."""
-        newest = max(self._config.values(), key=_version, default=None)
-        return () if newest is None else newest.chain
+        return () if self.newest is None else self.newest.chain
 
     def over(self, at: float) -> None:
         if self._complete_since > self.settled_by:
             chain = [shown(m) for m in self._chain()]
-            alive = [shown(m) for i, m in sorted(self.alive.items()) if i != WITNESS_ID]
+            alive = [shown(m) for _, m in sorted(self.team.items())]
             self.broken(at, f"chain {chain} since {self._complete_since:.3f}, alive are {alive}")
+        retired = () if self.newest is None else self.newest.roster.retired
+        still = [shown(m) for m in (self.newest.voters if self.newest is not None else ()) if m.id in retired]
+        if still:
+            self.broken(at, f"retired, and voters still: {still}")
 
 
 class OneVersion(_AfterFaults):
@@ -147,6 +172,7 @@ class OneVersion(_AfterFaults):
         self._look(at)
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
+        super().adopts(at, who, config)
         self._version[who.id] = config.version
         self._look(at)
 
@@ -192,7 +218,7 @@ class Obeyed(_AfterFaults):
         if self._silence is not None:
             last, then = self._silence
             self.broken(then, f"no leader command obeyed for {(then - last) * 1000.0:.0f} ms")
-        for robot_id in sorted(self.alive.keys() - {WITNESS_ID}):
+        for robot_id in sorted(self.team):
             last = self._obeyed_at.get(robot_id, LONG_AGO)
             if at > self.settled_by + SETTLED_S and at - last > SETTLED_S:
                 self.broken(at, f"no command of robot {robot_id} obeyed for {at - last:.1f} s")

@@ -98,7 +98,14 @@ def node_of(path: Path, heading: Heading) -> Node:
 
 
 def _agent(heading: Heading, told: dict[str, Any]) -> Node:
-    return Agent(told["robot_id"], heading.incarnation, told["fleet"], heading.floor, _mission(told))
+    return Agent(
+        told["robot_id"],
+        heading.incarnation,
+        told["fleet"],
+        heading.floor,
+        _mission(told),
+        spare=told.get("spare", False),
+    )
 
 
 def _witness(heading: Heading, told: dict[str, Any]) -> Node:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, WithFences, shown
 from lfa.deploy.analysis.verification.fleet_stop import StopHolds
+from lfa.protocol.lease.membership import is_spare
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
 from lfa.protocol.messages.consensus import Config, Electorate, Grant, Member, Promise, Propose, Term, Version
@@ -267,6 +268,21 @@ class OneAgreement(Checker):
             self.broken(at, f"{shown(voter)} {action} {shown(asker)}, which holds another agreement")
 
 
+class RosterHolds(Checker):
+    """Checker of I11: no retired robot is in a chain, and spares are fewer than the other voters."""
+
+    name = "I11"
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        out = [shown(m) for m in config.chain if m.id in config.roster.retired]
+        if out:
+            self.broken(at, f"retired, and in the chain of {shown(config.version.term)}.{config.version.seq}: {out}")
+        spares = sum(is_spare(config.roster, voter.id) for voter in config.voters)
+        if spares and 2 * spares >= len(config.voters):
+            voters = [shown(voter) for voter in config.voters]
+            self.broken(at, f"{spares} spares could decide alone among voters {voters}")
+
+
 SAFETY: tuple[type[Checker], ...] = (
     LeaseExclusivity,
     Acting,
@@ -278,4 +294,5 @@ SAFETY: tuple[type[Checker], ...] = (
     Residual,
     OneAgreement,
     StopHolds,
+    RosterHolds,
 )

@@ -87,7 +87,7 @@ class Team:
         self._endpoint = f"unixsock-stream/{self.folder / 'router.sock'}"
         self._credentials = credentials
         self._about = About(scenario.name, "processes", 0, fleet or f"bench{clock.wall_ms()}")
-        usual = rows(run, self._about, self._endpoint, scenario.mission, "")
+        usual = rows(run, self._about, self._endpoint, scenario, "")
         self._rows = {row.name: row for row in (usual if table is None else table(usual, self.folder))}
         self._processes = ProcessGroup(run)
         self._inbox = Inbox(every=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import structs
 
-from lfa.agents.team_orders import QUESTION
+from lfa.agents.orders.team_orders import QUESTION
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall
 from lfa.deploy.client.stop_call import StopOutcome
@@ -27,7 +27,9 @@ class CommandedTeam:
     """Team of `robots` on a straight road; the seed draws its clocks and delays."""
 
     def __init__(self, robots: int, seed: int) -> None:
-        calm = structs.replace(draw(seed), robots=robots, profile="std", witness=True, faults=(), stops=(), radio=FAIR)
+        calm = structs.replace(
+            draw(seed), robots=robots, profile="std", witness=True, faults=(), spares=(), stops=(), radio=FAIR
+        )
         self.team = AgentSimulation(structs.replace(calm, rates={}))
         self.robots: dict[int, TrueRobot] = {}
         """True state of each robot, as last told."""

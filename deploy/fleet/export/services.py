@@ -114,7 +114,8 @@ def _member(plan: FleetPlan, host: str, name: str, kept: Mapping[str, str], plac
         command = ("lfa-world", SCENARIO, "--seed", str(plan.file.seed), *team, *apart)
         return Service(name, host, WORLD_IMAGE, command, _of(kept, name, WITNESS_NAME), MEMORY_MIB[name], scenario=True)
     role, robot = ("witness", "w") if name == WITNESS_NAME else ("follower", name.removeprefix("robot"))
-    command = ("lfa-agent", "--role", role, "--id", robot, *team)
+    spare = ("--spare",) if any(str(one.id) == robot for one in plan.scenario.world.spares) else ()
+    command = ("lfa-agent", "--role", role, "--id", robot, *team, *spare)
     return Service(name, host, AGENT_IMAGE, command, _of(kept, name), AGENT_MEMORY_MIB)
 
 

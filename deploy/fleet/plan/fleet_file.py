@@ -155,10 +155,10 @@ def load(path: Path) -> FleetPlan:
         apply_rules(FLEET_RULES, file, mistakes)
     scenario = _scenario(file, path, mistakes)
     if scenario is not None:
-        apply_rules((Rule(partial(_placed, robots=scenario.mission.robots), ("scenario", "set")),), file, mistakes)
+        apply_rules((Rule(partial(_placed, robots=scenario.robots), ("scenario", "set")),), file, mistakes)
     if mistakes or scenario is None:
         raise toml.refuse(mistakes)
-    return FleetPlan(path, file, scenario, _places(file, scenario.mission.robots))
+    return FleetPlan(path, file, scenario, _places(file, scenario.robots))
 
 
 def _scenario(file: FleetFile, path: Path, mistakes: list[Mistake]) -> Scenario | None:

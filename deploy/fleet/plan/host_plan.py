@@ -63,6 +63,8 @@ class HostPlan(Struct, frozen=True):
     secure: bool = False
     keyed: bool = False
     """True: processes show certificates; the router does so to other routers, or to every process if secured."""
+    spares: tuple[int, ...] = ()
+    """Ids of the robots, here and elsewhere, that the mission does not name."""
     engine: Literal["own", "systemd", "systemd-system"] = "own"
     boot: bool = False
     """True: systemd starts the processes when the machine is switched on."""
@@ -116,6 +118,7 @@ def parts(
             scenario=scenario,
             seed=file.seed,
             robots=plan.robots_on(name),
+            spares=tuple(spare.id for spare in plan.scenario.world.spares),
             world=name == file.world,
             witness=mission.witness and name == file.witness and file.witness != file.world,
             world_witness=mission.witness and file.witness == file.world,
@@ -202,7 +205,9 @@ def rows(part: HostPlan) -> list[ProcessSpec]:
     if part.witness:
         made.append(ProcessSpec(WITNESS_NAME, ("lfa.agents.cli", "--role", "witness", "--id", "w", *team)))
     for robot in part.robots:
-        made.append(ProcessSpec(robot_name(robot), ("lfa.agents.cli", "--role", "follower", "--id", str(robot), *team)))
+        spare = ("--spare",) if robot in part.spares else ()
+        agent = ("lfa.agents.cli", "--role", "follower", "--id", str(robot), *team, *spare)
+        made.append(ProcessSpec(robot_name(robot), agent))
     return made
 
 

@@ -13,7 +13,7 @@ SKIPPED = ("extends", "hello", "grant", "nack")
 
 def columns(lines: list[str], schedule: Schedule) -> Trace:
     """Return a trace that appends to `lines`: time [ms], then one column for the witness and one for each robot."""
-    ids = range(schedule.robots + 1)
+    ids = range(schedule.robots + len(schedule.spares) + 1)
     lines.append("      ms  " + "".join(f"{'witness' if i == 0 else f'robot{i}':<{COLUMN}}" for i in ids).rstrip())
 
     def trace(at: float, who: int, what: str) -> None:
@@ -31,6 +31,9 @@ def describe(schedule: Schedule) -> str:
     for fault in schedule.faults:
         targets = ", ".join("leader" if t < 0 else str(t) for t in fault.targets)
         lines.append(f"{fault.at * 1000.0:8.1f}  {fault.kind} {targets} ({fault.duration_s:.3f} s, {fault.value:.2f})")
+    for call in schedule.rosters:
+        place = f" for {call.value:.0f}" if call.value else ""
+        lines.append(f"{call.at * 1000.0:8.1f}  {call.kind} {call.targets[0]}{place} (within {call.duration_s:.3f} s)")
     for held in schedule.held:
         late = "is lost" if held.by_s is None else f"comes {held.by_s:g} s late"
         lines.append(f"message {held.number} from the first fault on {late}")

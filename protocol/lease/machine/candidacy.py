@@ -154,9 +154,11 @@ def give_up_without_quorum(m: LeaseMemory, src: Member, _body: Nack, now: float)
 
 
 def ask_again(m: LeaseMemory, _src: Member, body: Nack, now: float) -> None:
-    """Adopt the newer config and ask for promises under it at once."""
+    """Adopt the newer config and ask for promises under it at once; give up if it has retired this robot (E34)."""
     resigning.adopt(m, body.config, now)
-    if m.candidate is not None and m.candidate.forget and now >= m.election.forget_until:
+    if not m.election.may_lead(m.config, m.me.id):
+        give_up_late(m, now)
+    elif m.candidate is not None and m.candidate.forget and now >= m.election.forget_until:
         forget_over(m, now)
     else:
         ask_promises(m, now)

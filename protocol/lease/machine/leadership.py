@@ -7,7 +7,7 @@ from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.machine import candidacy, resigning, voting
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.reconfiguration import reshaped
-from lfa.protocol.messages.consensus import Grant, Hello, Member
+from lfa.protocol.messages.consensus import Grant, Hello, Member, Roster
 
 
 def renew(m: LeaseMemory, now: float) -> None:
@@ -23,9 +23,14 @@ def renew(m: LeaseMemory, now: float) -> None:
 
 def reshape(m: LeaseMemory, now: float) -> None:
     """Write and propose the next config if chain or voters change (E8, E9, E17)."""
+    change_roster(m, m.config.roster, now)
+
+
+def change_roster(m: LeaseMemory, roster: Roster, now: float) -> None:
+    """Write and propose the next config under `roster`, and chain and voters by it (E33, E34)."""
     holder = m.holder
     assert holder is not None
-    newer = reshaped(m.config, holder, m.me, m.peers, m.left_out, m.policy, m.timing, now)
+    newer = reshaped(m.config, holder, m.me, m.peers, m.left_out, m.policy, m.timing, now, roster)
     holder.said_hello.clear()
     if newer is not m.config:
         resigning.adopt(m, newer, now)
@@ -61,7 +66,7 @@ def on_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
 def note_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> bool:
     """Note the sender, to be taken in with the next change; return False for strangers and earlier incarnations."""
     voting.answer_hello(m, src, body, now)
-    if m.holder is None or src.id not in m.election.all_member_ids or m.peers.later_than(src) is not None:
+    if m.holder is None or not m.election.takes_in(m.config, src.id) or m.peers.later_than(src) is not None:
         return False
     m.holder.heard_at[src] = now
     if src not in m.holder.said_hello:

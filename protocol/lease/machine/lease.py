@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.failure_detector import FailureDetector
-from lfa.protocol.lease.machine import voting
+from lfa.protocol.lease.machine import resigning, voting
 from lfa.protocol.lease.machine.deadlines import DEADLINES, NEVER, WAKES, expiry
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState, refusal, state_of
@@ -31,6 +31,7 @@ from lfa.protocol.messages.consensus import (
     Propose,
     Release,
     Role,
+    Roster,
     Superseded,
     Term,
 )
@@ -165,6 +166,18 @@ class Lease:
         m = self._memory
         return self.may_command(until) and m.candidate is None and m.config.previous is None
 
+    @property
+    def is_committed(self) -> bool:
+        """True if leading, and quorums have accepted the newest config, with no change of voters under way."""
+        m = self._memory
+        return m.holder is not None and m.config.previous is None and m.holder.committed(m.config)
+
+    def successor(self, now: float) -> int | None:
+        """Return the robot that a leader would hand its lease over to; None if it leads nobody who could take it."""
+        m = self._memory
+        found = None if m.holder is None else resigning.successor_of(m, m.holder, now)
+        return None if found is None else found[0].id
+
     def commanded(self, now: float) -> None:
         """Record that a command as leader was sent at `now` [s]."""
         self._memory.pending_release.commanded_at = now
@@ -236,6 +249,16 @@ class Lease:
         """Hand the lease of a stuck leader to the next in the chain that answers; release it if none does (E16)."""
         self._expire(now)
         self._fire(LeaseEvent.HAND_OVER, now)
+        return self._memory.drain()
+
+    def request_roster(self, roster: Roster, now: float) -> list[Effect]:
+        """Change the team as leader: the chain closes over a retired robot, a spare may join (E33, E34).
+
+        It is ignored unless this process leads without a candidacy; nobody retires itself: a leader hands over first.
+        """
+        self._expire(now)
+        if self._memory.me.id not in roster.retired:
+            self._fire(LeaseEvent.ROSTER, now, roster)
         return self._memory.drain()
 
     def request_forget(self, lost: tuple[Member, ...], now: float) -> list[Effect]:

@@ -51,7 +51,7 @@ class LeaseMemory:
         self.pending_release = PendingRelease(timing.deadman_s)
         self.election = Election(me, mission, timing, now)
         self.census = Census(agreement, me.id, self.election.all_member_ids, now)
-        self.policy = Policy(mission.tiebreak, mission.shrink, len(self.election.all_member_ids))
+        self.policy = Policy(mission.tiebreak, mission.shrink, mission.robots, mission.witness)
         self.peers = FailureDetector(me, timing.heartbeat_s)
         self.hello_at = now
         self.hellos: dict[int, tuple[Member, float]] = {}

@@ -97,7 +97,7 @@ def transfer(m: LeaseMemory, now: float) -> Propose | None:
     version included: the new leader writes a new one after its quorum.
     """
     assert m.holder is not None
-    successor = _successor(m, m.holder, now)
+    successor = successor_of(m, m.holder, now)
     if successor is None:
         return None
     member, nonce = successor
@@ -106,11 +106,11 @@ def transfer(m: LeaseMemory, now: float) -> Propose | None:
     return Propose(m.seen, m.config, 0, member, nonce=nonce, agreed=m.agreed)
 
 
-def _successor(m: LeaseMemory, holder: Holder, now: float) -> tuple[Member, float] | None:
+def successor_of(m: LeaseMemory, holder: Holder, now: float) -> tuple[Member, float] | None:
     """Return the first follower that may lead and was heard within t_chain, with the nonce of its last grant."""
     for member in m.config.chain[1:]:
         nonce = holder.nonces.get(member)
-        fit = member.id in m.election.may_lead and member in m.config.voters and not m.peers.is_gone(member)
+        fit = m.election.may_lead(m.config, member.id) and member in m.config.voters and not m.peers.is_gone(member)
         if fit and nonce is not None and not holder.silent(member, now, m.timing.chain_silence_s):
             return member, nonce
     return None

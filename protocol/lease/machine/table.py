@@ -97,6 +97,7 @@ class LeaseEvent(StrEnum):
     LEAVE = "asked to leave"
     HAND_OVER = "asked to hand over"
     FORGET = "asked to forget the dead"
+    ROSTER = "asked to change the roster"
     LEASE_EXPIRED = "lease expired"
     RELEASE_DUE = "last command too old"
     CONFIG_DUE = "config due"
@@ -240,6 +241,8 @@ TRANSITIONS = (
                "stop, fence the own gateway, then name the next in the chain that answers"),
     Transition(E.FORGET, LEADS_NOT, candidacy.forget, RESTING, "E20",
                "without a leader, stand at once, and need no vote of the dead"),
+    Transition(E.ROSTER, (S.LEADER,), leadership.change_roster, UP, "E33 E34",
+               "write and PROPOSE it, with chain and voters by it"),
     Transition(E.LEASE_EXPIRED, LEADS, resigning.expire, (*RESTING, S.CANDIDATE, S.FENCING, S.PROPOSING), "E7",
                "stop, fence the own gateway, stay silent for `T_grant`"),
     Transition(E.RELEASE_DUE, ALL, resigning.complete, (S.FOLLOWER,), "E4 E16",

@@ -46,7 +46,7 @@ def on_prepare(m: LeaseMemory, src: Member, body: Prepare, now: float) -> None:
 
 def stands_before(m: LeaseMemory, src: Member, body: Prepare) -> bool:
     """Return True if this process precedes the candidate `src` in the first election of a fleet (E5)."""
-    first = is_first(m.config) and body.version == m.config.version and m.me.id in m.election.may_lead
+    first = is_first(m.config) and body.version == m.config.version and m.election.may_lead(m.config, m.me.id)
     if not first or m.pending_release.closing:
         return False
     mine, other = (m.election.rank(m.config, i, m.peers) for i in (m.me.id, src.id))
@@ -117,7 +117,7 @@ def keep_grant(m: LeaseMemory, src: Member, body: Grant, _now: float) -> None:
 
 def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
     """Answer with the newest config while no leader is known (E9); tell an earlier incarnation so (E23)."""
-    if src.id in m.election.all_member_ids:
+    if m.election.takes_in(m.config, src.id):
         m.hellos[src.id] = (src, now)
     later = m.peers.later_than(src)
     if later is not None:

@@ -8,7 +8,7 @@ from math import hypot
 import pytest
 from msgspec import structs
 
-from lfa.agents.team_orders import QUESTION
+from lfa.agents.orders.team_orders import QUESTION
 from lfa.deploy.client.mission_changes import along, to_goal, unchanged
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome
@@ -32,7 +32,7 @@ class Commanded:
 
     def __init__(self, seed: int = 0) -> None:
         schedule = structs.replace(
-            draw(seed), robots=3, profile="std", witness=True, rates={}, faults=(), stops=(), radio=FAIR
+            draw(seed), robots=3, profile="std", witness=True, rates={}, faults=(), spares=(), stops=(), radio=FAIR
         )
         self.team = AgentSimulation(schedule)
         self.truth: dict[int, tuple[float, float, float]] = {}

@@ -26,7 +26,9 @@ class Stopped:
     """A team of four that drives, and the operator who stops it."""
 
     def __init__(self) -> None:
-        schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), radio=FAIR)
+        schedule = structs.replace(
+            draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), spares=(), radio=FAIR
+        )
         self.team = AgentSimulation(schedule)
         self.speeds: dict[int, list[tuple[float, float]]] = {}
         """Of each robot, time [s] and speed [m/s]."""

@@ -30,7 +30,9 @@ def test_in_every_order_the_chain_is_the_old_one_without_the_dead_and_the_last_o
 
 
 def _check(order: tuple[int, ...]) -> None:
-    schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), radio=FAIR)
+    schedule = structs.replace(
+        draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), spares=(), radio=FAIR
+    )
     team = AgentSimulation(schedule, ROAD_M)
     arrived: list[str] = []
     left = list(ROBOTS)

@@ -30,7 +30,9 @@ class Cut:
 
     def __init__(self, side: Sequence[int]) -> None:
         calm = structs.replace(FAIR, jitter_s=HEARD_S - FAIR.delay_s)
-        schedule = structs.replace(draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), radio=calm)
+        schedule = structs.replace(
+            draw(0), robots=4, profile="std", witness=True, rates={}, faults=(), spares=(), radio=calm
+        )
         self.team = AgentSimulation(schedule).start_all()
         self.timing = self.team.timing
         self.limits = self.team.mission.limits

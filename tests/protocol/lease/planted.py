@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from tests.protocol.lease import plants_of_rosters as rosters
 from tests.protocol.lease import plants_of_stops as stops
 from tests.protocol.lease import plants_of_team as team
 from tests.protocol.lease import plants_of_time as time
@@ -143,5 +144,16 @@ PLANTED: tuple[Bug, ...] = (
         "stop_latch::test_e30_an_agent_may_stop_its_gateway_and_lifts_no_stop"),
     Bug("rule E31", "a replayed order shows that an operator is there", stops.replayed_order_is_a_sign_of_life,
         "stop_latch::test_e31_a_replayed_order_is_no_sign_of_an_operator"),
+    Bug("rule E33", "spares vote like others", rosters.spares_vote_like_others,
+        "roster::test_e33_spares_are_fewer_than_the_other_voters_also_when_these_are_lost"),
+    Bug("rule E33", "whoever says HELLO is taken in", rosters.strangers_are_taken_in,
+        "roster::test_e33_a_spare_that_nobody_admitted_is_in_no_chain_and_stands_for_no_election"),
+    Bug("rule E33", "a full house leaves out the spare that asks for it",
+        rosters.spares_stand_for_a_full_house_without_them,
+        "roster::test_e33_a_spare_that_remembers_alone_makes_a_full_house_with_itself"),
+    Bug("rule E34", "a retired robot stands for election", rosters.retired_robots_stand,
+        "roster::test_e34_a_retired_robot_never_leads_also_when_nobody_else_is_left"),
+    Bug("rule E34", "a retired robot is taken in again", rosters.retired_robots_are_taken_in_again,
+        "roster::test_e34_the_chain_closes_over_a_retired_robot_and_it_neither_votes_nor_returns"),
 )
 # fmt: on

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import structs
 
-from lfa.agents.team_orders import TeamOrders
+from lfa.agents.orders.team_orders import TeamOrders
 from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.orders import OrderNote, TeamOrder

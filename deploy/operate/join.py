@@ -1,0 +1,58 @@
+"""`lfa join`: takes a robot that the mission does not name into a running team, or one that has retired."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from lfa.agents.orders.roster_orders import JOIN, ROBOT_MAX
+from lfa.deploy.client.roster.roster_call import RosterOutcome
+from lfa.deploy.client.roster.roster_fleet import TOPICS, change_roster
+from lfa.deploy.client.session import find, listen
+from lfa.protocol.errors import Refused
+from lfa.protocol.names import robot_name
+
+
+def command(
+    robot: Annotated[int, typer.Argument(help="Id of the robot: a spare's, or that of one that has retired.")],
+    slot_of: Annotated[
+        int, typer.Option("--for", help="Lost robot whose place in the chain it takes; 0: the tail.")
+    ] = 0,
+    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
+    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
+    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+) -> int:
+    """Admit a robot to the team; return 0 if quorums have accepted it, else 1. Raises Refused."""
+    return say(JOIN, robot, slot_of, fleet, connect, keys, as_json)
+
+
+def say(
+    what: str, robot: int, slot_of: int, fleet: str | None, connect: str | None, keys: Path | None, as_json: bool
+) -> int:
+    """Change a fleet's team, print what became of it, and return the exit code. Raises Refused."""
+    if not (1 <= robot <= ROBOT_MAX and 0 <= slot_of <= ROBOT_MAX):
+        raise Refused(f"{what} {robot}: must be a robot's number, 1 or higher")
+    with listen(find(fleet, connect, keys), TOPICS) as ear:
+        outcome = change_roster(ear, what, robot, slot_of)
+    print(msgspec.json.encode(outcome).decode() if as_json else told(what, outcome))
+    return 0 if outcome.accepted else 1
+
+
+def told(what: str, outcome: RosterOutcome) -> str:
+    """Return the outcome in one line."""
+    name, chain = robot_name(outcome.robot), list(outcome.chain)
+    if outcome.leader is None:
+        return f"{what} {outcome.robot}: no leader has answered"
+    if outcome.reason:
+        return f"{what}: {robot_name(outcome.leader)} refuses it: {outcome.reason}"
+    if not outcome.accepted:
+        return f"{what} {outcome.robot}: no quorum has accepted it in time; the chain is {chain}"
+    if what != JOIN:
+        return f"{what}: {name} is out of the team; the chain is {chain}"
+    if outcome.robot in outcome.chain:
+        return f"{what}: {name} is in the team; the chain is {chain}"
+    return f"{what}: {name} is admitted, and comes into the chain when it runs; the chain is {chain}"
