@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
-from lfa.agents.avoidance.moving_obstacle import Crossing, before, shadow
-from lfa.agents.avoidance.safety import safe, sharing, sharing_reach_m
+from lfa.agents.avoidance.moving_obstacle import Crossing, shadow
+from lfa.agents.avoidance.safety import safe
 from lfa.agents.behaviors.back_out import BackOut
+from lfa.agents.behaviors.command_limits import CommandLimits
 from lfa.agents.behaviors.follow_slot import FollowSlot
 from lfa.agents.behaviors.lead_route import LeadRoute
+from lfa.agents.behaviors.own_behavior import BehaviorInput, OwnBehaviors
 from lfa.agents.behaviors.team_mates import TeamMates
 from lfa.agents.following.factory import follower_of, predecessor_of
 from lfa.agents.following.predecessor import Predecessor
@@ -27,11 +29,10 @@ from lfa.agents.localization.estimator import Estimator
 from lfa.agents.perception.obstacle_model import ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.own_readings import OwnReadings
-from lfa.agents.perception.scan import Point
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
 from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, StuckMonitor
 from lfa.agents.team_state import TeamState
-from lfa.protocol.geometry import STILL, Pose2D, Twist, slowed
+from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
 from lfa.protocol.messages.team import ObstacleNote, RouteProgress
@@ -41,15 +42,13 @@ if TYPE_CHECKING:
     from lfa.agents.exploration.explorer import Explore
 
 DT_MIN_S = 0.002
-BEFORE_S = 0.5
-"""Time [s] ahead for which the robot brakes before what comes towards it."""
 
 
 class Navigator:
     """Motion of one robot with one mission."""
 
     def __init__(self, robot_id: int, mission: Mission, team: TeamState) -> None:
-        """Create a navigator. Raise `Refused` when the mission's gains or controller are invalid."""
+        """Create a navigator. Raise `Refused` when the mission's gains, controller or behaviours are invalid."""
         self._id = robot_id
         self._mission = mission
         self._team = team
@@ -64,21 +63,23 @@ class Navigator:
         self.own_readings = OwnReadings()
         self._detour = Detour(mission.radius_m, mission.limits, mission.control_period_s)
         self._crossing = Crossing(mission.radius_m)
+        self.hand_driving = HandDriving()
         self._begin_roles(mission)
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
         self._back_out = BackOut(mission, self.follower, self._detour, self._obstacles, self._stuck_monitor)
-        self._role = Role.WAITING
-        self._last = STILL
+        self._role, self._last = Role.WAITING, STILL
         self._driven_at: float | None = None
         self._placeless_since: float | None = None
-        self.hand_driving = HandDriving()
-        self._was_by_hand = False
         self.was_placed = False
         """True once the robot has had a pose."""
 
     def _begin_roles(self, mission: Mission) -> None:
-        self._follow_slot = FollowSlot(mission, self.follower, self._detour, self._obstacles)
-        self._lead_route = LeadRoute(self.leading, self._detour, self._obstacles, mission.radius_m)
+        self.limits = CommandLimits(mission, self._mates, self.scan_age, self.estimator, self._obstacles)
+        self._follow_slot = FollowSlot(
+            mission, self.follower, self._detour, self._obstacles, self._mates, self.leading, self.own_readings
+        )
+        self._lead_route = LeadRoute(self.leading, self._detour, self._obstacles, mission, self.hand_driving)
+        self._own = OwnBehaviors(mission)
 
     @property
     def predecessor(self) -> Predecessor | None:
@@ -113,19 +114,15 @@ class Navigator:
             self.leading.begin(known[0], 0.0 if new_route else self.estimator.odometer_m, now)
             self._stuck_monitor.begin(leading=True)
 
-    def lost_input(self, now: float) -> str | None:
-        """Return the input of the robot's own hardware that is too old to drive by; None when all is well."""
-        missing = self.estimator.missing(now)
-        if missing is not None:
-            return missing
-        if self.estimator.unfixed:
-            return "localization"
-        return "scan" if self.scan_age.lost(now) else None
-
     @property
     def pose_lost(self) -> bool:
         """True while the robot is stuck because it has no pose (S6)."""
         return self._stuck_monitor.pose_lost
+
+    @property
+    def failure(self) -> str | None:
+        """Fault of the mission's controller, or of a behaviour of its own; None while they work."""
+        return self.follower.failure or self._own.failure
 
     @property
     def decision(self) -> Decision | None:
@@ -165,9 +162,8 @@ class Navigator:
 
     def follow_robot(self, robot: int | None, followers: int) -> None:
         """Set the robot whose successor this robot is from now on; None for no predecessor."""
-        current = None if self.predecessor is None else self.predecessor.robot
-        if robot != current:
-            before = self.predecessor
+        before = self.predecessor
+        if robot != (None if before is None else before.robot):
             self._mates.predecessor = None if robot is None else predecessor_of(self._mission, robot, followers, before)
 
     def hold(self, now: float) -> Twist:
@@ -180,8 +176,8 @@ class Navigator:
             self._stuck_monitor.lose_pose(missing)
         self._driven_at = now
         self._detour.decision = self._crossing.decision = None
-        limits = self._mission.limits
-        self._last = safe(STILL, self._last, (), self._mission.radius_m, limits, self._mission.control_period_s)
+        period_s, limits = self._mission.control_period_s, self._mission.limits
+        self._last = safe(STILL, self._last, (), self._mission.radius_m, limits, period_s)
         self.follower.overridden(self._last)
         return self._last
 
@@ -197,31 +193,24 @@ class Navigator:
         self._placeless_since, self.was_placed = None, True
         if role != self._role:
             self._change(role, pose, twist, now)
-        points = self._obstacles.points(pose)
         self.leading.work(role is Role.LEADER, pose, self._mates.places, now)
-        moving = self._obstacles.moving(pose, now)
+        points, moving = self._obstacles.points(pose), self._obstacles.moving(pose, now)
         still = resting(points, pose, moving) if self._crossing.patient else points + shadow(moving, pose)
         if role is Role.LEADER:
-            by_hand = self._by_hand(pose, now)
-            wanted = self._lead_route.step(chain, still, pose, self._last, now) if by_hand is None else by_hand
+            wanted = self._lead_route.step(chain, still, pose, self._last, self.estimator.odometer_m, now)
         elif role is Role.FOLLOWER:
-            wanted = self._follow(still, pose, twist, dt, now)
+            wanted = self._follow_slot.step(still, pose, twist, self._last, dt, now, stuck=self.stuck is not None)
             if self._back_out.under_way:
                 wanted = self._back_out.step(points, pose, wanted, self._last, now)
         else:
             wanted = STILL
         if role is not Role.WAITING:
+            wanted = self._own.step(BehaviorInput(now, role, pose, self._last, wanted, still, moving))
             wanted = self._crossing.give_way(moving, pose, wanted, now, still)
-            wanted = self._ground_crossing.cross(wanted, now)
-            wanted = self._share(wanted, pose, now)
-            usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else self._mission.limits.v_max_mps
-            wanted = slowed(self.scan_age.limited(wanted, now), self.scan_age.speed_max_mps(usual_mps))
-            wanted = self.estimator.limited(wanted)
+            wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now)
         self._back_out.keep(pose)
         self._watch(role, pose, wanted, now)
-        limits = self._mission.limits
-        braked_for = points + self._obstacles.ground.doubtful(pose) + before(moving, pose, BEFORE_S)
-        self._last = safe(wanted, self._last, braked_for, self._mission.radius_m, limits, dt)
+        self._last = self.limits.brake(wanted, self._last, points, moving, pose, dt)
         self.follower.overridden(self._last)
         if role is Role.LEADER:
             progress = self.lead.progress(pose, self._last)
@@ -239,6 +228,7 @@ class Navigator:
         self._role = role
         self._detour.decision = self._crossing.decision = None
         self._follow_slot.end()
+        self._lead_route.by_hand = False
         self._stuck_monitor.begin(leading=role is Role.LEADER)
         omega_max = self._mission.limits.omega_max_radps
         self._detour.omega_max_radps = min(LEADER_OMEGA_MAX_RADPS, omega_max) if role is Role.LEADER else omega_max
@@ -250,40 +240,11 @@ class Navigator:
     def _watch(self, role: Role, pose: Pose2D, wanted: Twist, now: float) -> None:
         """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team."""
         waits = role is Role.LEADER and self.leading.waiting
-        if role is Role.WAITING or waits or self._was_by_hand or self.arrived(pose, self._last):
+        if role is Role.WAITING or waits or self._lead_route.by_hand or self.arrived(pose, self._last):
             self._stuck_monitor.rest(pose, now)
             return
-        decision = self.decision
-        action = None if decision is None else decision.action
+        action = None if self.decision is None else self.decision.action
         leads = role is Role.LEADER and self.leading.under_way
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
         planned = self.leading.rounding or self._follow_slot.catches_up
         self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not planned)
-
-    def _share(self, wanted: Twist, pose: Pose2D, now: float) -> Twist:
-        """Return `wanted`, slowed towards team-mates that this robot does not follow."""
-        radius_m, limits = self._mission.radius_m, self._mission.limits
-        strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now)
-        return sharing(wanted, strangers, radius_m, limits)
-
-    def _by_hand(self, pose: Pose2D, now: float) -> Twist | None:
-        """Return the twist of an operator who drives this leader; None for the route, on which it begins anew then."""
-        twist = self.hand_driving.wanted(self._mission.limits, now)
-        if twist is not None:
-            self._detour.decision = None
-        elif self._was_by_hand:
-            self.leading.begin(pose, self.estimator.odometer_m, now)
-        self._was_by_hand = twist is not None
-        return twist
-
-    def _follow(self, points: list[Point], pose: Pose2D, twist: Twist, dt: float, now: float) -> Twist:
-        sighting = None if self.predecessor is None else self.predecessor.at(now)
-        slot = self.formation.slot_of(self._id)
-        self.follower.own_readings = self.own_readings.at(now)
-        wanted = self.follower.step(sighting, slot, pose, twist, dt, on_trace=self.formation.trace)
-        explore = self.leading.explore
-        mapping = None if explore is None else explore.mapping
-        return self._follow_slot.step(
-            sighting, slot, points, pose, wanted, self._last, now, on_trace=self.formation.trace,
-            stuck=self.stuck is not None, mapping=mapping, mates=self._mates.places,
-        )  # fmt: skip

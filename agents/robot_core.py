@@ -374,7 +374,7 @@ class RobotCore:
     def _watch_inputs(self, now: float) -> None:
         """Publish an event when an input of the robot's own hardware is lost, and when it is back."""
         navigator = self.navigator
-        lost = (navigator.lost_input(now) or "") if navigator.was_placed or navigator.pose_lost else ""
+        lost = (navigator.limits.lost_input(now) or "") if navigator.was_placed or navigator.pose_lost else ""
         if lost != self._lost_input:
             self._lost_input = lost
             self._event("input", now, {"state": "lost", "input": lost} if lost else {"state": "back"})

@@ -52,7 +52,7 @@ class StuckPolicy:
         if driver.stuck != self._said:
             self._said = driver.stuck
             self._event("stuck", now, lease, {"reason": driver.stuck or "", "stuck": driver.stuck is not None})
-        broken = driver.follower.failure
+        broken = driver.failure
         if broken is not None:
             self._fail(broken, lease, now, controller=True)
         if role is not Role.LEADER:

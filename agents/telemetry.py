@@ -216,7 +216,7 @@ def _health(navigator: Navigator, lease: Lease, role: Role, others: tuple[str, .
     """
     if lease.missing:
         return f"waiting for {', '.join(robot_name(i) for i in lease.missing)}", Level.WARN
-    lost = navigator.lost_input(now)
+    lost = navigator.limits.lost_input(now)
     if lost is None:
         slow_hz = navigator.scan_age.slow_hz
         slow = "" if slow_hz is None else f"slow: scans at {slow_hz:.1f} Hz"

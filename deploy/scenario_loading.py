@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from lfa.agents.behaviors.own_behavior import OwnBehaviors
 from lfa.agents.config import Gains
 from lfa.agents.following.controller import find_controller
 from lfa.agents.following.factory import gains_of
@@ -13,7 +14,7 @@ from lfa.agents.following.plugin import add_controller_file, make_controller
 from lfa.deploy.faults.goals import check_goals
 from lfa.deploy.faults.script import parse
 from lfa.deploy.recording.run_folder import SCENARIO, scenario_of
-from lfa.protocol.config_file.mistake import Mistake, Rule
+from lfa.protocol.config_file.mistake import Mistake, RefusedValue, Rule
 from lfa.protocol.errors import Refused
 from lfa.world.description.course_rules import PLACES
 from lfa.world.description.load import Scenario, load
@@ -69,6 +70,13 @@ def _controller(scenario: Scenario) -> Iterator[Mistake]:
         yield Mistake(f"mission.following.{str(refused)[:end]}", str(refused)[end:])
 
 
+def _behaviors(scenario: Scenario) -> Iterator[Mistake]:
+    try:
+        OwnBehaviors(scenario.mission)
+    except RefusedValue as refused:
+        yield refused.mistake
+
+
 def _faults(scenario: Scenario) -> Iterator[Mistake]:
     for n, text in enumerate(scenario.faults):
         try:
@@ -89,6 +97,7 @@ RULES: tuple[Rule[Scenario], ...] = (
     Rule(_gains, ("mission.following", "mission.limits", "mission.control_hz")),
     Rule(_controller),
     INSTALLED_RULE,
+    Rule(_behaviors),
     Rule(_faults, ("mission.robots",)),
     Rule(_goals, ("faults", *PLACES)),
 )

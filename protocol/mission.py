@@ -143,6 +143,9 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     formation: FormationSpec = FormationSpec()
     following: Following = Following()
     leading: Leading = Leading()
+    behaviors: tuple[str, ...] = ()
+    """Names of behaviours of one's own (entry point `lfa.behaviors`), in the order in which they act: each may want
+    another twist than the robot's role gives."""
     limits: Limits = Limits()
     radius_m: float = 0.15
     operator_timeout_s: float | None = None

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import cos, hypot, inf, sin
 from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.avoidance.detour import Detour
+from lfa.agents.behaviors.team_mates import TeamMates
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.predecessor import Sighting
 from lfa.agents.leading.free_slot import FreeSlot
+from lfa.agents.leading.leader import Leadership
 from lfa.agents.perception.obstacle import ON_THE_MAP
 from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.own_readings import OwnReadings
 from lfa.agents.perception.scan import Point, without
 from lfa.protocol.geometry import Pose2D, Twist, in_base
 from lfa.protocol.messages.robot import LaserScan
@@ -20,7 +23,6 @@ from lfa.protocol.messages.team import Slot
 from lfa.protocol.mission import Mission
 
 if TYPE_CHECKING:
-    from lfa.agents.exploration.occupancy_grid import Mapping
     from lfa.agents.leading.way_back import WayBack
 
 CATCH_UP_PER_S = 0.8
@@ -40,11 +42,24 @@ WAY_BACK = Decision(Action.PLAN_ROUND, inf, 0.0, "wall", "the slot is out of rea
 class FollowSlot:
     """Following behaviour of one robot. `detour` holds the present decision, and is shared with the leader's."""
 
-    def __init__(self, mission: Mission, follower: Follower, detour: Detour, obstacles: ObstacleModel) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        follower: Follower,
+        detour: Detour,
+        obstacles: ObstacleModel,
+        mates: TeamMates,
+        leading: Leadership,
+        own_readings: OwnReadings,
+    ) -> None:
         self._mission = mission
         self._follower = follower
         self._detour = detour
         self._obstacles = obstacles
+        self._mates = mates
+        self._formation = leading.formation
+        self._leading = leading
+        self._own_readings = own_readings
         self._free_slot = FreeSlot(mission.radius_m)
         self._way_back: WayBack | None = None
         """Way back to the slot; None before this follower has lost it for the first time."""
@@ -65,31 +80,21 @@ class FollowSlot:
             self._way_back.see(scan, pose, twist, mates)
 
     def step(
-        self,
-        sighting: Sighting | None,
-        slot: Slot,
-        points: list[Point],
-        pose: Pose2D,
-        wanted: Twist,
-        last: Twist,
-        now: float,
-        *,
-        on_trace: bool,
-        stuck: bool,
-        mapping: Mapping | None,
-        mates: Callable[[float], Sequence[Pose2D]],
+        self, points: list[Point], pose: Pose2D, twist: Twist, last: Twist, dt: float, now: float, *, stuck: bool
     ) -> Twist:
-        """Return `wanted`, the twist of the law, or that of a way to the slot where obstacles lie between.
-
-        `points` are what stands, in `base_link`; `mapping` is a map that the robot keeps anyway, `mates` returns the
-        poses of the team-mates.
+        """Return the twist of the law, or that of a way to the slot where obstacles lie between. `points` are what
+        stands, in `base_link`.
         """
+        ahead, trace = self._mates.predecessor, self._formation.trace
+        sighting, slot = None if ahead is None else ahead.at(now), self._formation.slot_of(self._mates.own_id)
+        self._follower.own_readings = self._own_readings.at(now)
+        wanted = self._follower.step(sighting, slot, pose, twist, dt, on_trace=trace)
         if sighting is None or sighting.age_s > FRESH_S:
             return wanted
-        if on_trace and self._follower.readout.error_m < ON_TRACE_M:
+        if trace and self._follower.readout.error_m < ON_TRACE_M:
             return wanted
         place = self._follower.readout.slot_map
-        back = self._catch_up((place.x, place.y), points, pose, last, now, stuck=stuck, mapping=mapping, mates=mates)
+        back = self._catch_up((place.x, place.y), points, pose, last, now, stuck=stuck)
         if back is not None:
             return back
         ahead_mps, within_m = sighting.twist.linear_x, BESIDE_SLOT_SHARE * slot.separation_m
@@ -135,8 +140,6 @@ class FollowSlot:
         now: float,
         *,
         stuck: bool,
-        mapping: Mapping | None,
-        mates: Callable[[float], Sequence[Pose2D]],
     ) -> Twist | None:
         """Return the twist of a planned way back to `slot` in `map`; None while the follower needs none."""
         decision = self._detour.decision
@@ -148,9 +151,9 @@ class FollowSlot:
             from lfa.agents.leading.way_back import WayBack
 
             self._way_back = WayBack(self._mission)
-        was_back = self.catches_up
-        self._way_back.watch(slot, pose, hindered, mapping, now)
-        twist = self._way_back.steer(points, pose, slot, mates, last, now)
+        was_back, explore = self.catches_up, self._leading.explore
+        self._way_back.watch(slot, pose, hindered, None if explore is None else explore.mapping, now)
+        twist = self._way_back.steer(points, pose, slot, self._mates.places, last, now)
         if twist is not None:
             self._detour.decision = WAY_BACK
         elif was_back:

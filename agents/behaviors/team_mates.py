@@ -14,7 +14,7 @@ class TeamMates:
     """The other robots that tell where they are, and the one that this robot follows."""
 
     def __init__(self, robot_id: int, team: TeamState) -> None:
-        self._id = robot_id
+        self.own_id = robot_id
         self._team = team
         self.predecessor: Predecessor | None = None
 
@@ -40,4 +40,4 @@ class TeamMates:
         return mates
 
     def _others(self) -> list[int]:
-        return sorted(robot for robot in self._team.robots if robot != self._id)
+        return sorted(robot for robot in self._team.robots if robot != self.own_id)

@@ -46,7 +46,7 @@ class Leadership:
 
     def __init__(self, mission: Mission, formation: Formation, team: TeamState) -> None:
         self._mission = mission
-        self._formation = formation
+        self.formation = formation
         self._team = team
         self.lead = PathFollower(mission.leading, mission.limits, mission.radius_m, mission.control_period_s)
         self._planned: PlannedWay | None = None
@@ -126,7 +126,7 @@ class Leadership:
 
     def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
         """Return the wanted twist, and the maximum speed [m/s] of a detour."""
-        slots = [] if self._formation.trace else [self._formation.slot_of(robot) for robot in chain[1:]]
+        slots = [] if self.formation.trace else [self.formation.slot_of(robot) for robot in chain[1:]]
         self._slots = slots
         speed = self._mission.leading.cruise_mps
         if self._timetable is not None:
@@ -228,7 +228,7 @@ class Leadership:
         for robot in chain[1:]:
             here = self._team.pose_of(robot, now)
             if here is not None and ahead is not None:
-                widest = max(widest, distance(ahead, here) / self._formation.slot_of(robot).separation_m)
+                widest = max(widest, distance(ahead, here) / self.formation.slot_of(robot).separation_m)
             ahead = here
         if widest <= GAP_WAIT:
             self._waiting_since, self.waited_out = None, False

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from lfa.agents.behaviors.own_behavior import BEHAVIORS
 from lfa.agents.following import controller
 from tests.test_imports import ROOT
 
@@ -28,6 +29,7 @@ SHOWN: dict[str, tuple[str, ...]] = {
     "09_own_generator":    (r"seed 1: goal_reached past posts at \(3, \S+\), \(6, \S+\)", r"seed 2: goal_reached"),
     "10_own_sensor":       (r"law +goal_reached, last reading .*: \(12\.\d+, {'lux': \S+}\)", r"careful +goal"),
     "11_learn":            (r"gains 0\.00, 0\.00: -9\.", r"best: .* with -0\.9"),
+    "12_own_behavior":     (r"\[\] +goal_reached after 1\d s", r"\['cautious'\] +goal_reached after [23]\d s"),
 }  # fmt: skip
 
 
@@ -48,6 +50,7 @@ def test_an_example_does_what_it_says(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [str(path)])
     monkeypatch.setattr(controller, "_added", {})
+    monkeypatch.setattr(BEHAVIORS, "_added", {})
     runpy.run_path(str(path), run_name="__main__")
     shown = capsys.readouterr().out
     assert [pattern for pattern in SHOWN[path.stem] if not re.search(pattern, shown)] == [], shown

@@ -1,0 +1,58 @@
+"""Limits of a robot's command, each applied once, to whatever its behaviour wants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lfa.agents.avoidance.moving_obstacle import before
+from lfa.agents.avoidance.safety import safe, sharing, sharing_reach_m
+from lfa.agents.behaviors.team_mates import TeamMates
+from lfa.agents.localization.estimator import Estimator
+from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.agents.perception.scan import Point
+from lfa.agents.perception.scan_age import ScanAge
+from lfa.protocol.geometry import Pose2D, Twist, slowed
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.mission import Mission
+
+BEFORE_S = 0.5
+"""Time [s] ahead for which the robot brakes before what comes towards it."""
+
+
+class CommandLimits:
+    """Limits of one robot: by team-mates, by the age of scan and pose, by the drive, and by all obstacles last."""
+
+    def __init__(
+        self, mission: Mission, mates: TeamMates, scan_age: ScanAge, estimator: Estimator, obstacles: ObstacleModel
+    ) -> None:
+        self._mission = mission
+        self._mates = mates
+        self._scan_age = scan_age
+        self._estimator = estimator
+        self._obstacles = obstacles
+
+    def slow(self, wanted: Twist, role: Role, pose: Pose2D, now: float) -> Twist:
+        """Return `wanted`, slowed towards team-mates that no controller keeps a distance to, and by old inputs."""
+        limits, radius_m = self._mission.limits, self._mission.radius_m
+        strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now)
+        wanted = sharing(wanted, strangers, radius_m, limits)
+        usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else limits.v_max_mps
+        wanted = slowed(self._scan_age.limited(wanted, now), self._scan_age.speed_max_mps(usual_mps))
+        return self._estimator.limited(wanted)
+
+    def lost_input(self, now: float) -> str | None:
+        """Return the input of the robot's own hardware that is too old to drive by; None when all is well."""
+        missing = self._estimator.missing(now)
+        if missing is not None:
+            return missing
+        if self._estimator.unfixed:
+            return "localization"
+        return "scan" if self._scan_age.lost(now) else None
+
+    def brake(
+        self, wanted: Twist, last: Twist, points: list[Point], moving: Sequence[Feature], pose: Pose2D, dt: float
+    ) -> Twist:
+        """Return `wanted` within the drive's limits, and slow enough to stop before all that is seen or doubtful."""
+        braked_for = points + self._obstacles.ground.doubtful(pose) + before(moving, pose, BEFORE_S)
+        return safe(wanted, last, braked_for, self._mission.radius_m, self._mission.limits, dt)
