@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,7 @@ from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
+from lfa.protocol.output import write_line
 from lfa.protocol.topics import address
 from lfa.protocol.transport.message_bus import send
 
@@ -39,6 +41,7 @@ RRD = "recording.rrd"
 PICTURE = "view.png"
 FLUSH_S = 0.33  # the cost of a batch depends little on its size: at 0.1 s the total would be more than twice as high
 PORT, WEB_PORT = 9876, 9090
+SHOW_EVERY_S = 3.0  # wall-clock time between two lines of progress
 SHOT_S = 5.0  # time drawn of a running fleet before its picture is taken
 
 
@@ -86,6 +89,7 @@ def _write_clip(folder: Path | None, html: Path | None, gif: Path | None, mp4: P
 
     if folder is None:
         raise Refused("--html, --gif and --mp4: need a run folder")
+    write_line("reading the recording and drawing it ...", sys.stderr)
     clip = clip_of([folder])
     for path, write in ((html, lambda c, p: p.write_text(html_of(c), "utf-8")), (gif, write_gif), (mp4, write_mp4)):
         if path is not None:
@@ -108,6 +112,8 @@ def converted(folder: Path) -> Path:
     if rrd.is_file() and rrd.stat().st_mtime > max(path.stat().st_mtime for path in parts(folder)):
         return rrd
     scenario = scenario_of(folder)
+    write_line("converting the recording for the viewer ...", sys.stderr)
+    shown_at = time.perf_counter() + SHOW_EVERY_S
     stream = rr.RecordingStream(APPLICATION, recording_id=folder.resolve().name)
     unfinished = rrd.with_suffix(".part")
     stream.save(unfinished)
@@ -118,6 +124,9 @@ def converted(folder: Path) -> Path:
         lasted_s = 0.0
         for owner, topic, lasted_s, message in messages(folder, TOPICS):
             scene.see(lasted_s, owner, topic, message)
+            if time.perf_counter() > shown_at:
+                shown_at = time.perf_counter() + SHOW_EVERY_S
+                write_line(f"{lasted_s:7.1f} s of the run converted", sys.stderr)
         scene.flush()
         robots = len(scenario.mission.robots)
         layout(scenario, robots, lasted_s=lasted_s).save(APPLICATION, rrd.with_suffix(LAYOUT_AT_END))

@@ -43,8 +43,12 @@ def _rows(rrd: Path) -> Counter[str]:
     return found
 
 
-def test_each_robot_has_as_many_poses_scans_and_slots_as_were_recorded(folder: Path) -> None:
+def test_each_robot_has_as_many_poses_scans_and_slots_as_were_recorded(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(command, "SHOW_EVERY_S", 0.0)
     rrd = command.converted(folder)
+    assert "s of the run converted" in capsys.readouterr().err
     topics = frozenset({"pose", "scan", "tracking"})
     rows, said = _rows(rrd), Counter((owner, topic) for owner, topic, *_ in messages(folder, topics))
     for robot in ("robot1", "robot2", "robot3", "robot4"):
