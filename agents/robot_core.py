@@ -175,7 +175,7 @@ class RobotCore:
                 self._stop_listener.hear_sensors(message)
                 navigator.estimator.sensors(message, now)
                 self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
-                lease.told_of(message.agent)
+                lease.learn_incarnation(message.agent)
             case Localization():
                 navigator.estimator.localization(message, now)
             case LaserScan():
@@ -349,10 +349,10 @@ class RobotCore:
         drives = Role.WAITING if paused or self._stop_listener.stands else role
         command = navigator.drive(drives, self._place.ids, pose, twist, now)
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
-        told = obeyed(navigator.last, twist)
+        published = obeyed(navigator.last, twist)
         for kind, data in navigator.leading.drain():
             self._event(kind, now, data, lease.term)
-        self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, told, now)
+        self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, published, now)
         if self._stuck_policy.step(role, pose, lease, navigator, now):
             self._hand_over(now)
             return

@@ -68,9 +68,9 @@ class TeamState:
         if known is not None and known[0].header.incarnation == row.header.incarnation:
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
-        told = row.progress
-        if told is not None and told.route == self.route and (row.role is Role.LEADER or self.progress is None):
-            self.progress = told
+        reported = row.progress
+        if reported is not None and reported.route == self.route and (row.role is Role.LEADER or self.progress is None):
+            self.progress = reported
         self._table[robot] = (row, at)
         self._clocks[robot].heard(row.header.stamp, at)
 

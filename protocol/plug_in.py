@@ -43,7 +43,7 @@ class PlugIns:
         try:
             return points[name].load()
         except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
-            raise Refused(f"{self._kind} {name}: {points[name].value} cannot be loaded: {told(error)}") from None
+            raise Refused(f"{self._kind} {name}: {points[name].value} cannot be loaded: {error_text(error)}") from None
 
     def make(self, name: str, given: Mapping[str, Any], key: str, *arguments: Any) -> Any:
         """Return a plug-in made with `arguments` and, if its class has `Parameters`, with `given` as these.
@@ -67,7 +67,7 @@ class PlugIns:
         try:
             return make(*arguments, *own)
         except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-            raise RefusedValue(Mistake(key, f": {self._kind} {name} cannot be made: {told(error)}")) from None
+            raise RefusedValue(Mistake(key, f": {self._kind} {name} cannot be made: {error_text(error)}")) from None
 
     def _entry_points(self) -> dict[str, Any]:
         # Imported here, for a name that is no default: it costs 3 MB of memory.
@@ -109,7 +109,7 @@ def _as_whole(value: Any, kind: Any) -> Any:
     return [_as_whole(item, kind) for item in value] if isinstance(value, list | tuple) else value
 
 
-def told(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Return an exception of a user's own code in one line, with file and line where it was raised."""
     import traceback
 

@@ -58,7 +58,7 @@ class RobotHardware:
         self._answers = StopAnswers(self._outbox)
         self._hung: dict[str, Twist] = {}
         """Parts that hang, and the twist at which the wheels were when each began to."""
-        self._told: dict[str, tuple[Term, float]] = {}
+        self._refused_at: dict[str, tuple[Term, float]] = {}
 
     def hang(self, part: str, now: float) -> None:
         """Let the `driver`, the `localization` or the `scanner` hang, as a process does: silent, and without effect."""
@@ -81,10 +81,10 @@ class RobotHardware:
         reason = self.gateway.command(cmd, now)
         if reason is None:
             return ("leader_command", {"robot": self.id}) if cmd.as_leader else None
-        term, at = self._told.get(reason, (None, float("-inf")))
+        term, at = self._refused_at.get(reason, (None, float("-inf")))
         if cmd.term == term or now - at < REFUSAL_EVERY_S:
             return None
-        self._told[reason] = cmd.term, now
+        self._refused_at[reason] = cmd.term, now
         return "refused", {"robot": self.id, "reason": reason, "count": self.gateway.refused[reason]}
 
     def fence(self, fence: Fence, now: float) -> Envelope:

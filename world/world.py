@@ -242,7 +242,7 @@ class World:
 
     def _move(self, now: float) -> list[Touch]:
         wanted = [robot.twist(now) for robot in self._robots]
-        for place, twist in self._driven.items():  # wheels whose driver died or hangs turn on as it last told them
+        for place, twist in self._driven.items():  # wheels whose driver died or hangs turn on as last commanded
             wanted[place] = twist
         touches = self._bodies.step(wanted)
         for robot, wheels in zip(self._robots, self._bodies.wheels, strict=True):

@@ -19,7 +19,7 @@ from lfa.protocol.config_file.mistake import Mistake, RefusedValue
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.mission import Mission
-from lfa.protocol.plug_in import PlugIns, told
+from lfa.protocol.plug_in import PlugIns, error_text
 
 BEHAVIORS = PlugIns("behavior", "lfa.behaviors")
 
@@ -80,7 +80,7 @@ class OwnBehaviors:
                     BehaviorInput(seen.now, seen.role, seen.pose, seen.last, wanted, seen.still, seen.moving)
                 )
             except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way, and its robot must come to rest
-                self.failure = f"behavior {name}: {told(error)}"
+                self.failure = f"behavior {name}: {error_text(error)}"
                 return STILL
             if answer is None:
                 continue

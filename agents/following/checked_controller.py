@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lfa.agents.following.controller import Controller, Reference
 from lfa.protocol.geometry import Pose2D, Twist
-from lfa.protocol.plug_in import told
+from lfa.protocol.plug_in import error_text
 
 
 class CheckedController:
@@ -26,7 +26,7 @@ class CheckedController:
         try:
             self._controller.reset(own_pose, own_twist)
         except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way, and its robot must come to rest
-            self.failure = f"controller {self._name}: {told(error)}"
+            self.failure = f"controller {self._name}: {error_text(error)}"
 
     def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist | None:
         """Return the controller's twist; None once it has failed."""
@@ -42,7 +42,7 @@ class CheckedController:
             while last is not None and last.tb_next is not None:
                 last = last.tb_next
             if last is None or last.tb_frame.f_code.co_filename != __file__:
-                self.failure = f"controller {self._name}: {told(error)}"
+                self.failure = f"controller {self._name}: {error_text(error)}"
                 return None
         self.failure = f"controller {self._name}: {_place(self._controller)}step returned {_shown(wanted)}, must be " \
                        "a Twist of finite numbers"  # fmt: skip

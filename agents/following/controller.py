@@ -17,7 +17,7 @@ from lfa.agents.perception.own_readings import OwnReading
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.mission import Limits
-from lfa.protocol.plug_in import told
+from lfa.protocol.plug_in import error_text
 
 ENTRY_POINTS = "lfa.controllers"
 DEFAULT_CONTROLLER = "law"
@@ -108,7 +108,7 @@ def find_controller(name: str) -> MakeController:
     try:
         make: MakeController = known[name].load()
     except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
-        raise Refused(f"controller = {name}: {known[name].value} cannot be loaded: {told(error)}") from None
+        raise Refused(f"controller = {name}: {known[name].value} cannot be loaded: {error_text(error)}") from None
     return make
 
 

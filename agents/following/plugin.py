@@ -14,7 +14,7 @@ from lfa.agents.config import Gains
 from lfa.agents.following.controller import Controller, add_controller, find_controller
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Following, Limits, Parameter
-from lfa.protocol.plug_in import converted, parameters_of, told
+from lfa.protocol.plug_in import converted, error_text, parameters_of
 
 _files: dict[str, str] = {}
 """Absolute `FILE.py:Class` of each controller that was added from a file, by name."""
@@ -64,7 +64,7 @@ def make_controller(following: Following, gains: Gains, limits: Limits) -> Contr
     except Refused:
         raise
     except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-        raise Refused(f"controller = {following.controller}: cannot be made: {told(error)}") from None
+        raise Refused(f"controller = {following.controller}: cannot be made: {error_text(error)}") from None
     if not (callable(getattr(made, "step", None)) and callable(getattr(made, "reset", None))):
         raise Refused(f"controller = {following.controller}: must be a class with the methods reset and step")
     return made
@@ -81,7 +81,7 @@ def _module(path: Path, text: str) -> Any:
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # noqa: BLE001 - the file of a user may fail in any way
-        raise Refused(f"--controller {text}: {told(error)}") from None
+        raise Refused(f"--controller {text}: {error_text(error)}") from None
     return module
 
 

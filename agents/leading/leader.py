@@ -65,7 +65,7 @@ class Leadership:
             self._timetable = Timetable(mission.leading)
         self._free_place = FreePlace(mission.radius_m)
         self._looked_at = -1
-        self._told: list[tuple[str, dict[str, Any]]] = []
+        self._events: list[tuple[str, dict[str, Any]]] = []
         self._off_max_m: float | None = None
         """Largest distance [m] from the route since the leader left it; None on the route."""
         self.failure: str | None = None
@@ -151,7 +151,7 @@ class Leadership:
             place = self._free_place.look((x, y), points, pose, now)
             if place is not None and lead.place is None:
                 lead.end_at(place)
-                self._told.append(("waypoint_taken", {"waypoint": number, "x": place[0], "y": place[1]}))
+                self._events.append(("waypoint_taken", {"waypoint": number, "x": place[0], "y": place[1]}))
             elif self._free_place.none_left:
                 self._pass_over(number)
         if lead.place is None:
@@ -161,19 +161,19 @@ class Leadership:
     def drain(self) -> list[tuple[str, dict[str, Any]]]:
         """Return what has happened on the route since the last call, as kinds and data of events."""
         passed = [("waypoint", {"waypoint": n, "off_m": round(off_m, 3)}) for n, off_m in self.lead.passed]
-        told, self._told = [*passed, *self._told], []
+        passed_on, self._events = [*passed, *self._events], []
         self.lead.passed.clear()
-        return told
+        return passed_on
 
     def _tell_detour(self, off_m: float) -> None:
         """Tell when the leader has left its route by more than `LEFT_M`, and when it is back on it."""
         if self._off_max_m is None and off_m > LEFT_M:
-            self._told.append(("route", {"state": "left", "off_m": round(off_m, 3)}))
+            self._events.append(("route", {"state": "left", "off_m": round(off_m, 3)}))
             self._off_max_m = off_m
         elif self._off_max_m is not None:
             self._off_max_m = max(self._off_max_m, off_m)
             if off_m < BACK_M:
-                self._told.append(("route", {"state": "back", "off_max_m": round(self._off_max_m, 3)}))
+                self._events.append(("route", {"state": "back", "off_max_m": round(self._off_max_m, 3)}))
                 self._off_max_m = None
 
     def _pass_over(self, number: int) -> None:
@@ -182,7 +182,7 @@ class Leadership:
         if self.lead.is_last:
             self.failure = reason
         else:
-            self._told.append(("waypoint_skipped", {"waypoint": number, "reason": reason}))
+            self._events.append(("waypoint_skipped", {"waypoint": number, "reason": reason}))
             self.lead.skip()
 
     def target(self, pose: Pose2D) -> Point:

@@ -24,12 +24,12 @@ class SharedObstacles:
     def __init__(self, robots: Callable[[float], Iterable[Pose2D | None]]) -> None:
         """`robots(now)` returns the poses in `map` of all robots that are heard; None for a stale one."""
         self._robots = robots
-        self._told: dict[int, tuple[ObstacleNote, float]] = {}
+        self._reports: dict[int, tuple[ObstacleNote, float]] = {}
 
     def update(self, robot: int, note: ObstacleNote, at: float) -> None:
         """Keep `note`, the report of `robot` received at `at` [s]; only moving obstacles count."""
-        if note.kind == "moving" and (robot in self._told or len(self._told) < REPORTERS_MAX):
-            self._told[robot] = (note, at)
+        if note.kind == "moving" and (robot in self._reports or len(self._reports) < REPORTERS_MAX):
+            self._reports[robot] = (note, at)
 
     def moving(
         self,
@@ -43,7 +43,7 @@ class SharedObstacles:
         `seen_near(x, y, within_m)` returns whether this robot's scan shows anything near (x, y) in `map`.
         """
         known = list(seen)
-        for note, at in self._told.values():
+        for note, at in self._reports.values():
             vx, vy = note.twist_map
             x, y = note.x + vx * (now - at), note.y + vy * (now - at)
             if now - at <= REMOTE_TRACK_S or (now - at <= PARTIAL_TRACK_S and seen_near(x, y, SAME_M)):

@@ -133,8 +133,8 @@ def result(team: BarnTeam, field: BarnWorlds, world: BarnWorld) -> list[float]:
     fault whether it failed though there was a way past the dead robot.
     """
     done = outcome(team, field, world)
-    told = done.wrong or "ok"
-    print(f"barn/{team.name} {world.index}: {told}, score {done.score:.3f}", file=sys.stderr, flush=True)
+    verdict = done.wrong or "ok"
+    print(f"barn/{team.name} {world.index}: {verdict}, score {done.score:.3f}", file=sys.stderr, flush=True)
     values = [float(done.wrong is None), float(done.contact)] + ([done.score] if team.scored else [])
     return values + ([float(done.wrong is not None and done.passable)] if team.faults else [])
 

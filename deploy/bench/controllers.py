@@ -122,12 +122,12 @@ def report_of(combined: Combined) -> MergeReport:
     whole = sweep.report(combined)
     heads = ("controller", "loss", "runs", "good", *SHOWN, "worst spacing [m]")
     body = [(s.controller, s.loss, s.runs, s.good, *s.values, _short(s)) for s in standings(read(combined))]
-    told = (
+    note = (
         "<p class='soft'>Ranked by the median rms distance error of the worst follower under loss. hop_l2, hop_linf: "
         "amplification of the distance error per hop, rms and peak. Worst spacing: least distance of two robots in any "
         "run.</p>"
     )
-    board = Section("Leaderboard", rows(heads, body, text=(0,)) + told)
+    board = Section("Leaderboard", rows(heads, body, text=(0,)) + note)
     widths = [max(len(str(row[n])) for row in (heads, *body)) for n in range(len(heads))]
     lines = tuple("  ".join(str(c).ljust(w) for c, w in zip(row, widths, strict=True)) for row in (heads, *body))
     return msgspec.structs.replace(whole, sections=(board, *whole.sections), lines=lines, worst=())

@@ -74,11 +74,11 @@ def _rows() -> Iterator[list[BenchRow]]:
 def _help() -> list[BenchRow]:
     """Measure `lfa --help` against a bare start of the interpreter, to separate a slow machine from a slow command."""
     bare = statistics.median(_took([sys.executable, "-c", "pass"]) for _ in range(STARTS))
-    told = statistics.median(_took([*LFA, "--help"]) for _ in range(STARTS))
+    help_s = statistics.median(_took([*LFA, "--help"]) for _ in range(STARTS))
     return [
         row("help", Quantity("a bare start", "s"), bare),
-        row("help", Quantity("lfa --help", "s", 0.3), told),
-        row("help", Quantity("times a bare start", "1", 10.0), told / bare),
+        row("help", Quantity("lfa --help", "s", 0.3), help_s),
+        row("help", Quantity("times a bare start", "1", 10.0), help_s / bare),
     ]
 
 
@@ -166,5 +166,5 @@ def _lags(team: Team, subscriber: Subscriber, duration_s: float) -> float:
     """Return the median [ms] of the agents' loop lags, each the largest of one second."""
     subscriber.take()
     pause(team, duration_s)
-    told = [message for _, message in subscriber.take() if isinstance(message, Status)]
-    return statistics.median(status.counters["loop_lag_ms"] for status in told if "loop_lag_ms" in status.counters)
+    help_s = [message for _, message in subscriber.take() if isinstance(message, Status)]
+    return statistics.median(status.counters["loop_lag_ms"] for status in help_s if "loop_lag_ms" in status.counters)

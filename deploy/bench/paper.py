@@ -91,7 +91,7 @@ def _runs(seeds: int, jobs: int) -> Iterator[PaperRun]:
         waiting = [pool.submit(one, path, seed) for seed in range(1, seeds + 1) for path in PATHS]
         for number, future in enumerate(waiting, start=1):
             done = future.result()
-            print(f"{number} of {len(waiting)}: {_told(done)}", file=sys.stderr, flush=True)
+            print(f"{number} of {len(waiting)}: {_line(done)}", file=sys.stderr, flush=True)
             yield done
 
 
@@ -112,7 +112,7 @@ def _failures(done: PaperRun) -> list[str]:
     return [f"{f.name} = {f.value:g} ({f.note})" for f in done.findings if f.status == "fails"]
 
 
-def _told(done: PaperRun) -> str:
+def _line(done: PaperRun) -> str:
     failed = _failures(done)
     return f"{done.scenario}, seed {done.seed}: {'fails: ' + '; '.join(failed) if failed else 'ok'}"
 

@@ -55,7 +55,7 @@ def _living(subscriber: Subscriber) -> tuple[int, ...]:
     return tuple(robot for name in names if (robot := robot_id_of(name)))
 
 
-def told(outcome: StopOutcome, *, stand: bool) -> list[str]:
+def outcome_lines(outcome: StopOutcome, *, stand: bool) -> list[str]:
     """Return the outcome as lines for people."""
     verb = "stopped" if stand else "may go"
     done = ", ".join(map(robot_name, outcome.done)) or "no robot"

@@ -117,12 +117,12 @@ class Board:
         )
 
     def _happened(self, at: float, event: Event) -> None:
-        what = told("", event.kind, event.data)
+        what = event_text("", event.kind, event.data)
         if what is not None:
             self.events.append(Happened(at, event.header.sender, what))
 
 
-def told(who: str, kind: str, data: dict[str, Any]) -> str | None:
+def event_text(who: str, kind: str, data: dict[str, Any]) -> str | None:
     """Format an event as a line for people; None for an event that is not shown."""
     if kind in DULL:
         return None

@@ -275,7 +275,7 @@ class AgentSimulation:
         if observed.event is LeaseEvent.PROMISE:
             self._report(Checker.promises, self.now, *observed.given)
         for effect in observed.effects:
-            self._say(process.id, network.told(effect))
+            self._say(process.id, network.effect_text(effect))
             if isinstance(effect, StandAside):
                 self._report(Checker.leads_no_more, self.now, process.member)
                 self._report(Checker.ends, self.now, process.member)

@@ -7,7 +7,7 @@ from typing import Any
 
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.gateways import GatewaySimulation
-from lfa.deploy.fuzz.network import told
+from lfa.deploy.fuzz.network import effect_text
 from lfa.protocol.fleet_stop.memory import StopMemory
 from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, LeaseExtended, Send, StandAside, StepDown
@@ -132,7 +132,7 @@ class Hosts(GatewaySimulation):
         """Execute the effects of a lease; end the process if the lease is released, else update its wake-up."""
         for effect in effects:
             if self.trace is not None:
-                self.trace(self.now, process.id, told(effect))
+                self.trace(self.now, process.id, effect_text(effect))
             if isinstance(effect, Send):
                 self._send(process, effect)
             else:
@@ -272,7 +272,7 @@ class Hosts(GatewaySimulation):
         if (self.host_of_gateway(process.id), process.id) in self.cuts:
             return
         gateway, lease = host.gateway, process.lease
-        lease.told_of(gateway.agent)
+        lease.learn_incarnation(gateway.agent)
         process.stop.hear_gateway(gateway.stop.known)
         self.carry_out(process, lease.gateway_term(gateway.term_max, process.clock.local(self.now), gateway.latched))
 

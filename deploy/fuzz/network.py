@@ -101,7 +101,7 @@ def links(pairs: Set[tuple[int, int]]) -> frozenset[Link]:
     return frozenset((place(one), place(other)) for one, other in pairs)
 
 
-def told(effect: Effect) -> str:
+def effect_text(effect: Effect) -> str:
     """Return a short text of an effect that fits a column of the trace."""
     match effect:
         case Send(to=to, body=body):

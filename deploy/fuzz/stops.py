@@ -138,9 +138,9 @@ class StopTraffic:
         """Report that a robot has forgotten what it acknowledged: agent and gateway, before one has told the other."""
         word = self._acknowledged.get(robot)
         process, running = self._team.processes.get(robot), self._team.gateways.get(robot)
-        told = process is not None and process.alive and process.stop.known.word >= (word or NO_STOP)
+        known_there = process is not None and process.alive and process.stop.known.word >= (word or NO_STOP)
         known = running.gateway.stop.known if running is not None and running.alive else None
-        if word is not None and not told and not (known is not None and known.certain and known.word >= word):
+        if word is not None and not known_there and not (known is not None and known.certain and known.word >= word):
             del self._acknowledged[robot]
             self._team.report(Checker.stop_forgotten, self._team.now, robot)
 
@@ -162,9 +162,9 @@ class StopTraffic:
         process = self._team.processes.get(robot)
         if process is not None and process.alive and not process.paused:
             for delay_s in self._delays(robot, asker.id):
-                self._team.at(self._team.now + delay_s, self._told, asker, robot, process.stop.known)
+                self._team.at(self._team.now + delay_s, self._learn, asker, robot, process.stop.known)
 
-    def _told(self, asker: Member, robot: int, known: StopKnowledge) -> None:
+    def _learn(self, asker: Member, robot: int, known: StopKnowledge) -> None:
         process = self._team.processes[asker.id]
         if process.member == asker and process.alive and not process.paused:
             process.stop.hear_agent(robot, known)

@@ -27,14 +27,14 @@ class RobotEnvironment(gymnasium.Env[Observation, Action]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin a run, as `TeamEnvironment.reset` does."""
         super().reset(seed=seed)
-        seen, told = self._team.reset(seed, options)
-        return seen[self._name], told[self._name]
+        seen, infos = self._team.reset(seed, options)
+        return seen[self._name], infos[self._name]
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Go on for one step, as `TeamEnvironment.step` does."""
-        seen, rewards, ended, late, told = self._team.step({self._name: action})
+        seen, rewards, ended, late, infos = self._team.step({self._name: action})
         name = self._name
-        return seen[name], rewards[name], ended[name], late[name], told[name]
+        return seen[name], rewards[name], ended[name], late[name], infos[name]
 
     def close(self) -> None:
         self._team.close()

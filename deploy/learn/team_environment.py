@@ -95,9 +95,9 @@ class TeamEnvironment(ParallelEnv[str, Observation, Action]):
         ended = {name: (verdict is not None and not late) or name not in run.present for name in named}
         self.agents = [name for name in named if not ended[name] and not late]
         rewards = {name: self._view.reward(_id(name), run.leader) for name in named}
-        told = {name: {} if verdict is None else {"outcome": verdict.outcome} for name in named}
+        infos = {name: {} if verdict is None else {"outcome": verdict.outcome} for name in named}
         seen = {name: self._seen(name) for name in named}
-        return seen, rewards, ended, dict.fromkeys(named, late), told
+        return seen, rewards, ended, dict.fromkeys(named, late), infos
 
     def render(self) -> None:
         """Draw nothing: `lfa view` shows recorded runs."""

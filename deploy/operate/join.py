@@ -38,11 +38,11 @@ def say(
         raise Refused(f"{what} {robot}: must be a robot's number, 1 or higher")
     with listen(find(fleet, connect, keys), TOPICS) as ear:
         outcome = change_roster(ear, what, robot, slot_of)
-    print(msgspec.json.encode(outcome).decode() if as_json else told(what, outcome))
+    print(msgspec.json.encode(outcome).decode() if as_json else outcome_text(what, outcome))
     return 0 if outcome.accepted else 1
 
 
-def told(what: str, outcome: RosterOutcome) -> str:
+def outcome_text(what: str, outcome: RosterOutcome) -> str:
     """Return the outcome in one line."""
     name, chain = robot_name(outcome.robot), list(outcome.chain)
     if outcome.leader is None:

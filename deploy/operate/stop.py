@@ -9,7 +9,7 @@ import msgspec
 import typer
 
 from lfa.deploy.client.session import find, listen
-from lfa.deploy.client.stop_fleet import TOPICS, stop_fleet, told
+from lfa.deploy.client.stop_fleet import TOPICS, outcome_lines, stop_fleet
 
 
 def command(
@@ -29,5 +29,5 @@ def say(fleet: str | None, connect: str | None, keys: Path | None, as_json: bool
     if as_json:
         print(msgspec.json.encode(outcome).decode())
     else:
-        print("\n".join(told(outcome, stand=stand)))
+        print("\n".join(outcome_lines(outcome, stand=stand)))
     return 0 if outcome.complete else 1

@@ -38,8 +38,8 @@ class ProcessSpec(Struct, frozen=True):
 
     def restarted(self) -> ProcessSpec:
         """Return the specification of a restart: an agent starts as a follower, a world resumes by `restart_args`."""
-        told = tuple("follower" if word == "leader" else word for word in self.arguments)
-        return ProcessSpec(self.name, (*told, *self.restart_args), command_prefix=self.command_prefix)
+        arguments = tuple("follower" if word == "leader" else word for word in self.arguments)
+        return ProcessSpec(self.name, (*arguments, *self.restart_args), command_prefix=self.command_prefix)
 
 
 class AdoptedProcess:

@@ -85,7 +85,7 @@ class Driver:
         self._twist = STILL
         """Twist last measured."""
         self._led: Term | None = None
-        self._told: dict[str, float] = {}
+        self._refused_at: dict[str, float] = {}
 
     def next_deadline(self) -> float:
         return inf if self.finished else self._next
@@ -199,9 +199,9 @@ class Driver:
                 return []
             self._led = cmd.term
             return [self._event("leader_command", cmd.term, {}, now)]
-        if now - self._told.get(reason, -inf) < REFUSAL_EVERY_S:
+        if now - self._refused_at.get(reason, -inf) < REFUSAL_EVERY_S:
             return []
-        self._told[reason] = now
+        self._refused_at[reason] = now
         return [self._event("refused", cmd.term, {"reason": reason, "count": gateway.refused[reason]}, now)]
 
     def _event(self, kind: str, term: Term, data: dict[str, Any], now: float) -> Envelope:

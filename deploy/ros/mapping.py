@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from lfa.deploy.client.team_status import told
+from lfa.deploy.client.team_status import event_text
 from lfa.deploy.ros import markers, messages
 from lfa.deploy.ros.cdr import NS, CdrMessage
 from lfa.deploy.ros.explored import ExploredMap
@@ -170,7 +170,7 @@ class FleetMapping:
         self._obstacles[place] = (stamp_ns, ObstacleMark(message.x, message.y, message.radius_m))
 
     def _event(self, stamp_ns: int, owner: str, message: Event) -> list[RosMessage]:
-        words = told("", message.kind, message.data)
+        words = event_text("", message.kind, message.data)
         if words is None or not self._heard("/rosout"):
             return []
         level = "error" if message.kind in ERRORS else "warn" if message.kind in WARNINGS else "info"

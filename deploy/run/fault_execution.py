@@ -103,7 +103,7 @@ class FaultExecution:
             self._operator.event("fault", clock.now(), deed=action, robot=target, t=self._time.of(clock.now()))
         )
         if action == GOAL:
-            self._orders.begin(along((goal_of(str(target)),), self._walls), False, clock.now(), self._told)
+            self._orders.begin(along((goal_of(str(target)),), self._walls), False, clock.now(), self._answered)
             return True
         if action in ORDERS:
             self._publish(note(self._operator, clock.now(), action, target, self._mission.robots))
@@ -117,6 +117,6 @@ class FaultExecution:
             self.doomed.add(name)
         return self._processes.group.signal(name, SIGNALS[action])
 
-    def _told(self, done: bool, text: str) -> None:
+    def _answered(self, done: bool, text: str) -> None:
         if not done:
             self._publish(self._operator.event("order_refused", clock.now(), reason=text))

@@ -60,14 +60,14 @@ class RunResult(Struct, frozen=True):
 def main() -> None:
     """Record until a line, an end of file, or a signal arrives, then close the run folder."""
     task = msgspec.json.decode(sys.argv[1], type=RecorderTask)
-    told = Wake()
+    stop = Wake()
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: told.set())
+        signal.signal(number, lambda *_: stop.set())
     word: list[RunResult] = []
-    threading.Thread(target=_listen, args=(word, told), daemon=True).start()
+    threading.Thread(target=_listen, args=(word, stop), daemon=True).start()
     tape = _Tape(task)
     begun = clock.now()
-    while not told.wait(WAIT_S):
+    while not stop.wait(WAIT_S):
         tape.drain()
     if word:
         clock.sleep(LAST_WORDS_S)
@@ -83,12 +83,12 @@ def main() -> None:
         sys.exit(1)
 
 
-def _listen(word: list[RunResult], told: Wake) -> None:
+def _listen(word: list[RunResult], stop: Wake) -> None:
     """Wait for the launcher's line or the end of its output."""
     line = sys.stdin.buffer.readline()
     if line.endswith(b"\n"):
         word.append(msgspec.json.decode(line, type=RunResult))
-    told.set()
+    stop.set()
 
 
 class _Tape:

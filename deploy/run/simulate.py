@@ -269,7 +269,7 @@ class SimulatedRun:
     def _begin_order(self, goal: Point) -> None:
         """Send the team to another goal [m], as an operator does by `lfa go`."""
         change = along((goal,), self._scenario.world.walls_m)
-        self._orders.begin(change, False, self._simulator.now, self._told)
+        self._orders.begin(change, False, self._simulator.now, self._answered)
         self._go_on_ordering()
 
     def _go_on_ordering(self) -> None:
@@ -277,7 +277,7 @@ class SimulatedRun:
         if self._orders.running:
             self._simulator.at(self._simulator.now + ORDER_STEP_S, self._go_on_ordering)
 
-    def _told(self, done: bool, text: str) -> None:
+    def _answered(self, done: bool, text: str) -> None:
         if not done:
             self._say("order_refused", reason=text)
 

@@ -16,7 +16,7 @@ from lfa.deploy.client.order_calls import OrderCalls
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen, scenario_of_fleet
 from lfa.deploy.client.stop_call import StopCall
 from lfa.deploy.client.stop_fleet import TOPICS as STOP_TOPICS
-from lfa.deploy.client.stop_fleet import told
+from lfa.deploy.client.stop_fleet import outcome_lines
 from lfa.deploy.faults.goals import check_goal
 from lfa.deploy.faults.link_faults import goal_of, note
 from lfa.deploy.faults.script import GOAL, LEADER, LIVE, ORDERS, RESTART, SIGNALS
@@ -160,7 +160,7 @@ class FleetEngine:
         if outcome is not None:
             self._call = None
             self._stopped = stand
-            self._tell("; ".join(told(outcome, stand=stand)), alarm=not outcome.complete)
+            self._tell("; ".join(outcome_lines(outcome, stand=stand)), alarm=not outcome.complete)
 
     def _go_on_restarting(self, now: float) -> None:
         for robot, (until, again) in list(self._restarts.items()):
@@ -201,7 +201,7 @@ class FleetEngine:
         return self._signal(action, robot)
 
     def _signal(self, action: str, robot: int) -> str:
-        told = False
+        announced = False
         for team in (
             self._fleet.team,
             None,
@@ -210,10 +210,10 @@ class FleetEngine:
             for agent in here:
                 if agent.fleet != self._fleet.name or agent.robot != robot or identify(agent.identity.pid) is None:
                     continue
-                if not told:
+                if not announced:
                     send(self._subscriber.bus, self._operator.event("fault", clock.now(), deed=action, robot=robot))
                     clock.sleep(SENT_S)
-                told = True
+                announced = True
                 if send_signal(agent.identity, SIGNALS[action]):
                     return f"{action} {robot} (process {agent.identity.pid})"
         raise Refused(f"{action} {robot}: no process of yours here is robot {robot}")

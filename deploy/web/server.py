@@ -154,10 +154,10 @@ class PageServer:
 
     async def _show(self, socket: ServerConnection, rights: str) -> None:
         """Send the scene, then frames and news, always the newest."""
-        number, version, told = -1, -1, [0, 0]
+        number, version, sent = -1, -1, [0, 0]
         while True:
             if self._engine.number != number:
-                number, told = self._engine.number, [0] * len(self._engine.pictures)
+                number, sent = self._engine.number, [0] * len(self._engine.pictures)
                 viewer = self._tokens.viewer if rights == "operate" else ""
                 scene = {"scene": self._engine.scene(), "number": number, "rights": rights, "viewer": viewer}
                 await _send(socket, encode(scene))
@@ -166,8 +166,8 @@ class PageServer:
             version, frame = self._version, self._frame
             if self._engine.number != number or not frame:
                 continue
-            news = [p.news.since(n) for p, n in zip(self._engine.pictures, told, strict=True)]
-            told = [picture.news.count for picture in self._engine.pictures]
+            news = [p.news.since(n) for p, n in zip(self._engine.pictures, sent, strict=True)]
+            sent = [picture.news.count for picture in self._engine.pictures]
             await _send(socket, frame)
             if any(news):
                 await _send(socket, encode({"number": number, "news": news}))

@@ -61,5 +61,5 @@ def read_toml(path: Path, kind: str) -> TomlFile:
     except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
         said = " ".join(str(error).split())
         place = _PLACE.search(said)
-        told = f"no TOML ({_PLACE.sub('', said)}): {right}"
-        raise refuse_file(path, told, int(place[1]) if place else 0) from None
+        wrong = f"no TOML ({_PLACE.sub('', said)}): {right}"
+        raise refuse_file(path, wrong, int(place[1]) if place else 0) from None

@@ -17,18 +17,18 @@ class StopAnswers:
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
-        self._told_rest = True
+        self._reported_rest = True
 
     def answer(self, latch: StopLatch, twist: Twist, now: float) -> Envelope:
         """Return the answer to an order."""
         rests = _rests(twist)
-        self._told_rest = rests or not latch.known.word.stand
+        self._reported_rest = rests or not latch.known.word.stand
         state = StopState(self._outbox.header("stop_state", now), latch.known, rests, latch.kept)
         return self._outbox.envelope("stop_state", state)
 
     def at_rest(self, latch: StopLatch, twist: Twist, now: float) -> Envelope | None:
         """Return the message that the wheels have come to rest after an answer that said otherwise, once; else None."""
-        if self._told_rest or not _rests(twist):
+        if self._reported_rest or not _rests(twist):
             return None
         return self.answer(latch, twist, now)
 

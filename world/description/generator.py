@@ -13,7 +13,7 @@ import msgspec
 
 from lfa.protocol.config_file.conversion import convert
 from lfa.protocol.config_file.mistake import FileError, Mistake, RefusedFile, RefusedValue
-from lfa.protocol.plug_in import PlugIns, told
+from lfa.protocol.plug_in import PlugIns, error_text
 from lfa.world.description.scenario import Scenario
 
 GENERATORS = PlugIns("scenario generator", "lfa.scenarios")
@@ -56,7 +56,7 @@ def generated(scenario: Scenario, seed: int) -> tuple[Scenario, list[Mistake]]:
     try:
         drawn = made.generate(scenario, Random(f"{seed}/generator {name}"))
     except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-        raise RefusedValue(Mistake("generator", f": {name} with seed {seed}: {told(error)}")) from None
+        raise RefusedValue(Mistake("generator", f": {name} with seed {seed}: {error_text(error)}")) from None
     if not isinstance(drawn, Scenario):
         found = "nothing" if drawn is None else f"a value of type {type(drawn).__name__}"
         raise RefusedValue(Mistake("generator", f": {name}: generate returned {found}, must be a Scenario"))

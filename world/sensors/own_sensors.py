@@ -7,7 +7,7 @@ from math import isfinite
 
 from lfa.protocol.geometry import NUMBER_MAX
 from lfa.protocol.messages.robot import SENSOR_NAME_MAX, SENSOR_VALUES_MAX
-from lfa.protocol.plug_in import told
+from lfa.protocol.plug_in import error_text
 from lfa.world.description.own_sensor import OwnSensor, TrueState, make_sensor
 from lfa.world.description.scenario import Scenario
 from lfa.world.sensors.noise import chance_of
@@ -36,7 +36,7 @@ class OwnSensors:
         try:
             answer = self._sensors[name, state.robot].measure(state)
         except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-            return self._fail(name, state, told(error))
+            return self._fail(name, state, error_text(error))
         if answer is None:
             return None
         if not isinstance(answer, Mapping):

@@ -26,10 +26,10 @@ def spikes_explained(s: Subject) -> Measured:
 
 
 def episodes_felt(s: Subject) -> Measured:
-    told = [one for one in s.episodes if one.kind == "avoidance"]
-    mute = [one for one in told if not episodes.felt(s.run, one, s.distance)]
+    avoidances = [one for one in s.episodes if one.kind == "avoidance"]
+    mute = [one for one in avoidances if not episodes.felt(s.run, one, s.distance)]
     named = [f"robot {one.robot} at {one.from_s:.1f} s" for one in mute]
-    return Measured(share(len(told) - len(mute), len(told)), ", ".join(named))
+    return Measured(share(len(avoidances) - len(mute), len(avoidances)), ", ".join(named))
 
 
 def early_spikes(s: Subject) -> Measured:

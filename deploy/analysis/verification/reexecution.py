@@ -97,30 +97,30 @@ def node_of(path: Path, heading: Heading) -> Node:
         raise Refused(f"{path}: heading without what a {heading.config['kind']} is started with ({error})") from None
 
 
-def _agent(heading: Heading, told: dict[str, Any]) -> Node:
+def _agent(heading: Heading, facts: dict[str, Any]) -> Node:
     return Agent(
-        told["robot_id"],
+        facts["robot_id"],
         heading.incarnation,
-        told["fleet"],
+        facts["fleet"],
         heading.floor,
-        _mission(told),
-        spare=told.get("spare", False),
+        _mission(facts),
+        spare=facts.get("spare", False),
     )
 
 
-def _witness(heading: Heading, told: dict[str, Any]) -> Node:
-    return Witness(told["fleet"], heading.incarnation, heading.floor, _mission(told))
+def _witness(heading: Heading, facts: dict[str, Any]) -> Node:
+    return Witness(facts["fleet"], heading.incarnation, heading.floor, _mission(facts))
 
 
-def _world(heading: Heading, told: dict[str, Any]) -> Node:
-    scenario = msgspec.convert(told["scenario"], Scenario)
-    bodies = BODIES[told["bodies"]]
-    memory = msgspec.convert(told.get("memory"), Memory | None)
-    return World(told["fleet"], scenario, told["seed"], heading.incarnation, told["start_at"], bodies, memory)
+def _world(heading: Heading, facts: dict[str, Any]) -> Node:
+    scenario = msgspec.convert(facts["scenario"], Scenario)
+    bodies = BODIES[facts["bodies"]]
+    memory = msgspec.convert(facts.get("memory"), Memory | None)
+    return World(facts["fleet"], scenario, facts["seed"], heading.incarnation, facts["start_at"], bodies, memory)
 
 
-def _mission(told: dict[str, Any]) -> Mission | None:
-    return msgspec.convert(told["mission"], Mission | None)
+def _mission(facts: dict[str, Any]) -> Mission | None:
+    return msgspec.convert(facts["mission"], Mission | None)
 
 
 _MAKE: dict[str, Callable[[Heading, dict[str, Any]], Node]] = {"agent": _agent, "witness": _witness, "world": _world}

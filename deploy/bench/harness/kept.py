@@ -66,8 +66,8 @@ def _parts(case: Case) -> tuple[CasePart, ...]:
 
 def _item(bench: str, case: Case, part: CasePart) -> Item:
     name = name_of([KIND, bench, case.name, msgspec.to_builtins(case.quantities), part.facts])
-    told = "" if part.facts is None else f" {msgspec.json.encode(part.facts).decode()}"
-    return Item(name, f"{case.name}{told}", partial(_done, part))
+    facts = "" if part.facts is None else f" {msgspec.json.encode(part.facts).decode()}"
+    return Item(name, f"{case.name}{facts}", partial(_done, part))
 
 
 def _done(part: CasePart) -> ItemResult:

@@ -56,9 +56,9 @@ def _measured(team: Team, driver: subprocess.Popen[bytes], wheels: _Wheels) -> I
     since = clock.now()
     pause(team, WATCHED_S)
     errors_m = [
-        told.error_m
-        for told in team.heard.tracking
-        if told.header.sender == robot_name(MEMBER) and told.header.stamp > since
+        report.error_m
+        for report in team.heard.tracking
+        if report.header.sender == robot_name(MEMBER) and report.header.stamp > since
     ]
     rms_mm = 1e3 * sqrt(fsum(error_m**2 for error_m in errors_m) / len(errors_m)) if errors_m else float("nan")
     yield [row("member", Quantity("distance from its slot, rms", "mm", 20.0), rms_mm)]

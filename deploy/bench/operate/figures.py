@@ -48,11 +48,11 @@ def _rows(wanted: str, seeds: int) -> Iterator[list[BenchRow]]:
     for loss in LOSSES:
         name = f"stop/{ROBOTS} robots, {100.0 * loss:.0f} % loss"
         if fnmatchcase(name, wanted):
-            told = [_told(loss, seed) for seed in range(seeds)]
+            results = [_result(loss, seed) for seed in range(seeds)]
             yield [
-                row(name, Quantity("all stopped or named, max", "s", ANSWERED_S_MAX), max(at for at, _ in told)),
-                row(name, Quantity("all stopped, p50", "s"), median(at for at, _ in told)),
-                row(name, Quantity("named as not stopped", "robots"), float(sum(named for _, named in told))),
+                row(name, Quantity("all stopped or named, max", "s", ANSWERED_S_MAX), max(at for at, _ in results)),
+                row(name, Quantity("all stopped, p50", "s"), median(at for at, _ in results)),
+                row(name, Quantity("named as not stopped", "robots"), float(sum(named for _, named in results))),
             ]
     if fnmatchcase("go/leader killed", wanted):
         there = sum(map(_goes_there, range(seeds)))
@@ -70,7 +70,7 @@ def _late_s(seed: int) -> float:
     return scene.moved_at + TRUTH_S - said_at - speed_mps / scene.team.mission.limits.a_max_mps2
 
 
-def _told(loss: float, seed: int) -> tuple[float, int]:
+def _result(loss: float, seed: int) -> tuple[float, int]:
     """Return how long [s] a stop took whose messages are lost in `loss` of all cases, and how many robots it named."""
     team = LeaseSimulation(ROBOTS, seed=seed, radio=structs.replace(FAIR, loss=loss)).start_all()
     traffic = StopTraffic(team, team.mission.robots, seed)

@@ -48,7 +48,7 @@ def carry_out_on(remote: Remote, path: Path, plan: SweepPlan, out: Path | None, 
     """Do the plan at `path` in shares on an engine, which must see the folder of the results; return the exit code."""
     campaign = describe(plan, items_of(plan))
     kept = open_folder(_folder(plan, campaign, out), campaign)
-    kept.results()  # damaged ones are told before anything is submitted
+    kept.results()  # damaged ones are named before anything is submitted
     commands = share_commands(path, kept.path, remote.shares, remote.jobs, remote.more)
     with engine(remote.on, kept.path, commands, remote.minutes, remote.jobs, remote.slurm) as handles:
         lost = watch(handles, kept)

@@ -207,7 +207,7 @@ def _groups(
     try:
         load_scenario(name, (), keys.robots)
     except RefusedFile:
-        pass  # told below, unless the plan sets right what is wrong
+        pass  # named below, unless the plan sets right what is wrong
     except Refused as refused:
         raise file.refuse([Mistake("scenario", f": {refused}")]) from None
     groups: list[Group] = []

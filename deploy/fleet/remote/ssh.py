@@ -29,8 +29,8 @@ PROBE = (
     "    lfa = version('lfa')\n"
     "except Exception:\n"
     "    lfa = ''\n"
-    "told = {'python': list(sys.version_info[:3]), 'lfa': lfa, 'wall_ms': int(time.time() * 1000)}\n"
-    f"print('{ANSWER}' + json.dumps(told))\n"
+    "answer = {'python': list(sys.version_info[:3]), 'lfa': lfa, 'wall_ms': int(time.time() * 1000)}\n"
+    f"print('{ANSWER}' + json.dumps(answer))\n"
 )
 """Program for any remote Python, with or without `lfa`: print the versions and the wall clock as JSON."""
 
@@ -50,8 +50,8 @@ class Done(Struct, frozen=True):
     @property
     def answer(self) -> bytes | None:
         """What the program printed after its mark, whatever its shell printed before; None without the mark."""
-        _, mark, told = self.out.partition(ANSWER.encode())
-        return told if mark else None
+        _, mark, answer = self.out.partition(ANSWER.encode())
+        return answer if mark else None
 
     @property
     def greeting(self) -> str:

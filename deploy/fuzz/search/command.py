@@ -119,13 +119,13 @@ def _kept(seeds: range, jobs: int, out: Path, shard: Shard, as_json: bool, searc
 
 def _hunt(seeds: range, jobs: int, as_json: bool, search: Search) -> int:
     began, tally = time.perf_counter(), Tally()
-    told_at = began
+    shown_at = began
     try:
         for part in _played(seeds, jobs, search):
             tally.add(part)
-            if time.perf_counter() > told_at + TELL_EVERY_S:
-                told_at = time.perf_counter()
-                typer.echo(so_far(tally, len(seeds), told_at - began), err=True)
+            if time.perf_counter() > shown_at + TELL_EVERY_S:
+                shown_at = time.perf_counter()
+                typer.echo(so_far(tally, len(seeds), shown_at - began), err=True)
     except KeyboardInterrupt:
         return _interrupted(tally, seeds, time.perf_counter() - began, as_json)
     seconds = time.perf_counter() - began

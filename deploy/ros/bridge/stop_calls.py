@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from lfa.deploy.client.stop_call import Said, StopCall
-from lfa.deploy.client.stop_fleet import told
+from lfa.deploy.client.stop_fleet import outcome_lines
 from lfa.deploy.ros.bridge.answers import answer
 from lfa.deploy.ros.session import ServiceCall
 from lfa.protocol.errors import Refused
@@ -52,7 +52,7 @@ class StopCalls:
             self._say(said, now)
         outcome = self._running.outcome(now)
         if outcome is not None:
-            self._end(success=outcome.complete, text="; ".join(told(outcome, stand=self._stand)))
+            self._end(success=outcome.complete, text="; ".join(outcome_lines(outcome, stand=self._stand)))
 
     def _end(self, *, success: bool, text: str) -> None:
         waiting, self._waiting, self._running = self._waiting, [], None

@@ -52,7 +52,7 @@ def clip_of(folders: list[Path]) -> dict[str, Any]:
 
 def _pane(folder: Path, robots: tuple[int, ...]) -> _Pane:
     picture, pane = Picture(robots), _Pane()
-    told, tiles_at, next_s = 0, 0.0, 0.0
+    sent, tiles_at, next_s = 0, 0.0, 0.0
     tiles: dict[tuple[float, float], dict[str, Any]] = {}
     for owner, topic, t, message in messages(folder, TOPICS - {"scan"}):
         picture.see(t, owner, topic, message)
@@ -60,12 +60,12 @@ def _pane(folder: Path, robots: tuple[int, ...]) -> _Pane:
             continue
         next_s = t + pane.every_s
         pane.frames.append(frame)
-        for item in picture.news.since(told):
+        for item in picture.news.since(sent):
             if item["k"] == "tile":
                 tiles[item["x"], item["y"]] = item
             else:
                 pane.news.append({**item, "at": frame["t"]})
-        told = picture.news.count
+        sent = picture.news.count
         if t >= tiles_at:
             tiles_at = t + TILES_EVERY_S
             pane.news += [{**tile, "at": frame["t"]} for tile in tiles.values()]
@@ -75,7 +75,7 @@ def _pane(folder: Path, robots: tuple[int, ...]) -> _Pane:
     if not pane.frames:
         raise Refused(f"{folder}: no robot has a position in this recording")
     last = {"at": pane.frames[-1]["t"]}
-    pane.news += [{**item, **last} for item in picture.news.since(told) if item["k"] != "tile"]
+    pane.news += [{**item, **last} for item in picture.news.since(sent) if item["k"] != "tile"]
     pane.news += [{**tile, **last} for tile in tiles.values()]
     return pane
 

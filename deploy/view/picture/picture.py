@@ -13,7 +13,7 @@ from typing import Any
 from msgspec import Struct
 
 from lfa.deploy.client.radio_loss import RadioLoss
-from lfa.deploy.client.team_status import told
+from lfa.deploy.client.team_status import event_text
 from lfa.deploy.faults.link_faults import links
 from lfa.deploy.view.picture.leaders import LeaderTable
 from lfa.deploy.view.picture.news import News
@@ -247,7 +247,7 @@ class Picture:
                     self._version, self.chain = version, tuple(data["chain"])
         facts = {name: value for name, value in data.items() if name != "robot" or kind == "fault"}
         echo = (kind == "formation" and "side" not in data) or (kind == "chain" and not changed)
-        text = None if kind in SILENT or echo else told("", kind, facts)
+        text = None if kind in SILENT or echo else event_text("", kind, facts)
         if text is not None:
             alarm = kind in ALARMS or "refused" in data
             self.news.add({"k": "event", "t": round(t, 3), "kind": kind, "who": robot, "text": text, "alarm": alarm})

@@ -50,8 +50,12 @@ def _text(name: str) -> str:
 
 
 def _side_by_side(runs: Sequence[Run], sums: Sequence[Summary], section: Callable[[Run, Summary], str]) -> str:
-    told = [section(run, s) for run, s in zip(runs, sums, strict=True)]
-    return told[0] if len(told) == 1 else f'<div class="columns">{"".join(f"<div>{t}</div>" for t in told)}</div>'
+    sections = [section(run, s) for run, s in zip(runs, sums, strict=True)]
+    return (
+        sections[0]
+        if len(sections) == 1
+        else f'<div class="columns">{"".join(f"<div>{t}</div>" for t in sections)}</div>'
+    )
 
 
 # --- sections -------------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ import numpy as np
 import rerun as rr
 
 from lfa.deploy.client.radio_loss import RadioLoss
-from lfa.deploy.client.team_status import told
+from lfa.deploy.client.team_status import event_text
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.robot_colours import Colour, robot_colour
 from lfa.deploy.view.rerun import static_scene
@@ -222,7 +222,7 @@ class Scene:
             self._role(t, robot, "gone")
         elif kind == "leader_command" and robot and message.term is not None:
             self._lead(t, robot, message.term.n)
-        text = told(owner, kind, data)
+        text = event_text(owner, kind, data)
         if text is not None:
             self._say(t, "log", rr.TextLog(text, level="WARN" if kind in ALARMS else "INFO"))
 

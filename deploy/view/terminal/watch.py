@@ -171,7 +171,9 @@ class KeyHandler:
 
     def _stop(self, *, stand: bool) -> None:
         try:
-            self.said = "; ".join(stop_fleet.told(stop_fleet.stop_fleet(self._subscriber, stand=stand), stand=stand))
+            self.said = "; ".join(
+                stop_fleet.outcome_lines(stop_fleet.stop_fleet(self._subscriber, stand=stand), stand=stand)
+            )
         except Refused as refused:
             self.said = str(refused)
 
@@ -180,14 +182,14 @@ class KeyHandler:
             self.said = f"{action}: choose a robot first, by its digit"
             return
         target = "" if action == "heal" else str(self.chosen)
-        told = io.StringIO()
+        printed = io.StringIO()
         try:
-            with contextlib.redirect_stdout(told):
+            with contextlib.redirect_stdout(printed):
                 fault.command(action, target, fleet=self._subscriber.fleet.name, as_json=False)
         except Refused as refused:
             self.said = str(refused)
         else:
-            self.said = told.getvalue().strip()
+            self.said = printed.getvalue().strip()
 
 
 def _screen(subscriber: Subscriber, board: Board, hand: KeyHandler, width: int, height: int) -> Group:

@@ -235,7 +235,7 @@ class Lease:
             self._fire(LeaseEvent.GATEWAY_BARS, now)
         return self._memory.drain()
 
-    def told_of(self, incarnation: int | None) -> None:
+    def learn_incarnation(self, incarnation: int | None) -> None:
         """Note the number of this process that its gateway knows (E23); None: it knows none."""
         if incarnation is not None:
             voting.note_later(self._memory, incarnation)
