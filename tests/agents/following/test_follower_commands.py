@@ -283,3 +283,9 @@ def test_a_controller_that_fails_is_named_and_the_robot_brakes(name: str, shown:
     follower = Follower(DEFAULT, LIMITS, Failing(STILL), name=name)
     assert follower.step(sighted(Twist(0.5, 0.0)), BEHIND, IN_SLOT, STILL, DT) == STILL
     assert (follower.failure or "").startswith(shown)
+
+
+def test_a_drive_without_a_reverse_gear_never_goes_back() -> None:
+    follower = Follower(DEFAULT, Limits(v_reverse_max_mps=0.0), Wanting(Twist(-0.2, 0.1)))
+    out = follower.step(sighted(Twist(-0.5, 0.0)), BEHIND, IN_SLOT, STILL, DT)
+    assert out.linear_x == pytest.approx(0.0, abs=1e-6)

@@ -234,3 +234,34 @@ def test_errors_are_excused_while_a_robot_avoids_and_counted_in_seconds() -> Non
     assert robot.excused_s == pytest.approx(1.0, abs=0.05)
     assert robot.formation_changes == 0
     assert robot.final_pose is not None and robot.final_pose[2] == 0.0
+
+
+def test_left_behind_robots_are_judged_by_the_scenarios_bound() -> None:
+    judged = {a.name: a.ok for a in _summed(_chain(1, 2, number=1)).assertions}
+    assert judged["left_behind_max"] is False
+    assert {a.name: a.ok for a in _summed(_chain(1, 2, 3, number=1)).assertions}["left_behind_max"] is True
+
+
+def test_the_final_pose_is_place_and_heading_of_the_last_sample() -> None:
+    seen = RecordedRun({2: _truth(0.5 * T, 0.1 * T, theta=0.4)}, {}, {}, {})
+    assert _robot(2, seen, []).final_pose == pytest.approx((0.5 * T[-1], 0.1 * T[-1], 0.0, 0.4))
+
+
+def test_another_place_in_the_formation_is_a_change_of_it() -> None:
+    seen = _run(LATE, avoids_at_s=99.0)
+    seen.tracking[2][200:, 2] = K + 0.1
+    robot = _robot(2, seen, [])
+    assert (robot.formation_changes, robot.avoidances) == (1, 0)
+    assert robot.bearing_error_body_rms_rad is not None
+
+
+def test_an_unknown_class_of_obstacle_is_counted_as_any_other() -> None:
+    events = [line("decision", **{"class": "fog", "action": "left"})]
+    assert _robot(2, _run(LATE), events).obstacles_met["fog"] == 1
+
+
+def test_a_machine_falls_behind_by_standing_still_alone_or_by_late_robots_alone() -> None:
+    late, stood = overload([line("late", lag_s=0.2)]), overload([line("slowed", stood_still_s=5.1234)])
+    assert late is not None and (late.stood_still_s, late.late_s) == (0.0, {"robot2": 0.2})
+    assert stood is not None and (stood.stood_still_s, stood.late_s) == (5.123, {})
+    assert overload([line("late", lag_s=0.2, robot="world"), line("late", lag_s=0.0)]) is None

@@ -11,7 +11,7 @@ from lfa.deploy.client.roster.roster_call import RosterCall, RosterOutcome
 from lfa.deploy.fuzz.agent_simulation import FLEET, AgentSimulation
 from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import draw
-from lfa.deploy.operate.join import told
+from lfa.deploy.operate.join import outcome_text
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.codec import Message
@@ -68,7 +68,7 @@ def test_e33_a_spare_comes_to_the_tail_and_drives_with_the_team() -> None:
     assert team.speed[7] == 0.0
     assert "a spare: lfa join 7 takes it in" in team.texts["robot7"]
     outcome = team.say(JOIN, 7)
-    assert told(JOIN, outcome) == "join: robot7 is in the team; the chain is [1, 2, 3, 7]"
+    assert outcome_text(JOIN, outcome) == "join: robot7 is in the team; the chain is [1, 2, 3, 7]"
     team.run(25.0)
     assert team.places[7].x > 5.0
     assert team.places[7].x < team.places[3].x
@@ -84,7 +84,7 @@ def test_e33_a_spare_takes_the_place_of_a_lost_robot() -> None:
 def test_e34_a_retired_follower_stands_and_the_rest_close_up() -> None:
     team = Operated()
     outcome = team.say(RETIRE, 2)
-    assert told(RETIRE, outcome) == "retire: robot2 is out of the team; the chain is [1, 3]"
+    assert outcome_text(RETIRE, outcome) == "retire: robot2 is out of the team; the chain is [1, 3]"
     team.run(4.0)
     assert team.speed[2] == 0.0
     assert team.speed[3] > 0.2
