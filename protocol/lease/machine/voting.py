@@ -23,6 +23,8 @@ from lfa.protocol.messages.consensus import (
 from lfa.protocol.names import robot_name
 
 HELLO_HEARTBEATS = 3
+PATIENCE, FIRST_PATIENCE = 2.0, 20.0
+"""Heartbeats that a voter waits for the lease of the candidate that it promised a term to; in the first election."""
 
 
 def on_prepare(m: LeaseMemory, src: Member, body: Prepare, now: float) -> None:
@@ -39,9 +41,18 @@ def on_prepare(m: LeaseMemory, src: Member, body: Prepare, now: float) -> None:
     if isinstance(answer, Promise):
         _yield_to(m, body.term, now)
         if m.candidate is None:
-            m.elect_after(max(now + 2.0 * m.timing.heartbeat_s, m.election.base))
+            m.elect_after(max(now + _patience_s(m), m.election.base))
     elif answer is not None and answer.remaining_s > 0.0:
         m.refused_prepare = (src, body)  # answered again when the bond ends: it may have overtaken the RELEASE
+
+
+def _patience_s(m: LeaseMemory) -> float:
+    """Return the time [s] to wait for the lease of a candidate that was promised a term, from its last PREPARE.
+
+    A first election needs the promises of all (E18), and one candidate more undoes them. On a machine that starts many
+    robots at once, answers take longer than two heartbeats, and candidates beat each other until it has less to do.
+    """
+    return (FIRST_PATIENCE if is_first(m.config) else PATIENCE) * m.timing.heartbeat_s
 
 
 def stands_before(m: LeaseMemory, src: Member, body: Prepare) -> bool:
@@ -171,4 +182,4 @@ def _yield_to(m: LeaseMemory, term: Term, now: float) -> None:
     """Give up an own candidacy lower than `term`, which this process has promised or granted."""
     if m.candidate is not None and term > m.candidate.term:
         resigning.drop_candidacy(m, now)
-        m.elect_after(now + 2.0 * m.timing.heartbeat_s)
+        m.elect_after(now + _patience_s(m))

@@ -10,6 +10,7 @@ from lfa.protocol.lease.election import COLD_START_S
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import Config, Hello, Member, Prepare, Propose, Release, Term, Version
 from lfa.protocol.mission import Leading, Mission
+from lfa.protocol.transport.link_model import Radio
 from tests.rigs.lease_scenes import STD, Team, sent
 
 
@@ -22,6 +23,14 @@ def test_e5_whatever_the_order_of_starting_the_head_of_the_chain_leads_first() -
     team.run(4.0)
     assert team.leaders() == [1]
     assert team.lease_of(3).chain == (1, 2, 3, 4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_e5_twelve_that_start_at_once_on_a_busy_machine_do_not_undo_each_others_promises(seed: int) -> None:
+    """Half of the messages come late, by 0.2 s in the mean: longer than two heartbeats."""
+    team = LeaseSimulation(12, seed=seed, radio=Radio(0.01, 0.05, tail=0.5, tail_mean_s=0.2)).start_all()
+    team.run(2.0)
+    assert team.leaders() == [1]
 
 
 def test_e18_a_fleet_that_nobody_remembers_waits_for_everybody() -> None:
