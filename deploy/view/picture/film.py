@@ -35,11 +35,17 @@ def write_gif(clip: dict[str, Any], path: Path) -> None:
     first.save(path, save_all=True, append_images=others, duration=round(1000 / RATE_HZ), loop=0, optimize=True)
 
 
-def write_mp4(clip: dict[str, Any], path: Path) -> None:
-    """Write the first run of a clip as an MP4 in real time. Raises Refused without ffmpeg."""
+def ffmpeg_for(path: Path) -> str:
+    """Return the program that writes an MP4 to `path`. Raises Refused without ffmpeg."""
     program = shutil.which("ffmpeg")
     if program is None:
         raise Refused(f"--mp4 {path}: needs ffmpeg (apt-get install ffmpeg), --gif does without")
+    return program
+
+
+def write_mp4(clip: dict[str, Any], path: Path) -> None:
+    """Write the first run of a clip as an MP4 in real time. Raises Refused without ffmpeg."""
+    program = ffmpeg_for(path)
     images = _images(clip, MP4_FRAMES_MAX)
     first = next(images)
     form = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{first.width}x{first.height}", "-r", "10", "-i", "-"]

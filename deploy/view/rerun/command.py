@@ -84,13 +84,15 @@ def command(
 def _write_clip(folder: Path | None, html: Path | None, gif: Path | None, mp4: Path | None) -> int:
     """Write a recording as files that need no lfa; print their names. Raises Refused."""
     from lfa.deploy.view.picture.clip import clip_of
-    from lfa.deploy.view.picture.film import write_gif, write_mp4
+    from lfa.deploy.view.picture.film import ffmpeg_for, write_gif, write_mp4
     from lfa.deploy.view.picture.html_file import html_of
 
     if folder is None:
         raise Refused("--html, --gif and --mp4: need a run folder")
-    write_line("reading the recording and drawing it ...", sys.stderr)
+    if mp4 is not None:
+        ffmpeg_for(mp4)
     clip = clip_of([folder])
+    write_line("drawing the recording ...", sys.stderr)
     for path, write in ((html, lambda c, p: p.write_text(html_of(c), "utf-8")), (gif, write_gif), (mp4, write_mp4)):
         if path is not None:
             write(clip, path)

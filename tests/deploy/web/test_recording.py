@@ -77,7 +77,7 @@ def test_two_recordings_are_played_on_one_clock(run: Path, tab: Browser) -> None
 def test_one_html_file_plays_it_without_a_server(run: Path, tab: Browser, tmp_path: Path) -> None:
     path = tmp_path / "clip.html"
     done = lfa("view", str(run), "--html", str(path))
-    assert (done.returncode, done.stdout, done.stderr) == (0, f"{path}\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{path}\n", "drawing the recording ...\n")
     assert path.stat().st_size < 7.0 * HTML_BYTES_A_S
     tab.errors.clear()
     tab.open(path.as_uri())

@@ -168,7 +168,7 @@ def test_with_obstacle_avoidance_switched_off_the_verdict_is_1(
 ) -> None:
     monkeypatch.setattr(Detour, "steer", lambda *_: None)
     monkeypatch.setattr(Crossing, "give_way", lambda _self, _moving, _pose, wanted, *_: wanted)
-    monkeypatch.setattr("lfa.agents.navigator.safe", lambda wanted, *_: wanted)
+    monkeypatch.setattr("lfa.agents.behaviors.command_limits.safe", lambda wanted, *_: wanted)
     folder = run(load("paper_path2", ["time_limit_s=25"]), 1, tmp_path / "run").folder
     assert command([folder], as_json=True) == 1
     said = json.loads(capsys.readouterr().out)
