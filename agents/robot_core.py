@@ -15,6 +15,7 @@ from lfa.agents.attendance import Attendance
 from lfa.agents.avoidance.safety import obeyed
 from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
+from lfa.agents.input_watch import InputWatch
 from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
 from lfa.agents.orders.roster_orders import JOIN, RETIRE, RosterOrders
@@ -89,13 +90,11 @@ class RobotCore:
         self._reports = Reports(outbox, len(mission.robots), timing.deadman_s - mission.control_period_s)
         self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
+        self._input_watch = InputWatch(outbox, self.navigator)
         self._period_s = mission.control_period_s
         self._next_control = now
         self._arrived = False
         self._spec = mission.formation
-        self._lost_input = ""
-        self._slow_scans = False
-        """Input of the robot's own hardware that was reported as lost; empty for none."""
         self._pending_release = False
         self._asks = not self._stop_listener.memory.certain
         self.interests = with_mission(outbox.fleet, outbox.name, None, asks=self._asks)
@@ -334,7 +333,7 @@ class RobotCore:
         """Run one control step: pose, role, command, then the reports."""
         lease, navigator = self.lease, self.navigator
         self.defer_grants = lease.is_settled(now + EASE_PERIODS * self._period_s)
-        self._watch_inputs(now)
+        self._input_watch.step(lease.term, now)
         self._stop_listener.step(now)
         if self._asks == self._stop_listener.memory.certain:
             self._subscribe()
@@ -370,19 +369,6 @@ class RobotCore:
         self._reports.step_without_pose(self.navigator, self._team, self._place.neighbours(), role, now)
         if self._stuck_policy.step(role, None, self.lease, self.navigator, now):
             self._hand_over(now)
-
-    def _watch_inputs(self, now: float) -> None:
-        """Publish an event when an input of the robot's own hardware is lost, and when it is back."""
-        navigator = self.navigator
-        lost = (navigator.limits.lost_input(now) or "") if navigator.was_placed or navigator.pose_lost else ""
-        if lost != self._lost_input:
-            self._lost_input = lost
-            self._event("input", now, {"state": "lost", "input": lost} if lost else {"state": "back"})
-        slow_hz = navigator.scan_age.slow_hz
-        if (slow_hz is not None) != self._slow_scans:
-            self._slow_scans = slow_hz is not None
-            rate = {} if slow_hz is None else {"rate_hz": round(slow_hz, 1)}
-            self._event("input", now, {"state": "slow" if rate else "as fast as needed", "input": "scan", **rate})
 
     def _role(self) -> Role:
         return self._place.role(follows=self.navigator.predecessor is not None)
