@@ -153,6 +153,7 @@ EXTRAS = {
     "rerun": "view", "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
     "pyarrow": "campaign", "submitit": "slurm", "distributed": "dask",
     "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove", "websockets": "web",
+    "gymnasium": "learn", "pettingzoo": "learn",
 }  # fmt: skip
 """Modules outside the base install, each with the extra that installs it."""
 

@@ -22,12 +22,15 @@ from lfa.protocol.topics import HOST_PREFIX
 from lfa.protocol.transport.zenoh_config import answers, default_endpoint
 
 EXTRAS = {
-    "world": ("numpy", "PIL", "pymunk"), "view": ("mcap", "matplotlib", "rerun"),
+    "world": ("numpy", "PIL", "pymunk", "yaml"), "view": ("mcap", "matplotlib", "rerun"),
     "deploy": ("asyncssh", "cryptography", "rich"), "ros": ("rosbags", "xxhash"), "foxglove": ("foxglove",),
+    "web": ("websockets",), "campaign": ("pyarrow",), "slurm": ("submitit",), "dask": ("distributed",),
+    "learn": ("gymnasium", "pettingzoo"),
 }  # fmt: skip
 PURPOSES = {
     "world": "simulated worlds", "view": "recordings, figures and views", "deploy": "lfa up over ssh, watch and top",
-    "ros": "ROS 2", "foxglove": "Foxglove",
+    "ros": "ROS 2", "foxglove": "Foxglove", "web": "the page of lfa web", "campaign": "Parquet files of campaigns",
+    "slurm": "campaigns on Slurm", "dask": "campaigns on Dask", "learn": "environments for learners",
 }  # fmt: skip
 """What each extra is installed for."""
 

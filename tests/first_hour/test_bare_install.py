@@ -6,9 +6,13 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+
+from lfa.deploy.fleet.doctor import EXTRAS, PURPOSES
+from tests.test_imports import ROOT
 
 LFA = Path(sys.executable).with_name("lfa")
 BARE = Path(__file__).parent / "bare"
@@ -34,6 +38,11 @@ def test_the_doctor_says_that_a_bare_machine_is_healthy_and_how_to_get_more(tmp_
     says = {one["check"]: one["says"] for one in found["findings"]}
     assert says["[world]"] == "not here, for simulated worlds: pip install 'lfa[world]'"
     assert says["router"] == "no router: none is needed for run, sim, up" or says["router"].endswith("answers")
+
+
+def test_the_doctor_knows_every_extra_that_a_user_may_want() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(EXTRAS) == set(PURPOSES) == set(extras) - {"all", "test", "docs"}
 
 
 @pytest.mark.parametrize(

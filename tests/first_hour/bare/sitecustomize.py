@@ -5,7 +5,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 
 EXTRAS = {
     "numpy", "PIL", "pymunk", "matplotlib", "mcap", "rerun", "zstandard", "rich", "asyncssh", "cryptography", "rosbags",
-    "xxhash", "foxglove",
+    "xxhash", "foxglove", "yaml", "websockets", "pyarrow", "submitit", "distributed", "gymnasium", "pettingzoo",
 }  # fmt: skip
 
 
