@@ -14,6 +14,7 @@ import pytest
 from lfa.deploy.ros import messages
 from lfa.deploy.ros.topics import fleet_topics, robot_topics
 from lfa.deploy.ros.types import kind, type_hash
+from lfa.deploy.ros.wire import LATCHED
 from lfa.protocol.geometry import Pose2D
 from tests.rigs.foreign_peers import answer, start
 from tests.rigs.lfa_runs import LFA, eventually, lfa, running
@@ -74,6 +75,8 @@ def test_the_bridge_of_a_secured_fleet_shows_and_commands_it_with_the_operators_
             node = space.node("user")
             odom = node.subscription("/robot1/odom", "nav_msgs/msg/Odometry")
             awaited(odom.take, "the secured fleet's odometry")
+            leader = node.subscription("/lfa/leader", "std_msgs/msg/Int32", LATCHED)
+            awaited(lambda: any(number.data for number in leader.take()), "a leader")
             for service, told in (
                 ("/lfa/handover", "robot 2 leads"),
                 ("/lfa/pause", "order 1 carried out by robot 2"),
