@@ -138,6 +138,8 @@ class StuckConditions:
         self._entered: tuple[float, float] | None = None
         """Position where the cell was entered: noise on a border does not count as a new entry."""
         self._entries: dict[tuple[int, int], deque[float]] = {}
+        self._avoided = False
+        """True once something was avoided since the last cell was entered."""
 
     def reset(self) -> None:
         self.__init__(again=self._again)  # type: ignore[misc]
@@ -166,10 +168,14 @@ class StuckConditions:
             self._action, self._since = action, now
             if action is Action.U_TURN and (not self._turns or now - self._turns[-1] >= TURN_S_MIN):
                 self._turns.append(now)
+        self._avoided = self._avoided or action is not None
         cell = (floor(pose.x / CELL_M), floor(pose.y / CELL_M))
         far = self._entered is None or hypot(pose.x - self._entered[0], pose.y - self._entered[1]) > 0.5 * CELL_M
         if cell != self._cell and far:
             self._cell, self._entered = cell, (pose.x, pose.y)
+            avoided, self._avoided = self._avoided, False
+            if not avoided:  # it follows its slot, which may swing in the open, or a route that crosses itself
+                return
             self._entries.setdefault(cell, deque(maxlen=CELL_ENTRIES)).append(now)
             if len(self._entries) > 256:
                 self._entries.pop(next(iter(self._entries)))
