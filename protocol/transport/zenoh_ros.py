@@ -64,10 +64,13 @@ class RosQuery:
         self.attachment = b"" if query.attachment is None else query.attachment.to_bytes()
 
     def reply(self, payload: bytes, attachment: bytes) -> None:
+        """Answer, and end the query: a client that waits for all answers waits until each query has ended."""
         try:
             self._query.reply(self.key, payload, attachment=attachment)
         except zenoh.ZError:
             return  # the client, or the link to it, is gone
+        finally:
+            self._query.drop()  # type: ignore[no-untyped-call]
 
 
 class RosSession:
@@ -189,8 +192,7 @@ class RosSession:
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
         )
-        answers = [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
-        return answers[0] if answers else None
+        return next((reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None), None)
 
     def close(self) -> None:
         """Close the session with all its declarations."""
