@@ -9,8 +9,8 @@ ANEW_S = (1.5, 6.5)
 AGAIN_S = (3.0, 12.0)
 """First and maximum interval [s] while a process lacks messages; each is twice the one before.
 
-A fleet that starts on a busy machine lacks messages for seconds though no declaration is lost; repeats take processor
-time from it: at intervals of 1.5 to 6 s, twelve robots on two cores with other work did not become one chain in 60 s.
+A fleet that starts on a busy machine lacks messages for seconds though no declaration is lost, and each repeat takes
+processor time from all its routers.
 """
 
 

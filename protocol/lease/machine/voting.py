@@ -24,7 +24,8 @@ from lfa.protocol.names import robot_name
 
 HELLO_HEARTBEATS = 3
 PATIENCE, FIRST_PATIENCE = 2.0, 20.0
-"""Heartbeats that a voter waits for the lease of the candidate that it promised a term to; in the first election."""
+"""Heartbeats that a voter waits for the lease of the candidate that it promised a term to: usually, and in the first
+election."""
 
 
 def on_prepare(m: LeaseMemory, src: Member, body: Prepare, now: float) -> None:
