@@ -1,7 +1,7 @@
 """How many robots this machine carries as processes in real time, and the rates at which it carries more.
 
-The costs were fitted to runs of twelve robots on two cores; `lfa bench agents` prints an agent's own part of them. A run
-of more robots than fit loses its lease now and then, and its followers their leader.
+The costs were fitted to runs of twelve robots on two cores; `lfa bench agents` prints an agent's own part of them. A
+run of more robots than fit loses its lease now and then, and its followers their leader.
 """
 
 from __future__ import annotations
