@@ -32,6 +32,10 @@ class PlugIns:
         """Return the names of all installed and added plug-ins."""
         return sorted({*self._entry_points(), *self._added})
 
+    def installed(self) -> list[str]:
+        """Return the names of the installed plug-ins, which other processes find too."""
+        return sorted(self._entry_points())
+
     def find(self, name: str) -> Any:
         """Return the class called `name`. Raise `Refused` for an unknown one, and one whose package cannot be read."""
         if name in self._added:

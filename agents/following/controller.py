@@ -17,9 +17,10 @@ from lfa.agents.perception.own_readings import OwnReading
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.mission import Limits
-from lfa.protocol.plug_in import error_text
+from lfa.protocol.plug_in import PlugIns
 
 ENTRY_POINTS = "lfa.controllers"
+CONTROLLERS = PlugIns("controller", ENTRY_POINTS)
 DEFAULT_CONTROLLER = "law"
 SLOT_SPEED_MIN_MPS = 0.05
 """Slot speed [m/s] below which the slot has no direction: the desired heading is held."""
@@ -76,10 +77,6 @@ class MakeController(Protocol):
     def __call__(self, gains: Gains, limits: Limits, /) -> Controller: ...
 
 
-_added: dict[str, MakeController] = {}
-"""Controllers that a script has added to this process, by name."""
-
-
 def add_controller(name: str, make: MakeController) -> None:
     """Make `make` the controller called `name` in this process: for a script or a notebook that simulates.
 
@@ -88,35 +85,19 @@ def add_controller(name: str, make: MakeController) -> None:
     """
     if name == DEFAULT_CONTROLLER:
         raise Refused(f"controller {name}: the default one cannot be replaced, give another name")
-    _added[name] = make
+    CONTROLLERS.add(name, make)
 
 
 def find_controller(name: str) -> MakeController:
     """Return the installed or added controller called `name`. Raise `Refused`. Entry points are read at the start."""
     if name == DEFAULT_CONTROLLER:
         return Law
-    if name in _added:
-        return _added[name]
-    # Imported here, for a controller other than the default: it costs 3 MB of memory.
-    from importlib.metadata import entry_points
-
-    known = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
-    if name not in known:
-        choices = ", ".join(sorted({*known, *_added}))
+    if name not in CONTROLLERS.names():
+        choices = ", ".join(CONTROLLERS.names())
         raise Refused(f"controller = {name}: must be one of {choices} (entry points {ENTRY_POINTS}), or be given by "
                       "--controller FILE.py:Class")  # fmt: skip
-    try:
-        make: MakeController = known[name].load()
-    except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
-        raise Refused(f"controller = {name}: {known[name].value} cannot be loaded: {error_text(error)}") from None
+    make: MakeController = CONTROLLERS.find(name)
     return make
-
-
-def installed_controllers() -> list[str]:
-    """Return the names of the installed controllers."""
-    from importlib.metadata import entry_points
-
-    return sorted({point.name for point in entry_points(group=ENTRY_POINTS)})
 
 
 class Law:

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from lfa.agents.following.controller import installed_controllers
+from lfa.agents.following.controller import CONTROLLERS
 from lfa.deploy.bench.harness.kept import Keep
 from lfa.deploy.campaign.combine import Combined
 from lfa.deploy.campaign.merge import sweep
@@ -87,7 +87,7 @@ def plan_for(seeds: int) -> SweepPlan:
         "title": "Controllers",
         "scenario": "figure_eight",
         "seeds": f"1..{seeds}",
-        "controllers": installed_controllers(),
+        "controllers": CONTROLLERS.installed(),
         "set": SET,
         "grid": {"radio.loss": [0.0, LOSS]},
         "assert": {"goal_reached": False, "contacts_max": 0},

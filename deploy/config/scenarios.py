@@ -8,7 +8,7 @@ import msgspec
 import typer
 
 from lfa.agents.behaviors.own_behavior import BEHAVIORS
-from lfa.agents.following.controller import installed_controllers
+from lfa.agents.following.controller import CONTROLLERS
 from lfa.protocol.errors import Refused
 from lfa.world.description.generator import GENERATORS, title_of
 from lfa.world.description.load import titled
@@ -24,7 +24,7 @@ def command(as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.
         for name, s in titled().items()
     ]  # fmt: skip
     plug_ins = [{"name": name, "kind": "scenario generator", "title": _title(name)} for name in GENERATORS.names()]
-    plug_ins += [{"name": name, "kind": "controller"} for name in installed_controllers()]
+    plug_ins += [{"name": name, "kind": "controller"} for name in CONTROLLERS.installed()]
     plug_ins += [{"name": name, "kind": "sensor"} for name in SENSORS.names()]
     plug_ins += [{"name": name, "kind": "behavior"} for name in BEHAVIORS.names()]
     if as_json:

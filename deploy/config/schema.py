@@ -18,7 +18,7 @@ import typer
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo, fields
 
-from lfa.agents.following.controller import find_controller, installed_controllers
+from lfa.agents.following.controller import CONTROLLERS, find_controller
 from lfa.deploy.fleet.plan.fleet_file import FleetFile
 from lfa.protocol.plug_in import parameters_of
 from lfa.world.description.load import Scenario
@@ -113,7 +113,7 @@ def _controller_keys(path: str) -> Iterator[Key]:
 
 def controller_parameters() -> dict[str, type[Struct]]:
     """Return the type of the parameters of each installed controller that has some, by name."""
-    kinds = {name: parameters_of(find_controller(name)) for name in installed_controllers()}
+    kinds = {name: parameters_of(find_controller(name)) for name in CONTROLLERS.installed()}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from lfa.agents.behaviors.own_behavior import BEHAVIORS
-from lfa.agents.following import controller
+from lfa.agents.following.controller import CONTROLLERS
+from lfa.world.description.own_sensor import SENSORS
 from tests.test_imports import ROOT
 
 FOLDER = ROOT / "deploy" / "examples"
@@ -49,8 +50,8 @@ def test_an_example_does_what_it_says(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", [str(path)])
-    monkeypatch.setattr(controller, "_added", {})
-    monkeypatch.setattr(BEHAVIORS, "_added", {})
+    for kind in (CONTROLLERS, BEHAVIORS, SENSORS):
+        monkeypatch.setattr(kind, "_added", {})
     runpy.run_path(str(path), run_name="__main__")
     shown = capsys.readouterr().out
     assert [pattern for pattern in SHOWN[path.stem] if not re.search(pattern, shown)] == [], shown

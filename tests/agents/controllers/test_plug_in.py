@@ -38,7 +38,7 @@ def test_the_readmes_controller_follows_a_bend(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_scripts_own_controller_is_found_by_its_name_and_replaces_no_default(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(controller, "_added", {})
+    monkeypatch.setattr(controller.CONTROLLERS, "_added", {})
     with pytest.raises(Refused, match="must be one of"):
         find_controller("mine")
     controller.add_controller("mine", controller.Law)

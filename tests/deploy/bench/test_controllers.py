@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from lfa.agents.following.controller import installed_controllers
+from lfa.agents.following.controller import CONTROLLERS
 from lfa.deploy.bench import controllers
 from lfa.deploy.bench.harness.kept import Keep
 from lfa.deploy.campaign.folder import open_folder
@@ -33,7 +33,7 @@ def done(tmp_path: Path) -> Path:
 
 def test_every_installed_controller_drives_the_same_seeds_with_and_without_loss() -> None:
     groups = controllers.plan_for(3).groups
-    assert {group.values for group in groups} == {(n, loss) for n in installed_controllers() for loss in ("0", "0.2")}
+    assert {group.values for group in groups} == {(n, loss) for n in CONTROLLERS.installed() for loss in ("0", "0.2")}
 
 
 def test_the_leaderboard_ranks_by_the_error_under_loss(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
