@@ -7,6 +7,7 @@ from time import process_time
 
 from tests.model import refinement
 from tests.model.checker import Outcome, explore, in_columns
+from tests.model.fleet_stop import stop_refinement
 from tests.model.runs import MUTANTS, RULES, STATES_MAX, Run
 
 
@@ -30,7 +31,7 @@ def report(rules: tuple[Run, ...], mutants: tuple[Run, ...]) -> int:
         if run.mutant == "t_grant_short" and outcome.violation:
             print(text, flush=True)
     print("\nThe code of protocol/ against the models' rules")
-    for compare in refinement.ALL:
+    for compare in (*refinement.ALL, *stop_refinement.ALL):
         print(f"{compare():10,} comparisons  {compare.__name__}", flush=True)
     print(f"\n{states:,} states, {process_time() - began:.0f} s of one core: {'FAILED' if failed else 'ok'}")
     return 1 if failed else 0

@@ -108,6 +108,7 @@ class Register(RegisterState):
         at, i = self.at[k], self.issuer[k]
         promisers, blank = self._promisers(s, k), s[at + BLANK_PROMISES]
         lives = [[m for m in (2 * v, 2 * v + 1) if (promisers | blank) >> m & 1] for v in self.ids]
+        lives = [some for v, some in enumerate(lives) if some or v not in self.spares]
         for house in product(*lives):
             if 2 * i + s[3 * i + LIFE] not in house:
                 continue
@@ -211,6 +212,9 @@ class Register(RegisterState):
         for choice in product((0, 1), repeat=len(others)):
             mine = 1 << 2 * leader + s[3 * leader + LIFE]
             voters = mine | sum(1 << m for m, chosen in zip(others, choice, strict=True) if chosen)
+            spares = sum((voters >> 2 * v & 3).bit_count() for v in self.spares)
+            if 2 * spares >= voters.bit_count() > 0 < spares and self.mutant != "spares_decide":
+                continue  # E33
             tie = voters & 3 << 2 * self.witness
             found.append((voters, tie or (mine if self.head_ties else 0)))
         return found
@@ -238,7 +242,7 @@ class Register(RegisterState):
             if led is None or led[0] != i:
                 continue
             version = self._version(old, led[1])
-            for heir in self.ids[:-1]:
+            for heir in (v for v in self.ids if v != self.witness):
                 if heir == i:
                     continue
                 b = bytearray(s)

@@ -25,6 +25,7 @@ MUTANTS = {
     "full_house_half": "full house without the joint rule `all`",
     "no_joint": "a change of voters without a joint config",
     "same_life": "a restarted process votes at once, as its old life, with the first config",
+    "spares_decide": "a spare votes like a robot that the mission names",
 }
 
 
@@ -53,28 +54,31 @@ class RegisterState:
         head_ties: bool = False,
         floor: bool = False,
         mutant: str = "",
+        spare: bool = False,
     ) -> None:
         """`restarts`: the ids of which one may die and start again. `cold`: everybody starts blank.
-        `head_ties`: without the witness, the leader that writes is tie-breaker.
+        `head_ties`: without the witness, the leader that writes is tie-breaker. `spare`: one more robot, with the last
+        id, runs, and the mission does not name it (E33).
         """
         assert mutant in ("", *MUTANTS), mutant
-        self.ids = tuple(range(robots + 1))
+        self.ids = tuple(range(robots + 1 + spare))
         self.witness = robots
-        self.columns = (*(f"robot {i + 1}" for i in range(robots)), "witness")
+        self.spares = self.ids[robots + 1 :]
+        self.columns = (*(f"robot {i + 1}" for i in range(robots)), "witness", *("spare" for _ in self.spares))
         self.issuer = (-1, *issuers)
         self.terms = tuple(range(1, len(issuers) + 1))
         self.changes, self.restarts, self.cold, self.head_ties, self.mutant = changes, restarts, cold, head_ties, mutant
         self.floor = floor
         self.lasting = floor or not restarts
         """ONE also counts terms whose holder has died."""
-        self.blanks = cold or bool(restarts)
+        self.blanks = cold or bool(restarts) or spare
         """Without blank processes there is no full house: nobody but voters need promise, no promise keep a version."""
         self.members = 2 * len(self.ids)
         self.used = 3 * len(self.ids)
         """Where the number of joint changes stands."""
         self.term_size = PROMISES + self.members + 2 * SEQS
         self.at = (0, *(self.used + 1 + self.term_size * (k - 1) for k in self.terms))
-        first = sum(1 << 2 * i for i in self.ids)
+        first = sum(1 << 2 * i for i in self.ids if i not in self.spares)
         self.contents: list[Content] = [(first, 1 << 2 * self.witness, 0, 0, HALF)]
         self._number = {self.contents[0]: 0}
 

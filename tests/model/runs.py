@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.model import lease_state, register_state
+from tests.model import lease_state, register_state, roster
 from tests.model.checker import Model
+from tests.model.fleet_stop import fleet_stop
+from tests.model.fleet_stop.fleet_stop import FleetStop
 from tests.model.lease_core import LeaseCore
 from tests.model.register import Register
+from tests.model.roster import RosterModel
 
 STATES_MAX = 4_000_000
 """More than any run below reaches; one that does is not complete, and fails."""
@@ -53,12 +56,27 @@ def config(
     cold: bool = False,
     head_ties: bool = False,
     floor: bool = False,
+    spare: bool = False,
 ) -> Run:
     terms = tuple(int(digit) - 1 for digit in issuers)
     return Run(
         f"{name}, {robots} robots and witness, terms of {issuers}",
-        lambda: Register(robots, terms, changes, restarts, cold, head_ties, floor),
+        lambda: Register(robots, terms, changes, restarts, cold, head_ties, floor, spare=spare),
         short,
+    )
+
+
+def stop(
+    robots: int, words: tuple[int, ...], gateways: int, agents: int, *, forget: int = 1, short: bool = False
+) -> Run:
+    said = ", ".join(fleet_stop.WORD_NAMES[word] for word in words)
+    count = f"{robots} robots, restarts of {gateways} gateway(s) and {agents} agent(s) of {forget} robot(s)"
+    return Run(f"stops: {said}; {count}", lambda: FleetStop(robots, words, gateways, agents, restarting=forget), short)
+
+
+def rosters(calls: int, *, short: bool = False) -> Run:
+    return Run(
+        f"rosters: 2 robots, witness and a spare, {calls} joins or retirements", lambda: RosterModel(calls), short
     )
 
 
@@ -92,6 +110,16 @@ RULES = (
     config("one change, restart, hand-over", 2, "121", 1, (0,)),
     config("one change, restart with a floor, hand-over", 2, "121", 1, (0,), floor=True),
     config("one change, restart", 3, "12", 1, (0,)),
+    config("a spare that leads, one change", 1, "31", 1, short=True, spare=True),
+    config("a spare that leads, one change", 2, "41", 1, spare=True),
+    stop(1, (1, 2, 3, 4), 1, 1),
+    stop(2, (2,), 1, 1, short=True),
+    stop(2, (2, 3), 1, 1),
+    stop(2, (1, 2), 1, 1),
+    stop(2, (2, 3), 1, 1, forget=2),
+    stop(3, (2,), 1, 1),
+    rosters(1),
+    rosters(2),
 )
 
 
@@ -103,10 +131,21 @@ def lease_mutant(
     return Run(lease_state.MUTANTS[mutant], build, short, mutant)
 
 
-def config_mutant(mutant: str, robots: int, issuers: str, restarts: tuple[int, ...] = (), *, short: bool = True) -> Run:
+def config_mutant(
+    mutant: str, robots: int, issuers: str, restarts: tuple[int, ...] = (), *, short: bool = True, spare: bool = False
+) -> Run:
     terms = tuple(int(digit) - 1 for digit in issuers)
-    build: Callable[[], Model] = lambda: Register(robots, terms, 1, restarts, mutant=mutant)  # noqa: E731
+    build: Callable[[], Model] = lambda: Register(robots, terms, 1, restarts, mutant=mutant, spare=spare)  # noqa: E731
     return Run(register_state.MUTANTS[mutant], build, short, mutant)
+
+
+def stop_mutant(mutant: str, robots: int, words: tuple[int, ...], gateways: int = 0, agents: int = 0) -> Run:
+    build: Callable[[], Model] = lambda: FleetStop(robots, words, gateways, agents, mutant)  # noqa: E731
+    return Run(fleet_stop.MUTANTS[mutant], build, True, mutant)
+
+
+def roster_mutant(mutant: str) -> Run:
+    return Run(roster.MUTANTS[mutant], lambda: RosterModel(2, mutant), True, mutant)
 
 
 MUTANTS = (
@@ -126,4 +165,16 @@ MUTANTS = (
     config_mutant("same_life", 2, "12", (0, 1, 2)),
     config_mutant("hand_over_writes", 2, "121"),
     config_mutant("full_house_half", 3, "12", (0,), short=False),
+    config_mutant("spares_decide", 2, "41", spare=True),
+    stop_mutant("stop_not_held", 1, (2,)),
+    stop_mutant("replayed_believed", 1, (2, 3, 4)),
+    stop_mutant("resume_wins_tie", 1, (1, 2)),
+    stop_mutant("starts_certain", 2, (2,), gateways=1, agents=1),
+    stop_mutant("any_resume", 2, (1, 2), gateways=1, agents=1),
+    stop_mutant("agent_sure", 2, (2,), gateways=1, agents=1),
+    stop_mutant("command_first", 1, (1, 2), gateways=1),
+    roster_mutant("spares_vote"),
+    roster_mutant("retired_returns"),
+    roster_mutant("retired_leads"),
+    roster_mutant("full_house_of_all"),
 )

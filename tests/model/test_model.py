@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.model import lease_state, refinement, register_state
+from tests.model import lease_state, refinement, register_state, roster
 from tests.model.__main__ import report
 from tests.model.checker import explore, in_columns
+from tests.model.fleet_stop import fleet_stop, stop_refinement
 from tests.model.runs import MUTANTS, RULES, STATES_MAX, Run
 
 
@@ -28,7 +29,12 @@ def test_a_planted_fault_is_caught_with_a_trace(run: Run) -> None:
 
 
 def test_every_mutant_is_planted() -> None:
-    assert {run.mutant for run in MUTANTS} == {*lease_state.MUTANTS, *register_state.MUTANTS}
+    assert {run.mutant for run in MUTANTS} == {
+        *lease_state.MUTANTS,
+        *register_state.MUTANTS,
+        *fleet_stop.MUTANTS,
+        *roster.MUTANTS,
+    }
 
 
 def test_make_model_fails_with_a_trace_when_t_grant_is_one_unit_short(capsys: pytest.CaptureFixture[str]) -> None:
@@ -42,6 +48,6 @@ def test_make_model_fails_when_a_planted_fault_survives() -> None:
     assert report((), (harmless,)) == 1
 
 
-@pytest.mark.parametrize("compare", refinement.ALL, ids=lambda compare: compare.__name__)
+@pytest.mark.parametrize("compare", [*refinement.ALL, *stop_refinement.ALL], ids=lambda compare: compare.__name__)
 def test_the_code_decides_as_the_models_rule(compare: Callable[[], int]) -> None:
     assert compare() > 0
