@@ -74,8 +74,9 @@ def _start_ros(arguments: argparse.Namespace, fleet: str, start_map: Pose2D | No
         "laser": None if laser is None else (laser.x, laser.y, laser.theta),
     }
     names = structs.replace(load_preset(arguments.robot), **{k: v for k, v in changed.items() if v is not None})
+    namespace = None if arguments.namespace is None else arguments.namespace.rstrip("/")
     robot = RosRobot(
-        RosOptions(arguments.ros, arguments.domain, arguments.namespace, names, arguments.robot_stops_by_itself),
+        RosOptions(arguments.ros, arguments.domain, namespace, names, arguments.robot_stops_by_itself),
         start_map,
     )
     try:
@@ -151,7 +152,7 @@ def _parser() -> argparse.ArgumentParser:
         "--robot", default="turtlebot3", metavar="NAME", help="turtlebot3, turtlebot4, create3, clearpath, nav2, F.toml"
     )
     add("--namespace", metavar="/NAME", help="the robot's namespace; default the only robot found")
-    add("--domain", type=int, default=0, help="ROS_DOMAIN_ID (default: %(default)s)")
+    add("--domain", type=int, help="ROS_DOMAIN_ID; default that of the only robot found")
     add("--odom", metavar="TOPIC", help="instead of the preset's")
     add("--scan", metavar="TOPIC", help="instead of the preset's")
     add("--cmd-vel", metavar="TOPIC", help="instead of the preset's; Twist or TwistStamped is found")

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from math import hypot, isfinite
+from math import hypot
 from typing import Any
 
+from lfa.agents.localization.plausibility import plausible
 from lfa.deploy.robot.base import Reading, Scan
 from lfa.deploy.robot.ros_frames import FrameTree
 from lfa.deploy.robot.ros_presets import RosPreset, full_name
-from lfa.deploy.robot.ros_scan import converted
+from lfa.deploy.robot.ros_scan import converted, remarks
 from lfa.deploy.ros import messages
 from lfa.deploy.ros.quaternions import yaw_of
 from lfa.deploy.ros.session import NodeHandle
 from lfa.deploy.ros.topics import TF_QOS
 from lfa.deploy.ros.wire import LATCHED, SENSOR_DATA
 from lfa.protocol.errors import Refused
-from lfa.protocol.geometry import Pose2D, Twist, along_arc, compose, inverse
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, compose, inverse
 
 ODOM_S_MAX = 0.2
 """Age [s] of the last odometry above which the robot gives no reading."""
@@ -102,11 +103,10 @@ class RosBase:
 
     def _take_odom(self, message: Any, arrived: float) -> None:
         place, turn, twist = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
-        yaw = yaw_of(turn)
-        if yaw is None or not all(map(isfinite, (place.x, place.y, twist.linear.x, twist.angular.z))):
-            self._warn("odom", "odom has numbers that are not finite, or no quaternion: dropped")
+        yaw, moving = yaw_of(turn), Twist(twist.linear.x, twist.angular.z)
+        if yaw is None or not plausible(pose := Pose2D(place.x, place.y, yaw), moving):
+            self._warn("odom", "odom has numbers that are not finite or of no robot, or no quaternion: dropped")
             return
-        pose = Pose2D(place.x, place.y, yaw)
         if self._odom is not None:
             step_m = hypot(pose.x - self._odom[1].x, pose.y - self._odom[1].y)
             dt_s = max(1e-3, arrived - self._odom[0])
@@ -117,7 +117,7 @@ class RosBase:
                 self._rebase(pose)
             else:
                 self._odometer_m += step_m
-        self._odom = (arrived, pose, Twist(twist.linear.x, twist.angular.z))
+        self._odom = (arrived, pose, moving)
         self._odom_frame, self._base_frame = message.header.frame_id or "odom", message.child_frame_id or "base_link"
         stamp_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         off_s = 1e-9 * self._wall_ns() - stamp_s
@@ -133,8 +133,8 @@ class RosBase:
         """Take the newest pose of the localisation: where `odom` is in `map`, until the next."""
         for message in [] if self._poses is None else self._poses.take()[-1:]:
             place, yaw = message.pose.pose.position, yaw_of(message.pose.pose.orientation)
-            if yaw is None or not isfinite(place.x) or not isfinite(place.y):
-                self._warn("pose", "the pose in map has numbers that are not finite, or no quaternion: dropped")
+            if yaw is None or not plausible(Pose2D(place.x, place.y, yaw), STILL):
+                self._warn("pose", "the pose in map has numbers that are not finite or of no robot: dropped")
             elif self._odom is not None:
                 self._map_odom, self._from_tf = compose(Pose2D(place.x, place.y, yaw), inverse(self._odom[1])), False
 
@@ -169,7 +169,11 @@ class RosBase:
                 self._warn("tilt", f"{laser} is not level: its scans are dropped, say --laser X,Y,YAW if they are flat")
                 return None
             try:
-                return converted(message, mount)
+                scan = converted(message, mount)
             except Refused as refused:
                 self._warn("scan", f"a scan is dropped: {refused}")
+                return None
+            for kind, words in remarks(message).items():
+                self._warn(kind, words)
+            return scan
         return None

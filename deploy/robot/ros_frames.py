@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any
 
 from msgspec import Struct
 
+from lfa.agents.localization.plausibility import plausible
 from lfa.deploy.ros.quaternions import is_tilted, yaw_of
-from lfa.protocol.geometry import Pose2D, between, compose
+from lfa.protocol.geometry import STILL, Pose2D, between, compose
 
 FRAMES_MAX = 1000
 
@@ -37,7 +37,7 @@ class FrameTree:
             child, parent = _plain(one.child_frame_id), _plain(one.header.frame_id)
             full = len(self._frames) >= FRAMES_MAX and child not in self._frames
             yaw = yaw_of(turn)
-            if yaw is None or not all(map(isfinite, (move.x, move.y))) or full:
+            if yaw is None or not plausible(Pose2D(move.x, move.y, yaw), STILL) or full:
                 self.dropped += 1
                 continue
             if is_tilted(turn):

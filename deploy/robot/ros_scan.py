@@ -11,6 +11,11 @@ from lfa.protocol.geometry import TAU, Pose2D
 
 BEAMS_MAX = 720
 """Largest number of beams passed on; of neighbours that share a beam the nearest reading counts."""
+_UNUSUAL = {
+    "nan": "such beams count as not measured",
+    "zero": "such beams count as not measured",
+    "-inf": "something nearer than range_min counts there (REP-117)",
+}
 CENTRED_M = 1e-3
 """Distance [m] of the scanner from the base's centre below which beams keep their ranges."""
 
@@ -37,6 +42,22 @@ def converted(message: Any, mount: Pose2D) -> Scan:
         first, step, ranges = _rebinned(first, step, ranges, mount)
         high += hypot(mount.x, mount.y)
     return Scan(_wrapped(first), step, low, high, tuple(ranges))
+
+
+def remarks(message: Any) -> dict[str, str]:
+    """Return what is unusual in a scan, a line each by its kind; `converted` takes all of it as the line says."""
+    found = {}
+    if message.angle_increment < 0.0:
+        found["clockwise"] = "the scan has a negative angle_increment: its beams are taken in reverse"
+    counts = {
+        "nan": sum(map(isnan, message.ranges)),
+        "zero": sum(value == 0.0 for value in message.ranges),
+        "-inf": sum(value == -inf for value in message.ranges),
+    }
+    for kind, means in _UNUSUAL.items():
+        if counts[kind]:
+            found[kind] = f"{counts[kind]} of {len(message.ranges)} ranges of a scan are {kind}: {means}"
+    return found
 
 
 def _reading(value: float, low: float, high: float) -> float:

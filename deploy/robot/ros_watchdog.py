@@ -21,7 +21,6 @@ from lfa.protocol.output import write_line
 from lfa.protocol.transport.zenoh_ros import ros_session
 
 NODE = "lfa_watchdog"
-READY = "ready"
 ZEROS, PERIOD_S = 10, 0.02
 """Number of zeros at each stop, and the time [s] between them: best effort subscribers may miss one."""
 _STAMP = struct.Struct("<iI")
@@ -58,6 +57,11 @@ class ZeroSpeaker:
         self._publication = self._session.publisher(endpoint.key, reliable=True, kept=None)
         self._tokens = [self._session.token(node.token), self._session.token(endpoint.token)]
 
+    @property
+    def session(self) -> str:
+        """Id of its session, by which its driver knows it in the ROS graph."""
+        return self._session.id
+
     def stop(self) -> int:
         """Say zero a few times; return 0."""
         for _ in range(ZEROS):
@@ -79,7 +83,7 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # what ends the driver must not end its watchdog first
     speaker = ZeroSpeaker(msgspec.json.decode(sys.argv[2], type=StopTask))
-    write_line(READY, sys.stdout)
+    write_line(speaker.session, sys.stdout)
     try:
         return watch(sys.stdin.fileno(), float(sys.argv[1]), speaker.stop)
     finally:

@@ -6,6 +6,8 @@ odometry, never by its tokens.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from lfa.deploy.ros.wire import HASHLESS, Kind, RosEndpoint, RosNode, read_token
 
 TOKENS_MAX = 20_000
@@ -49,9 +51,13 @@ class RosGraph:
         found = (entity for entity in self._known.values() if isinstance(entity, RosEndpoint))
         return sorted({one.node.full_name for one in found if one.hash != HASHLESS})
 
-    def commanders(self, topic: str) -> list[str]:
-        """Return the names of the nodes that publish on a robot's command topic."""
-        return sorted({one.node.full_name for one in self.endpoints("MP", topic)})
+    def publishers(self, topic: str, own_sessions: Collection[str] = ()) -> list[str]:
+        """Return the names of the nodes that publish on `topic`, without those of `own_sessions`.
+
+        A name comes twice if two nodes have it: two robots of one make are told apart by their sessions only.
+        """
+        nodes = {one.node for one in self.endpoints("MP", topic) if one.node.session not in own_sessions}
+        return sorted(node.full_name for node in nodes)
 
 
 TWISTS = {"geometry_msgs/msg/Twist": False, "geometry_msgs/msg/TwistStamped": True}

@@ -230,13 +230,14 @@ class RosClient:
 
 
 class GraphFeed:
-    """The ROS graph of one domain, fed by liveliness tokens; `poll` brings it up to date.
+    """The ROS graph of one domain or of all, fed by liveliness tokens; `poll` brings it up to date.
 
     When a link returns, the tokens are asked for again: a router that was restarted does not repeat them.
     """
 
-    def __init__(self, space: RosSpace) -> None:
+    def __init__(self, space: RosSpace, *, all_domains: bool = False) -> None:
         self._space = space
+        self._expression = f"{TOKENS}/{'*' if all_domains else space.domain}/**"
         self._graph = RosGraph()
         self._queue: deque[tuple[str, bool]] = deque(maxlen=TOKENS_MAX)
         self._links_changed = False
@@ -262,7 +263,7 @@ class GraphFeed:
         self._links.undeclare()
 
     def _subscribe(self) -> Undeclarable:
-        return self._space.session.tokens(f"{TOKENS}/{self._space.domain}/**", self._on_token)
+        return self._space.session.tokens(self._expression, self._on_token)
 
     def _on_token(self, token: str, up: bool) -> None:
         self._queue.append((token, up))

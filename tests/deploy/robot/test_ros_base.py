@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from math import nan, pi
+from math import inf, isfinite, nan, pi
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from msgspec import structs
 
+from lfa.agents.localization.plausibility import plausible
 from lfa.deploy.robot.ros_base import ODOM_S_MAX, RosBase
 from lfa.deploy.robot.ros_frames import FrameTree
-from lfa.deploy.robot.ros_open import RosOptions, check_place, listeners, only
+from lfa.deploy.robot.ros_open import RosOptions, RosRobot, check_place, check_sources, listeners, only
 from lfa.deploy.robot.ros_presets import PRESETS, RosPreset, load_preset
 from lfa.deploy.ros import messages
 from lfa.deploy.ros.graph import RosGraph
 from lfa.deploy.ros.session import NodeHandle, RosSpace
-from lfa.deploy.ros.types import from_cdr, type_hash
+from lfa.deploy.ros.types import from_cdr, to_cdr, type_hash
 from lfa.deploy.ros.wire import DEFAULT, LATCHED, RosEndpoint, RosNode
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -154,6 +158,57 @@ def test_bad_odometry_is_one_warning(x: float, late_s: float, kind_: str, words:
     assert words in robot.warned[kind_]
 
 
+def test_unusual_readings_of_a_scan_are_one_warning_each_and_the_scan_is_taken(robot: Robot) -> None:
+    robot.tf_static.publish(messages.tf([messages.Transform(0, "base", "laser", Pose2D())]))
+
+    def taken() -> Any:
+        robot.scans.publish(scan([nan, 0.0, -inf, 2.0], pi, -pi / 2))
+        robot.moves(1.0)
+        reading = robot.base.read(clock.now())
+        return reading and reading.scan
+
+    made = awaited(taken, "a scan")
+    assert made.ranges_m[:2] == (2.0, -inf), "in reverse"
+    told = {kind: words for kind, words in robot.warned.items() if kind not in ("mount", "clock")}
+    assert {"nan", "zero", "-inf", "clockwise"} == set(told)
+    assert all("\n" not in words for words in told.values())
+
+
+SHORT = st.floats(width=32)
+SCANS = st.tuples(st.lists(SHORT, min_size=1, max_size=4), SHORT, SHORT, SHORT, SHORT)
+NUMBERS = st.floats() | st.sampled_from((nan, inf, -inf, 1e308, -1e308, 0.0))
+
+
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_any_bytes_and_any_numbers_from_the_robot_are_a_plausible_reading_or_none(robot: Robot, data: Any) -> None:
+    def number() -> float:
+        return float(data.draw(NUMBERS))
+
+    base, at = robot.base, Pose2D()
+    odom = from_cdr(*reversed(messages.odometry(0, at, Twist(number(), number()), 0.0, "odom", "base")))
+    fix = ros_values.pose_with_covariance(0, at, [0.0] * 36)
+    tf = from_cdr(
+        *reversed(messages.tf([messages.Transform(0, "map", "odom", at), messages.Transform(0, "base", "laser", at)]))
+    )
+    for place, turn in (
+        *((one.pose.pose.position, one.pose.pose.orientation) for one in (odom, fix)),
+        *((one.transform.translation, one.transform.rotation) for one in tf.transforms),
+    ):
+        place.x, place.y, turn.z = number(), number(), number()
+    look = scan(*data.draw(SCANS))
+    assert base._scans is not None
+    assert base._poses is not None
+    for subscription, message in ((base._odoms, odom), (base._poses, fix), (base._tf[0], tf), (base._scans, look)):
+        whole, noise = to_cdr(message), data.draw(st.binary(max_size=80))
+        subscription._receive("", data.draw(st.sampled_from((whole, noise, whole[: len(noise)]))), b"")
+    reading = base.read(clock.now())
+    if reading is not None:
+        assert plausible(reading.pose_odom, reading.twist)
+        assert isfinite(reading.odometer_m)
+        assert reading.pose_map is None or isfinite(reading.pose_map.x)
+
+
 def test_frames_are_composed_over_a_common_ancestor_and_circles_end() -> None:
     tree = FrameTree()
     links = [("base_footprint", "base_link", Pose2D(0.0, 0.0, 0.0)), ("base_link", "scan", Pose2D(-0.1, 0.0, pi / 2)),
@@ -167,11 +222,12 @@ def test_frames_are_composed_over_a_common_ancestor_and_circles_end() -> None:
     assert tree.between("a", "scan") is None
 
 
-def listening(topic: str, of_type: str = STAMPED) -> RosGraph:
+def listening(topic: str, of_type: str = STAMPED, domains: tuple[int, ...] = (0,)) -> RosGraph:
     graph = RosGraph()
-    for one in topic.split():
-        node = RosNode(0, "a", 0, "", "base")
-        graph.update(RosEndpoint(node, 1, "MS", one, of_type, type_hash(of_type), DEFAULT).token, up=True)
+    for domain in domains:
+        for one in topic.split():
+            node = RosNode(domain, "a", 0, "", "base")
+            graph.update(RosEndpoint(node, 1, "MS", one, of_type, type_hash(of_type), DEFAULT).token, up=True)
     return graph
 
 
@@ -186,6 +242,46 @@ def test_no_robot_and_several_are_refused_in_one_line(topics: str, namespace: st
     with pytest.raises(Refused) as refused:
         only(listeners(listening(topics), options), options)
     assert words in str(refused.value)
+
+
+def test_the_domain_is_that_of_the_only_robot_unless_it_is_named() -> None:
+    found = listening("/a/cmd_vel", domains=(7,))
+    anywhere, elsewhere = (RosOptions("tcp/127.0.0.1:7447", domain, None, RosPreset()) for domain in (None, 3))
+    assert only(listeners(found, anywhere), anywhere).node.domain == 7
+    assert listeners(found, elsewhere) == []
+    twice = listening("/a/cmd_vel", domains=(7, 42))
+    with pytest.raises(Refused, match="say --domain 7 or --domain 42"):
+        only(listeners(twice, anywhere), anywhere)
+
+
+def test_a_robot_without_a_namespace_is_found_by_the_name_that_is_said_of_it() -> None:
+    found = listening("/cmd_vel /a/cmd_vel")
+    anywhere, root = (RosOptions("tcp/127.0.0.1:7447", 0, name, RosPreset()) for name in (None, ""))
+    with pytest.raises(Refused, match="say --namespace / or --namespace /a"):
+        only(listeners(found, anywhere), anywhere)
+    assert only(listeners(found, root), root).topic == "/cmd_vel"
+
+
+@pytest.mark.parametrize("names", [("base", "base"), ("base", "ekf")])
+def test_two_robots_under_one_namespace_are_refused_in_one_line(names: tuple[str, str]) -> None:
+    odom, graph = "nav_msgs/msg/Odometry", RosGraph()
+    for session, name in zip("ab", names, strict=True):
+        node = RosNode(0, session, 0, "/bot", name)
+        graph.update(RosEndpoint(node, 1, "MP", "/bot/odom", odom, type_hash(odom), DEFAULT).token, up=True)
+    with pytest.raises(Refused, match=r"/bot/odom: published by .*: two robots share a namespace, give each one"):
+        check_sources(graph, "/bot/odom")
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [({"domain": 233}, "--domain 233"), ({"namespace": "/*"}, "--namespace '/\\*'"),
+     ({"namespace": "bot"}, "full ROS name"), ({"names": RosPreset(odom="**")}, "--odom"),
+     ({"names": RosPreset(cmd_vel="a//b")}, "--cmd-vel")],
+)  # fmt: skip
+def test_what_is_no_name_of_ros_is_refused_before_anything_is_opened(changed: dict[str, Any], words: str) -> None:
+    options = structs.replace(RosOptions("tcp/127.0.0.1:7447", 0, None, RosPreset()), **changed)
+    with pytest.raises(Refused, match=words):
+        RosRobot(options, None)
 
 
 def test_a_link_to_another_machine_is_refused_unless_the_robot_stops_by_itself() -> None:

@@ -44,9 +44,18 @@ def test_another_publisher_of_a_command_is_seen_until_its_token_vanishes() -> No
     graph = _of_genuine_nodes()
     teleop = _twist("MP", "b")
     graph.update(teleop, up=True)
-    assert graph.commanders("/robot3/cmd_vel") == ["/teleop"]
+    assert graph.publishers("/robot3/cmd_vel") == ["/teleop"]
     graph.update(teleop, up=False)
-    assert graph.commanders("/robot3/cmd_vel") == []
+    assert graph.publishers("/robot3/cmd_vel") == []
+
+
+def test_two_nodes_of_one_name_are_two_publishers_and_ones_own_are_left_out() -> None:
+    """Two robots of one make run nodes of the same name: only their sessions differ."""
+    graph = RosGraph()
+    for session in ("a", "b", "c"):
+        graph.update(_twist("MP", session), up=True)
+    assert graph.publishers("/robot3/cmd_vel") == ["/teleop"] * 3
+    assert graph.publishers("/robot3/cmd_vel", {"a", "b"}) == ["/teleop"]
 
 
 def test_nodes_of_humble_are_told_from_newer_ones() -> None:
