@@ -180,12 +180,13 @@ class FleetMapping:
 
     def _transforms_due(self, now_ns: int) -> bool:
         """Return True as soon as every robot has new odometry, or once the first that has waited for TF_NS."""
-        moving = [view for view in self._robots.values() if view.moves(now_ns)]
-        if not any(view.tf_due for view in moving) or now_ns - self._tf_at < TF_APART_NS:
+        views = self._robots.values()
+        if not any(view.tf_due for view in views) or now_ns - self._tf_at < TF_APART_NS:
             return False
         if self._tf_waits_since is None:
             self._tf_waits_since = now_ns
-        if not all(view.tf_due for view in moving) and now_ns - self._tf_waits_since < TF_NS:
+        late = any(view.moves(now_ns) and not view.tf_due for view in views)
+        if late and now_ns - self._tf_waits_since < TF_NS:
             return False
         self._tf_at, self._tf_waits_since = now_ns, None
         return True
@@ -270,7 +271,7 @@ class FleetMapping:
             sent.append(RosMessage("/map", now_ns, messages.occupancy_grid(now_ns, grid)))
         if self._heard("/diagnostics"):
             statuses = [
-                messages.diagnosis(f"robot{robot}", view.status, view.error_m(now_ns))
+                messages.diagnosis(f"robot{robot}", view.status, view.error_m(now_ns), self.leader)
                 for robot, view in sorted(self._robots.items())
                 if view.status is not None
             ]

@@ -148,7 +148,8 @@ def log(stamp_ns: int, level: str, name: str, words: str) -> CdrMessage:
     return out.message("rcl_interfaces/msg/Log")
 
 
-def answer_of_trigger(success: bool, words: str) -> CdrMessage:
+def answer_of_service(success: bool, words: str) -> CdrMessage:
+    """Return std_srvs/Trigger's response, which is SetBool's as well."""
     return CdrWriter().int8(success).string(words).message("std_srvs/msg/Trigger_Response")
 
 
@@ -161,9 +162,9 @@ class RobotDiagnostics(NamedTuple):
     facts: dict[str, str]
 
 
-def diagnosis(robot: str, status: Status, error_m: float | None) -> RobotDiagnostics:
-    """Return one robot's diagnostics: its level and sentence, its role and term, its error and all its counters."""
-    facts = {"role": str(status.role), "term": str(status.term.n)}
+def diagnosis(robot: str, status: Status, error_m: float | None, leader: int) -> RobotDiagnostics:
+    """Return one robot's diagnostics: level and sentence, role, term, its leader (0: none), error, all its counters."""
+    facts = {"role": str(status.role), "term": str(status.term.n), "leader": str(leader)}
     if error_m is not None:
         facts["error_m"] = f"{error_m:.4f}"
     facts |= {name: f"{value:g}" for name, value in status.counters.items()}

@@ -21,6 +21,7 @@ from lfa.deploy.ros.bridge.stop_calls import StopCalls
 from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.session import ServiceCall
 from lfa.deploy.ros.topics import ON_DEMAND, SOURCES, WORLD_TIME, sources_heard
+from lfa.deploy.terminal_text import visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.orders import OrderNote
@@ -96,6 +97,7 @@ class Bridge:
         arrivals = self._subscriber.take()
         self._follow_robots()
         present = self._output.robots
+        sent: list[RosMessage] = []
         for arrival, message in arrivals:
             if isinstance(message, Truth):
                 self._clocks.see_world(arrival.at, message.time_s)
@@ -106,9 +108,10 @@ class Bridge:
             self._hear_answer(robot, message, now)
             if self._clocks.ready and (not robot or robot in present):
                 stamp_ns = self._clocks.stamp_ns(message.header, arrival.at, prompt=where.topic not in _WAITED)
-                self._output.publish(self._mapping.update(stamp_ns, where.owner, message))
+                sent += self._mapping.update(stamp_ns, where.owner, message)
         if self._clocks.ready:
-            self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
+            sent += self._mapping.tick(self._clocks.now_ns(now))
+        self._output.publish(sent)
         self._stops.step(now)
         self._orders.step(now)
 
@@ -178,7 +181,7 @@ class Bridge:
 
     def warn(self, words: str) -> None:
         """Print a warning, and publish it on /rosout."""
-        print(f"lfa: {words}", file=sys.stderr, flush=True)
+        print(visible(f"lfa: {words}"), file=sys.stderr, flush=True)
         stamp_ns = self._clocks.now_ns(clock.now())
         self._output.publish([RosMessage("/rosout", stamp_ns, messages.log(stamp_ns, "warn", BRIDGE_NODE, words))])
 

@@ -14,7 +14,7 @@ from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.ros.bridge.answers import answer
 from lfa.deploy.ros.bridge.bridge import EAGER, Bridge
 from lfa.deploy.ros.bridge.foxglove_output import FoxgloveOutput
-from lfa.deploy.ros.bridge.inward import SERVICES, ServiceInput
+from lfa.deploy.ros.bridge.inward import SERVICES, TRIGGER, ServiceInput
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.bus import Wake
@@ -44,7 +44,7 @@ def command(
     found = find(fleet, connect, keys)
     wake = Wake()
     with Interrupts() as interrupts, listen(found, frozenset(), every=True, wake=wake, eager=EAGER) as subscriber:
-        output = FoxgloveOutput(host, port, (*SERVICES, *FORMATIONS), tf_per_robot=tf_per_robot)
+        output = FoxgloveOutput(host, port, SERVICES | dict.fromkeys(FORMATIONS, TRIGGER), tf_per_robot=tf_per_robot)
         try:
             bridge = Bridge(subscriber, output, sim_time=False, tf_per_robot=tf_per_robot)
             services = ServiceInput(bridge)

@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as LateAnswer
 
 import foxglove
 from foxglove.websocket import Capability, ServerListener, Service, ServiceRequest
 
-from lfa.deploy.ros.bridge.inward import HANDOVER_S_MAX
+from lfa.deploy.ros.bridge.inward import HANDOVER_S_MAX, SET_BOOL, TRIGGER
 from lfa.deploy.ros.mapping import RosMessage
 from lfa.deploy.ros.session import ServiceCall
 from lfa.deploy.ros.topics import RosTopic, fleet_topics, robot_topics
-from lfa.deploy.ros.types import kind, to_cdr, typestore
+from lfa.deploy.ros.types import BadRosMessage, from_cdr, kind, request_type, to_cdr, typestore
 from lfa.protocol.errors import Refused
 
 ANSWER_S_MAX = HANDOVER_S_MAX + 2.0
 PENDING_MAX = 16
 SUBSCRIPTIONS_MAX = 10_000
+_REQUESTS = {TRIGGER: "", SET_BOOL: "bool data"}
+"""Definitions of the services' requests."""
 
 
 class FoxgloveOutput:
     """Server with one channel per topic. Foxglove does not latch: latched messages are sent again to later clients."""
 
-    def __init__(self, host: str, port: int, services: Iterable[str], *, tf_per_robot: bool) -> None:
-        """Start the server with Trigger `services`. Raises Refused if it cannot listen."""
+    def __init__(self, host: str, port: int, services: Mapping[str, str], *, tf_per_robot: bool) -> None:
+        """Start the server with `services`, each with its type. Raises Refused if it cannot listen."""
         self._tf_per_robot = tf_per_robot
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
@@ -43,7 +45,7 @@ class FoxgloveOutput:
                 port=port,
                 capabilities=[Capability.Services],
                 supported_encodings=["cdr"],
-                services=[_trigger(name, self._call) for name in services],
+                services=[_service(name, of_type, self._call) for name, of_type in services.items()],
                 server_listener=_Newcomers(self._newcomers),
                 context=self._context,
             )
@@ -105,10 +107,9 @@ class FoxgloveOutput:
             if topic.qos.latched:
                 self._latched[topic.name] = None
 
-    def _call(self, name: str) -> bytes:
+    def _call(self, name: str, request: object) -> bytes:
         """Answer a call, on one of the server's threads: the loop decides."""
         answer: Future[bytes] = Future()
-        request = kind("std_srvs/msg/Trigger_Request")(0)
         if len(self.calls) >= PENDING_MAX:
             raise ValueError("too many calls at once")
         self.calls.append((name, ServiceCall(request, lambda response: answer.set_result(to_cdr(response)))))
@@ -128,17 +129,27 @@ class _Newcomers(ServerListener):
         self._topics.append(channel.topic)
 
 
-def _trigger(name: str, call: Callable[[str], bytes]) -> Service:
+def _service(name: str, of_type: str, call: Callable[[str, object], bytes]) -> Service:
     request, response = (
         foxglove.MessageSchema(
             encoding="cdr",
-            schema=foxglove.Schema(name=f"std_srvs/srv/Trigger_{part}", encoding="ros2msg", data=definition.encode()),
+            schema=foxglove.Schema(name=f"{of_type}_{part}", encoding="ros2msg", data=definition.encode()),
         )
-        for part, definition in (("Request", ""), ("Response", "bool success\nstring message"))
+        for part, definition in (("Request", _REQUESTS[of_type]), ("Response", "bool success\nstring message"))
     )
 
     def handle(request: ServiceRequest) -> bytes:
-        return call(request.service_name)
+        return call(request.service_name, _request(of_type, request.payload))
 
-    schema = foxglove.ServiceSchema(name="std_srvs/srv/Trigger", request=request, response=response)
+    schema = foxglove.ServiceSchema(name=of_type, request=request, response=response)
     return Service(name=name, schema=schema, handler=handle)
+
+
+def _request(of_type: str, payload: bytes) -> object:
+    """Return the request in `payload`; one that says nothing may have any bytes. Raises ValueError for others."""
+    if not _REQUESTS[of_type]:
+        return kind(request_type(of_type))(0)
+    try:
+        return from_cdr(payload, request_type(of_type))
+    except BadRosMessage as bad:
+        raise ValueError(str(bad)) from None

@@ -16,14 +16,15 @@ from lfa.protocol.mission import FormationSpec
 
 GOAL = "/goal_pose"
 """Topic of RViz's button `2D Goal Pose`."""
-PAUSE, GO = "/lfa/pause", "/lfa/go"
+PAUSE = "/lfa/pause"
 HANDOVER = "/lfa/handover"
 HANDOVER_S_MAX = 5.0
 """Time [s] within which another robot must lead after a hand-over was asked for."""
 WORDS_MAX = 120
 """Number of characters of a line that repeats a foreign text."""
-SERVICES = (RESUME, STOP, PAUSE, GO, HANDOVER)
-"""Trigger services, in the order in which calls that wait together are obeyed: of stop and resume, stop is the last."""
+TRIGGER, SET_BOOL = "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
+SERVICES = {RESUME: TRIGGER, STOP: TRIGGER, PAUSE: SET_BOOL, HANDOVER: TRIGGER}
+"""Type of each service, in the order in which calls that wait together are obeyed: stop after resume."""
 
 
 class FleetCommands(Protocol):
@@ -76,7 +77,7 @@ class HandoverCalls:
 
 
 class ServiceInput:
-    """Calls of the Trigger services, from ROS or from Foxglove."""
+    """Calls of the services, from ROS or from Foxglove."""
 
     def __init__(self, fleet: FleetCommands) -> None:
         self._fleet = fleet
@@ -86,8 +87,8 @@ class ServiceInput:
         """Obey a call of one of SERVICES; `leader`: 0 for none."""
         if service in (STOP, RESUME):
             self._fleet.stop(call, now, stand=service == STOP)
-        elif service in (PAUSE, GO):
-            self._fleet.pause(call, now, paused=service == PAUSE)
+        elif service == PAUSE:
+            self._fleet.pause(call, now, paused=bool(call.request.data))
         else:
             self._handovers.ask(call, leader, now)
 
@@ -103,7 +104,7 @@ class OperatorInput:
         self._fleet = fleet
         self._formation = node.subscription("/lfa/formation/set", "std_msgs/msg/String")
         self._goals = node.subscription(GOAL, "geometry_msgs/msg/PoseStamped")
-        self._services = {name: node.service(name, "std_srvs/srv/Trigger") for name in SERVICES}
+        self._services = {name: node.service(name, of_type) for name, of_type in SERVICES.items()}
         self._input = ServiceInput(fleet)
 
     def step(self, leader: int, now: float) -> None:

@@ -50,9 +50,9 @@ EXAMPLES = st.one_of(
     st.builds(messages.text, FRAMES),
     st.builds(messages.number, st.integers(0, 2**60)),
     st.builds(messages.log, STAMPS, st.sampled_from(["info", "error"]), FRAMES, FRAMES),
-    st.builds(messages.answer_of_trigger, st.booleans(), FRAMES),
+    st.builds(messages.answer_of_service, st.booleans(), FRAMES),
     st.builds(lambda stamp, error_m: messages.diagnostics(
-        stamp, [messages.diagnosis(robot, status(), error_m) for robot in ("robot1", "robot22")]), STAMPS, NUMBERS),
+        stamp, [messages.diagnosis(robot, status(), error_m, 1) for robot in ("robot1", "robot22")]), STAMPS, NUMBERS),
     st.builds(markers.formation, STAMPS, st.lists(ROBOTS, max_size=3), st.lists(BODIES, max_size=2)),
 )  # fmt: skip
 

@@ -31,7 +31,7 @@ NOT_IN_THE_WHEELS = {"tf2_msgs/msg/TFMessage"}
 def examples() -> dict[str, Any]:
     """Return one filled message of each type that this project sends or reads."""
     scan = LaserScan(header(), -1.0, 0.5, 0.1, 10.0, (inf, 2.0, 3.0))
-    status = messages.diagnosis("robot3", Status(header(), Level.WARN, "waits", Role.WAITING, TERM, {"x": 1.0}), 0.1)
+    status = messages.diagnosis("robot3", Status(header(), Level.WARN, "waits", Role.WAITING, TERM, {"x": 1.0}), 0.1, 1)
     found = [
         messages.odometry(T, AT, Twist(0.5, 0.1), 2.0, "odom", "base_link"),
         messages.laser_scan(T, scan, "base_scan"),

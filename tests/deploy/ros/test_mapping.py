@@ -223,10 +223,11 @@ def test_the_chain_is_told_when_it_changes() -> None:
 
 def test_diagnostics_and_log_carry_level_text_and_counters() -> None:
     mapping = FleetMapping()
+    mapping.update(T, "robot1", pose(Pose2D(), 1, Role.LEADER))
     mapping.update(T, "robot3", status())
     (one,) = on("/diagnostics", mapping.tick(T)).status
     assert (one.level, one.name, one.message) == (1, "lfa: robot3", "waiting for robot2")
-    assert {"role": "waiting", "term": "7", "loop_lag_ms": "0.5"}.items() <= {
+    assert {"role": "waiting", "term": "7", "leader": "1", "loop_lag_ms": "0.5"}.items() <= {
         v.key: v.value for v in one.values
     }.items()
     log = on("/rosout", mapping.update(T, "robot3", event()))
