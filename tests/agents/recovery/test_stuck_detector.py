@@ -1,5 +1,7 @@
 """S1 to S5: when a robot is stuck, and when it only waits."""
 
+from collections.abc import Callable
+
 import pytest
 
 from lfa.agents.avoidance.decision import Action
@@ -8,9 +10,11 @@ from lfa.agents.recovery.stuck_detector import (
     BLOCKED_S,
     CALM_S,
     CELL_ENTRIES,
+    COMES_BACK,
     FREED_M,
     SCAN_LOST,
     STANDS_S,
+    STILL_M,
     STILL_S,
     TURN_S_MIN,
     TURNS,
@@ -90,11 +94,35 @@ def test_who_avoids_nothing_may_come_back_as_often_as_its_slot_or_route_does() -
         assert stuck.watch(Pose2D(0.1 + n % 2, 0.1, 0.0), AHEAD, action, None, 2.0 * n) is None
 
 
-def test_noise_on_a_cells_border_is_no_coming_back() -> None:
+@pytest.mark.parametrize("y", [0.1, 5.1])
+def test_noise_on_a_cells_border_is_no_coming_back(y: float) -> None:
     stuck = StuckConditions()
     for n in range(500):
         x = 0.5 + (0.004 if n % 2 else -0.004) + 0.0002 * n
-        assert stuck.watch(Pose2D(x, 0.1, 0.0), STILL, Action.LEFT, None, 0.02 * n) is None
+        assert stuck.watch(Pose2D(x, y, 0.0), STILL, Action.LEFT, None, 0.02 * n) is None
+
+
+def entered(*at_s: float, action_before: Action | None = Action.LEFT) -> str | None:
+    """Return the reason after these times [s] of entering a place along y, with another place a second before each."""
+    stuck, reason = StuckConditions(), None
+    for n, now in enumerate(at_s):
+        action = Action.LEFT if n else action_before
+        stuck.watch(Pose2D(0.1, 1.1, 0.0), AHEAD, action, None, now - 1.0)
+        reason = stuck.watch(Pose2D(0.1, 0.1, 0.0), AHEAD, action, None, now)
+    return reason
+
+
+def test_S3_counts_the_entries_of_the_last_30_s() -> None:
+    assert str(entered(101.0, 115.0, 130.9)).startswith("S3")
+    assert entered(101.0, 120.0, 131.1) is None
+
+
+def test_S3_counts_only_entries_before_which_something_was_avoided() -> None:
+    assert entered(1.0, 5.0, 9.0, action_before=None) is None
+    stuck = StuckConditions()
+    for now, x in enumerate((0.1, 1.1, 0.1, 1.1, 0.1)):  # it begins there, without having avoided anything
+        assert stuck.watch(Pose2D(x, 0.1, 0.0), AHEAD, Action.LEFT if now else None, None, float(now)) is None
+    assert str(entered(1.0, 5.0, 9.0)).startswith("S3")
 
 
 def test_S4_waited_too_long_for_what_moves() -> None:
@@ -189,13 +217,34 @@ def test_who_is_stuck_beside_the_axis_is_not_free_where_it_stands() -> None:
     assert monitor.reason is not None
     monitor.rest(Pose2D(0.0, 3.0 - FREED_M, 0.0), 2.2)
     assert monitor.reason is None
+    for now in (10.0, 12.0):
+        monitor.watch(Pose2D(3.0, 0.0, 0.0), STILL, Action.BLOCKED, None, now, leads=False)
+    monitor.rest(Pose2D(3.0, 0.0, 0.0), 12.1)
+    assert monitor.reason is not None
 
 
-def test_S1_holds_beside_the_axis_too() -> None:
+@pytest.mark.parametrize("place", [Pose2D(0.0, 3.0, 0.0), Pose2D(3.0, 0.0, 0.0)])
+def test_S1_holds_beside_the_axes_too(place: Pose2D) -> None:
     stuck, reason = StuckConditions(), None
     for n in range(round((STILL_S + 0.2) / 0.02)):
-        reason = stuck.watch(Pose2D(0.0, 3.0, 0.0), AHEAD, None, None, 0.02 * n)
+        reason = stuck.watch(place, AHEAD, None, None, 0.02 * n)
     assert str(reason).startswith("S1")
+
+
+def test_S1_who_went_there_and_back_has_moved() -> None:
+    stuck, reason = StuckConditions(), None
+    for n in range(round((STILL_S + 0.2) / 0.02)):
+        x = 2.0 * STILL_M if 50 < n < 100 else 0.0
+        reason = stuck.watch(Pose2D(x, 0.0, 0.0), AHEAD, None, None, 0.02 * n)
+    assert reason is None
+
+
+def test_S1_counts_from_when_motion_was_wanted_last() -> None:
+    stuck, reason = StuckConditions(), None
+    for n in range(round((STILL_S + 0.3) / 0.02)):
+        wanted = STILL if n == round((STILL_S - 0.2) / 0.02) else AHEAD
+        reason = stuck.watch(Pose2D(), wanted, None, None, 0.02 * n)
+    assert reason is None
 
 
 @pytest.mark.parametrize(
@@ -260,3 +309,75 @@ def test_S3_places_are_half_a_metre_wide_along_both_axes(place: Pose2D) -> None:
         off_m = 0.1 * n  # within the same half metre
         reason = stuck.watch(Pose2D(place.x + off_m, place.y + off_m, 0.0), AHEAD, Action.LEFT, None, 4.0 * n + 2.0)
     assert str(reason).startswith("S3")
+
+
+def come_back(*, again: bool) -> StuckMonitor:
+    """A monitor of a robot that was in one place again and again."""
+    monitor = StuckMonitor()
+    for n in range(CELL_ENTRIES):
+        for x, now in ((1.1, 4.0 * n), (0.1, 4.0 * n + 2.0)):
+            monitor.watch(Pose2D(x, 0.1, 0.0), AHEAD, Action.LEFT, None, now, leads=False, again=again)
+    return monitor
+
+
+def test_S3_on_a_planned_way_coming_back_does_not_count_and_all_else_does() -> None:
+    assert come_back(again=True).reason == COMES_BACK
+    monitor = come_back(again=False)
+    assert monitor.reason is None
+    for now in (20.0, 22.0):
+        monitor.watch(Pose2D(), STILL, Action.BLOCKED, None, now, leads=False, again=False)
+    assert str(monitor.reason).startswith("S2")
+
+
+def other_role(monitor: StuckMonitor) -> None:
+    monitor.begin(leading=True)
+
+
+def follows_for_a_step(monitor: StuckMonitor) -> None:
+    monitor.watch(Pose2D(), STILL, None, None, STANDS_S - 1.9, leads=False)
+
+
+def without_pose_for_a_step(monitor: StuckMonitor) -> None:
+    monitor.lose_pose("localization")
+    monitor.find_pose()
+
+
+def rests_for_a_step(monitor: StuckMonitor) -> None:
+    monitor.rest(Pose2D(), STANDS_S - 1.9)
+
+
+@pytest.mark.parametrize("between", [other_role, follows_for_a_step, without_pose_for_a_step, rests_for_a_step])
+def test_S1_a_leader_stands_from_when_it_began_to(between: Callable[[StuckMonitor], None]) -> None:
+    monitor = StuckMonitor()
+    for now in (0.0, STANDS_S - 2.0):
+        monitor.watch(Pose2D(), STILL, None, None, now, leads=True)
+    between(monitor)
+    for now in (STANDS_S - 1.8, STANDS_S + 1.0):
+        monitor.watch(Pose2D(), STILL, None, None, now, leads=True)
+    assert monitor.reason is None
+
+
+def test_who_is_stuck_for_another_reason_has_its_pose() -> None:
+    assert not while_stuck().pose_lost
+
+
+def test_who_is_blocked_when_its_pose_comes_back_is_stuck_where_it_is_then() -> None:
+    monitor = StuckMonitor()
+    monitor.lose_pose("localization")
+    for now in (0.0, 2.0):
+        monitor.watch(Pose2D(), STILL, Action.BLOCKED, None, now, leads=False)
+    assert str(monitor.reason).startswith("S2")
+    monitor.rest(Pose2D(FREED_M, 0.0, 0.0), 2.1)
+    assert monitor.reason is None
+
+
+def test_who_is_out_of_the_place_backs_out_no_more_and_is_watched_anew() -> None:
+    monitor = StuckMonitor()
+    for n in range(round((STILL_S + 0.2) / 0.02)):
+        monitor.watch(Pose2D(), AHEAD, None, None, 0.02 * n, leads=False)
+    assert monitor.reason is not None
+    monitor.backing_out = True
+    monitor.out()
+    assert not monitor.backing_out
+    monitor.watch(Pose2D(), AHEAD, None, None, STILL_S + 0.22, leads=False)
+    assert monitor.reason is None
