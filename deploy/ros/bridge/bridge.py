@@ -97,7 +97,6 @@ class Bridge:
         arrivals = self._subscriber.take()
         self._follow_robots()
         present = self._output.robots
-        sent: list[RosMessage] = []
         for arrival, message in arrivals:
             if isinstance(message, Truth):
                 self._clocks.see_world(arrival.at, message.time_s)
@@ -108,10 +107,9 @@ class Bridge:
             self._hear_answer(robot, message, now)
             if self._clocks.ready and (not robot or robot in present):
                 stamp_ns = self._clocks.stamp_ns(message.header, arrival.at, prompt=where.topic not in _WAITED)
-                sent += self._mapping.update(stamp_ns, where.owner, message)
+                self._output.publish(self._mapping.update(stamp_ns, where.owner, message))
         if self._clocks.ready:
-            sent += self._mapping.tick(self._clocks.now_ns(now))
-        self._output.publish(sent)
+            self._output.publish(self._mapping.tick(self._clocks.now_ns(now)))
         self._stops.step(now)
         self._orders.step(now)
 

@@ -30,9 +30,6 @@ from lfa.protocol.transport.zenoh_ros import ros_session
 ROUTER = "tcp/127.0.0.1:7447"
 SERVED = "tcp/[::]:7447"
 WARNINGS_MAX = 100
-GATHER_S = 0.0003
-"""Time [s] from the first message of a burst, such as all robots' odometry, to the step that passes it on: one step for
-all of them takes a tenth less of a core than one for each."""
 GRAPH_S = 1.0
 """Time [s] to wait for the tokens of those who are there already, and period of looking for newcomers."""
 
@@ -77,7 +74,6 @@ def command(
             settle()
             while interrupts.signal is None:
                 wake.wait(bridge.period_s())
-                clock.sleep(GATHER_S)
                 now = clock.now()
                 bridge.step(now)
                 orders.step(bridge.leader, now)
