@@ -1,8 +1,10 @@
 """The bridge to ROS 2 beside a running team of four: its cost, how late its topics come, what the agents feel.
 
-One process listens to the fleet and to the bridge at once, so that the machine's load delays both alike; a sample is
-recognised by its pose. Processor time is that of the bridge's process alone. A bare process, which receives and sends
-as much without any computation, is measured by the same steps right after: what this machine asks for at that time.
+Beside the bridge a relay takes the same way with raw Zenoh: it receives one robot's `sensors` and publishes the bytes
+at a router of its own. One process listens to the fleet, the relay and the bridge at once, so that the machine's load
+delays all alike; a sample is recognised by its pose. Processor time is that of the bridge's process alone. A bare
+process, which receives and sends as much without any computation, is measured by the same steps right after: what this
+machine asks for at that time.
 """
 
 from __future__ import annotations
@@ -11,8 +13,8 @@ import re
 import statistics
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from math import isfinite
 from pathlib import Path
 
@@ -38,8 +40,9 @@ from lfa.protocol.transport.zenoh_ros import RosSession, ros_session
 ROBOTS = 4
 SETTLE_S, WINDOW_S, WINDOWS, STEP_S = 3.0, 5.0, 5, 0.2
 START_S_MAX = 30.0
-WATCHED = "/robot1/odom"
-"""Topic whose delay is measured; its messages are made of `robot1/sensors`."""
+WATCHED, SOURCE = "/robot1/odom", "robot1/sensors"
+"""Topic whose delay is measured, and what its messages are made of."""
+RELAYED = "raw/robot1/sensors"
 Arrivals = dict[tuple[float, float], float]
 """Time [s] of arrival by the pose x, y [m] of a sample."""
 CPU = Quantity("share of a core", "%", 8.0)
@@ -55,18 +58,22 @@ class Watched(Struct, frozen=True):
     """Share of a core: the median of the windows."""
     memory_mb: float
     says: tuple[Saying, ...]
-    added_ms: tuple[float, ...]
+    later_ms: tuple[float, ...]
     """Delay of the watched topic behind the fleet's own `sensors`, sorted."""
+    added_ms: tuple[float, ...]
+    """Delay of the watched topic behind what the relay sends, sorted; empty without a relay."""
+    relayed_ms: tuple[float, ...]
+    """Delay of what the relay sends behind the fleet's own `sensors`, sorted; empty without a relay."""
     lag_ms: float
     """Median of the agents' loop lags."""
 
 
-def bridge_rows(endpoint: str) -> Iterator[list[BenchRow]]:
-    """Yield the rows; `endpoint`: a free TCP endpoint for the ROS router."""
+def bridge_rows(endpoint: str, relay_endpoint: str) -> Iterator[list[BenchRow]]:
+    """Yield the rows; free TCP endpoints for the ROS router and for that of the relay."""
     with Team(endless(ROBOTS)) as team:
         team.await_chain(ROBOTS)
         pause(team, SETTLE_S)
-        with listen(team.fleet, frozenset({"*/status", "robot1/sensors"}), every=True) as subscriber:
+        with listen(team.fleet, frozenset({"*/status", SOURCE}), every=True) as subscriber:
             pause(team, WINDOWS * WINDOW_S)
             alone_ms = _take(subscriber, {})
             words = [*LFA, "ros", "--serve", "--ros", endpoint, "--fleet", team.fleet.name]
@@ -75,13 +82,22 @@ def bridge_rows(endpoint: str) -> Iterator[list[BenchRow]]:
                 pause(team, SETTLE_S)
                 rest_percent = statistics.median(_windows(team, bridge))
                 unheard_ms = _take(subscriber, {})
-                seen = _watch(team, subscriber, bridge, endpoint)
-            task = _bare_task(team, endpoint, seen.says)
-            words = [sys.executable, "-P", "-m", "lfa.deploy.bench.harness.bare_process"]
-            with started([*words, msgspec.json.encode(task).decode()]) as bare:
+                with started(_words(_relay_task(team, relay_endpoint))):
+                    seen = _watch(team, subscriber, bridge, endpoint, relay_endpoint)
+            with started(_words(_bare_task(team, endpoint, seen.says))) as bare:
                 floor = _watch(team, subscriber, bare, endpoint)
-    yield _rows(seen, "bridge", CPU, MEMORY, ADDED)
-    yield _rows(floor, "bridge/bare process", *map(_without_bar, (CPU, MEMORY, ADDED)))
+    yield _rows(seen, "bridge", CPU, MEMORY)
+    relayed_ms = _percentile(seen.relayed_ms, 50)
+    yield [
+        row("bridge/odom after the relay", ADDED, _percentile(seen.added_ms, 50)),
+        row("bridge/odom after the relay", Quantity("p99", "ms"), _percentile(seen.added_ms, 99)),
+        row("bridge/relay after sensors", Quantity("p50", "ms"), relayed_ms),
+        row("bridge/relay after sensors", Quantity("p99", "ms"), _percentile(seen.relayed_ms, 99)),
+        row(
+            "bridge", Quantity("bridge's delay over the relay's", "ratio"), _percentile(seen.later_ms, 50) / relayed_ms
+        ),
+    ]
+    yield _rows(floor, "bridge/bare process", *map(_without_bar, (CPU, MEMORY)))
     yield [row("bridge/nobody listens", AT_REST, rest_percent)]
     bar_ms = max(1.25 * alone_ms, alone_ms + 0.5)
     yield [
@@ -96,20 +112,31 @@ def _without_bar(quantity: Quantity) -> Quantity:
     return Quantity(quantity.name, quantity.unit)
 
 
-def _rows(seen: Watched, name: str, cpu: Quantity, memory: Quantity, added: Quantity) -> list[BenchRow]:
-    later = seen.added_ms or (float("nan"),)
+def _rows(seen: Watched, name: str, cpu: Quantity, memory: Quantity) -> list[BenchRow]:
     return [
         row(name, cpu, seen.cpu_percent),
         row(name, memory, seen.memory_mb),
         row(name, Quantity("messages a second", "1/s"), sum(one.rate_hz for one in seen.says)),
-        row(f"{name}/odom after sensors", added, later[len(later) // 2]),
-        row(f"{name}/odom after sensors", Quantity("p99", "ms"), later[len(later) * 99 // 100]),
+        row(f"{name}/odom after sensors", Quantity("p50", "ms"), _percentile(seen.later_ms, 50)),
+        row(f"{name}/odom after sensors", Quantity("p99", "ms"), _percentile(seen.later_ms, 99)),
     ]
 
 
-def _watch(team: Team, subscriber: Subscriber, process: subprocess.Popen[bytes], endpoint: str) -> Watched:
-    """Listen to all topics of the ROS router at `endpoint`, which `process` is."""
-    with closing(_session(team, endpoint)) as session:
+def _percentile(ordered: tuple[float, ...], percent: int) -> float:
+    """Return a percentile of sorted numbers; nan for none."""
+    return ordered[len(ordered) * percent // 100] if ordered else float("nan")
+
+
+def _watch(
+    team: Team, subscriber: Subscriber, process: subprocess.Popen[bytes], endpoint: str, relay_endpoint: str = ""
+) -> Watched:
+    """Listen to all topics of the ROS router at `endpoint`, which `process` is, and to the relay if there is one."""
+    with ExitStack() as open_sessions:
+        session = open_sessions.enter_context(closing(_session(team, endpoint)))
+        relayed: Arrivals = {}
+        if relay_endpoint:
+            relay = open_sessions.enter_context(closing(_session(team, relay_endpoint)))
+            kept = relay.subscriber(RELAYED, _note(relayed), kept=None)
         heard = [_Heard(session, topic) for topic in _topics()]
         pause(team, SETTLE_S)
         raw: Arrivals = {}
@@ -122,8 +149,34 @@ def _watch(team: Team, subscriber: Subscriber, process: subprocess.Popen[bytes],
         lag_ms = _take(subscriber, raw)
         watched = next(one for one in heard if one.topic == WATCHED)
         bridged = {pose: at for at, payload in watched.samples if (pose := _pose(payload)) is not None}
-    added = sorted(1e3 * (at - raw[pose]) for pose, at in bridged.items() if pose in raw)
-    return Watched(statistics.median(shares), _rss_mb(process.pid), says, tuple(added), lag_ms)
+        if relay_endpoint:
+            kept.undeclare()
+    return Watched(
+        statistics.median(shares),
+        _rss_mb(process.pid),
+        says,
+        _delays_ms(raw, bridged),
+        _delays_ms(relayed, bridged),
+        _delays_ms(raw, relayed),
+        lag_ms,
+    )
+
+
+def _delays_ms(before: Arrivals, after: Arrivals) -> tuple[float, ...]:
+    """Return the delays [ms] of the samples that arrived in both ways, sorted."""
+    return tuple(sorted(1e3 * (at - before[pose]) for pose, at in after.items() if pose in before))
+
+
+def _note(arrivals: Arrivals) -> Callable[[str, bytes, bytes], None]:
+    """Return a callback that notes when samples arrive."""
+
+    def on_sample(_key: str, payload: bytes, _attached: bytes) -> None:
+        at = clock.now()
+        pose = _pose(payload)
+        if pose is not None:
+            arrivals[pose] = at
+
+    return on_sample
 
 
 def _windows(team: Team, process: subprocess.Popen[bytes]) -> Iterator[float]:
@@ -163,6 +216,18 @@ def _topics() -> list[RosTopic]:
     for robot in range(1, ROBOTS + 1):
         topics += robot_topics(robot, tf_per_robot=False)
     return topics
+
+
+def _words(task: BareTask) -> list[str]:
+    """Return the command that runs a bare process."""
+    program = [sys.executable, "-P", "-m", "lfa.deploy.bench.harness.bare_process"]
+    return [*program, msgspec.json.encode(task).decode()]
+
+
+def _relay_task(team: Team, endpoint: str) -> BareTask:
+    """Return the task to relay the watched topic's source, at a router of its own, and nothing else."""
+    source = f"lfa/{team.fleet.name}/{SOURCE}"
+    return BareTask(team.fleet.endpoint, (source,), (), endpoint, relays={source: RELAYED})
 
 
 def _bare_task(team: Team, endpoint: str, says: tuple[Saying, ...]) -> BareTask:
