@@ -33,7 +33,7 @@ FAULT_ACTIONS: dict[str, str] = {
     "cut":       "no radio between sides: 3, or 1-2, or 1,2-3,w, or one way 1>2 (w: the world with its witness)",
     "heal":      "ends a cut, or all cuts and all loss",
     "loss":      "every receiver loses this share of messages: 0.2; without a share: the initial value",
-    "range":     "messages reach robots up to this distance [m]: 5; 0: any distance (only in virtual time)",
+    "range":     "messages reach robots up to this distance [m]: 5; 0: any distance",
     "handover":  "the leader hands its lease to the next in the chain",
     "hang":      "a part of a simulated robot hangs: driver 2 (its wheels go on), localization 2 or scanner 2",
     "resume":    "ends a hang of the same part",
@@ -59,10 +59,6 @@ LASTING: dict[str, FaultAction] = {"stop": "continue", "cut": "heal", "loss": "l
 LEADER = "leader"
 RESTART: FaultAction = "restart"
 """Fault action carried out by the launcher; in a fleet that already runs, an operator's message requests it."""
-SIMULATED = ("range",)
-"""Fault actions that only the simulator executes: a live receiver does not know how far away its senders are."""
-LIVE = tuple(action for action in FAULT_ACTIONS if action not in SIMULATED)
-"""Fault actions for a fleet that runs as processes."""
 COMMON = ("router", "world")
 """Processes besides robots that can be killed, stopped and continued, where the fleet runs as processes."""
 TIME_S_MAX = 1e6

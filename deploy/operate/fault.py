@@ -17,7 +17,7 @@ from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agent
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import goal_of, note
-from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, GOAL, LEADER, LIVE, ORDERS, RESTART, SIGNALS
+from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, GOAL, LEADER, ORDERS, RESTART, SIGNALS
 from lfa.deploy.operate import go
 from lfa.deploy.process.identity import Identity, own_processes, send_signal
 from lfa.protocol import clock, incarnations
@@ -37,7 +37,7 @@ SENT_S = 0.05  # delay [s] so that the event about a fault leaves before the fau
 
 
 def command(
-    action: Annotated[str, typer.Argument(help=f"One of: {', '.join(LIVE)}.")],
+    action: Annotated[str, typer.Argument(help=f"One of: {', '.join(FAULT_ACTIONS)}.")],
     target: Annotated[
         str,
         typer.Argument(
@@ -49,8 +49,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> int:
     """Inject a fault into a fleet that runs on this machine. Raises Refused."""
-    if action not in LIVE:
-        raise Refused(f"{action!r}: must be one of {', '.join(LIVE)}")
+    if action not in FAULT_ACTIONS:
+        raise Refused(f"{action!r}: must be one of {', '.join(FAULT_ACTIONS)}")
     if action == GOAL:
         return go.command(*goal_of(target), fleet=fleet, as_json=as_json)
     team = one_fleet(agents(), fleet)

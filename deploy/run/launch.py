@@ -17,7 +17,7 @@ import msgspec
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.goals import check_goals
-from lfa.deploy.faults.script import SIMULATED, Fault
+from lfa.deploy.faults.script import Fault
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
@@ -58,10 +58,8 @@ RECORDER_S_MAX = 30.0  # to read the recording and write the summary
 
 def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
     """Run `scenario` as processes; all have ended when this returns. Raises Refused for a bad `out` or fault."""
-    simulated = next((fault for fault in faults if fault.action in SIMULATED), None)
-    if simulated is not None or scenario.radio.range_m > 0.0:
-        what = "radio.range_m" if simulated is None else f"fault '{simulated}'"
-        raise Refused(f"{what}: only in lfa sim, a live receiver does not know how far away its senders are")
+    if scenario.radio.range_m > 0.0:
+        raise Refused("radio.range_m: only in lfa sim, say the fault 'range 5 at 0 s' where robots are processes")
     drawn = draw(scenario, seed)
     check_goals(drawn, faults)
     folder = make(out, drawn)

@@ -19,7 +19,7 @@ from lfa.deploy.client.stop_fleet import TOPICS as STOP_TOPICS
 from lfa.deploy.client.stop_fleet import outcome_lines
 from lfa.deploy.faults.goals import check_goal
 from lfa.deploy.faults.link_faults import goal_of, note
-from lfa.deploy.faults.script import GOAL, LEADER, LIVE, ORDERS, RESTART, SIGNALS
+from lfa.deploy.faults.script import FAULT_ACTIONS, GOAL, LEADER, ORDERS, RESTART, SIGNALS
 from lfa.deploy.process.identity import identify, send_signal
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.view.picture.ground import ground_of, ground_of_mission
@@ -44,7 +44,7 @@ BEAT_S = 0.2
 RESTART_S, RESTART_EVERY_S = 2.0, 0.3
 SENT_S = 0.02
 """Delay [s] so that the event about a fault leaves before the fault."""
-LINK_FAULTS = ("cut", "heal", "loss")
+LINK_FAULTS = ("cut", "heal", "loss", "range")
 
 
 class FleetEngine:
@@ -181,8 +181,8 @@ class FleetEngine:
     def _fault(self, text: str) -> str:
         """Carry out a fault; return what was done. Raises Refused."""
         action, _, target = text.strip().partition(" ")
-        if action not in LIVE:
-            raise Refused(f"{action[:20]!r}: must be one of {', '.join(LIVE)}")
+        if action not in FAULT_ACTIONS:
+            raise Refused(f"{action[:20]!r}: must be one of {', '.join(FAULT_ACTIONS)}")
         if target == LEADER:
             if self._picture.leader is None:
                 raise Refused(f"{text}: nobody leads at the moment")

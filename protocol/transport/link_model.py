@@ -16,8 +16,10 @@ from typing import Any
 import msgspec
 from msgspec import Struct, structs
 
+from lfa.protocol.messages.robot import Localization
+from lfa.protocol.messages.team import PoseStamped, TableRow
 from lfa.protocol.names import WITNESS_NAME
-from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER, WORLD_NAME, address
+from lfa.protocol.topics import OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER, WORLD_NAME, address, message_in
 from lfa.protocol.transport.bus import Arrival
 
 Link = tuple[str, str]
@@ -26,6 +28,8 @@ LINK_CONDITIONS = "weather"
 """Operator command that sets link conditions; its arguments are those of `LinkModel.obey`."""
 WAITING_MAX = 4096
 """Maximum number of delayed messages at a live receiver."""
+_PLACED = frozenset({"localization", "pose", "table"})
+"""Topics from which a live receiver knows where its own robot and its senders are."""
 _ON_NO_LINK = (OPERATOR_NAME, RECORDER_NAME, TRUTH_OWNER)
 
 
@@ -50,7 +54,7 @@ class Radio(Struct, frozen=True, forbid_unknown_fields=True):
     reorder: float = 0.0
     """Probability that a message is held back for up to 0.15 s, so that later ones overtake it."""
     range_m: float = 0.0
-    """Distance [m] up to which robots hear each other, 0: any; only in virtual time, where their places are known."""
+    """Distance [m] up to which robots hear each other, 0: any. Processes know the places from what robots say."""
 
     @property
     def prompt_s(self) -> float:
@@ -190,12 +194,23 @@ class Reception:
 
     def put(self, arrival: Arrival) -> None:
         """Queue a message of the bus with its simulated delays; drop it if it is lost."""
+        if self.link_model.radio.range_m > 0.0:
+            self._locate(arrival)
         link = link_of(arrival.key, self._receiver)
         delays = [0.0] if link is None else self.link_model.delays(*link)
         for delay_s in delays[: WAITING_MAX - len(self._waiting)]:
             self._order += 1
             due = structs.replace(arrival, at=arrival.at + delay_s) if delay_s > 0.0 else arrival
             heapq.heappush(self._waiting, (due.at, self._order, due))
+
+    def _locate(self, arrival: Arrival) -> None:
+        """Note where a robot says that it is, in a message that is then lost as well, and where this one is itself."""
+        where = address(arrival.key)
+        if where is None or where.topic not in _PLACED or not isinstance(arrival.payload, bytes):
+            return
+        match message_in(arrival.key, arrival.payload):
+            case Localization(pose_map=at) | (PoseStamped() as at) | (TableRow(placed=True) as at):
+                self.link_model.places[where.owner] = at.x, at.y
 
     def take(self, now: float) -> list[Arrival]:
         """Return and remove the messages due until `now` [s], in order of time."""

@@ -51,8 +51,6 @@ export class Controls {
       if (scene.faults !== false) {
         this.loss = this.slider("loss", 0, 1, 0.05, (value) => `${Math.round(100 * value)} %`);
         parts.push(this.loss.label);
-      }
-      if (scene.engine === "virtual") {
         this.range = this.slider("range", 0, 20, 0.5, (value) => (value > 0 ? `${value} m` : "no limit"));
         parts.push(this.range.label);
       }

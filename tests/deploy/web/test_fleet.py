@@ -68,6 +68,15 @@ def test_orders_reach_the_fleet(page: Browser, fleet: Running) -> None:
     assert {"formation", "cut", "heal", "obstacle"} <= {e.get("deed") for e in fleet.events() if e["kind"] == "fault"}
 
 
+def test_the_range_slider_takes_messages_from_those_who_are_farther_away_until_it_is_let_go(page: Browser) -> None:
+    slide = "s.dispatchEvent(new Event('input')), s.dispatchEvent(new Event('change'))"
+    page.value(f"((s) => {{ s.value = 2; {slide} }})(document.getElementById('range'))")
+    page.wait_for("[...lfa.models[0].robots.values()].some((robot) => robot.loss > 0.1)")
+    page.value(f"((s) => {{ s.value = 0; {slide} }})(document.getElementById('range'))")
+    page.wait_for("[...lfa.models[0].robots.values()].every((robot) => robot.loss < 0.1)")
+    page.wait_for("[...lfa.models[0].robots.values()].filter((robot) => robot.role === 'follower').length === 3")
+
+
 def test_a_clicked_goal_is_carried_out_and_an_impossible_one_refused(page: Browser) -> None:
     page.value("lfa.order({do: 'fault', text: 'goal 20,2'})")
     page.wait_for("lfa.models[0].goal.join() === '20,2'")

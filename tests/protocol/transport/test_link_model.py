@@ -5,6 +5,12 @@ from random import Random
 import pytest
 from msgspec import structs
 
+from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.consensus import NO_TERM, Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import Localization
+from lfa.protocol.messages.team import PoseStamped, TableRow
 from lfa.protocol.transport.bus import Arrival
 from lfa.protocol.transport.link_model import REORDER_S, WAITING_MAX, LinkModel, Radio, Reception, link_of
 
@@ -18,6 +24,37 @@ def fates(radio: Radio, count: int, seed: int = 1) -> list[list[float]]:
 def test_the_share_of_lost_messages_is_the_given_one(burst: float) -> None:
     lost = sum(fate == [] for fate in fates(Radio(loss=0.2, loss_burst=burst), 20_000))
     assert abs(lost / 20_000 - 0.2) < 0.02
+
+
+def said(message: Message, key: str) -> Arrival:
+    return Arrival(1.0, f"lfa/fleet/{key}", encode(message))
+
+
+def test_a_live_receiver_hears_robots_up_to_the_range_by_what_they_say_of_their_place() -> None:
+    reception = Reception("robot2", Random(1))
+    assert reception.link_model.obey({"radio": {"range_m": 5.0}})
+    header, twist = Header("robot1", 1, 1, 0.0), Twist()
+
+    def row(x: float, placed: bool = True) -> Arrival:
+        return said(TableRow(header, x, 0.0, 0.0, 0.0, 0.0, Role.LEADER, placed=placed), "robot1/table")
+
+    def pose(x: float) -> Arrival:
+        return said(PoseStamped(header, x, 0.0, 0.0, 0.0, twist, 0.0, Role.LEADER, NO_TERM), "robot1/pose")
+
+    def heard(*arrivals: Arrival) -> list[Arrival]:
+        for arrival in arrivals:
+            reception.put(arrival)
+        return reception.take(2.0)
+
+    assert heard(row(9.0)) != [], "its own place is not known yet"
+    own = said(Localization(header, Pose2D(0.0, 0.0, 0.0)), "robot2/localization")
+    assert heard(own) == [own]
+    assert heard(row(9.0)) == heard(pose(6.0)) == []
+    assert heard(pose(4.0)) != []
+    assert heard(row(9.0, placed=False)) != [], "a robot without a pose is where it was last"
+    assert heard(Arrival(1.0, "lfa/fleet/robot1/pose", b"noise")) != [], "dropped by the decoder behind it, not here"
+    assert reception.link_model.obey({"heal": True})
+    assert heard(pose(9.0)) != []
 
 
 def test_bursts_have_the_given_mean_length() -> None:
