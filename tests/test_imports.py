@@ -51,7 +51,7 @@ ORDER = (
     "deploy/fleet/security", "deploy/fleet/engine", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet/export",
     "deploy/fleet", "deploy/web", "deploy/bench/harness",
     "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/engines", "deploy/campaign/commands",
-    "deploy/bench/control_cases", "deploy/bench/agents",
+    "deploy/bench/control_cases", "deploy/bench/driving", "deploy/bench/agents",
     "deploy/bench/operate", "deploy/bench/sim", "deploy/bench/web", "deploy/bench", "deploy/cli", "deploy/completion",
 )  # fmt: skip
 """Rooms: a folder, or a file that lies directly in a package. Each imports only rooms that stand before it, so there is

@@ -1,173 +1,173 @@
-"""`lfa bench motion`: complete teams in virtual time in every shipped scenario, and on unknown maps.
+"""`lfa bench motion`: complete teams in virtual time, on every ground that driving is judged by.
 
-Each case is one scenario over several seeds, or random pairs of start and goal on a map. A run is good if it ends at
-its goal without contact, without a violated invariant and without a robot left behind; otherwise the cause is printed.
-Maps of the Nav2 project are searched in `shared/data/maps`, beside the checkout or above it; without them their rows
-are skipped with a message.
+The rows: every shipped scenario; the BARN worlds (`lfa bench barn`, and with the noise of `explore`); gaps, traps,
+corners and a closing door; whatever moves; maps that nobody knows; the time of one control step. A run is good if it
+ends at its goal without contact, without a violated invariant and without a robot left behind. What falls short is
+listed by cause, each run with its folder, in which `lfa explain`, `lfa plot` and `lfa view` show it again.
+Maps and worlds of others are searched in `shared`, beside the checkout or above it; without them their rows are
+skipped with a message.
 """
 
 from __future__ import annotations
 
-import shutil
 import sys
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator
 from fnmatch import fnmatchcase
-from functools import cache, partial
-from math import ceil, hypot
+from functools import partial
+from math import ceil
 from pathlib import Path
 from random import Random
+from time import strftime
 
-from msgspec import Struct
-
-from lfa.deploy.analysis.summary import Summary
+from lfa.deploy.bench import barn
+from lfa.deploy.bench.driving import courses, movers, step_time, unknown_maps
+from lfa.deploy.bench.driving.course_file import course_text
+from lfa.deploy.bench.driving.courses import CourseKind
+from lfa.deploy.bench.driving.movers import MoverKind
+from lfa.deploy.bench.driving.one_run import complaint, driven, loaded, note, show_failures
+from lfa.deploy.bench.driving.unknown_maps import BenchMap
 from lfa.deploy.bench.harness.kept import Keep, measured_or_kept
 from lfa.deploy.bench.harness.rows import Case, CasePart, Quantity, many, select, show
+from lfa.deploy.recording.run_folder import RUNS
 from lfa.protocol.errors import Refused
 
-SEEDS = 3
-TRIES_MAX = 4000
-FOUND_IN = Path("shared") / "data" / "maps"
+SEEDS = 10
+"""Runs of each shipped scenario, course and body, where the command line gives no number."""
+MOVER_SEEDS = 20
+GOOD_SHARE = 0.98
+WAY_RATIO_MAX = 1.4
+STEP_MS_MAX = 1.5
 
 
-class BenchMap(Struct, frozen=True):
-    """Map that the robots do not know, and the parameters of the start and goal pairs drawn on it."""
-
-    name: str
-    shipped: bool = False
-    robots: int = 4
-    apart_m: float = 8.0
-    """Minimum straight distance [m] between start and goal; no route is shorter."""
-    clear_m: float = 0.45
-    """Minimum clearance [m] of start and goal."""
-    pairs: int = 20
-    sets: tuple[str, ...] = ()
+def run(as_json: bool, rows: str = "*", jobs: int = 1, seeds: int | None = None, keep: Keep | None = None) -> int:
+    """Print the rows whose names match the glob `rows`, then the failures by cause; return 0 if all hold, else 1."""
+    failed = RUNS / f"motion-{strftime('%Y%m%d-%H%M%S')}"
+    code = show(measured_or_kept("motion", select(cases(seeds, failed, rows), rows), jobs, rows, keep), as_json)
+    show_failures(failed, as_json)
+    return code
 
 
-GOOD_SHARE = 0.9
-GROUNDS = (
-    BenchMap("rooms", shipped=True),
-    BenchMap("depot"),
-    BenchMap(
-        "tb3_sandbox", robots=2, apart_m=3.0, clear_m=0.25, pairs=10, sets=("mission.formation.separation_m=0.6",)
-    ),
-)
+def cases(seeds: int | None, failed: Path, rows: str = "*") -> list[Case]:
+    """Return the cases: `seeds` runs of each, or of pairs and worlds; None: the numbers that the bars need.
+
+    Failing runs leave their folders in `failed`. What lacks its file is left out, with a line where `rows` names it.
+    """
+    return [
+        *_scenarios(seeds or SEEDS, failed),
+        *_barn(seeds, failed, rows),
+        *(
+            _course(kind, motion, radius_m, seeds or SEEDS, failed)
+            for kind in courses.KINDS
+            for motion in kind.motions
+            for radius_m in kind.radii_m
+        ),
+        *(_mover(kind, motion, seeds or MOVER_SEEDS, failed) for kind in movers.KINDS for motion in movers.MOTIONS),
+        *_unknown(seeds, failed, rows),
+        Case("step/180 beams", (Quantity("p99", "ms", STEP_MS_MAX),), step_time.step_ms),
+    ]
 
 
-def cases(seeds: int | None) -> list[Case]:
-    """Return the cases: `seeds` runs per scenario and pairs per available map; None: the numbers that the bars need."""
+def _scenarios(seeds: int, failed: Path) -> Iterator[Case]:
     from lfa.world.description.load import shipped
 
-    of_each = seeds or SEEDS
-    all_good = Quantity("good", "runs", float(of_each), "at least")
-    runs = [many(f"scenario/{name}", (all_good,), seeds_of(name, of_each)) for name in shipped()]
-    return runs + [_unknown(ground, seeds or ground.pairs) for ground in GROUNDS if map_of(ground) is not None]
+    all_good = Quantity(f"good of {seeds}", "runs", float(seeds), "at least")
+    for name in shipped():
+        parts = [CasePart(seed, partial(run_good, name, failed, seed)) for seed in range(1, seeds + 1)]
+        yield many(f"scenario/{name}", (all_good,), parts)
 
 
-def _unknown(ground: BenchMap, count: int) -> Case:
-    good = Quantity(f"good of {count}", "runs", float(ceil(GOOD_SHARE * count)), "at least")
-    parts = [CasePart(number, partial(pair_good, ground, count, number)) for number in range(1, count + 1)]
-    return many(f"unknown/{ground.name}", (good,), parts)
-
-
-def map_of(ground: BenchMap) -> Path | None:
-    """Return the path of the map's YAML file, or None if it does not exist."""
-    from lfa.world.description.load import SCENARIOS
-
-    if ground.shipped:
-        return SCENARIOS / "maps" / f"{ground.name}.yaml"
-    above = (*Path.cwd().parents, *Path(__file__).resolve().parents)
-    return next((path for up in above if (path := up / FOUND_IN / f"{ground.name}.yaml").is_file()), None)
-
-
-def run(
-    as_json: bool, rows: str = "scenario/*", jobs: int = 1, seeds: int | None = None, keep: Keep | None = None
-) -> int:
-    """Print the rows whose names match the glob `rows`; return 0 if all hold, else 1."""
-    for ground in GROUNDS:
-        if map_of(ground) is None and fnmatchcase(f"unknown/{ground.name}", rows.rsplit("/good", 1)[0]):
-            where = f"{FOUND_IN / ground.name}.yaml"
-            print(f"unknown/{ground.name} is left out: no {where} beside the checkout or above it", file=sys.stderr)
-    return show(measured_or_kept("motion", select(cases(seeds), rows), jobs, rows, keep), as_json)
-
-
-def seeds_of(name: str, seeds: int) -> list[CasePart]:
-    """Return a part for each of the seeds 1 to `seeds` of the scenario."""
-    return [CasePart(seed, partial(run_good, name, seed)) for seed in range(1, seeds + 1)]
-
-
-def run_good(name: str, seed: int) -> tuple[float]:
-    """Return 1 if the run of the scenario is good, else 0."""
-    return (float(_good(name, seed, ())),)
-
-
-def pair_good(ground: BenchMap, count: int, number: int) -> tuple[float]:
-    """Return 1 if the run on the `number`-th of `count` random pairs is good, else 0; the map may have fewer pairs."""
-    drawn = pairs(ground, count)
-    return (float(number <= len(drawn) and _good("explore", number, drawn[number - 1], ground.robots)),)
-
-
-@cache
-def pairs(ground: BenchMap, count: int) -> list[tuple[str, ...]]:
-    """Return up to `count` random pairs in free space, each as arguments of `--set`.
-
-    The scenario `explore` must load with each pair: the chain fits at the start, and a route leads to the goal.
-    """
-    from lfa.world.description import maps
+def run_good(name: str, failed: Path, seed: int) -> list[float]:
+    """Return 1 if the run of the shipped scenario is good, else 0."""
     from lfa.world.description.load import load
 
-    path = map_of(ground)
-    assert path is not None, ground
-    drawn = maps.read(path)
-    room, chance, found = maps.Room(drawn), Random("pairs"), list[tuple[str, ...]]()
-    free = [(int(row), int(column)) for row, column in zip(*(drawn.cells == 0).nonzero(), strict=True)]
-    sets = ground.sets if ground.shipped else (f"map={path}", *ground.sets)
-    for _ in range(TRIES_MAX):
-        if len(found) == count:
-            break
-        a, b = (
-            drawn.to_map((column + chance.random()) * drawn.resolution_m, (row + chance.random()) * drawn.resolution_m)
-            for row, column in chance.choices(free, k=2)
-        )
-        clear_m = min(room.clearance_m(*a), room.clearance_m(*b))
-        if hypot(a[0] - b[0], a[1] - b[1]) < ground.apart_m or clear_m < ground.clear_m:
-            continue
-        pair = (*sets, f"start={a[0]:.2f},{a[1]:.2f}", f"goal={b[0]:.2f},{b[1]:.2f}")
-        try:
-            load("explore", pair, ground.robots)
-        except Refused:
-            continue
-        found.append(pair)
-    return found
+    with driven(load(name), seed) as done:
+        wrong = complaint(done.summary)
+        note(f"scenario/{name}", done, wrong, failed)
+    return [float(wrong is None)]
 
 
-def _good(name: str, seed: int, sets: Sequence[str], robots: int | None = None) -> bool:
-    from lfa.deploy.faults.script import parse_all
-    from lfa.deploy.run.simulate import run as simulate
-    from lfa.world.description.load import load
-
-    scenario = load(name, sets, robots)
-    folder = Path(tempfile.mkdtemp(prefix="lfa-motion-"))
+def _barn(seeds: int | None, failed: Path, rows: str) -> list[Case]:
     try:
-        summary = simulate(scenario, seed, folder / "run", parse_all(scenario.mission, scenario.faults, ())).summary
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    if summary.outcome == "interrupted":  # a signal ended the run, so the bench ends too
-        raise KeyboardInterrupt
-    wrong = complaint(summary)
-    options = ("" if robots is None else f" --robots {robots}") + "".join(f" --set {one}" for one in sets)
-    ended = f"{wrong or 'ok'}, {summary.sim_duration_s:.0f} s"
-    print(f"lfa sim {name} --seed {seed}{options}: {ended}", file=sys.stderr, flush=True)
-    return wrong is None
+        return barn.cases(seeds, None, failed)
+    except Refused as refused:
+        _left_out("barn/one", rows, str(refused))
+        return []
 
 
-def complaint(summary: Summary) -> str | None:
-    """Return the reason why a run is not good, or None if it is good."""
-    contacts = sum(robot.contacts for robot in summary.robots)
-    if summary.exit_code != 0:
-        return summary.reason or ", ".join(one.name for one in summary.assertions if not one.ok)
-    if summary.violations:
-        return ", ".join(one.invariant for one in summary.violations)
-    if summary.left_behind:
-        return f"left behind: {summary.left_behind}"
-    return f"{contacts} contacts" if contacts else None
+def _course(kind: CourseKind, motion: str, radius_m: float, seeds: int, failed: Path) -> Case:
+    name = f"course/{kind.name}/{motion}"
+    if len(kind.radii_m) > 1:
+        name += f"/r {radius_m:g}"
+    good = Quantity(f"good of {seeds}", "runs", float(seeds), "at least")
+    parts = [
+        CasePart(seed, partial(course_good, name, kind, motion, radius_m, failed, seed)) for seed in range(1, seeds + 1)
+    ]
+    return many(name, (good,), parts)
+
+
+def course_good(name: str, kind: CourseKind, motion: str, radius_m: float, failed: Path, seed: int) -> list[float]:
+    """Return 1 if the run through the course that the seed draws is good, else 0."""
+    course = kind.draw(Random(f"{kind.name} {seed}"), radius_m)
+    text = course_text(name, course, motion, sets=(f"radius_m = {radius_m:g}",))
+    with driven(loaded(kind.name, text), seed) as done:
+        wrong = complaint(done.summary)
+        note(name, done, wrong, failed)
+    return [float(wrong is None)]
+
+
+def _mover(kind: MoverKind, motion: str, seeds: int, failed: Path) -> Case:
+    name = f"mover/{kind.name}/{motion}"
+    quantities = (
+        Quantity(f"good of {seeds}", "runs", float(seeds), "at least"),
+        Quantity("contacts to blame", "", 0.0),
+    )
+    parts = [CasePart(seed, partial(mover_good, name, kind, motion, failed, seed)) for seed in range(1, seeds + 1)]
+    return many(name, quantities, parts)
+
+
+def mover_good(name: str, kind: MoverKind, motion: str, failed: Path, seed: int) -> list[float]:
+    """Return 1 if the run among the movers that the seed draws is good, else 0, and the contacts that count."""
+    course, mps = movers.drawn(kind, seed)
+    scenario = loaded(kind.name, course_text(f"{name} at {mps:g} m/s", course, motion))
+    with driven(scenario, seed) as done:
+        wrong, counted = movers.wrong_of(done, faster=mps > scenario.mission.limits.v_max_mps)
+        note(f"{name} at {mps:g} mps", done, wrong, failed)
+    return [float(wrong is None), float(counted)]
+
+
+def _unknown(seeds: int | None, failed: Path, rows: str) -> Iterator[Case]:
+    for ground in unknown_maps.GROUNDS:
+        name, count = f"unknown/{ground.name}", seeds or ground.pairs
+        if unknown_maps.map_of(ground) is None:
+            _left_out(name, rows, f"no shared/{ground.place} beside the checkout or above it")
+            continue
+        quantities = (
+            Quantity(f"good of {count}", "runs", float(ceil(GOOD_SHARE * count)), "at least"),
+            Quantity("way over the shortest known", "", WAY_RATIO_MAX, over="mean"),
+        )
+        parts = [CasePart(n, partial(pair_good, ground, count, failed, n)) for n in range(1, count + 1)]
+        yield many(name, quantities, parts)
+
+
+def pair_good(ground: BenchMap, count: int, failed: Path, number: int) -> list[float]:
+    """Return 1 if the run on the `number`-th of `count` random pairs is good, else 0, and the longest way of a robot
+    over the shortest known one; the map may have fewer pairs.
+    """
+    from lfa.world.description.load import load
+
+    drawn = unknown_maps.pairs(ground, count)
+    if number > len(drawn):
+        return [0.0, 1.0]
+    pair = drawn[number - 1]
+    scenario = load("explore", pair, ground.robots)
+    with driven(scenario, number) as done:
+        wrong = complaint(done.summary)
+        note(f"unknown/{ground.name}", done, wrong, failed)
+        way_m = max(robot.way_m or 0.0 for robot in done.summary.robots if robot.role_at_end == "leader")
+    return [float(wrong is None), way_m / unknown_maps.shortest_on(ground, pair, scenario.mission.radius_m)]
+
+
+def _left_out(name: str, rows: str, why: str) -> None:
+    """Say that the rows of a case are left out, where the glob `rows` names them."""
+    if fnmatchcase(name, rows) or fnmatchcase(f"{name}/", rows.rpartition("/")[0] + "/"):
+        print(f"{name} is left out: {why}", file=sys.stderr)

@@ -37,7 +37,7 @@ def command(
     ] = None,
     shard: Annotated[str | None, typer.Option(help="With --out: measure only this share, 3/16.")] = None,
     seeds: Annotated[
-        int | None, typer.Option(help="Number of runs of each scenario, from seed 1; of pairs on each map.")
+        int | None, typer.Option(help="Number of runs of each case, from seed 1; of pairs on each map, of BARN worlds.")
     ] = None,
 ) -> int:
     """Run a benchmark; exit with code 1 if a row misses its bar."""
