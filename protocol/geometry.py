@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, hypot, pi, sin
 from typing import Annotated
 
@@ -99,3 +100,21 @@ def in_base(pose: Pose2D, point: Point) -> Point:
     dx, dy = point[0] - pose.x, point[1] - pose.y
     c, s = cos(pose.theta), sin(pose.theta)
     return c * dx + s * dy, c * dy - s * dx
+
+
+CORNER_M_MIN = 0.001
+"""Length [m] whose square is the least area by which a corner of a convex polygon turns left."""
+
+
+def convex(corners_m: Sequence[tuple[float, float]]) -> bool:
+    """Return True if every corner turns left and the corners turn once around in all (a pentagram turns twice)."""
+    if len(corners_m) < 3:
+        return False
+    turned_rad = 0.0
+    for n, (cx, cy) in enumerate(corners_m):
+        (ax, ay), (bx, by) = corners_m[n - 2], corners_m[n - 1]
+        across = (bx - ax) * (cy - by) - (by - ay) * (cx - bx)
+        if across <= CORNER_M_MIN**2:
+            return False
+        turned_rad += atan2(across, (bx - ax) * (cx - bx) + (by - ay) * (cy - by))
+    return turned_rad < 1.5 * TAU

@@ -26,7 +26,7 @@ ORDER = (
     "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/plug_in",
     "protocol/clock",
     "protocol/incarnations",
-    "protocol/names", "protocol/mission", "protocol/mission_checks", "protocol/geometry", "protocol/messages",
+    "protocol/names", "protocol/geometry", "protocol/mission", "protocol/mission_checks", "protocol/messages",
     "protocol/node", "protocol/topics", "protocol/outbox", "protocol/fleet_stop", "protocol/lease",
     "protocol/lease/machine", "protocol/witness", "protocol/transport", "protocol/runtime",
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan2
 
 from lfa.protocol.fleet_stop.answers import StopAnswers
-from lfa.protocol.geometry import TAU, Pose2D, Twist, wrap
+from lfa.protocol.geometry import Pose2D, Twist, wrap
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
@@ -24,7 +24,8 @@ from lfa.protocol.node import Envelope
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TO_ALL, WORLD_NAME
 from lfa.world.description.scenario import Scenario
-from lfa.world.sensors.lidar import ANGLE_MIN, Floats
+from lfa.world.sensors.lidar import Floats
+from lfa.world.sensors.lidar_mount import seen_from_base
 from lfa.world.sensors.noise import HeightNoise, Localizer, RangeNoise, WheelOdometry
 
 PARTS = ("driver", "localization", "scanner")
@@ -130,14 +131,9 @@ class RobotHardware:
     def scan(self, stamp: float, ranges: Floats) -> Envelope:
         """Return the scan that this robot's scanner measures from the exact `ranges` [m], one per beam."""
         lidar = self._lidar
-        message = LaserScan(
-            self._outbox.header("scan", stamp),
-            ANGLE_MIN,
-            TAU / lidar.beams,
-            lidar.range_min_m,
-            lidar.range_max_m,
-            self._range_noise.apply(ranges),
-        )
+        seen = seen_from_base(self._range_noise.apply(ranges), lidar)
+        limits = lidar.range_min_m, seen.range_max_m
+        message = LaserScan(self._outbox.header("scan", stamp), seen.angle_min, seen.step, *limits, seen.ranges_m)
         return self._outbox.envelope("scan", message)
 
     def ground(self, stamp: float, offsets_m: tuple[float, ...], heights: Floats) -> Envelope:

@@ -89,6 +89,14 @@ NOISE = (
     "world.noise.range_dropout=0.002",
 )
 """Noise of the shipped scenario `explore`."""
+JACKAL = (
+    "mission.radius_m=0.333",
+    "mission.footprint_m=[[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]]",
+    "world.lidar.fov_rad=4.712389",
+    "world.lidar.beams=270",
+    "world.lidar.mount=[0.12, 0.0, 0.0]",
+)
+"""A Jackal with its scanner of 270 degrees ahead of its centre, with a beam a degree."""
 BODY = f"mission.radius_m={RADIUS_M}"
 COLUMN_OF_THREE = (
     "mission.robots=[1, 2, 3]",
@@ -100,6 +108,7 @@ TEAMS = (
     BarnTeam("one", (BODY, *DRIVE), score_bar=SCORE_BAR),
     BarnTeam("one_noisy", (BODY, *DRIVE, *NOISE), score_bar=NOISY_SCORE_BAR),
     BarnTeam("jackal_circle", ("mission.radius_m=0.333", *DRIVE), good_share=0.96),
+    BarnTeam("jackal_rectangle", (*JACKAL, *DRIVE), good_share=0.96),
     BarnTeam("path_following", (BODY, "mission.leading.motion=path_following"), scored=False, good_share=0.95),
     BarnTeam("point_to_point", (BODY, "mission.leading.motion=point_to_point"), scored=False, good_share=0.95),
     BarnTeam("reactive", (BODY, "mission.leading.motion=reactive"), scored=False, good_share=0.8),

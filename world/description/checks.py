@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from difflib import get_close_matches
-from math import atan2, hypot, pi
+from math import hypot, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, Rule, out_of_range, wrong
-from lfa.protocol.geometry import TAU
+from lfa.protocol.geometry import TAU, convex
 from lfa.protocol.names import robot_name
-from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Point, Scenario
+from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Scenario
 from lfa.world.description.terrain import feature_mistakes, features
 
 ROBOTS_MAX = 500
@@ -62,6 +62,14 @@ def _assertions(scenario: Scenario) -> Iterator[Mistake]:
             yield wrong(f"assert.{bound}", value, "0 or more: less can never hold, or always does")
 
 
+def _mount(scenario: Scenario) -> Iterator[Mistake]:
+    """Require a scanner on the robot: its beams begin inside of the body's circle."""
+    mount, radius_m = scenario.world.lidar.mount, scenario.mission.radius_m
+    if not (all(map(isfinite, mount)) and hypot(mount[0], mount[1]) <= radius_m and abs(mount[2]) <= TAU):
+        right = f"x, y [m] within mission.radius_m = {radius_m:g} of the centre, and an angle [rad] of a turn at most"
+        yield wrong("world.lidar.mount", list(mount), right, "mission.radius_m")
+
+
 def _terrain(scenario: Scenario) -> Iterator[Mistake]:
     for key, feature in features(scenario.world):
         yield from feature_mistakes(f"world.{key}", feature)
@@ -79,6 +87,7 @@ def _ranges(scenario: Scenario) -> Iterator[Mistake]:
         Range("world.lidar.beams", lidar.beams, 4, 4096),
         Range("world.lidar.range_min_m", lidar.range_min_m, 0.0, lidar.range_max_m, "world.lidar.range_max_m"),
         Range("world.lidar.range_max_m", lidar.range_max_m, 0.1, 1e3),
+        Range("world.lidar.fov_rad", lidar.fov_rad, 0.1, TAU),
         Range("world.lidar.rate_hz", lidar.rate_hz, 0.1, world.physics_hz, "world.physics_hz"),
         Range("world.ground.first_m", ground.first_m, 0.0, ground.reach_m, "world.ground.reach_m"),
         Range("world.ground.reach_m", ground.reach_m, 0.05, 10.0),
@@ -124,7 +133,7 @@ def _shape(where: str, obstacle: Obstacle) -> Iterator[Mistake]:
         yield Mistake(where, says, (f"{where}.radius_m", f"{where}.corners_m"))
     if radius_m is not None and not 0.01 <= radius_m <= 100.0:
         yield wrong(f"{where}.radius_m", radius_m, "a number from 0.01 to 100")
-    if corners_m is not None and not _convex(corners_m):
+    if corners_m is not None and not convex(corners_m):
         right = "at least three corners of a convex polygon, counter-clockwise"
         yield wrong(f"{where}.corners_m", [list(corner) for corner in corners_m], right)
     if obstacle.mass_kg is not None and not 0.01 <= obstacle.mass_kg <= 1e4:
@@ -157,20 +166,7 @@ def _motion(where: str, obstacle: Obstacle) -> Iterator[Mistake]:
         yield wrong(f"{where}.walk_m", obstacle.walk_m, right, f"{where}.speed_mps")
 
 
-def _convex(corners_m: tuple[Point, ...]) -> bool:
-    """Return True if every corner turns left and the corners turn once around in all (a pentagram turns twice)."""
-    if len(corners_m) < 3:
-        return False
-    turned_rad = 0.0
-    for n, (cx, cy) in enumerate(corners_m):
-        (ax, ay), (bx, by) = corners_m[n - 2], corners_m[n - 1]
-        across = (bx - ax) * (cy - by) - (by - ay) * (cx - bx)
-        if across <= LENGTH_M_MIN**2:
-            return False
-        turned_rad += atan2(across, (bx - ax) * (cx - bx) + (by - ay) * (cy - by))
-    return turned_rad < 1.5 * TAU
-
-
 SCENARIO_RULES: tuple[Rule[Scenario], ...] = tuple(
-    Rule(check) for check in (_saved_from, _robots, _ranges, _obstacles, _terrain, _assertions, _restarts, _walls)
+    Rule(check)
+    for check in (_saved_from, _robots, _ranges, _obstacles, _mount, _terrain, _assertions, _restarts, _walls)
 )

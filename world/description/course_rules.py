@@ -47,7 +47,7 @@ def _goal(scenario: Scenario) -> Iterator[Mistake]:
     start = f"the start of robot {mission.robots[0]} at ({first.x:.2f}, {first.y:.2f})"
     value = f"... [{goal[0]:g}, {goal[1]:g}]"
     yield from _covered(scenario, goal, f"the goal at ({goal[0]:.2f}, {goal[1]:.2f})")
-    if parted(((first.x, first.y), *route), scenario.world.walls_m):
+    if parted(((first.x, first.y), *route), scenario.world.walls_m, mission.radius_m):
         yield wrong("mission.leading.route_m", value, f"a goal that can be reached, walls part it from {start}")
     for n, box in enumerate(mission.leading.keepout_m):
         if _within(goal, box):

@@ -11,6 +11,7 @@ from typing import Literal
 
 from msgspec import Struct, field
 
+from lfa.protocol.geometry import TAU
 from lfa.protocol.mission import Mission, Parameter
 from lfa.protocol.transport.link_model import Radio
 from lfa.world.description.terrain import Bump, Ditch, Pothole
@@ -60,12 +61,21 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
-    """Laser scanner at the centre of each robot, covering 360 degrees."""
+    """Laser scanner of each robot. Its scans are published as seen from `base_link`, wherever it is mounted."""
 
     beams: int = 180
     range_min_m: float = 0.05
     range_max_m: float = 8.0
     rate_hz: float = 10.0
+    fov_rad: float = TAU
+    """Field of view [rad], centred on the scanner's own x axis; what lies outside of it is not seen."""
+    mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Mounting pose x, y [m], theta [rad] in `base_link`."""
+
+    @property
+    def beams_a_turn(self) -> int:
+        """Number of beams that a full turn would have."""
+        return round(self.beams * TAU / self.fov_rad)
 
 
 class Ground(Struct, frozen=True, forbid_unknown_fields=True):

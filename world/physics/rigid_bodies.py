@@ -56,7 +56,10 @@ class Physics:
         self.wheels: list[Twist] = [STILL] * len(self.poses)
         """Twist that each robot's wheels roll; differs from `twists` where they slip."""
         mass_kg, radius_m = world.body.mass_kg, mission.radius_m
+        self._footprint_m = mission.footprint_m
         self._inertia = pymunk.moment_for_circle(mass_kg, 0.0, radius_m)
+        if self._footprint_m:
+            self._inertia = pymunk.moment_for_poly(mass_kg, self._footprint_m)
         self._mass_kg, self._push_n, self._torque_nm = mass_kg, world.body.push_n, world.body.push_n * radius_m
         self._robots = [self._add_robot(n, robot_name(robot_id), radius_m) for n, robot_id in enumerate(mission.robots)]
         self._velocity = [(0.0, 0.0, 0.0)] * len(self._robots)
@@ -182,7 +185,8 @@ class Physics:
         body = pymunk.Body(self._mass_kg, self._inertia)
         body.position, body.angle = (self.poses[n].x, self.poses[n].y), self.poses[n].theta
         self._space.add(body)
-        self._add_shape(pymunk.Circle(body, radius_m), _ROBOT, n, name)
+        body_shape = pymunk.Poly(body, self._footprint_m) if self._footprint_m else pymunk.Circle(body, radius_m)
+        self._add_shape(body_shape, _ROBOT, n, name)
         return body
 
     def _add_shape(self, shape: pymunk.Shape, kind: int, robot: int, name: str) -> None:

@@ -241,6 +241,16 @@ def test_a_goal_in_a_keepout_zone_is_refused(tmp_path: Path) -> None:
         load("explore", sets)
 
 
+def test_walls_with_a_gap_that_only_a_smaller_robot_fits_through_part_the_ground() -> None:
+    for angle in (0.0, 0.3, pi / 4, 1.1):
+        c, s = np.cos(angle), np.sin(angle)
+        box = [(2.0, -2.0), (2.0, 2.0), (-2.0, 2.0), (-2.0, -2.0), (1.33, -2.0)]
+        turned = [(c * x - s * y, s * x + c * y) for x, y in box]
+        walls = [(*a, *b) for a, b in pairwise(turned)]
+        parts = [parted([(0.0, 0.0), (9.0, 1.0)], walls, robot_m) for robot_m in (0.25, 0.333, 0.5)]
+        assert parts == [False, False, True], angle
+
+
 @pytest.mark.parametrize(("gap_m", "barred"), [(0.0, True), (0.3, False)])
 def test_walls_with_a_gap_that_a_robot_fits_through_part_nothing(gap_m: float, barred: bool) -> None:
     """Along, across and aslant of the cells of the flood fill."""

@@ -15,7 +15,7 @@ from lfa.protocol.geometry import TAU, Pose2D
 from lfa.world.description.load import Lidar, load
 from lfa.world.description.placement import to_segment
 from lfa.world.description.scenario import Scenario
-from lfa.world.sensors.lidar import ANGLE_MIN, Scanner, cast
+from lfa.world.sensors.lidar import ANGLE_MIN, Scanner, cast, robot_outlines
 
 BEAMS = 72
 AHEAD, LEFT, BEHIND, RIGHT = BEAMS // 2, BEAMS * 3 // 4, 0, BEAMS // 4
@@ -111,7 +111,8 @@ def test_the_batch_sees_what_the_engine_sees(
     clear = [c for c in circles if all(hypot(c[0] - x, c[1] - y) > c[2] + 0.06 for x, y, _ in poses)]
     segments = [s for s in segments if all(_is_fair(s, x, y) for x, y, _ in poses)]
     lidar = Lidar(beams=beams)
-    ranges = cast(poses, 0.15, np.array(clear).reshape(-1, 3), np.array(segments).reshape(-1, 4), lidar)
+    bodies = robot_outlines(poses, (), 0.15)
+    ranges = cast(poses, bodies, np.array(clear).reshape(-1, 3), np.array(segments).reshape(-1, 4), lidar)
     for n, pose in enumerate(poses):
         for beam in range(beams):
             angle = pose[2] + ANGLE_MIN + beam * TAU / beams
