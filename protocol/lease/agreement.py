@@ -5,10 +5,11 @@ from __future__ import annotations
 from zlib import crc32
 
 import msgspec
+from msgspec import structs
 
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
 from lfa.protocol.messages.consensus import Agreement
-from lfa.protocol.messages.header import WIRE_VERSION
+from lfa.protocol.messages.header import AGREED_WIRE, WIRE_VERSION
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import robot_name
 
@@ -54,15 +55,23 @@ def agreement_of(mission: Mission, timing: Timing) -> Agreement:
 
 
 def digest(agreement: Agreement) -> int:
-    """Return a number that differs, but for chance, where two agreements do; never 0, which is said by nobody."""
-    return crc32(msgspec.msgpack.encode(agreement)) or 1
+    """Return a number that differs, but for chance, where two agreements do; never 0, which is said by nobody.
+
+    The version of the messages is no part of it, for two of them may meet (E35).
+    """
+    return crc32(msgspec.msgpack.encode(structs.replace(agreement, wire=AGREED_WIRE))) or 1
+
+
+def understands(wire: int) -> bool:
+    """Return True if messages of version `wire` and of this one may meet in one fleet: neighbours (E35)."""
+    return abs(wire - WIRE_VERSION) <= 1
 
 
 def difference(own: Agreement, other: Agreement) -> tuple[str, object, object] | None:
     """Return the name of the first field that differs, with its own and its other value."""
     for field, name in NAMES:
         mine, theirs = getattr(own, field), getattr(other, field)
-        if mine != theirs:
+        if mine != theirs and not (field == "wire" and understands(theirs)):
             return name, _plain(mine), _plain(theirs)
     return None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from lfa.protocol.lease.quorum import is_quorum, quorum_time
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Grant, Member, Propose, Term, Version
+from lfa.protocol.messages.header import WIRE_VERSION
 
 ROUNDS_KEPT = 64
 """Number of rounds whose send times are kept for late grants: more than one T_act has in any profile."""
@@ -48,7 +49,7 @@ class Holder:
         self._sent_at.pop(number - ROUNDS_KEPT, None)
         self.next_round_at = now + RETRY_HEARTBEATS * self._timing.heartbeat_s
         fenced = self._fenced if now - self.began_at < self._timing.grant_s else ()
-        return Propose(self.term, config, number, self._me, fenced, agreed=self._agreed)
+        return Propose(self.term, config, number, self._me, fenced, agreed=self._agreed, wire=WIRE_VERSION)
 
     def transferred(self, number: int, since: float) -> None:
         """Count round `number`, sent by the term's issuer, from `since` [s], a nonce of this process (E16)."""

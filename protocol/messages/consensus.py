@@ -7,7 +7,7 @@ from enum import StrEnum
 from msgspec import Struct
 
 from lfa.protocol.geometry import Number
-from lfa.protocol.messages.header import Count, Header, Stamp
+from lfa.protocol.messages.header import UNSAID_WIRE, Count, Header, Stamp
 from lfa.protocol.mission import ColdStart, Lonely, Profile, Shrink, TieBreak
 
 
@@ -109,6 +109,8 @@ class Prepare(Struct, frozen=True, array_like=True, tag="prepare"):
     """Incarnations that an operator declared dead for this attempt only, with all earlier ones of their ids (E20)."""
     agreed: Count = 0
     """Digest of the sender's agreement (E25)."""
+    wire: Count = UNSAID_WIRE
+    """Version of the sender's messages (E35)."""
 
 
 class Grantee(Struct, frozen=True, array_like=True):
@@ -146,6 +148,8 @@ class Propose(Struct, frozen=True, array_like=True, tag="propose"):
     nonce: Stamp | None = None
     agreed: Count = 0
     """Digest of the sender's agreement (E25)."""
+    wire: Count = UNSAID_WIRE
+    """Version of the sender's messages (E35)."""
 
 
 class Grant(Struct, frozen=True, array_like=True, tag="grant"):
@@ -167,6 +171,8 @@ class Hello(Struct, frozen=True, array_like=True, tag="hello"):
     version: Version | None
     agreed: Count = 0
     """Digest of the sender's agreement (E25)."""
+    wire: Count = UNSAID_WIRE
+    """Version of the sender's messages (E35)."""
 
 
 class Superseded(Struct, frozen=True, array_like=True, tag="superseded"):

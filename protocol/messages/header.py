@@ -8,8 +8,15 @@ from msgspec import Meta, Struct
 
 from lfa.protocol.geometry import NUMBER_MAX
 
-WIRE_VERSION = 5
-"""Version of the messages, agreed on like the mission (E25): it grows with each change of a message's fields."""
+WIRE_VERSION = 6
+"""Version of the messages: it grows with each change of a message's fields (E35)."""
+AGREED_WIRE = 5
+"""Version that the digest of an agreement names (E25): of the oldest messages that are still understood. It grows when
+a message changes otherwise than by `WIRE_ADDS`, one version after those who send the new form can be heard."""
+UNSAID_WIRE = 5
+"""Version of a sender whose messages have no field `wire` yet."""
+WIRE_ADDS: dict[int, tuple[str, ...]] = {6: ("Prepare.wire", "Propose.wire", "Hello.wire")}
+"""Fields that each version adds, at the end of their messages and with a default: earlier versions skip them."""
 MESSAGE_BYTES_MAX = 64 * 1024
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 """Non-negative integer up to 2**53, so that increments still fit msgpack (2**64) and stay exact in JSON (2**53)."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from msgspec import structs
+
+from lfa.protocol.lease.agreement import understands
 from lfa.protocol.lease.effects import StandAside
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.membership import is_first
@@ -10,9 +13,13 @@ from lfa.protocol.names import robot_name
 
 
 def refuse_foreign(m: LeaseMemory, src: Member, body: Prepare | Propose | Hello, _now: float) -> None:
-    """Answer with the own agreement; nothing else of the message is read."""
+    """Answer with the own agreement; nothing else of the message is read.
+
+    To a neighbour it is said in the neighbour's version, which would else take that for the difference (E35).
+    """
     term = NO_TERM if isinstance(body, Hello) else body.term
-    m.send(robot_name(src.id), Nack(term, NO_TERM, None, 0.0, m.config, m.census.own))
+    own = structs.replace(m.census.own, wire=body.wire) if understands(body.wire) else m.census.own
+    m.send(robot_name(src.id), Nack(term, NO_TERM, None, 0.0, m.config, own))
 
 
 def refused_as_foreign(m: LeaseMemory, src: Member, body: Nack, now: float) -> None:

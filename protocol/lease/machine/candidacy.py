@@ -10,6 +10,7 @@ from lfa.protocol.lease.machine.memory import LeaseMemory, gateway_of
 from lfa.protocol.lease.membership import led_by, unanimous_config
 from lfa.protocol.lease.step_down import SLOWEST
 from lfa.protocol.messages.consensus import Fence, Fenced, Grant, Member, Nack, Prepare, Promise, Propose, Term
+from lfa.protocol.messages.header import WIRE_VERSION
 
 
 def stand(m: LeaseMemory, now: float) -> None:
@@ -32,7 +33,7 @@ def ask_promises(m: LeaseMemory, now: float) -> None:
     candidate = m.candidate
     assert candidate is not None
     candidate.asked(now)
-    request = Prepare(candidate.term, m.config.version, candidate.forget, m.agreed)
+    request = Prepare(candidate.term, m.config.version, candidate.forget, m.agreed, WIRE_VERSION)
     m.send("all", request)
     own = m.acceptor.prepare(m.me, request, m.config, now, m.holder_gone())
     if isinstance(own, Promise):

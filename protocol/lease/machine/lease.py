@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from lfa.protocol.lease.agreement import understands
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.machine import resigning, voting
@@ -282,7 +283,7 @@ class Lease:
         """Note what any message tells, and return its event; None if it says nothing to act upon."""
         m = self._memory
         if isinstance(body, Prepare | Propose | Hello):
-            if body.agreed != m.agreed:
+            if body.agreed != m.agreed or not understands(body.wire):
                 return LeaseEvent.FOREIGN
             m.census.alike(src.id)
         if not m.window.believes(highest(body), now):

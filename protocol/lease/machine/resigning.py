@@ -6,6 +6,7 @@ from lfa.protocol.lease.effects import AdoptChain, Cause, StepDown
 from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.machine.memory import LeaseMemory, gateway_of
 from lfa.protocol.messages.consensus import Config, Fence, Fenced, Grant, Member, Propose, Release, Term
+from lfa.protocol.messages.header import WIRE_VERSION
 from lfa.protocol.names import robot_name
 
 NEVER = float("inf")
@@ -103,7 +104,7 @@ def transfer(m: LeaseMemory, now: float) -> Propose | None:
     member, nonce = successor
     m.seen = Term(max(m.seen.n, m.holder.term.n) + 1, m.me.id, m.me.incarnation)
     m.window.know(m.seen.n)
-    return Propose(m.seen, m.config, 0, member, nonce=nonce, agreed=m.agreed)
+    return Propose(m.seen, m.config, 0, member, nonce=nonce, agreed=m.agreed, wire=WIRE_VERSION)
 
 
 def successor_of(m: LeaseMemory, holder: Holder, now: float) -> tuple[Member, float] | None:

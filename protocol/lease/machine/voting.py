@@ -20,6 +20,7 @@ from lfa.protocol.messages.consensus import (
     Superseded,
     Term,
 )
+from lfa.protocol.messages.header import WIRE_VERSION
 from lfa.protocol.names import robot_name
 
 HELLO_HEARTBEATS = 3
@@ -156,7 +157,7 @@ def say_hello(m: LeaseMemory, now: float) -> None:
     on_time = now < m.hello_at + pause_s  # so that late ticks do not accumulate
     m.hello_at = (m.hello_at if on_time else now) + pause_s
     if m.is_out(now) and not m.pending_release.closing:
-        m.send(_greeted(m), Hello(None if is_first(m.config) else m.config.version, m.agreed))
+        m.send(_greeted(m), Hello(None if is_first(m.config) else m.config.version, m.agreed, WIRE_VERSION))
 
 
 def _greeted(m: LeaseMemory) -> str:

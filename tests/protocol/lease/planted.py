@@ -155,5 +155,7 @@ PLANTED: tuple[Bug, ...] = (
         "roster::test_e34_a_retired_robot_never_leads_also_when_nobody_else_is_left"),
     Bug("rule E34", "a retired robot is taken in again", rosters.retired_robots_are_taken_in_again,
         "roster::test_e34_the_chain_closes_over_a_retired_robot_and_it_neither_votes_nor_returns"),
+    Bug("rule E35", "messages of any version are read", team.any_version_is_read,
+        "wire_versions::test_e35_a_version_further_off_is_refused_with_the_own_one", (2**53,)),
 )
 # fmt: on

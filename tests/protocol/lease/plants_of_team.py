@@ -9,6 +9,7 @@ import pytest
 import lfa.protocol.lease.failure_detector
 import lfa.protocol.lease.holder
 import lfa.protocol.lease.machine.candidacy
+import lfa.protocol.lease.machine.lease
 import lfa.protocol.lease.machine.memory
 import lfa.protocol.lease.machine.resigning
 import lfa.protocol.lease.machine.voting
@@ -175,6 +176,10 @@ def any_term_is_believed(patch: pytest.MonkeyPatch) -> None:
 
 def nothing_is_agreed(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(lfa.protocol.lease.machine.memory, "digest", lambda agreement: 1)
+
+
+def any_version_is_read(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(lfa.protocol.lease.machine.lease, "understands", lambda wire: True)
 
 
 def ended_lives_may_still_grant(patch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from lfa.protocol.lease.effects import Effect, Send, StandAside
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import Agreement, Hello, LeaseBody, Member, Nack, Prepare, Propose, Term, Version
+from lfa.protocol.messages.header import WIRE_VERSION
 from lfa.protocol.mission import Mission
 from tests.rigs.lease_scenes import STD, TEAM, Team, config_of
 
@@ -56,9 +57,9 @@ def test_e25_a_voter_refuses_who_holds_something_else_and_says_what_it_holds_its
     lease, sender, term = newcomer(), Member(1, 1), Term(9, 1, 1)
     other, own = agreed(OTHER[name]), agreement_of(TEAM, STD)
     said: tuple[LeaseBody, ...] = (
-        Prepare(term, Version(), agreed=other),
-        Propose(term, config_of(term), 0, sender, agreed=other),
-        Hello(None, other),
+        Prepare(term, Version(), agreed=other, wire=WIRE_VERSION),
+        Propose(term, config_of(term), 0, sender, agreed=other, wire=WIRE_VERSION),
+        Hello(None, other, WIRE_VERSION),
     )
     for body in said:
         assert refusals(lease.receive(sender, body, 1.0)) == [own], body
@@ -74,7 +75,7 @@ def test_e25_the_same_is_not_refused() -> None:
 
 
 def test_e25_what_says_nothing_of_it_is_refused() -> None:
-    assert refusals(newcomer().receive(Member(1, 1), Hello(None), 1.0)) == [agreement_of(TEAM, STD)]
+    assert refusals(newcomer().receive(Member(1, 1), Hello(None, wire=WIRE_VERSION), 1.0)) == [agreement_of(TEAM, STD)]
 
 
 @pytest.mark.parametrize("name", OTHER)

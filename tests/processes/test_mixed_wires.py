@@ -1,0 +1,56 @@
+"""E35 on processes: agents of the last commit with the version of the messages before beside agents of today."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import tarfile
+from pathlib import Path
+
+import pytest
+
+from lfa.protocol.messages.team import Status
+from tests.processes.test_by_hand import Terminals, terminals  # noqa: F401
+from tests.rigs.lfa_runs import eventually
+
+pytestmark = pytest.mark.processes
+
+BEFORE = "8b1b7b48a8b5364425fd9c6574852c7a0b601dfd"
+"""Last commit with version 5 of the messages."""
+PACKAGES = ("agents", "deploy", "protocol", "world", ".namespace")
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Return the environment of a process that runs the code of that commit."""
+    packed = subprocess.run(["git", "archive", BEFORE, *PACKAGES], cwd=ROOT, capture_output=True, check=False)
+    if packed.returncode != 0:
+        pytest.skip(f"this clone has no commit {BEFORE[:8]}: {packed.stderr.decode().strip()}")
+    folder = tmp_path_factory.mktemp("before")
+    with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
+        archive.extractall(folder, filter="tar")
+    return {**os.environ, "PYTHONPATH": str(folder / ".namespace")}
+
+
+def _chains(terminals: Terminals) -> dict[str, tuple[int, ...]]:  # noqa: F811
+    return {m.header.sender: m.chain for m in terminals.heard() if isinstance(m, Status)}
+
+
+def test_e35_agents_of_both_versions_are_one_chain_and_each_leads_the_other(
+    terminals: Terminals,  # noqa: F811
+    before: dict[str, str],
+) -> None:
+    terminals.router()
+    terminals.look_on()
+    terminals.world(robots=4)
+    old = terminals.start("lfa.agents.cli", "--role", "leader", "--id", "1", *terminals.team(), environment=before)
+    new = terminals.agent(2)
+    terminals.agent(3, environment=before)
+    terminals.agent(4)
+    eventually(lambda: (1, 2, 3, 4) in _chains(terminals).values(), "not all are in the chain of an old leader")
+    old.kill()
+    eventually(lambda: _chains(terminals).get("robot3") == (2, 3, 4), "the old do not follow the new leader")
+    new.kill()
+    eventually(lambda: _chains(terminals).get("robot4") == (3, 4), "the new do not follow the old leader")
