@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 LISTED = Path(__file__).parent / "equivalent.toml"
 SHARE_MIN = 0.9
 KINDS = "not processes and not hosts and not campaign and not wheel"
-OPTIONS = ("-q", "-p", "no:cacheprovider", "--tb=no", "--hypothesis-seed=1", "-m", KINDS)
+OPTIONS = ("-q", "-p", "no:cacheprovider", "-p", "no:faulthandler", "--tb=no", "--hypothesis-seed=1", "-m", KINDS)
 FURTHER = {
     "world/physics": ("tests/world",),
     "world/sensors": ("tests/world",),
