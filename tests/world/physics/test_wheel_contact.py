@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from math import acos, atan, cos, hypot, inf, pi, sin, sqrt, tan
+from math import acos, atan, copysign, cos, hypot, inf, pi, sin, sqrt, tan
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.world.description.load import load
 from lfa.world.physics import wheel_contact
 from lfa.world.physics.kinematics import Kinematic
 from lfa.world.physics.rigid_bodies import Physics
-from lfa.world.physics.wheel_contact import dip_m, gap_m_max, speed_after_step, step_m_max
+from lfa.world.physics.wheel_contact import WHEEL_SIDE, Floor, dip_m, gap_m_max, speed_after_step, step_m_max
 
 HZ = 100
 RADIUS_M = 0.05
@@ -237,3 +237,35 @@ def test_a_floor_that_lets_everything_pass_is_caught(monkeypatch: pytest.MonkeyP
     world = bodies(ditch(0.3))
     drive(world, Twist(0.1, 0.0), 30.0)
     assert world.poses[0].x > 2.5
+
+
+# --- one wheel at an edge ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("pose", "twist", "climbs"),
+    [
+        (Pose2D(0.999, -0.4, 0.0), Twist(0.4, 0.0), 0),  # the bump lies ahead of the left wheel alone
+        (Pose2D(0.999, 1.4, 0.0), Twist(0.4, 0.0), 1),
+        (Pose2D(0.999, -0.4, pi), Twist(-0.4, 0.0), 1),  # backwards
+        (Pose2D(0.999, 0.5, 0.0), Twist(0.0, 3.0), 1),  # on the spot: one wheel goes ahead
+        (Pose2D(0.999, 0.5, 0.0), Twist(0.0, -3.0), 0),
+    ],
+)
+def test_a_wheel_that_climbs_alone_loses_its_speed_alone(pose: Pose2D, twist: Twist, climbs: int) -> None:
+    height_m, side_m = 0.002, WHEEL_SIDE * 0.15
+    edge_y = {-0.4: (-0.4, 0.0), 1.4: (1.0, 1.4), 0.5: (0.5, 0.5)}[pose.y]
+    length_m = 1.4 if edge_y[0] != edge_y[1] else 2.0
+    low = edge_y[0] if pose.y < 0.0 else edge_y[1] - length_m if pose.y > 1.0 else -0.5
+    middle = low + 0.5 * length_m
+    feature = f"world.bumps=[{{center_m=[1.15,{middle}], width_m=0.3, length_m={length_m}, height_m={height_m}}}]"
+    floor = Floor(load("straight", ["mission.robots=[1]", feature]))
+    assert floor.near(0, pose)
+    rims = [twist.linear_x - side_m * twist.angular_z, twist.linear_x + side_m * twist.angular_z]
+    after = speed_after_step(abs(rims[climbs]), height_m, RADIUS_M, TRACTION)
+    assert after is not None
+    through, slowed = floor.roll(0, pose, twist, twist)
+    assert through == twist
+    rims[climbs] = copysign(after, rims[climbs])
+    assert slowed.linear_x == pytest.approx(0.5 * (rims[0] + rims[1]))
+    assert slowed.angular_z == pytest.approx(0.5 * (rims[1] - rims[0]) / side_m)
