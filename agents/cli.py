@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Any, NoReturn
@@ -51,13 +52,31 @@ def start(arguments: argparse.Namespace) -> int:
         add_controller_file(arguments.controller)
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
+    if arguments.lockstep is not None:
+        return _granted(arguments, endpoint, mission)
     fleet, wall_ms = fleet_name(arguments.fleet), clock.wall_ms()
-    node = _node(arguments.role, arguments.id, fleet, wall_ms, mission, arguments.spare)
+    node = _node(arguments.role, arguments.id, fleet, wall_ms, mission, arguments.spare, incarnations.drawn())
     known = None if arguments.keys is None else credentials(arguments.keys, node.name, wall_ms)
     lease_ms = LINK_LEASES_MS[arguments.link]
     notify = os.environ.get("NOTIFY_SOCKET", "")
     options = Options(fleet, endpoint, arguments.journal, arguments.faults, lease_ms, known, notify)
     return run([node], options, wall_ms)
+
+
+def _granted(arguments: argparse.Namespace, endpoint: str, mission: Mission | None) -> int:
+    """Run one robot of a lockstep run, in granted time. Raise `Refused`."""
+    # Imported here: most agents keep their own time, and memory is short on a robot.
+    from lfa.protocol.runtime.granted_time import run_granted
+    from lfa.protocol.transport.zenoh_grants import GrantLink
+
+    incarnation = whole_number(arguments.lockstep) or 0
+    if incarnation < 1:
+        raise Refused(f"--lockstep {arguments.lockstep}: must be the number of a start, 1 or higher")
+    fleet = fleet_name(arguments.fleet)
+    node = _node(arguments.role, arguments.id, fleet, incarnation, mission, arguments.spare, incarnation)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_DFL)  # nothing is left to say: the run has the journal
+    return run_granted(node, GrantLink(endpoint, fleet, node.name, incarnation))
 
 
 class _AgentParser(argparse.ArgumentParser):
@@ -83,12 +102,13 @@ def _parser() -> argparse.ArgumentParser:
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
     add("--controller", metavar="FILE.py:Class", help="a controller of your own, for a mission that chooses it")
     add("--faults", action="store_true", help="obey an operator's link conditions (lfa fault cut, loss): for tests")
+    add("--lockstep", metavar="START", help="take time and messages from `lfa run --lockstep`, which starts its "
+        "agents so; START counts the robot's starts from 1")
     # fmt: on
     return parser
 
 
-def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None, spare: bool) -> Node:
-    incarnation = incarnations.drawn()
+def _node(role: str, id: str, fleet: str, wall_ms: int, mission: Mission | None, spare: bool, incarnation: int) -> Node:
     if role not in ROLES:
         raise Refused(f"--role {role}: must be one of {', '.join(ROLES)}")
     if role == "witness":

@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
 
 COMMANDS = (
-    Command("run", "lfa.deploy.run.launch", "Run a scenario as processes on this machine; write a run folder.",
+    Command("run", "lfa.deploy.lockstep.command", "Run a scenario as processes on this machine; write a run folder.",
           "lfa run paper_path1 --robots 4 --fault 'kill leader at 20 s'"),
     Command("sim", "lfa.deploy.campaign.commands.sim",
           "Run a scenario in one process, in virtual time, once or many times; write a run folder.",
@@ -38,6 +38,9 @@ COMMANDS = (
     Command("fuzz", "lfa.deploy.fuzz.search.command",
           "Search for fault schedules that violate invariants of the lease.",
           "lfa fuzz --seeds 1000 --jobs 2; lfa fuzz --seed 147 -v; lfa fuzz --whole; lfa fuzz --systematic"),
+    Command("step", "lfa.deploy.lockstep.step_command",
+          "Let a lockstep run that stands go on, by some ticks or without an end.",
+          "lfa run straight --lockstep --pause; lfa step 50; lfa step"),
     Command("up", "lfa.deploy.fleet.up", "Start a fleet on its machines, over ssh; wait until all are in the chain.",
           "lfa up deploy/fleet.example.toml"),
     Command("export", "lfa.deploy.fleet.export.command",
@@ -113,6 +116,9 @@ COMMANDS = (
     Command("replay", "lfa.deploy.analysis.verification.replay",
           "Re-execute cores on their journals and compare, or play a recording back.",
           "lfa replay runs/paper_path1-20260101-120000 --robot 2"),
+    Command("diff", "lfa.deploy.lockstep.diff_command",
+          "Compare two runs in virtual time by their state hashes: the first tick and process that differ.",
+          "lfa diff runs/straight-20260101-120000 runs/straight-20260101-120100"),
     Command("verify", "lfa.deploy.analysis.verification.command",
           "Check runs: the invariants of the lease, and the paper's figures.",
           "lfa verify runs/paper_path1-20260101-120000 runs/paper_path2-20260101-120100"),

@@ -46,7 +46,7 @@ ORDER = (
     "deploy/analysis/paper", "deploy/analysis/verification",
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/picture", "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal",
-    "deploy/robot", "deploy/run", "deploy/learn", "deploy/simulate", "deploy/examples",
+    "deploy/robot", "deploy/run", "deploy/lockstep", "deploy/learn", "deploy/simulate", "deploy/examples",
     "deploy/fuzz", "deploy/fuzz/search", "deploy/fleet/plan", "deploy/config",
     "deploy/fleet/security", "deploy/fleet/engine", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet/export",
     "deploy/fleet", "deploy/web", "deploy/bench/harness",

@@ -6,11 +6,12 @@ no real clock is read. Each node has its own monotonic clock (offset and rate), 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from random import Random
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
+from lfa.protocol.messages.grants import GrantedCall
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import (
@@ -26,7 +27,7 @@ from lfa.protocol.node import (
     reborn,
 )
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
-from lfa.protocol.runtime.node_host import NodeHost, Sent
+from lfa.protocol.runtime.node_host import NodeHost, Sent, encode_local
 from lfa.protocol.topics import NO_ECHO, TOPIC, address, alive_key, matches
 from lfa.protocol.transport.link_model import LinkModel, Radio
 from lfa.protocol.transport.links import Links
@@ -67,6 +68,8 @@ class Simulator(VirtualTime):
         self.taps: list[Tap] = []
         self.reborn: Callable[[Node], Journal] = _unjournalled
         """Called with a node that goes on under a later number (E23), before it starts; returns its journal."""
+        self.make_host: Callable[[Node, Journal, Sequence[NodeObserver]], NodeHost] = NodeHost
+        """Makes the host of a node that starts: another one calls a node that runs elsewhere."""
         self._random = Random(f"air-{seed}")
         self.link_model = LinkModel(radio, self._random)
         self.refused_leave = False
@@ -90,7 +93,7 @@ class Simulator(VirtualTime):
 
         `observers` hear each input of the node.
         """
-        process = _SimulatedNode(NodeHost(node, journal, observers), clock or LocalClock())
+        process = _SimulatedNode(self.make_host(node, journal, observers), clock or LocalClock())
         self._processes[node.name] = process
         self._routes.add(process, node.name)
         self._refresh(process)
@@ -153,6 +156,27 @@ class Simulator(VirtualTime):
             tap(self.now, key, payload, message)
         for process, _ in self._routes.of(key):
             self.at(self.now + LOCAL_DELAY_S, self._give, process, key, message, payload)
+
+    def upcoming(self) -> Iterator[tuple[NodeHost, GrantedCall]]:
+        """Yield the next calls of all nodes that nothing can change or precede any more, in their order.
+
+        What a node publishes from now on arrives later than these, after at least the shortest delay of a link. A
+        node's calls after one of unknown content are left out.
+        """
+        unknown = set()
+        for when, action, arguments in self.planned(self.now + min(LOCAL_DELAY_S, self.link_model.radio.delay_s)):
+            process = arguments[0] if arguments else None
+            if not isinstance(process, _SimulatedNode) or process.gone or process.paused or process in unknown:
+                continue
+            now = process.clock.local(when)
+            if action == self._give and isinstance(arguments[2], Local):
+                yield process.host, GrantedCall(now, "", encode_local(arguments[2]))
+            elif action == self._give:
+                yield process.host, GrantedCall(now, arguments[1], arguments[3])
+            elif action == self._due and process.deadline == arguments[1]:
+                yield process.host, GrantedCall(max(now, arguments[1]))
+            elif action != self._due:
+                unknown.add(process)
 
     # --- one call of one node ---------------------------------------------------------------------------------
 
@@ -223,7 +247,7 @@ class Simulator(VirtualTime):
     def _remove(self, process: _SimulatedNode) -> None:
         del self._processes[process.node.name]
         process.gone = True
-        process.host.journal.close()
+        process.host.end()
         self._routes.remove(process, process.interests)
 
     def _vitals(self, process: _SimulatedNode) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from heapq import heapify, heappop, heappush
+from math import inf
 from typing import Any, Self
 
 from msgspec import Struct
@@ -32,6 +33,8 @@ class VirtualTime:
     def __init__(self) -> None:
         self.now = 0.0
         self._halted = False
+        self._until = -inf
+        """End [s] of the present `run`; -inf between two, when calls may come that are not scheduled."""
         self._heap: list[tuple[float, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = 0
 
@@ -42,16 +45,24 @@ class VirtualTime:
 
     def run(self, until: float) -> Self:
         """Advance to true time `until` [s], or up to the call during which `halt` was called."""
-        heap, self._halted = self._heap, False
+        heap, self._halted, self._until = self._heap, False, until
         while heap and heap[0][0] <= until:
             when, _, action, arguments = heappop(heap)
             if when > self.now:
                 self.now = when
             action(*arguments)
             if self._halted:
-                return self
-        self.now = max(self.now, until)
+                break
+        else:
+            self.now = max(self.now, until)
+        self._until = -inf
         return self
+
+    def planned(self, by: float) -> list[tuple[float, Callable[..., None], tuple[Any, ...]]]:
+        """Return the calls scheduled up to true time `by` [s] that the present `run` comes to, in their order."""
+        last = min(by, self._until)
+        near = sorted(event for event in self._heap if event[0] <= last)
+        return [(when, action, arguments) for when, _, action, arguments in near]
 
     def halt(self) -> None:
         """End the present `run` with the call under way; the next one goes on from there."""

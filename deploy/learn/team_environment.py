@@ -110,9 +110,9 @@ class TeamEnvironment(ParallelEnv[str, Observation, Action]):
         assert self._run is not None
         return self._view.observation(_id(name), self._run.leader)
 
-    def _agent(self, robot: int, incarnation: int, fleet: str, floor: int) -> Agent:
+    def _agent(self, robot: int, incarnation: int, fleet: str, floor: int, *, spare: bool) -> Agent:
         if robot_name(robot) not in self.possible_agents:
-            return Agent(robot, incarnation, fleet, floor)
+            return Agent(robot, incarnation, fleet, floor, spare=spare)
         self._commanded[robot_name(robot)] = agent = CommandedAgent(robot, incarnation, fleet, floor)
         return agent
 

@@ -64,7 +64,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     check_goals(drawn, faults)
     folder = make(out, drawn)
     about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}", provenance())
-    sockets = _socket_folder()
+    sockets = socket_folder()
     try:
         with Interrupts() as interrupts:
             launch = _Launch(drawn, folder, about, sockets, faults)
@@ -79,7 +79,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
 command = scenario_command(run, figures_by_default=True, fit=fitted)
 
 
-def _socket_folder() -> Path:
+def socket_folder() -> Path:
     """Create a private folder with a short name: a socket's path is limited to 107 bytes."""
     usual = tempfile.gettempdir()
     return Path(tempfile.mkdtemp(prefix="lfa-", dir=usual if len(usual) <= SOCKET_FOLDER_MAX else "/tmp"))

@@ -30,5 +30,15 @@ def rows(folder: Path, about: About, endpoint: str, scenario: Scenario, recorder
     ]  # fmt: skip
 
 
+def granted_row(
+    robot_id: int, incarnation: int, endpoint: str, fleet: str, mission: Mission, *, spare: bool
+) -> ProcessSpec:
+    """Return the agent's process of a robot in a lockstep run, which grants it time and messages at `endpoint`."""
+    own_code = file_of(mission.following.controller)
+    arguments = ["--role", _role(robot_id, mission), "--id", str(robot_id), "--fleet", fleet, "--connect", endpoint]
+    arguments += ["--lockstep", str(incarnation), *(() if own_code is None else ("--controller", own_code))]
+    return ProcessSpec(robot_name(robot_id), ("lfa.agents.cli", *arguments, *(("--spare",) if spare else ())))
+
+
 def _role(robot_id: int, mission: Mission) -> str:
     return "leader" if robot_id == mission.robots[0] else "follower"

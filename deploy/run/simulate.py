@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
@@ -30,12 +30,15 @@ from lfa.deploy.run.finish import Ended, finish, verdict_of
 from lfa.deploy.run.termination import Termination
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.grants import GrantedCall
 from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.team import Event, OperatorNote
-from lfa.protocol.names import robot_name
-from lfa.protocol.node import Node
+from lfa.protocol.names import robot_id_of, robot_name
+from lfa.protocol.node import Node, NodeObserver
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
+from lfa.protocol.runtime.node_host import NodeHost
+from lfa.protocol.runtime.state_hashes import HashedJournal, StateHashes
 from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import LINK_CONDITIONS, Radio
 from lfa.protocol.transport.message_bus import send
@@ -52,6 +55,7 @@ SHOW_EVERY_S = 5.0  # of wall-clock time
 LOOK_EVERY_S = 0.1  # of virtual time, between two looks at what may end a run from outside
 LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
 ORDER_STEP_S = 0.02  # period in which an operator looks whether the team knows an order
+MakeHost = Callable[[Node, Journal, Sequence[NodeObserver]], NodeHost]
 
 
 def run(
@@ -128,10 +132,12 @@ class SimulatedRun:
         record: Callable[[float, str, Message], None],
         journals: Path | None,
         drivers: Sequence[Node] = (),
-        make_agent: Callable[[int, int, str, int], Agent] = Agent,
+        make_agent: Callable[..., Node] = Agent,
+        make_host: MakeHost = NodeHost,
     ) -> None:
-        """Start the team. `journals` is the folder of the journals; None: there are none, and the run says nothing
-        about its progress. `make_agent` makes each agent, from the arguments of `Agent`.
+        """Start the team. `journals` is the folder of the journals, beside which the state hashes are written; None:
+        there are none, and the run says nothing about its progress. `make_agent` makes each agent, from the arguments
+        of `Agent`, and `make_host` what calls a node.
         """
         self._make_agent = make_agent
         self._scenario = drawn
@@ -148,6 +154,7 @@ class SimulatedRun:
         self._simulator = Simulator(drawn.radio, seed)
         self._simulator.taps.append(self._hear)
         self._simulator.reborn = self._journal
+        self._simulator.make_host = make_host
         self._show_at = inf if journals is None else time.perf_counter() + SHOW_EVERY_S
         self._say("start", scenario=drawn.name, seed=seed)
         self._add(World(FLEET, drawn, seed, self._next_incarnation(WORLD_NAME), start_at=0.0))
@@ -158,7 +165,11 @@ class SimulatedRun:
             self._simulator.add(driver, Journal(None, heading))
         for robot_id in drawn.robots:
             self._add(self._agent(robot_id))
+        self._hashes = None if journals is None else StateHashes(journals.parent, self._simulator.names)
+        self.tick_s = 1.0 / drawn.mission.control_hz
+        """Control period [s]: the time between two rows of state hashes."""
         self._flush()
+        self._hash(0)
 
     @property
     def now(self) -> float:
@@ -196,6 +207,15 @@ class SimulatedRun:
         if self._schedule.pending[0] is fault:
             self._check_at = fault.at_s
 
+    def upcoming(self) -> Iterator[tuple[NodeHost, GrantedCall]]:
+        """Yield the next calls of all nodes that are certain (`Simulator.upcoming`)."""
+        return self._simulator.upcoming()
+
+    def lose(self, name: str, how: str) -> None:
+        """Count the process of a robot as killed now, because of `how` it has ended."""
+        self._say("died", robot=robot_id_of(name), how=how, t=self.now)
+        self._simulator.kill(name)
+
     def advance(self, until: float, over: Callable[[], bool] = lambda: False) -> None:
         """Go on to virtual time `until` [s], to the verdict, or until `over()`, which is asked every `LOOK_EVERY_S`."""
         simulator = self._simulator
@@ -212,6 +232,8 @@ class SimulatedRun:
         self._say("end", outcome=verdict.outcome, reason=verdict.reason)
         for journal in self._journals.values():
             journal.close()
+        if self._hashes is not None:
+            self._hashes.close()
         return verdict
 
     def _do_due(self) -> None:
@@ -299,15 +321,16 @@ class SimulatedRun:
     def _journal(self, node: Node) -> Journal:
         started_with = {"fleet": FLEET, **node.started_with}
         heading = Heading(JOURNAL_VERSION, node.name, node.incarnation, node.incarnation, started_with)
-        journal = Journal(self._journal_folder, heading)
+        journal = (
+            Journal(None, heading) if self._journal_folder is None else HashedJournal(self._journal_folder, heading)
+        )
         self._journals[f"{node.name}-{node.incarnation}"] = journal
         return journal
 
-    def _agent(self, robot_id: int) -> Agent:
+    def _agent(self, robot_id: int) -> Node:
         incarnation = self._next_incarnation(robot_name(robot_id))
-        if robot_id not in self._scenario.mission.robots:
-            return Agent(robot_id, incarnation, FLEET, incarnation, spare=True)
-        return self._make_agent(robot_id, incarnation, FLEET, incarnation)
+        spare = robot_id not in self._scenario.mission.robots
+        return self._make_agent(robot_id, incarnation, FLEET, incarnation, spare=spare)
 
     def _next_incarnation(self, name: str) -> int:
         self._incarnations[name] = self._incarnations.get(name, 0) + 1
@@ -318,3 +341,12 @@ class SimulatedRun:
         for journal in self._journals.values():
             journal.flush()
         self._simulator.at(self._simulator.now + JOURNAL_FLUSH_S, self._flush)
+
+    def _hash(self, tick: int) -> None:
+        """Write the state hashes now, at the tick of this number, and plan the next."""
+        if self._hashes is None:
+            return
+        newest = {name: f"{name}-{self._incarnations.get(name, 1)}" for name in self._simulator.names}
+        running = {name: self._journals[file] for name, file in newest.items() if file in self._journals}
+        self._hashes.write(tick, self.now, running)
+        self._simulator.at((tick + 1) * self.tick_s, self._hash, tick + 1)

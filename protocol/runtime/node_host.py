@@ -16,7 +16,7 @@ from lfa.protocol.topics import TOPIC, address, may_sign, message_in
 
 Sent = list[tuple[str, bytes]]
 
-_local_encoder = msgspec.msgpack.Encoder()
+encode_local = msgspec.msgpack.Encoder().encode
 
 
 class NodeHost:
@@ -54,7 +54,7 @@ class NodeHost:
         if key:
             self.journal.add("message", at, key, payload, sent)
         else:
-            self.journal.add("local", at, "", _local_encoder.encode(message), sent)
+            self.journal.add("local", at, "", encode_local(message), sent)
         return sent
 
     def tick(self, now: float) -> Sent:
@@ -62,6 +62,10 @@ class NodeHost:
         sent = _encoded(self.node.tick(now))
         self.journal.add("tick", now, "", b"", sent)
         return sent
+
+    def end(self) -> None:
+        """Close the journal of a node that has ended."""
+        self.journal.close()
 
 
 def _encoded(envelopes: list[Envelope]) -> Sent:

@@ -18,7 +18,7 @@ MAKEFILE = (ROOT / "Makefile").read_text()
 ON_A_RUN = (
     "lfa verify RUN...", "lfa report RUN", "lfa report A B", "lfa replay RUN --robot 2", "lfa plot RUN", "lfa list",
     "lfa validate FILE", "lfa schema", "lfa completion bash", "lfa sim SCENARIO --seed 7", "lfa --version",
-    "lfa why RUN",
+    "lfa why RUN", "lfa diff A B",
 )  # fmt: skip
 ON_A_FLEET = (
     "lfa watch",
@@ -40,6 +40,7 @@ ELSEWHERE = {
         ("lfa sim SCENARIO --seeds 1..100 --set a=1,2,3", "lfa campaign PLAN", "lfa campaign merge DIR..."),
         "tests/deploy/campaign/test_docs_page.py",
     ),
+    **dict.fromkeys(("lfa run SCENARIO --lockstep", "lfa step 50"), "tests/processes/test_lockstep.py"),
     "lfa teleop": "tests/deploy/operate/test_orders_team.py",
     "lfa forget 3": "tests/protocol/lease/test_forget.py",
     **dict.fromkeys(("lfa join 7", "lfa retire 3"), "tests/processes/test_roster.py"),
