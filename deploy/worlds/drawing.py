@@ -44,7 +44,10 @@ class WorldDrawing(Struct):
                 self.walls.append((*self._place(x1, y1), *self._place(x2, y2)))
 
     def add_circle(self, x: float, y: float, radius_m: float) -> None:
-        """Add a round obstacle. Raises Refused."""
+        """Add a round obstacle; a dot that no scenario can hold is left out. Raises Refused."""
+        if 0.0 < radius_m < SIZE_M_MIN:
+            self.skipped.append(f"circle of radius {radius_m:g} m at {x:g}, {y:g}")
+            return
         if not SIZE_M_MIN <= radius_m <= SIZE_M_MAX:
             raise Refused(f"radius {radius_m:g} m: must be from {SIZE_M_MIN:g} to {SIZE_M_MAX:g}")
         self._count()

@@ -49,11 +49,14 @@ def command(
     path = out or Path(f"{file.stem}.toml")
     if path.exists():
         raise Refused(f"{path}: exists already, give another place with --out")
+    drawing = None
     try:
         drawing = read_world(file, unit_m)
         text = scenario_text(drawing, robots, *places)
     except Refused as refused:
         said = str(refused)
+        if drawing is not None and drawing.skipped and not (drawing.walls or drawing.obstacles):
+            said += f" (left out: {', '.join(drawing.skipped[:SHOWN_MAX])})"
         raise Refused(said if said.startswith(str(file)) else f"{file}: {said}") from None
     _write(path, text, file)
     counts = {"walls": len(drawing.walls), "obstacles": len(drawing.obstacles)}
@@ -75,7 +78,7 @@ def read_world(file: Path, unit_m: float | None = None) -> WorldDrawing:
         case ".map":
             read_movingai(text_of(file), drawing, unit_m or CELL_M)
         case ".sdf" | ".world":
-            read_sdf(parsed(text_of(file)), drawing)
+            read_sdf(parsed(text_of(file)), drawing, file)
         case ".svg":
             read_svg(parsed(text_of(file)), drawing, unit_m)
         case ".yaml" | ".yml":

@@ -56,8 +56,8 @@ def read_irsim(document: dict[str, Any], drawing: WorldDrawing) -> None:
     if "obstacle_map" in world:
         drawing.skipped.append("world.obstacle_map: import the grid itself, as a ROS map")
     for where, entry in _entries(document, "obstacle"):
-        for pose in _poses(entry, where, drawing):
-            _add_shape(entry, pose, where, drawing)
+        for n, pose in enumerate(_poses(entry, where, drawing)):
+            _add_shape(_shape(entry, n), pose, where, drawing)
     robots = [
         (where, entry, pose) for where, entry in _entries(document, "robot") for pose in _poses(entry, where, drawing)
     ]
@@ -66,10 +66,11 @@ def read_irsim(document: dict[str, Any], drawing: WorldDrawing) -> None:
     where, entry, pose = robots[0]
     drawing.robots, drawing.start = len(robots), pose[:2]
     goal = entry.get("goal")
-    goals = goal if isinstance(goal, list) and goal and isinstance(goal[0], list) else [goal]
-    if goals[0] is not None:
-        drawing.goal = _point(goals[0], f"{where}.goal")
-    shape = _shape(entry)
+    while isinstance(goal, list) and goal and isinstance(goal[0], list):
+        goal = goal[0]  # of several robots the first one's, of several goals of one robot the first
+    if goal is not None:
+        drawing.goal = _point(goal, f"{where}.goal")
+    shape = _shape(entry, 0)
     if shape.get("name", "circle") == "circle":
         drawing.radius_m = number(shape.get("radius", RADIUS_M), f"{where}.shape.radius")
 
@@ -107,8 +108,8 @@ def _poses(entry: dict[str, Any], where: str, drawing: WorldDrawing) -> Iterator
         yield x, y, rest[0] if rest else 0.0
 
 
-def _add_shape(entry: dict[str, Any], pose: tuple[float, float, float], where: str, drawing: WorldDrawing) -> None:
-    shape, (x, y, theta) = _shape(entry), pose
+def _add_shape(shape: dict[str, Any], pose: tuple[float, float, float], where: str, drawing: WorldDrawing) -> None:
+    x, y, theta = pose
     name = shape.get("name", "circle")
     match name:
         case "circle":
@@ -131,8 +132,11 @@ def _add_shape(entry: dict[str, Any], pose: tuple[float, float, float], where: s
             drawing.skipped.append(f"{where}: shape {str(name)[:40]} without its corners")
 
 
-def _shape(entry: dict[str, Any]) -> dict[str, Any]:
+def _shape(entry: dict[str, Any], n: int) -> dict[str, Any]:
+    """Return the shape of the `n`-th copy of an entry; of several shapes the last one is that of all further copies."""
     shape = entry.get("shape", {})
+    if isinstance(shape, list) and shape:
+        shape = shape[min(n, len(shape) - 1)]
     return shape if isinstance(shape, dict) else {"name": shape}
 
 

@@ -6,12 +6,14 @@ before.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from math import atan2, cos, hypot, sin
+from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from lfa.deploy.worlds.drawing import WorldDrawing, number, numbers
-from lfa.deploy.worlds.xml_tree import Element
+from lfa.deploy.worlds.drawing import WorldDrawing, number, numbers, text_of
+from lfa.deploy.worlds.xml_tree import Element, parsed
 from lfa.protocol.errors import Refused
 from lfa.world.description.scenario import Obstacle, Point, Scenario
 
@@ -22,39 +24,93 @@ WALL_M = 0.05
 HEIGHT_M = 1.0
 """Height [m] of what is written."""
 TILT_MAX = 1e-3
+INCLUDES_MAX, INCLUDES_DEEP_MAX = 500, 5
+"""Largest number of included models, and of models that include one another."""
+ABOVE_MAX = 5
+"""Number of folders above a file in which, and beside which, its models are looked for."""
 DRAWN_WALL_M = 0.01
 
 Frame = tuple[float, float, float, float]
 """x [m], y [m], z [m], yaw [rad] of what stands upright."""
 
 
-def read_sdf(root: Element, drawing: WorldDrawing) -> None:
-    """Add all that stands in the way in the first world, or in the models, of an SDF file. Raises Refused."""
+def read_sdf(root: Element, drawing: WorldDrawing, file: Path | None = None) -> None:
+    """Add all that stands in the way in the first world, or in the models, of an SDF file. Raises Refused.
+
+    Models that it includes are read from the folders of `model_folders(file)`; without `file` they are left out.
+    """
     if root.name != "sdf":
         raise Refused(f"<{root.name[:40]}>: must be <sdf>")
     world = root.find("world")
-    for model in (root if world is None else world).all("model"):
-        _read_model(model, drawing)
-    for include in () if world is None else world.all("include"):
+    _SdfReader(drawing, model_folders(file)).read(root if world is None else world, (), INCLUDES_DEEP_MAX)
+
+
+def model_folders(file: Path | None) -> tuple[Path, ...]:
+    """Return where models are looked for: above the file, `models` beside those folders, and Gazebo's variables."""
+    if file is None:
+        return ()
+    above = file.resolve().parents[:ABOVE_MAX]
+    named = [
+        path for name in ("GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH") for path in os.environ.get(name, "").split(":")
+    ]
+    return (*above, *(folder / "models" for folder in above), *(Path(path) for path in named if path))
+
+
+class _SdfReader:
+    """Reader of one file and of the models that it includes."""
+
+    def __init__(self, drawing: WorldDrawing, folders: tuple[Path, ...]) -> None:
+        self._drawing = drawing
+        self._folders = folders
+        self._includes = 0
+
+    def read(self, parent: Element, outer: tuple[Element, ...], deep: int) -> None:
+        """Add the models in `parent`, and those that it includes; `outer` hold the poses around it."""
+        for model in parent.all("model"):
+            self._read_model(model, (*outer, model), deep)
+        for include in parent.all("include"):
+            self._include(include, outer, deep)
+
+    def _read_model(self, model: Element, frames: tuple[Element, ...], deep: int) -> None:
+        name = model.attributes.get("name", "")[:40]
+        for link in model.all("link"):
+            for collision in link.all("collision"):
+                where = f"model {name!r}, collision {collision.attributes.get('name', '')[:40]!r}"
+                try:
+                    frame = _upright((*frames, link, collision))
+                    if frame is None:
+                        self._drawing.skipped.append(f"{where}: tilted, or relative to another frame")
+                    else:
+                        _read_geometry(collision, frame, self._drawing, where)
+                except Refused as refused:
+                    raise Refused(f"{where}: {refused}") from None
+        self.read(model, frames, deep)
+
+    def _include(self, include: Element, outer: tuple[Element, ...], deep: int) -> None:
+        """Add an included model, at the pose of the include if it has one, else at its own."""
         uri = include.find("uri")
-        drawing.skipped.append(f"include {'' if uri is None else uri.text.strip()[:60]}")
+        name = "" if uri is None else uri.text.strip()
+        self._includes += 1
+        path = self._path(name) if self._includes <= INCLUDES_MAX and deep else None
+        if path is None:
+            self._drawing.skipped.append(f"include {name[:60]}")
+            return
+        try:
+            root = parsed(text_of(path))
+            for model in root.all("model"):
+                placed = model if include.find("pose") is None else include
+                self._read_model(model, (*outer, placed), deep - 1)
+        except Refused as refused:
+            raise Refused(f"include {name[:60]}: {refused}") from None
 
-
-def _read_model(model: Element, drawing: WorldDrawing) -> None:
-    name = model.attributes.get("name", "")[:40]
-    for link in model.all("link"):
-        for collision in link.all("collision"):
-            where = f"model {name!r}, collision {collision.attributes.get('name', '')[:40]!r}"
-            try:
-                frame = _upright((model, link, collision))
-                if frame is None:
-                    drawing.skipped.append(f"{where}: tilted, or relative to another frame")
-                else:
-                    _read_geometry(collision, frame, drawing, where)
-            except Refused as refused:
-                raise Refused(f"{where}: {refused}") from None
-    for inner in model.all("model"):
-        drawing.skipped.append(f"model {name!r}: the model {inner.attributes.get('name', '')[:40]!r} in it")
+    def _path(self, uri: str) -> Path | None:
+        """Return the file of a model `model://NAME`, None if it is in none of the folders."""
+        scheme, _, name = uri.partition("://")
+        parts = [part for part in name.split("/") if part]
+        if scheme != "model" or not parts or ".." in parts:
+            return None
+        files = (folder.joinpath(*parts, "model.sdf") for folder in self._folders)
+        return next((file for file in files if file.is_file()), None)
 
 
 def _upright(chain: tuple[Element, ...]) -> Frame | None:

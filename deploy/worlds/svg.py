@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from itertools import pairwise
-from math import cos, hypot, pi, radians, sin, tan
+from math import atan2, ceil, cos, hypot, pi, radians, sin, sqrt, tan
 
 from lfa.deploy.worlds.drawing import WorldDrawing, number, numbers
 from lfa.deploy.worlds.xml_tree import Element
@@ -26,8 +26,11 @@ UNIT_M = 0.01
 """Length [m] of a unit of a drawing that names no size in mm, cm, m or in."""
 UNSEEN = ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata", "title", "desc", "style", "namedview")
 GROUPS = ("svg", "g", "a")
-ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "Z": 0}
+ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+FLAGS = (3, 4)
+"""Places of the flags among the numbers of an arc: each is one digit, and the next number may follow it at once."""
 _TOKEN = re.compile(r"([A-Za-z])|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|[\s,]+|(.)", re.ASCII | re.DOTALL)
+_FLAG = re.compile(r"[\s,]*()([01])()", re.ASCII)
 _FUNCTION = re.compile(r"(\w+)\s*\(([^()]*)\)\s*,?\s*", re.ASCII)
 
 
@@ -95,7 +98,7 @@ class _Reader:
                 self._closed(matrix, _pairs(element.attributes.get("points", "")))
             case "path":
                 for points, closed in _strokes(element.attributes.get("d", "")):
-                    (self._closed if closed else self._open)(matrix, points)
+                    (self._closed if closed and len(points) > 2 else self._open)(matrix, points)
             case _:
                 self._drawing.skipped.append(where)
 
@@ -187,7 +190,7 @@ def _is_even(m: Matrix) -> bool:
 
 
 def _strokes(text: str) -> Iterator[tuple[list[Point], bool]]:
-    """Yield the points of each part of a path, and whether it is closed. Raises Refused for arcs."""
+    """Yield the points of each part of a path, and whether it is closed. Raises Refused."""
     points: list[Point] = []
     handle: Point | None = None
     for letter, v in _commands(text):
@@ -205,6 +208,9 @@ def _strokes(text: str) -> Iterator[tuple[list[Point], bool]]:
             points, handle = [points[0]], None
             continue
         last = points[-1]
+        if kind == "A":
+            points, handle = [*points, *_arc(last, v, relative)], None
+            continue
         ends = _ends(kind, v, last, relative)
         curve = _controls(kind, ends, last, handle)
         handle = curve[-2] if len(curve) > 1 else None
@@ -216,7 +222,14 @@ def _strokes(text: str) -> Iterator[tuple[list[Point], bool]]:
 def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
     """Yield each command's letter and numbers; numbers without a letter repeat the command before."""
     letter, values = "", [0.0][:0]
-    for match in _TOKEN.finditer(text):
+    place = 0
+    while place < len(text):
+        is_flag = letter in ("A", "a") and len(values) in FLAGS
+        match = (_FLAG.match(text, place) if is_flag else None) or _TOKEN.match(text, place)
+        assert match is not None, "any character is a token"
+        if is_flag and match[2] not in ("0", "1", None):
+            raise Refused(f"d: {letter} with the flag {match[2][:20]}: must be 0 or 1")
+        place = match.end()
         if match[3]:
             raise Refused(f"d: {match[3]!r}: must be commands and numbers")
         if match[1]:
@@ -244,6 +257,31 @@ def _ends(kind: str, v: list[float], last: Point, relative: bool) -> list[Point]
     if kind == "V":
         return [(last[0], y + v[0])]
     return [(x + a, y + b) for a, b in zip(v[::2], v[1::2], strict=True)]
+
+
+def _arc(last: Point, v: list[float], relative: bool) -> list[Point]:
+    """Return the points of an elliptical arc from `last` on; by the notes on implementation of SVG, F.6.5 and F.6.6."""
+    (ax, ay), (rx, ry), turn = last, (abs(v[0]), abs(v[1])), radians(v[2])
+    large, sweep = v[3] != 0.0, v[4] != 0.0
+    bx, by = (ax + v[5], ay + v[6]) if relative else (v[5], v[6])
+    if min(rx, ry) == 0.0 or (ax, ay) == (bx, by):
+        return [(bx, by)]
+    c, s = cos(turn), sin(turn)
+    x, y = (c * (ax - bx) + s * (ay - by)) / 2.0 / rx, (c * (ay - by) - s * (ax - bx)) / 2.0 / ry
+    half = hypot(x, y)
+    if half > 1.0:  # radii that do not reach grow until they do
+        rx, ry, x, y, half = rx * half, ry * half, x / half, y / half, 1.0
+    apart = sqrt(max(0.0, 1.0 - half * half)) / half * (-1.0 if large == sweep else 1.0)
+    ux, uy = apart * y, -apart * x
+    begin, end = atan2(y - uy, x - ux), atan2(-y - uy, -x - ux)
+    span = (end - begin) % (2.0 * pi) if sweep else -((begin - end) % (2.0 * pi))
+    steps = max(1, ceil(abs(span) / (2.0 * pi) * ROUND_CORNERS))
+    points = []
+    for n in range(1, steps):
+        angle = begin + span * n / steps
+        px, py = rx * (ux + cos(angle)), ry * (uy + sin(angle))
+        points.append((c * px - s * py + (ax + bx) / 2.0, s * px + c * py + (ay + by) / 2.0))
+    return [*points, (bx, by)]
 
 
 def _controls(kind: str, ends: list[Point], last: Point, handle: Point | None) -> list[Point]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import cos, hypot, pi, sin, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +125,36 @@ def test_a_path_with_curves_follows_them(tmp_path: Path) -> None:
         assert min(hypot(x - px, y - py) for px, py in points) < 0.15
 
 
+@pytest.mark.parametrize(
+    ("path", "middle"),
+    [
+        ("M0 0 A100 100 0 0 1 200 0", (1.0, 1.0)),
+        ("M0 0 a100 100 0 01200 0", (1.0, 1.0)),
+        ("M0 0 A100 100 0 0 0 200 0", (1.0, -1.0)),
+        ("M0 0 A10 10 0 0 1 200 0", (1.0, 1.0)),
+        ("M0 0 A100 50 0 0 1 200 0", (1.0, 0.5)),
+        ("M0 0 A50 100 90 0 1 200 0", (1.0, 0.5)),
+        ("M0 0 A100 100 0 1 1 100 -100", (-sqrt(0.5), 1.0 + sqrt(0.5))),
+    ],
+)
+def test_an_arc_passes_through_its_middle_and_keeps_its_distance(
+    tmp_path: Path, path: str, middle: tuple[float, float]
+) -> None:
+    drawing = read_world(written(tmp_path, "w.svg", f'<svg><path d="{path}"/></svg>'))
+    points = [wall[:2] for wall in drawing.walls]
+    assert min(hypot(x - middle[0], y - middle[1]) for x, y in points) < 0.15
+
+
+def test_a_path_that_closes_on_fewer_than_three_corners_is_a_line_or_nothing(tmp_path: Path) -> None:
+    drawing = read_world(written(tmp_path, "w.svg", '<svg><path d="M5 5 z M0 0 L900 0 z"/></svg>'))
+    assert drawing.walls == [(0.0, 0.0, 9.0, 0.0)]
+
+
+def test_a_dot_is_left_out_and_named(tmp_path: Path) -> None:
+    drawing = read_world(written(tmp_path, "w.svg", "<svg><circle cx='100' cy='-200' r='0.4'/></svg>"))
+    assert (drawing.obstacles, drawing.skipped) == ([], ["circle of radius 0.004 m at 1, 2"])
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_an_imported_world_is_accepted_and_driven(tmp_path: Path, name: str) -> None:
     scenario = scenario_of(tmp_path, written(tmp_path, name, FILES[name]), robots=2)
@@ -191,7 +221,8 @@ DAMAGED: list[tuple[str, str | bytes, str]] = [
     ("w.svg", "<svg><rect width='1'/></svg>", "must be above 0"),
     ("w.svg", "<svg><circle cx='1' r='inf'/></svg>", "must be a number up to"),
     ("w.svg", "<svg><polygon points='1,2 3'/></svg>", "must be pairs"),
-    ("w.svg", "<svg><path d='M0 0 A1 1 0 0 0 2 2'/></svg>", "command A: must be one of"),
+    ("w.svg", "<svg><path d='M0 0 A1 1 0 0 2 2 2'/></svg>", "the flag 2: must be 0 or 1"),
+    ("w.svg", "<svg><path d='M0 0 B1 1'/></svg>", "command B: must be one of"),
     ("w.svg", "<svg><path d='L1 1'/></svg>", "before the first M"),
     ("w.svg", "<svg><path d='M1 1 L2'/></svg>", "too many or too few"),
     ("w.svg", "<svg><g transform='spin(3)'><line x2='9'/></g></svg>", "must be translate, scale"),
@@ -240,3 +271,50 @@ def test_what_is_there_already_is_not_written_over(tmp_path: Path) -> None:
     with pytest.raises(Refused, match="must be a new or empty folder"):
         export_world("sdf", "straight", tmp_path)
     assert out.read_text() == "mine"
+
+
+CRATE = (
+    "<link name='l'><collision name='c'><pose>0 0 0.5 0 0 0</pose>"
+    "<geometry><box><size>1 1 1</size></box></geometry></collision></link>"
+)
+
+
+def test_models_in_models_and_included_ones_stand_where_all_poses_lead(tmp_path: Path) -> None:
+    """As Gazebo's own worlds are made: a world of includes, with the models in folders beside it."""
+    shelf = tmp_path / "models" / "shelf"
+    shelf.mkdir(parents=True)
+    written(shelf, "model.sdf", f"<sdf><model name='shelf'><pose>9 9 0 0 0 0</pose>{CRATE}</model></sdf>")
+    inner = f"<model name='in'><pose>0 2 0 0 0 0</pose>{CRATE}</model>"
+    here = "<include><uri>model://shelf</uri></include>"
+    there = "<include><uri>model://shelf</uri><pose>4 0 0 0 0 0</pose></include>"
+    missing = "<include><uri>model://../../secret</uri></include>"
+    folder = tmp_path / "worlds"
+    folder.mkdir()
+    world = f"<sdf><world><model name='out'><pose>1 0 0 0 0 0</pose>{inner}</model>{here}{there}{missing}</world></sdf>"
+    drawing = read_world(written(folder, "w.world", world))
+    assert [one.center_m for one in drawing.obstacles] == [(1.0, 2.0), (9.0, 9.0), (4.0, 0.0)]
+    assert drawing.skipped == ["include model://../../secret"]
+
+
+def test_a_model_that_includes_itself_ends(tmp_path: Path) -> None:
+    folder = tmp_path / "m"
+    folder.mkdir()
+    me = "<include><uri>model://m</uri></include>"
+    drawing = read_world(written(folder, "model.sdf", f"<sdf><model name='m'>{CRATE}{me}{me}</model></sdf>"))
+    assert 1 < len(drawing.obstacles) < 1000
+    assert "include model://m" in drawing.skipped
+
+
+def test_a_world_whose_models_are_not_here_says_which(tmp_path: Path) -> None:
+    file = written(tmp_path, "w.world", "<sdf><world><include><uri>model://house</uri></include></world></sdf>")
+    with pytest.raises(Refused, match=r"nothing stands in it.*left out: include model://house"):
+        command(file, tmp_path / "out.toml")
+
+
+def test_of_several_shapes_and_goals_in_irsim_each_body_has_its_own_and_the_robot_the_first(tmp_path: Path) -> None:
+    shapes = "[{name: circle, radius: 1.5}, {name: circle, radius: 0.5}]"
+    obstacles = f"obstacle:\n  - {{number: 3, state: [[20, 20], [30, 20], [40, 20]], shape: {shapes}}}\n"
+    robot = "robot: {state: [1, 1, 0], goal: [[[9, 8, 0], [2, 4, 1]]]}\n"
+    drawing = read_world(written(tmp_path, "w.yaml", f"world: {{width: 50, height: 50}}\n{robot}{obstacles}"))
+    assert [one.radius_m for one in drawing.obstacles] == [1.5, 0.5, 0.5]
+    assert drawing.goal == (9.0, 8.0)
