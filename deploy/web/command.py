@@ -5,15 +5,19 @@ from __future__ import annotations
 import asyncio
 import secrets
 import ssl
+import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import msgspec
 import typer
+from msgspec.structs import replace
 
 from lfa.deploy.client.session import find
 from lfa.deploy.fleet.host.router import host_credentials
+from lfa.deploy.run.machine_size import FEW_BEAMS, SLOW_HZ
+from lfa.deploy.scenario_loading import load_scenario
 from lfa.deploy.view.picture.clip import clip_of
 from lfa.deploy.web.engine import Engine, RecordingEngine
 from lfa.deploy.web.fleet import FleetEngine
@@ -22,9 +26,13 @@ from lfa.deploy.web.server import PageServer, PageTokens, is_loopback
 from lfa.deploy.web.share import Setting, setting_of
 from lfa.deploy.web.virtual import VirtualEngine
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import write_line
 
 PORT = 8642
 HOST = "127.0.0.1"
+ROBOTS_USUAL = 16
+"""Number of robots above which a team in virtual time is computed at the rates of `LIGHT`."""
+LIGHT: dict[str, float] = {"mission.control_hz": SLOW_HZ, "world.lidar.beams": FEW_BEAMS}
 
 
 def command(
@@ -88,8 +96,24 @@ def _virtual(what: str | None, seed: int | None, robots: int | None, overrides: 
     if what is not None and "#" in what:
         setting = setting_of(what)
     else:
-        setting = Setting(what or LESSONS[0].setting.scenario, seed, robots, overrides)
+        setting = lighter(Setting(what or LESSONS[0].setting.scenario, seed, robots, overrides))
     return VirtualEngine(setting, allowed=setting.scenario)
+
+
+def lighter(setting: Setting) -> Setting:
+    """Return a setting with lower rates if it has many robots, and say so in a line. Raises Refused.
+
+    Rates that it sets stay. The others become part of the run, its link and the saved scenario: it is the same run on
+    every machine.
+    """
+    scenario = load_scenario(setting.scenario, setting.overrides, setting.robots)
+    kept = {override.partition("=")[0].strip() for override in setting.overrides}
+    rates = tuple(f"{key}={value:g}" for key, value in LIGHT.items() if key not in kept)
+    robots = len(scenario.mission.robots)
+    if robots <= ROBOTS_USUAL or not rates:
+        return setting
+    write_line(f"{robots} robots: computed with {', '.join(rates)} (--set another value keeps that)", sys.stderr)
+    return replace(setting, overrides=(*setting.overrides, *rates))
 
 
 def _secured(listen: str, keys: Path | None) -> ssl.SSLContext | None:

@@ -31,6 +31,7 @@ PAGE = Path(__file__).parents[2] / "web" / "page"
 FIRST = Quantity("first frame", "s", 1.0)
 SIZE = Quantity("size of the page", "MB", 1.0)
 FPS = Quantity("frames a second", "Hz", 50.0, "at least")
+SPEED = Quantity("virtual time over real time, while it is watched", "ratio")
 COST = Quantity("server's CPU for each viewer", "%", 5.0)
 LAG = Quantity("loop lag, 5 viewers over nobody", "ratio", 1.5)
 ALONE = Quantity("loop lag, nobody looks", "ms", 20.0)
@@ -54,8 +55,10 @@ def _rows() -> Iterator[list[BenchRow]]:
         browser.wait_for(SHOWN.format(ROBOTS))
         yield [row(f"{ROBOTS} robots", FIRST, perf_counter() - began)]
         browser.value("lfa.order({do: 'play'})")
+        before_s, began = browser.value("lfa.models[0].t"), perf_counter()
         clock.sleep(WATCHED_S)
-        yield [row(f"{ROBOTS} robots", FPS, browser.value("lfa.fps.value"))]
+        reached = (browser.value("lfa.models[0].t") - before_s) / (perf_counter() - began)
+        yield [row(f"{ROBOTS} robots", FPS, browser.value("lfa.fps.value")), row(f"{ROBOTS} robots", SPEED, reached)]
         browser.value("lfa.order({do: 'pause'})")
         alone = _cost(server)
         with _viewers(address):

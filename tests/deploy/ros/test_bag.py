@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -78,6 +81,17 @@ def test_foxgloves_own_reader_decodes_every_message(written: Path, tmp_path: Pat
     counts = json.loads(answer(start("foxglove", "foxglove_bag.js", str(file), home=tmp_path)))
     with AnyReader([written]) as reader:
         assert counts == {topic: info.msgcount for topic, info in reader.topics.items()}
+
+
+@pytest.mark.processes
+def test_reruns_importer_finds_no_fault_and_draws_transforms_and_poses(written: Path, tmp_path: Path) -> None:
+    (file,) = written.glob("*.mcap")
+    rerun, drawn = Path(sys.executable).with_name("rerun"), tmp_path / "bag.rrd"
+    for words in (("check", str(file)), ("convert", str(file), "-o", str(drawn))):
+        done = subprocess.run([str(rerun), "mcap", *words], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    told = subprocess.run([str(rerun), "rrd", "print", "-v", str(drawn)], capture_output=True, text=True, check=True)
+    assert {"Transform3D", "InstancePoses3D"} <= set(re.findall(r"Transform3D|InstancePoses3D", told.stdout))
 
 
 def test_the_odometry_of_the_bag_is_the_recorded_one(run: Path, written: Path) -> None:

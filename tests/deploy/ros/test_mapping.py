@@ -98,6 +98,15 @@ def test_one_message_carries_the_transforms_of_all_robots_fifty_times_a_second()
     assert counts == [3] * 50
 
 
+def test_with_sim_time_the_clock_ticks_fifty_times_a_second_in_the_worlds_time() -> None:
+    mapping = FleetMapping(sim_time=True)
+    sent = [one for step in range(200) for one in mapping.tick(T + step * NS // 200) if one.topic == "/clock"]
+    assert len(sent) == 50
+    told = on("/clock", sent[-1:]).clock
+    assert told.sec * NS + told.nanosec == sent[-1].stamp_ns >= T + NS - NS // 40
+    assert all(one.topic != "/clock" for one in FleetMapping().tick(T))
+
+
 @given(st.lists(st.integers(0, 19), min_size=1, max_size=5), st.integers(0, 3))
 def test_no_robots_transform_waits_longer_than_two_periods_whatever_the_phases(phases_ms: list[int], dead: int) -> None:
     """Robots at 50 Hz, each at its own phase; one of them falls silent after a second."""

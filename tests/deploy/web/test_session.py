@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from lfa.deploy.faults.script import parse_all
 from lfa.deploy.run import simulate
 from lfa.deploy.scenario_loading import load_scenario
+from lfa.deploy.web.command import lighter
 from lfa.deploy.web.share import Setting, fragment_of, setting_of
 from lfa.deploy.web.virtual import VirtualEngine
 from lfa.protocol.errors import Refused
@@ -155,3 +156,13 @@ def test_a_run_with_another_goal_ends_there() -> None:
     assert engine.state()["over"] == "goal_reached"
     x, y = engine.pictures[0].where(1) or (0.0, 0.0)
     assert hypot(x - 3.0, y - 2.0) < 0.15
+
+
+def test_many_robots_are_computed_at_lower_rates_that_are_part_of_the_link(capfd: pytest.CaptureFixture[str]) -> None:
+    few = Setting("straight", robots=16)
+    assert lighter(few) == few
+    many = lighter(Setting("straight", robots=50, overrides=("world.lidar.beams=180",)))
+    assert many.overrides == ("world.lidar.beams=180", "mission.control_hz=20")
+    assert "50 robots: computed with mission.control_hz=20" in capfd.readouterr().err
+    assert setting_of(fragment_of(many)) == many
+    assert lighter(many) == many
