@@ -36,5 +36,5 @@ class CommandPublisher:
         term = lease.term if as_leader else lease.config.version.term
         holder = self._id if as_leader else self._place.first
         header = self._outbox.header("cmd_vel", now)
-        cmd = CmdVel(header, twist, term, holder, as_leader, sensors.gateway, self._stop.known)
+        cmd = CmdVel(header, twist, term, holder, as_leader, sensors.gateway, self._stop.known, lease.grant_s)
         self._outbox.publish("cmd_vel", cmd)

@@ -4,18 +4,42 @@ from __future__ import annotations
 
 from lfa.agents.navigator import Navigator
 from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.robot import UNSAID_GRANT_S, Sensors
 from lfa.protocol.outbox import Outbox
 
 
 class InputWatch:
     """Watch over the inputs that `navigator` uses; `step` is called in each control step."""
 
-    def __init__(self, outbox: Outbox, navigator: Navigator) -> None:
+    def __init__(self, outbox: Outbox, navigator: Navigator, grant_s: float) -> None:
+        """`grant_s` is the `T_grant` [s] of the mission, which the robot's gateway must hold too (E25)."""
         self._outbox = outbox
+        self._grant_s = grant_s
+        self._others_s: float | None = None
+        """`T_grant` [s] of the own gateway, if that is another one."""
         self._navigator = navigator
         self._lost = ""
         """Input that was reported as lost; empty for none."""
         self._slow_scans = False
+
+    def fits(self, sensors: Sensors, term: Term, now: float) -> bool:
+        """Return whether the gateway of `sensors` holds the team's `T_grant`; publish an event when that changes.
+
+        With another one it would obey a former leader for too long, or nobody for long enough: the robot takes nothing
+        from it, has no pose, and is left behind (S6).
+        """
+        others_s = None if sensors.grant_s in (UNSAID_GRANT_S, self._grant_s) else sensors.grant_s
+        if others_s != self._others_s:
+            self._others_s = others_s
+            holds = {"grant_s": sensors.grant_s, "must_be_s": self._grant_s}
+            self._outbox.event("gateway", now, term, {"state": "back" if others_s is None else "other", **holds})
+        return others_s is None
+
+    def text(self) -> str:
+        """Return what the own gateway holds otherwise than the team; empty for nothing."""
+        if self._others_s is None:
+            return ""
+        return f"its gateway holds T_grant = {self._others_s:g} s: must be {self._grant_s:g} s, as in the mission"
 
     def step(self, term: Term, now: float) -> None:
         """Publish an event for each input that is lost or slow since the last step, or is back."""

@@ -90,7 +90,7 @@ class RobotCore:
         self._reports = Reports(outbox, len(mission.robots), timing.deadman_s - mission.control_period_s)
         self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
-        self._input_watch = InputWatch(outbox, self.navigator)
+        self._input_watch = InputWatch(outbox, self.navigator, self.lease.grant_s)
         self._period_s = mission.control_period_s
         self._next_control = now
         self._arrived = False
@@ -161,7 +161,8 @@ class RobotCore:
                 self._attendance.update(lease, self._team, now)
                 stopped = self._stop_listener.text() if lease.chain else ""
                 held = stopped or self._roster_orders.text() or self._attendance.text()
-                self._reports.status(message, navigator, self._team, lease, self._role(), held, now)
+                gateway = self._input_watch.text()
+                self._reports.status(message, navigator, self._team, lease, self._role(), held, gateway, now)
             case Stop():
                 self._stop(now)
 
@@ -169,7 +170,7 @@ class RobotCore:
         """Update the state from a message of the robot's own hardware."""
         lease, navigator = self.lease, self.navigator
         match message:
-            case Sensors():
+            case Sensors() if self._input_watch.fits(message, lease.term, now):
                 self._team.hear_sensors(message, now)
                 self._stop_listener.hear_sensors(message)
                 navigator.estimator.sensors(message, now)

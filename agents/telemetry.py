@@ -161,9 +161,13 @@ class Reports:
             self._outbox.publish("plan", PlanNote(self._outbox.header("plan", now), route, *tile))
 
     def status(
-        self, vitals: Vitals, navigator: Navigator, team: TeamState, lease: Lease, role: Role, outside: str, now: float
-    ) -> None:
-        """Publish the diagnostics (as in ROS); `outside` says who is there and not in the chain."""
+        self, vitals: Vitals, navigator: Navigator, team: TeamState, lease: Lease, role: Role,
+        outside: str, gateway: str, now: float,
+    ) -> None:  # fmt: skip
+        """Publish the diagnostics (as in ROS).
+
+        `outside` says who is there and not in the chain, `gateway` what is wrong with the own one.
+        """
         if self._lateness.update(vitals.loop_lag_s):
             worst_s = self._lateness.worst_s
             self._outbox.event("late", now, lease.term, {"late": worst_s > 0.0, "lag_s": round(worst_s, 3)})
@@ -175,6 +179,8 @@ class Reports:
             counters["predecessor_clock_offset_s"] = navigator.predecessor.clock.offset(now)
             counters["predecessor_refused"] = navigator.predecessor.refused
         text, level = _health(navigator, lease, role, (self._lateness.text(), outside), now)
+        if gateway:
+            text, level = gateway, Level.ERROR
         outbox = self._outbox
         header = outbox.header("status", now)
         outbox.publish("status", Status(header, level, text, role, lease.term, counters, lease.chain))

@@ -20,6 +20,12 @@ ASK_S = 0.5
 STATUS_S = 1.0
 
 
+def heard_by_witness(fleet: str) -> frozenset[str]:
+    """Return the key expressions that a witness subscribes to."""
+    lease = {key(fleet, "*", "lease", to) for to in (TO_ALL, TO_HELLO, WITNESS_NAME)}
+    return frozenset(lease | {key(fleet, "*", "mission"), alive_key(fleet, "*", "*")})
+
+
 class Witness:
     """Node around a `Lease` with id 0. Without a mission it asks for one."""
 
@@ -28,15 +34,7 @@ class Witness:
 
     def __init__(self, fleet: str, incarnation: int, floor: int, mission: Mission | None = None) -> None:
         self.incarnation = incarnation
-        self.interests = frozenset(
-            {
-                key(fleet, "*", "lease", TO_ALL),
-                key(fleet, "*", "lease", TO_HELLO),
-                key(fleet, "*", "lease", WITNESS_NAME),
-                key(fleet, "*", "mission"),
-                alive_key(fleet, "*", "*"),
-            }
-        )
+        self.interests = heard_by_witness(fleet)
         self.finished = False
         self.refusal: str | None = None
         self.started_with = {"kind": "witness", "mission": msgspec.to_builtins(mission)}

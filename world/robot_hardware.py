@@ -117,6 +117,7 @@ class RobotHardware:
             gateway.agent,
             gateway.stop.known,
             gateway.stop.holds(now),
+            gateway.grant_s,
         )
         odometry.redraw()
         return self._outbox.envelope("sensors", message)

@@ -82,7 +82,8 @@ def _command(scenario: Scenario, robot: int, number: int, now: float) -> bytes:
     turn = 0.3 if (number // 50 + robot) % 2 else -0.3
     first = scenario.mission.robots[0]
     header = Header(robot_name(robot), 1, number, now)
-    return encode(CmdVel(header, Twist(0.4, turn), TERM, first, robot == first, GatewayStamp(1, now), NEVER_STOPPED))
+    stamp, grant_s = GatewayStamp(1, now), timing_for(scenario.mission).grant_s
+    return encode(CmdVel(header, Twist(0.4, turn), TERM, first, robot == first, stamp, NEVER_STOPPED, grant_s))
 
 
 def _real(scenario: Scenario) -> float:

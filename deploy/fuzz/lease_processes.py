@@ -278,4 +278,5 @@ class Hosts(GatewaySimulation):
 
     def _drawn(self, process: Process, term: Term, holder: int, as_leader: bool, stamp: GatewayStamp) -> CmdVel:
         header = Header(robot_name(process.id), process.member.incarnation, 0, process.clock.local(self.now))
-        return CmdVel(header, FORWARD, term, holder, as_leader, stamp, process.stop.known)
+        known, grant_s = process.stop.known, process.lease.grant_s
+        return CmdVel(header, FORWARD, term, holder, as_leader, stamp, known, grant_s)

@@ -38,6 +38,13 @@ MakeBase = Callable[[Limits, float], Base]
 """Function that opens a robot's hardware: its mission's limits and the time [s] in, the hardware out."""
 
 
+def heard_by_driver(fleet: str, robot_id: int) -> frozenset[str]:
+    """Return the key expressions that the driver of robot `robot_id` subscribes to."""
+    own = robot_name(robot_id)
+    others = {key(fleet, "*", "mission"), key(fleet, "*", "stop"), key(fleet, "*", "lease", f"gateway{robot_id}")}
+    return frozenset(others | {key(fleet, own, "cmd_vel"), alive_key(fleet, own, "*")})
+
+
 class Driver:
     """Driver of robot `robot_id`; `make_base(limits, now)` opens its hardware once the mission is known."""
 
@@ -61,15 +68,7 @@ class Driver:
         self.refusal: str | None = None
         self.defer_hellos = self.defer_grants = False
         self.started_with: dict[str, Any] = {"kind": "driver", "robot_id": robot_id}
-        self.interests = frozenset(
-            {
-                key(fleet, "*", "mission"),
-                key(fleet, "*", "stop"),
-                key(fleet, robot_name(robot_id), "cmd_vel"),
-                key(fleet, "*", "lease", f"gateway{robot_id}"),
-                alive_key(fleet, robot_name(robot_id), "*"),
-            }
-        )
+        self.interests = heard_by_driver(fleet, robot_id)
         self._robot_id = robot_id
         self._spare = spare
         self._make_base = make_base
@@ -171,6 +170,7 @@ class Driver:
                 gateway.agent,
                 gateway.stop.known,
                 gateway.stop.holds(now),
+                gateway.grant_s,
             )
         ]
         topics = ["sensors"]

@@ -16,12 +16,13 @@ from lfa.protocol.incarnations import is_later
 from lfa.protocol.lease.term_window import TermWindow
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
-from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.robot import UNSAID_GRANT_S, CmdVel
 from lfa.protocol.mission import Limits
 
 SHUT, OLD_INCARNATION, OLD_TERM, FOREIGN_HOLDER = "shut", "old_incarnation", "old_term", "foreign_holder"
 FOREIGN_STAMP, OLD_STAMP, LATCHED, TWO_HOLDERS = "foreign_stamp", "old_stamp", "latched", "two_holders"
 FUTURE_STAMP, REORDERED, BAD_TWIST = "future_stamp", "reordered", "bad_twist"
+OTHER_TIMING = "other_timing"
 
 
 class Gateway:
@@ -48,6 +49,9 @@ class Gateway:
         self.stop = StopLatch(robot_id, incarnation, operator_timeout_s)
         """Fleet stop at this gateway: it obeys commands and knows their terms also while no wheel may turn."""
         self._window = TermWindow()
+        self.grant_s = timing.grant_s
+        """`T_grant` [s], which follows from `T_act` and D: leases end in time only at gateways that hold the same as
+        all voters (E25)."""
         self._deadman_s = timing.deadman_s
         self._limits = limits
         # E13: an earlier incarnation of this gateway may have confirmed a fence unknown to this one. Every lease below
@@ -85,6 +89,8 @@ class Gateway:
     def _objection(self, cmd: CmdVel, now: float) -> str | None:
         if now < self._shut_until:
             return SHUT
+        if cmd.grant_s not in (UNSAID_GRANT_S, self.grant_s):
+            return OTHER_TIMING
         if self._knows_later(cmd.header.incarnation):
             return OLD_INCARNATION
         if cmd.term < self.term_max:

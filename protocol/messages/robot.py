@@ -11,6 +11,9 @@ from lfa.protocol.messages.consensus import GatewayStamp, Term
 from lfa.protocol.messages.header import Count, Header, Step
 from lfa.protocol.messages.stop import UNCERTAIN, StopKnowledge
 
+UNSAID_GRANT_S = 0.0
+"""`grant_s` of a message of version 5 (E35), which does not say it: it is not compared."""
+
 SENSOR_NAME_MAX, SENSOR_VALUES_MAX = 64, 64
 """Longest name of a sensor of a user's own or of one of its values, and the largest number of its values."""
 SensorName = Annotated[str, Meta(max_length=SENSOR_NAME_MAX)]
@@ -33,6 +36,8 @@ class Sensors(Struct, frozen=True, array_like=True, tag="sensors"):
     """What the gateway knows of the fleet stop (E28)."""
     stands: bool = False
     """True while the gateway lets no wheel turn: stopped, not certain yet, or without an operator (E28, E31)."""
+    grant_s: Number = UNSAID_GRANT_S
+    """`T_grant` [s] of the gateway: an agent takes no sensors from one that holds another than its team (E25)."""
 
 
 class Localization(Struct, frozen=True, array_like=True, tag="localization"):
@@ -99,3 +104,5 @@ class CmdVel(Struct, frozen=True, array_like=True, tag="cmd_vel"):
     gateway: GatewayStamp
     stop: StopKnowledge = UNCERTAIN
     """What the agent knows of the fleet stop: a gateway that has restarted learns it from here (E30)."""
+    grant_s: Number = UNSAID_GRANT_S
+    """`T_grant` [s] that the sender's lease counts on: a gateway with another one refuses (E25)."""

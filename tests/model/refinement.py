@@ -254,7 +254,8 @@ def gateway() -> int:
 
 
 def _command(term: Term, stamped_at: float) -> CmdVel:
-    return CmdVel(Header("robot1", 7, 0, 0.0), STILL, term, 1, True, GatewayStamp(5, stamped_at))
+    stamp, grant_s = GatewayStamp(5, stamped_at), timing_of("std").grant_s
+    return CmdVel(Header("robot1", 7, 0, 0.0), STILL, term, 1, True, stamp, grant_s=grant_s)
 
 
 ALL = (acceptor, candidate, holder, gateway, quorums)

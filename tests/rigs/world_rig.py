@@ -59,6 +59,7 @@ class Rig:
             as_leader=as_leader,
             gateway=GatewayStamp(9, self.now),
             stop=NEVER_STOPPED,
+            grant_s=timing_of("std").grant_s,
         )
         return self.hear(f"robot{robot_id}/cmd_vel", msgspec.structs.replace(cmd, **changes))
 

@@ -97,6 +97,11 @@ class Lease:
         return self._memory.agreed
 
     @property
+    def grant_s(self) -> float:
+        """`T_grant` [s] that this process and its team count on (E25)."""
+        return self._memory.timing.grant_s
+
+    @property
     def leader(self) -> int | None:
         """Id of the holder of the newest term known; None once its lease has expired by this process's own clock."""
         return self._memory.leader

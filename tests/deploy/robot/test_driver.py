@@ -60,7 +60,10 @@ class Bench:
             if twist is not None:
                 stamp = self.last(Sensors).gateway
                 header = Header("robot2", 1, 1, self.now)
-                self.hear("lfa/f/robot2/cmd_vel", CmdVel(header, twist, term, 1, as_leader, stamp, NEVER_STOPPED))
+                self.hear(
+                    "lfa/f/robot2/cmd_vel",
+                    CmdVel(header, twist, term, 1, as_leader, stamp, NEVER_STOPPED, TIMING.grant_s),
+                )
         return self
 
     def all(self, kind: type) -> list[Message]:
@@ -121,7 +124,10 @@ def test_a_command_that_echoes_no_moment_of_this_gateway_moves_nothing() -> None
     bench = Bench().begin()
     stamp = bench.last(Sensors).gateway
     old = type(stamp)(stamp.incarnation + 1, stamp.time)
-    bench.hear("lfa/f/robot2/cmd_vel", CmdVel(Header("robot2", 1, 1, bench.now), GO, TERM, 1, False, old))
+    bench.hear(
+        "lfa/f/robot2/cmd_vel",
+        CmdVel(Header("robot2", 1, 1, bench.now), GO, TERM, 1, False, old, grant_s=TIMING.grant_s),
+    )
     bench.run(0.2)
     assert bench.last(Sensors).odometer_m == 0.0
     assert bench.last(Sensors).refused == 1
@@ -160,7 +166,7 @@ def test_each_term_in_which_it_leads_is_one_event() -> None:
         stamp, term = bench.last(Sensors).gateway, Term(n, 2, 1)
         for _ in range(3):
             header = Header("robot2", 1, 1, bench.now)
-            bench.hear("lfa/f/robot2/cmd_vel", CmdVel(header, GO, term, 2, True, stamp, NEVER_STOPPED))
+            bench.hear("lfa/f/robot2/cmd_vel", CmdVel(header, GO, term, 2, True, stamp, NEVER_STOPPED, TIMING.grant_s))
     events = [m for m in bench.all(Event) if isinstance(m, Event) and m.kind == "leader_command"]
     assert [(event.term, event.data) for event in events] == [(Term(n, 2, 1), {"robot": 2}) for n in (5, 6)]
 

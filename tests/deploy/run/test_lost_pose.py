@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.faults.script import parse_all
+from lfa.deploy.recording.mcap_reader import messages
 from lfa.deploy.run.simulate import run
+from lfa.protocol.lease.timing import timing_of
 from lfa.world.description.load import load
+from lfa.world.robot_hardware import RobotHardware
 
 SETTINGS = ("mission.leading.route_m=[[6.0, 0.0]]", "faults=[]", "time_limit_s=60.0", "world.lidar.beams=60")
 REPRODUCE = "lfa sim straight --robots 3 --seed 1 --set mission.leading.route_m=[[6.0,0.0]] --fault"
@@ -32,6 +36,29 @@ def test_a_robot_that_never_has_a_pose_is_left_behind_and_the_others_arrive(
     assert (summary.outcome, summary.left_behind) == ("goal_reached", [robot]), f"{REPRODUCE} '{fault}'"
     stuck = [line["reason"] for line in done.events if line["kind"] == "stuck" and line["robot"] == robot]
     assert stuck[0].startswith("S6: own pose lost")
+
+
+@pytest.mark.parametrize("robot", [1, 2])
+def test_e25_a_robot_whose_gateway_holds_other_durations_stands_says_so_and_is_left_behind(
+    robot: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As with a driver that was started for the profile `wifi` in a team of `std`."""
+    ordinary = RobotHardware.__init__
+
+    def other(self: RobotHardware, *arguments: Any) -> None:
+        ordinary(self, *arguments)
+        if self.id == robot:
+            self.gateway.grant_s = timing_of("wifi").grant_s
+
+    monkeypatch.setattr(RobotHardware, "__init__", other)
+    done, summary = driven(tmp_path / "run")
+    assert (summary.outcome, summary.left_behind) == ("goal_reached", [robot])
+    said = [line for line in done.events if line["kind"] == "gateway"]
+    assert [(line["robot"], line["grant_s"], line["must_be_s"]) for line in said] == [(robot, 1.003, 0.301)]
+    assert abs(done.truth[robot][:, 4]).max() < 1e-3
+    told = messages(done.folder, frozenset({"status"}))
+    texts = {status.text for owner, _, _, status in told if owner == f"robot{robot}"}
+    assert "its gateway holds T_grant = 1.003 s: must be 0.301 s, as in the mission" in texts
 
 
 @pytest.mark.parametrize("robot", [1, 2])

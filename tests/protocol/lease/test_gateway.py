@@ -36,9 +36,20 @@ def command(
     issuer: int = 1,
     seq: int = 0,
     twist: Twist = GO,
+    grant_s: float = STD.grant_s,
 ) -> CmdVel:
-    stamp = GatewayStamp(gateway, at)
-    return CmdVel(Header("robot1", life, seq, 0.0), twist, Term(n, issuer, 1), holder, as_leader, stamp, NEVER_STOPPED)
+    header, term, stamp = Header("robot1", life, seq, 0.0), Term(n, issuer, 1), GatewayStamp(gateway, at)
+    return CmdVel(header, twist, term, holder, as_leader, stamp, NEVER_STOPPED, grant_s)
+
+
+def test_e25_commands_of_a_team_with_other_durations_are_refused() -> None:
+    """With a longer D it would obey a former leader beyond its lease; with a shorter T_grant, forget a fence."""
+    gateway = opened()
+    for profile in ("fast", "wifi"):
+        other = command(1.0, grant_s=timing_of(profile).grant_s)  # type: ignore[arg-type]
+        assert gateway.command(other, 1.0) == "other_timing"
+    assert gateway.twist(1.0) == STILL
+    assert gateway.command(command(1.0), 1.0) is None
 
 
 def test_e12_a_fresh_command_of_the_newest_term_moves_the_robot() -> None:

@@ -162,7 +162,8 @@ class Stage:
         process.steps += 1
         header = Header(robot_name(process.member.id), process.member.incarnation, process.steps, self.now)
         stamp = gateway.stamp(self.now)
-        gateway.command(CmdVel(header, FORWARD, lease.term, lease.chain[0], as_leader, stamp), self.now)
+        cmd = CmdVel(header, FORWARD, lease.term, lease.chain[0], as_leader, stamp, grant_s=lease.grant_s)
+        gateway.command(cmd, self.now)
         if as_leader:
             lease.commanded(self.now)
 
