@@ -10,13 +10,19 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.node import Node
-from lfa.protocol.topics import address
+from lfa.protocol.topics import TO_ALL, TO_HELLO, TOPICS, address, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.message_bus import Decoder
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 
 NAMESAKE_LEASES = 1.75  # of the two that are waited: a process that waits for its mission publishes only once a second
 TWIN_LEASES = 1.5
+
+
+def said_by(fleet: str, name: str) -> frozenset[str]:
+    """Return the keys on which a process of this name may be heard: a list, as a secured router admits no wildcard."""
+    lease = {key(fleet, name, "lease", to) for to in (TO_ALL, TO_HELLO)}
+    return frozenset(lease | {key(fleet, name, topic.name) for topic in TOPICS if topic.name != "lease"})
 
 
 def refuse_double(bus: ZenohBus, inbox: Inbox, fleet: str, lease_s: float, node: Node) -> list[int]:
@@ -28,7 +34,7 @@ def refuse_double(bus: ZenohBus, inbox: Inbox, fleet: str, lease_s: float, node:
     dead = bus.living(fleet, node.name)
     if not dead:
         return []
-    bus.follow(frozenset({f"lfa/{fleet}/{node.name}/**"}))
+    bus.follow(said_by(fleet, node.name))
     heard: dict[int, float] = {}
     patience_until = clock.now() + 2.0 * lease_s
     while clock.now() < patience_until:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from random import Random
+from secrets import token_hex
 from threading import get_ident
 from typing import Any
 
@@ -59,7 +59,8 @@ class ZenohBus:
         self._pulled: frozenset[str] = frozenset()
         self._spelled: dict[str, str] = {}
         """Spelling under which each followed key expression is declared at the moment; only its samples count."""
-        self._random = Random()
+        self._name, self._turn = token_hex(4), 0
+        """Whose spellings are used (an observer has none of its own), and how often all were declared again."""
         self._token: zenoh.LivelinessToken | None = None
         self._links = self._session.info.declare_transport_events_listener(
             zenoh.handlers.Callback(self._on_transport, indirect=False), history=False
@@ -67,6 +68,7 @@ class ZenohBus:
 
     def announce(self, fleet: str, owner: str, incarnation: int) -> None:
         """Declare the liveliness token of this incarnation."""
+        self._name = owner
         self._token = self._session.liveliness().declare_token(alive_key(fleet, owner, incarnation))
 
     def withdraw(self) -> None:
@@ -125,9 +127,10 @@ class ZenohBus:
         A busy router permanently drops declarations that cross a link while it recovers (zenoh#1886), and with them the
         subscribed messages. What another client of the own router has declared in the same words is not passed on.
         """
+        self._turn += 1
         for key in sorted(self._followed):
             before = self._followed[key]
-            spelling = key if _is_token(key) else respelled(key, self._random)
+            spelling = key if _is_token(key) else respelled(key, self._name, self._turn)
             if spelling == self._spelled[key]:
                 before.undeclare()
                 self._followed[key] = self._subscribe(key)

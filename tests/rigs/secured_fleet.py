@@ -139,7 +139,7 @@ class Poison:
         """What robot 1 proposed so far."""
         self._attacker = attacker
         self._statuses: list[Status] = []
-        attacker.declare_subscriber(f"{BASE}/robot1/lease/all", self._hear_lease)
+        attacker.declare_subscriber(f"{BASE}/*/lease/all", self._hear_lease)
         attacker.declare_subscriber(f"{BASE}/{TRAITOR}/status", self._hear_status)
         eventually(lambda: bool(self.proposes) and bool(self._statuses), "robot 1 or robot 3 says nothing")
         self.agreed = self.proposes[-1].agreed
@@ -158,7 +158,7 @@ class Poison:
 
     def _hear_lease(self, sample: zenoh.Sample) -> None:
         note = decode(sample.payload.to_bytes(), LeaseNote)
-        if isinstance(note, LeaseNote) and isinstance(note.body, Propose):
+        if isinstance(note, LeaseNote) and note.header.sender == "robot1" and isinstance(note.body, Propose):
             self.proposes.append(note.body)
 
     def _hear_status(self, sample: zenoh.Sample) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 from msgspec import Struct
 
+from lfa.deploy.fleet.security.follow_rights import followable
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
 from lfa.protocol.names import WITNESS_NAME, robot_id_of
 from lfa.protocol.topics import (
@@ -35,7 +36,8 @@ is also the minimum interval on a key: no agent publishes two of these at once. 
 usual, and only operators read it."""
 LEARN = ("declare_subscriber", "declare_queryable", "query", "liveliness_query", "declare_liveliness_subscriber")
 """Zenoh messages that tell a client about subscribers; without them it sends nothing."""
-ASK = ("declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber")
+ASK = ("declare_subscriber", "query")
+SEE = ("liveliness_query", "declare_liveliness_subscriber")
 SAY = ("put", "liveliness_token")
 HEAR = ("put", "reply", "liveliness_token")
 
@@ -63,6 +65,9 @@ class KeyPlan(Struct, frozen=True):
         The keys of persons, who join from anywhere, are on no machine.
         """
         return [name for name in self.at(host) if name not in PERSONS and self.places[name][0] == host]
+
+    def robots(self) -> list[int]:
+        return [robot for name in self.places if (robot := robot_id_of(name))]
 
     def simulated(self) -> list[str]:
         """Return the robots whose hardware the world simulates: those without a driver."""
@@ -153,7 +158,11 @@ def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, A
     neighbours = [host_name(other) for other in plan.hosts if other != host]
     members = [name for name in plan.at(host) if name not in neighbours]
     everything = f"lfa/{plan.fleet}/**"
-    allowed = [_rule("learn", "egress", LEARN, [everything]), _rule("ask", "ingress", ASK, [everything])]
+    allowed = [
+        _rule("learn", "egress", LEARN, [everything]),
+        _rule("ask", "ingress", ASK, [everything]),
+        _rule("see", "ingress", SEE, [everything]),
+    ]
     subjects: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
     for name in [*members, *neighbours]:
@@ -161,12 +170,16 @@ def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, A
             continue
         publishes = sayable(name, plan) if name in members else _through(name, plan, common_names)
         own = [_rule(f"hear-{name}", "egress", HEAR, hearable(name, plan))]
+        asked = followable(name, plan.fleet, plan.robots()) if name in members else None
+        if asked is not None:
+            own.append(_rule(f"ask-{name}", "ingress", ASK, asked))
         if publishes:
             own.append(_rule(f"say-{name}", "ingress", SAY, publishes))
         allowed += own
         seen = _subjects(name, common_names[name], joins=name in members)
         subjects += seen
-        policies.append({"rules": ["learn", "ask", *(r["id"] for r in own)], "subjects": [s["id"] for s in seen]})
+        common = ["learn", "see"] if asked is not None else ["learn", "see", "ask"]
+        policies.append({"rules": [*common, *(r["id"] for r in own)], "subjects": [s["id"] for s in seen]})
     guard = {"enabled": True, "default_permission": "deny", "rules": allowed, "subjects": subjects}
     return {
         "access_control": guard | {"policies": policies},

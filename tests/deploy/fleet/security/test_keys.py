@@ -5,20 +5,30 @@ from __future__ import annotations
 import json
 import os
 import stat
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from lfa.agents.agent import Agent
+from lfa.agents.subscriptions import with_mission
 from lfa.deploy.fleet.keys_command import command, planned
 from lfa.deploy.fleet.security import authority, keys, registry
 from lfa.deploy.fleet.security.access_rules import KeyPlan, rules, sayable
+from lfa.deploy.fleet.security.follow_rights import followable
 from lfa.deploy.fleet.security.private_files import ISSUED
+from lfa.deploy.robot.base import SimulatedBase
+from lfa.deploy.robot.driver import Driver
 from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.node import Node
+from lfa.protocol.runtime.namesakes import said_by
 from lfa.protocol.topics import TOPICS, Topic, matches
 from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, check_valid, credentials, validity
+from lfa.protocol.transport.spelling import respelled
 from lfa.protocol.transport.zenoh_router import check_listen
+from lfa.protocol.witness import Witness
 from tests.rigs.lfa_runs import lfa
 
 DAY_MS = 86_400_000
@@ -98,6 +108,43 @@ def test_every_rule_is_for_somebody_and_every_subject_has_rules() -> None:
     assert {s for policy in guard["policies"] for s in policy["subjects"]} == {s["id"] for s in guard["subjects"]}
     assert all(rule["permission"] == "allow" for rule in guard["rules"])
     assert guard["enabled"] and guard["default_permission"] == "deny"
+
+
+WITHIN = plan(drivers=[3], places={name: ["a"] for name in ("robot1", "robot3", "driver3", "witness", "world")})
+NODES: dict[str, Callable[[], Node]] = {
+    "robot1": lambda: Agent(1, 9, "f", 0),
+    "driver3": lambda: Driver("f", 3, 9, lambda limits, now: SimulatedBase(Pose2D(), limits, now)),
+    "witness": lambda: Witness("f", 9, 0),
+}
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_a_member_may_follow_what_its_node_follows_and_find_namesakes(name: str) -> None:
+    listed = followable(name, "f", WITHIN.robots())
+    assert listed is not None
+    wanted = {one for one in NODES[name]().interests if "/alive/" not in one} | said_by("f", name)
+    assert wanted <= set(listed)
+    spelled = {respelled(one, name, turn) for one in wanted for turn in range(9)}
+    assert spelled <= set(listed), "a member that declares anew would hear nothing more"
+
+
+def test_a_robot_may_follow_whomever_it_is_behind() -> None:
+    listed = followable("robot1", "f", WITHIN.robots())
+    assert listed is not None
+    for ahead in (None, 2, 3):
+        assert {one for one in with_mission("f", "robot1", ahead, asks=True) if "/alive/" not in one} <= set(listed)
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_what_a_member_may_follow_is_a_list_that_other_spellings_do_not_widen(name: str) -> None:
+    """Only the owner may be a wildcard: `lfa/f/robot3/**` would admit a family of names below it."""
+    guard = rules(WITHIN, "a", {one: one for one in (*WITHIN.places, "host-a")})["access_control"]
+    policies = [policy for policy in guard["policies"] if f"hear-{name}" in policy["rules"]]
+    asking = {r["id"]: r["key_exprs"] for r in guard["rules"] if "declare_subscriber" in r["messages"]}
+    admitted = [one for p in policies for rule in p["rules"] if rule != "learn" for one in asking.get(rule, [])]
+    assert 0 < len(admitted) < 400
+    assert not [one for one in admitted if one.split("/")[-1].endswith("*") or "**" in one]
+    assert not [one for one in admitted if "*" in one.split("/")[2] and one.split("/")[2] != "*"]
 
 
 # --- what lies where -------------------------------------------------------------------------------------------------
