@@ -30,8 +30,8 @@ demo: $(STAMP)
 test test-fast: export PYTHONDONTWRITEBYTECODE =
 test test-fast: export PYTHONPYCACHEPREFIX = $(CURDIR)/$(VENV)/bytecode
 test: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadgroup -m $(COMPUTE) || { $(ALONE) -m $(COMPUTE); }
-	$(BIN)/pytest -n 2 --dist loadgroup -m $(TEAMS) || { $(ALONE) -m $(TEAMS); }
+	$(BIN)/pytest -n 2 --dist load -m $(COMPUTE) || { $(ALONE) -m $(COMPUTE); }
+	$(BIN)/pytest -n 2 --dist load -m $(TEAMS) || { $(ALONE) -m $(TEAMS); }
 
 # Programs of others that tests of the ROS side talk to, each in an environment of its own; their tests are skipped
 # without them. Fetches some 400 MB once.
@@ -50,7 +50,7 @@ peers: .peers/genuine/.installed .peers/sdk/.installed .peers/foxglove/.installe
 
 # The tests that start no process.
 test-fast: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadgroup -m $(COMPUTE)
+	$(BIN)/pytest -n 2 --dist load -m $(COMPUTE)
 
 # The wheel, built and installed with and without extras: fetches packages.
 test-wheel: $(STAMP)
@@ -110,7 +110,7 @@ why: $(STAMP)
 # The lines of agents, world and protocol that the fast tests of their rooms reach: a short form, for a traced Python takes
 # three times as long. The floor is in pyproject.toml.
 coverage: $(STAMP)
-	$(BIN)/pytest -n 2 --dist loadgroup -m 'not processes' --cov=agents --cov=world --cov=protocol --cov-report=term \
+	$(BIN)/pytest -n 2 --dist load -m 'not processes' --cov=agents --cov=world --cov=protocol --cov-report=term \
 		tests/agents tests/world tests/protocol/lease/traces tests/protocol/lease/test_[ghqv]*.py \
 		tests/protocol/runtime tests/protocol/transport tests/protocol/messages tests/protocol/test_*.py
 

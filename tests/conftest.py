@@ -1,11 +1,9 @@
 """For all tests: an example of a property may take as long as the machine takes, since speed belongs to `lfa bench`;
 and Ctrl-C means what it says, also to a run that a shell has started in the background, where it is ignored.
 
-Workers of pytest-xdist with `--dist loadgroup`: all tests with real processes are in two groups, each run by one
-worker, one test after the other, so that there are no more than two teams at a time. Tests that share a fixture of
-their module stay together, so that it is made once. Each worker has a runtime folder of its own.
-With pytest 9.2, xdist 3.8 does not see the groups: two workers still are two teams, and a test may not rely on what
-another one left.
+Workers of pytest-xdist: tests that share a fixture of their module stay together, so that it is made once; each other
+test goes to whoever is free. Two workers are two teams of processes at a time, and a test may not rely on what another
+one left. Each worker has a runtime folder of its own.
 """
 
 from __future__ import annotations
@@ -17,6 +15,9 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -31,8 +32,6 @@ os.environ["XDG_RUNTIME_DIR"] = RUNTIME  # now: some modules ask for the default
 
 PROCESSES = ("tests/processes/", "tests/protocol/transport/test_zenoh_threads.py")
 """Tests below these paths start real processes, whether they say so or not."""
-FIRST_GROUP = ("test_run.py", "test_looking.py")
-"""Files that take about as long as all others with real processes."""
 RUN = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
 TEAMS = os.path.join(tempfile.gettempdir(), f"lfa-teams-{os.getuid()}-{RUN}")
 """Lock file of this run of the tests: shared by teams that run, exclusive for a test that needs the machine alone."""
@@ -64,20 +63,30 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
         os.close(handle)
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest chooses by marker, and before a worker reads the groups
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests that start processes, and tell xdist which tests stay together."""
+@pytest.hookimpl(tryfirst=True)  # before pytest chooses by marker
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests that start processes."""
     for item in items:
         if item.nodeid.startswith(PROCESSES):
             item.add_marker("processes")
-        if hasattr(config, "workerinput") and (group := _group(item)):
-            item.add_marker(pytest.mark.xdist_group(group))
 
 
-def _group(item: pytest.Item) -> str:
-    """Return the group of a test; empty when any worker may run it at any time."""
-    if item.get_closest_marker("processes"):
-        return f"processes {1 if item.path.name in FIRST_GROUP else 2}"
-    fixtures = item._fixtureinfo.name2fixturedefs.values()  # type: ignore[attr-defined]
-    shared = [one for many in fixtures for one in many if one.scope == "module"]
-    return str(item.path) if shared else ""
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Return what gives tests to the workers: a file with a fixture of its module is given as a whole.
+
+    xdist's own `loadgroup` cannot do it: it gives tests another id in an attribute that pytest 9.2 does not read.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class SharedFixtureScheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return file if _shares_a_fixture(config.rootpath / file) else nodeid
+
+    return SharedFixtureScheduling(config, log)
+
+
+@cache
+def _shares_a_fixture(file: Path) -> bool:
+    return 'scope="module"' in file.read_text()

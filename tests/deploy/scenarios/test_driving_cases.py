@@ -20,11 +20,11 @@ SHORT = (
     ("1_nose_at_a_post/1_nose_at_a_post.toml",                      1),
     ("3_gap_called_walled_in/3_gap_called_walled_in.toml",          1),
     ("driving/e_gap0.7_0.0_left_path.toml",                         10001),
-    ("driving/e_kd0.5_left.toml",                                   10001),
     ("driving/c_head_0.3_path.toml",                                10003),
     ("driving/c_left_0.1_path.toml",                                10001),
 )  # fmt: skip
 LONG = (
+    ("driving/e_kd0.5_left.toml",                                   10001),
     ("2_team_leader_killed/2_team_leader_killed.toml",              1),
     ("driving/c_head_0.3_expl.toml",                                10003),
     ("driving/c_over_0.6_path.toml",                                10004),
