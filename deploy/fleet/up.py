@@ -93,7 +93,7 @@ def _chosen(plan: FleetPlan, *, secure: bool, system: bool, boot: bool) -> Fleet
 
 async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool, wait_s: float) -> dict[str, Any]:
     """Bring the fleet up and return its chain and hosts. Raises NotUp, after ending everything started here."""
-    digest, keys = _digest(plan), bundles(plan)
+    digest, keys = digest_of(plan), bundles(plan)
     fleet = FleetHosts(plan, parts(plan, f"{time.strftime('%Y%m%d-%H%M%S')}-{digest}", digest, keys))
     try:
         await fleet.reach()
@@ -101,13 +101,13 @@ async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool
         _all_well(fleet)
         _join_those_that_run(plan, fleet, found, digest, keys)
         fresh = [name for name in plan.hosts if not found[name].run]
-        _say(f"starting {len(fresh)} of {len(found)} hosts")
+        tell(f"starting {len(fresh)} of {len(found)} hosts")
         started = await fleet.do("start")
         for name in (name for name in fresh if name in started and started[name].note):
-            _say(f"host {name}: {started[name].note}")
+            tell(f"host {name}: {started[name].note}")
         if fleet.wrong:
             raise NotUp(fleet.lines(), 1)
-        return await asyncio.to_thread(_await_health, plan, fleet.parts, interrupts, wait_s)
+        return await asyncio.to_thread(await_health, plan, fleet.parts, interrupts, wait_s)
     except NotUp as not_up:
         lines = await _take_down(fleet, locals().get("fresh", []))
         raise NotUp([*not_up.lines, *lines], not_up.code) from None
@@ -145,9 +145,7 @@ def _join_those_that_run(
         fleet.parts = parts(plan, run, digest, keys)
 
 
-def _await_health(
-    plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float
-) -> dict[str, Any]:
+def await_health(plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float) -> dict[str, Any]:
     """Observe the fleet until it has been healthy for HEALTHY_S; return its chain and hosts. Raises NotUp."""
     own = next((part for part in fleet_view.here() if part.fleet == plan.name), None)
     endpoints = [own.socket] if own is not None else []
@@ -181,14 +179,16 @@ def _progress(missing: list[str], shown: str) -> str:
     """Print each change of the missing items once; return the text shown last."""
     text = f"waiting: {missing[0]}{f', and {len(missing) - 1} more' if len(missing) > 1 else ''}" if missing else ""
     if text and text != shown:
-        _say(text)
+        tell(text)
     return text
 
 
-def _say(text: str) -> None:
+def tell(text: str) -> None:
+    """Print a line of progress."""
     print(text, file=sys.stderr, flush=True)
 
 
-def _digest(plan: FleetPlan) -> str:
+def digest_of(plan: FleetPlan) -> str:
+    """Return the digest of a fleet's file and scenario, by which its machines know that they run the same."""
     said = msgspec.json.encode((plan.file, plan.scenario), order="deterministic")
     return hashlib.sha256(said).hexdigest()[:8]

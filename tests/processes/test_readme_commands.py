@@ -59,6 +59,7 @@ ELSEWHERE = {
     "lfa foxglove": "tests/processes/test_foxglove.py",
     "lfa bag RUN": "tests/deploy/ros/test_bag.py",
     "lfa doctor": "tests/hosts/test_refused.py",
+    "lfa upgrade FILE": "tests/deploy/fleet/test_upgrade.py",
     "lfa up FILE --secure": "tests/deploy/fleet/security/test_secure.py",
     "lfa export compose FILE": "tests/deploy/fleet/export/test_export.py",
     "lfa import FILE": "tests/deploy/worlds/test_import.py",

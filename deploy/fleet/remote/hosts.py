@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import sys
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
 
+from lfa.deploy.fleet.host.host import ANSWER
 from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import HostPlan
@@ -18,6 +20,8 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, decode_json
 
+WIRE = f"from lfa.protocol.messages.header import WIRE_VERSION; print('{ANSWER}' + str(WIRE_VERSION))"
+"""Program for a machine's Python: print the version of the messages of its `lfa`."""
 CLOCK_S_MAX = 60.0
 """Maximum difference [s] of wall clocks; beyond it certificates start or end at the wrong time."""
 
@@ -66,6 +70,32 @@ class FleetHosts:
         chosen = set(self._shells if names is None else names)
         await self._each({name: shell for name, shell in self._shells.items() if name in chosen}, one)
         return answers
+
+    async def wires(self) -> dict[str, int]:
+        """Return the version of the messages that the `lfa` of each reached machine speaks."""
+        answers: dict[str, int] = {}
+
+        async def one(name: str) -> None:
+            python = python_of(self._plan.hosts[name])
+            done = await self._shells[name].run((python, "-P", "-c", WIRE))
+            if done.answer is None:
+                raise Refused(f"python = {python}: has no lfa that says its version ({done.last_line})")
+            answers[name] = int(done.answer)
+
+        await self._each(self._shells, one)
+        return answers
+
+    async def renew(self, name: str) -> None:
+        """Install this `lfa` on one machine, unless it uses the same, and start its part again with it."""
+
+        async def one(name: str) -> None:
+            shell, machine, part = self._shells[name], self._plan.hosts[name], self.parts[name]
+            if not machine.local or python_of(machine) != sys.executable:
+                await install(shell, machine, part.version)
+            await ask(shell, machine, "stop", part)
+            await ask(shell, machine, "start", part)
+
+        await self._each({name: self._shells[name]}, one)
 
     async def close(self) -> None:
         await asyncio.gather(*(shell.close() for shell in self._shells.values()), return_exceptions=True)
