@@ -148,10 +148,7 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     another twist than the robot's role gives."""
     limits: Limits = Limits()
     radius_m: float = 0.15
-    """Radius [m] of the body around `base_link`; with `footprint_m` that of the circle which the robots keep free."""
-    footprint_m: tuple[tuple[float, float], ...] = ()
-    """Corners x, y [m] of a body that is a convex polygon, in `base_link`, counter-clockwise around its origin. Empty:
-    the body is round."""
+    """Radius [m] of the circle around `base_link` that holds the body, and that the robots keep free."""
     operator_timeout_s: float | None = None
     """Silence [s] of all operators after which every robot stands, until one is there again; `lfa watch` shows that one
     is. None: a team needs no operator."""

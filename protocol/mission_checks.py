@@ -7,12 +7,9 @@ from itertools import pairwise
 from math import hypot, inf, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, RefusedValue, Rule, apply_rules, out_of_range, wrong
-from lfa.protocol.geometry import convex
 from lfa.protocol.mission import CONTROL_HZ, CONTROL_HZ_MIN, KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
 
 _ROBOTS, _ROUTE, _TIMES = "mission.robots", "mission.leading.route_m", "mission.leading.times_s"
-REACH_M = 1e-3
-"""Rounding [m] of a radius that a corner may lie outside of."""
 
 
 def check_mission(mission: Mission) -> Mission:
@@ -98,24 +95,6 @@ def _boxes(mission: Mission) -> Iterator[Mistake]:
             yield wrong(where, list(box), "x1, y1, x2, y2 [m] with x1 < x2 and y1 < y2")
 
 
-def _footprint(mission: Mission) -> Iterator[Mistake]:
-    """Find a body that is not convex, does not hold `base_link`, or is larger than the circle kept free for it."""
-    where, corners = "mission.footprint_m", mission.footprint_m
-    if not corners:
-        return
-    value = [list(corner) for corner in corners]
-    sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
-    if not (all(isfinite(c) for corner in corners for c in corner) and convex(corners)):
-        yield wrong(where, value, "at least three corners of a convex polygon, counter-clockwise")
-    elif any(ax * by - ay * bx <= 0.0 for (ax, ay), (bx, by) in sides):
-        yield wrong(where, value, "around the origin [0, 0], where base_link is")
-    else:
-        reach_m = max(hypot(x, y) for x, y in corners)
-        if mission.radius_m < reach_m - REACH_M:
-            right = f"at least {reach_m:.4g}, the distance of the farthest corner of {where}"
-            yield wrong("mission.radius_m", mission.radius_m, right, where)
-
-
 def _orientations(mission: Mission) -> Iterator[Mistake]:
     for n, orientation in enumerate(mission.leading.orientations):
         if not (isfinite(orientation.at_m) and orientation.at_m >= 0.0):
@@ -150,5 +129,5 @@ def _ranges(mission: Mission) -> Iterator[Mistake]:
 
 
 MISSION_RULES: tuple[Rule[Mission], ...] = tuple(
-    Rule(check) for check in (_robots, _can_lead, _ranges, _route, _times, _known, _boxes, _orientations, _footprint)
+    Rule(check) for check in (_robots, _can_lead, _ranges, _route, _times, _known, _boxes, _orientations)
 )

@@ -91,7 +91,7 @@ NOISE = (
 """Noise of the shipped scenario `explore`."""
 JACKAL = (
     "mission.radius_m=0.333",
-    "mission.footprint_m=[[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]]",
+    "world.body.footprint_m=[[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]]",
     "world.lidar.fov_rad=4.712389",
     "world.lidar.beams=270",
     "world.lidar.mount=[0.12, 0.0, 0.0]",

@@ -27,19 +27,6 @@ REFUSED = [
     (msgspec.structs.replace(GOOD, leading=Leading(route_m=((0.0, 0.0), (9e3, 0.0)) * 9)), "at most 10000 m"),
 ]
 
-JACKAL = ((0.254, 0.215), (-0.254, 0.215), (-0.254, -0.215), (0.254, -0.215))
-REFUSED += [
-    (msgspec.structs.replace(GOOD, footprint_m=corners, radius_m=radius_m), says)
-    for corners, radius_m, says in (
-        (JACKAL[:2], 0.4, "mission.footprint_m"),
-        (JACKAL[::-1], 0.4, "convex polygon, counter-clockwise"),
-        ((*JACKAL[:3], (0.0, 0.0), JACKAL[3]), 0.4, "convex polygon"),
-        (((0.0, float("nan")), *JACKAL[1:]), 0.4, "mission.footprint_m"),
-        (((0.3, 0.2), (0.1, 0.2), (0.1, -0.2), (0.3, -0.2)), 0.4, "around the origin"),
-        (JACKAL, 0.3, "mission.radius_m = 0.3: must be at least 0.3328"),
-    )
-]
-
 TIMED = Leading(motion="trajectory", route_m=((0.0, 0.0), (5.0, 0.0)), times_s=(0.0, 12.0))
 REFUSED += [
     (msgspec.structs.replace(GOOD, leading=msgspec.structs.replace(TIMED, **wrong)), says)
@@ -59,10 +46,6 @@ def test_refused_in_one_line_that_names_the_field(mission: Mission, says: str) -
         check_mission(mission)
     assert says in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-def test_a_body_that_is_a_polygon_is_taken() -> None:
-    assert check_mission(msgspec.structs.replace(GOOD, footprint_m=JACKAL, radius_m=0.333)).footprint_m == JACKAL
 
 
 def test_a_good_mission_is_taken_as_it_is() -> None:

@@ -15,6 +15,8 @@ from lfa.world.description.terrain import feature_mistakes, features
 
 ROBOTS_MAX = 500
 LENGTH_M_MIN = 0.001
+REACH_M = 1e-3
+"""Rounding [m] of a radius that a corner may lie outside of."""
 PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
 
 
@@ -60,6 +62,24 @@ def _assertions(scenario: Scenario) -> Iterator[Mistake]:
         value = getattr(scenario.asserted, bound)
         if value is not None and value < 0:
             yield wrong(f"assert.{bound}", value, "0 or more: less can never hold, or always does")
+
+
+def _footprint(scenario: Scenario) -> Iterator[Mistake]:
+    """Find a body that is not convex, does not hold `base_link`, or is larger than the circle kept free for it."""
+    where, corners, radius_m = "world.body.footprint_m", scenario.world.body.footprint_m, scenario.mission.radius_m
+    if not corners:
+        return
+    value = [list(corner) for corner in corners]
+    sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
+    if not (all(isfinite(c) for corner in corners for c in corner) and convex(corners)):
+        yield wrong(where, value, "at least three corners of a convex polygon, counter-clockwise")
+    elif any(ax * by - ay * bx <= 0.0 for (ax, ay), (bx, by) in sides):
+        yield wrong(where, value, "around the origin [0, 0], where base_link is")
+    else:
+        reach_m = max(hypot(x, y) for x, y in corners)
+        if radius_m < reach_m - REACH_M:
+            right = f"at least {reach_m:.4g}, the distance of the farthest corner of {where}"
+            yield wrong("mission.radius_m", radius_m, right, where)
 
 
 def _mount(scenario: Scenario) -> Iterator[Mistake]:
@@ -168,5 +188,16 @@ def _motion(where: str, obstacle: Obstacle) -> Iterator[Mistake]:
 
 SCENARIO_RULES: tuple[Rule[Scenario], ...] = tuple(
     Rule(check)
-    for check in (_saved_from, _robots, _ranges, _obstacles, _mount, _terrain, _assertions, _restarts, _walls)
+    for check in (
+        _saved_from,
+        _robots,
+        _ranges,
+        _obstacles,
+        _footprint,
+        _mount,
+        _terrain,
+        _assertions,
+        _restarts,
+        _walls,
+    )
 )

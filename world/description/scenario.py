@@ -52,12 +52,15 @@ class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Body(Struct, frozen=True, forbid_unknown_fields=True):
-    """Bodies of the simulated robots; their radius is the mission's."""
+    """Bodies of the simulated robots, within the circle of the mission's radius."""
 
     mass_kg: float = 5.0
     push_n: float = 40.0
     """Largest force [N] of the wheels on the ground; limits what a robot can push and how steep a contact it climbs."""
     wheel_radius_m: float = 0.05
+    footprint_m: tuple[Point, ...] = ()
+    """Corners x, y [m] of a body that is a convex polygon, in `base_link`, counter-clockwise around its origin. Empty:
+    the body is round."""
 
 
 class Lidar(Struct, frozen=True, forbid_unknown_fields=True):

@@ -56,7 +56,7 @@ class Physics:
         self.wheels: list[Twist] = [STILL] * len(self.poses)
         """Twist that each robot's wheels roll; differs from `twists` where they slip."""
         mass_kg, radius_m = world.body.mass_kg, mission.radius_m
-        self._footprint_m = mission.footprint_m
+        self._footprint_m = world.body.footprint_m
         self._inertia = pymunk.moment_for_circle(mass_kg, 0.0, radius_m)
         if self._footprint_m:
             self._inertia = pymunk.moment_for_poly(mass_kg, self._footprint_m)

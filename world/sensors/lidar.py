@@ -38,7 +38,7 @@ class Scanner:
     def __init__(self, scenario: Scenario) -> None:
         self._lidar = scenario.world.lidar
         self._radius_m = scenario.mission.radius_m
-        self._footprint_m = scenario.mission.footprint_m
+        self._footprint_m = scenario.world.body.footprint_m
         self._mount = Pose2D(*self._lidar.mount)
         lidar, turn = self._lidar, self._lidar.beams_a_turn
         self._turn = replace(lidar, beams=turn, fov_rad=TAU)

@@ -228,3 +228,28 @@ def _gap(a: Obstacle, b: Obstacle) -> float:
     """At least this far [m] apart: a polygon counts as the circle around it."""
     apart = hypot(a.center_m[0] - b.center_m[0], a.center_m[1] - b.center_m[1])
     return apart - reach_of(a) - reach_of(b)
+
+
+JACKAL = "[[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]]"
+
+
+@pytest.mark.parametrize(
+    ("corners", "radius_m", "says"),
+    [
+        ("[[0.254, 0.215], [-0.254, 0.215]]", 0.4, "world.body.footprint_m"),
+        ("[[0.3, 0.2], [0.3, -0.2], [-0.3, -0.2], [-0.3, 0.2]]", 0.4, "convex polygon, counter-clockwise"),
+        ("[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.0, 0.0], [0.3, -0.2]]", 0.4, "convex polygon"),
+        ("[[nan, 0.2], [-0.3, 0.2], [-0.3, -0.2]]", 0.4, "world.body.footprint_m"),
+        ("[[0.3, 0.2], [0.1, 0.2], [0.1, -0.2], [0.3, -0.2]]", 0.4, "around the origin"),
+        (JACKAL, 0.3, "mission.radius_m = 0.3: must be at least 0.3328"),
+    ],
+)
+def test_a_body_that_cannot_be_is_refused_in_one_line(corners: str, radius_m: float, says: str) -> None:
+    with pytest.raises(Refused) as refused:
+        load("straight", [f"world.body.footprint_m={corners}", f"mission.radius_m={radius_m}"])
+    assert says in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_body_that_is_a_polygon_is_taken() -> None:
+    world = load("straight", [f"world.body.footprint_m={JACKAL}", "mission.radius_m=0.333"]).world
+    assert world.body.footprint_m[0] == (0.254, 0.215)

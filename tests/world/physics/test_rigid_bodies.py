@@ -225,7 +225,7 @@ def test_a_crowd_that_collides_moves_the_same_in_every_process() -> None:
 @pytest.mark.parametrize(("theta", "touches"), [(0.0, 0), (pi / 2, 1)])
 def test_a_rectangle_touches_a_wall_beside_it_only_with_its_long_side(theta: float, touches: int) -> None:
     corners = "[[0.254,0.215],[-0.254,0.215],[-0.254,-0.215],[0.254,-0.215]]"
-    world = bodies("mission.radius_m=0.333", f"mission.footprint_m={corners}", "mission.formation.separation_m=1")
+    world = bodies("mission.radius_m=0.333", f"world.body.footprint_m={corners}", "mission.formation.separation_m=1")
     assert isinstance(world, Physics)
     world.set_down(9, Obstacle((0.0, 1.0), corners_m=((-2.0, -0.1), (2.0, -0.1), (2.0, 0.1), (-2.0, 0.1))))
     world.place(0, Pose2D(0.0, 0.9 - 0.235, theta))

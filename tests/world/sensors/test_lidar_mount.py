@@ -15,7 +15,10 @@ from lfa.world.sensors.lidar_mount import BaseScan, seen_from_base
 
 BEAMS = 360
 WALLS = "world.walls_m=[[3,-1,3,1],[-2,-1,-2,1]]"
-JACKAL = ("mission.radius_m=0.333", "mission.footprint_m=[[0.254,0.215],[-0.254,0.215],[-0.254,-0.215],[0.254,-0.215]]")
+JACKAL = (
+    "mission.radius_m=0.333",
+    "world.body.footprint_m=[[0.254,0.215],[-0.254,0.215],[-0.254,-0.215],[0.254,-0.215]]",
+)
 WIDE = "mission.formation.separation_m=1.5"
 
 
