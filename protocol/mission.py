@@ -39,7 +39,8 @@ class FormationSpec(Struct, frozen=True, forbid_unknown_fields=True):
     """Angle alpha [rad] off the predecessor's rear axis, in [0, pi/2]; the paper's phi."""
     side: Side = "left"
     heading_filter_m: float = 0.0
-    """Travelled distance L_chi [m] over which the formation's heading follows the predecessor's."""
+    """Travelled distance L_chi [m] over which the formation's heading follows the predecessor's. 0: none, the paper's
+    rigid offset, with up to 3 followers and on a trace; 0.6 k |cos phi| with more, whose rigid slots would swing."""
 
 
 class Following(Struct, frozen=True, forbid_unknown_fields=True):

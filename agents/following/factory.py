@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from math import cos
+
 import msgspec
 
 from lfa.agents.config import Gains, check_gains
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
+from lfa.agents.formation.formation import phi_of
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Mission
+
+FILTER_SHARE = 0.6
+"""L_chi as a share of k |cos phi|: above the 0.5 from which no wave across the path grows (5.3)."""
 
 
 def gains_of(mission: Mission) -> Gains:
@@ -31,11 +37,20 @@ def follower_of(mission: Mission) -> Follower:
         mission.limits,
         make_controller(following, gains, mission.limits),
         name=following.controller,
-        heading_filter_m=mission.formation.heading_filter_m,
+        heading_filter_m=heading_filter_of(mission),
         cruise_mps=mission.leading.cruise_mps,
         radius_m=mission.radius_m,
         paper_observer=following.observer == "paper",
     )
+
+
+def heading_filter_of(mission: Mission) -> float:
+    """Return L_chi [m]: the mission's, or the one with which nothing grows along a chain of its length (5.4)."""
+    spec = mission.formation
+    rigid = mission.following.trace or len(mission.robots) - 1 <= DEAD_RECKONING_FOLLOWERS_MAX
+    if spec.heading_filter_m > 0.0 or rigid:
+        return spec.heading_filter_m
+    return FILTER_SHARE * spec.separation_m * abs(cos(phi_of(spec.side, spec.angle_rad, 0)))
 
 
 def predecessor_of(mission: Mission, robot: int, followers: int, previous: Predecessor | None = None) -> Predecessor:
