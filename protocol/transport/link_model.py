@@ -54,7 +54,7 @@ class Radio(Struct, frozen=True, forbid_unknown_fields=True):
     reorder: float = 0.0
     """Probability that a message is held back for up to 0.15 s, so that later ones overtake it."""
     range_m: float = 0.0
-    """Distance [m] up to which robots hear each other, 0: any. Processes know the places from what robots say."""
+    """Distance [m] up to which robots hear each other, 0: any. Where robots are processes the fault `range` sets it."""
 
     @property
     def prompt_s(self) -> float:
