@@ -1,7 +1,7 @@
 """Who hears a key: the subscriptions of all simulated processes, and the receivers of each key as last found.
 
-A team of N robots has some 20 N subscriptions and 20 N keys. So a subscription without a wildcard costs one look-up,
-and only the some twenty expressions with one, which all robots share, are compared with a new key.
+A team of N robots has some 20 N subscriptions and, in an election, as many keys as pairs of robots. So a subscription
+without a wildcard costs one look-up, and of those with one a new key is compared only with those of its own ending.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ Receiver = TypeVar("Receiver")
 Route = list[tuple[Receiver, Link | None]]
 """Receivers of a key in the order of their starts, and the radio link to each (None: not over radio)."""
 
+ANY = "*"
+"""Ending of expressions that have a wildcard in it."""
+
 
 class Routes(Generic[Receiver]):
     """Subscriptions of the processes that have been added and not removed."""
@@ -26,7 +29,8 @@ class Routes(Generic[Receiver]):
         self._place: dict[Receiver, int] = {}
         self._starts = 0
         self._exact: dict[str, set[Receiver]] = {}
-        self._wild: dict[str, set[Receiver]] = {}
+        self._wild: dict[str, dict[str, set[Receiver]]] = {}
+        """Receivers by expression, by what `_ending` returns for it."""
         self._known: dict[str, Route[Receiver]] = {}
 
     def add(self, receiver: Receiver, name: str) -> None:
@@ -53,16 +57,19 @@ class Routes(Generic[Receiver]):
         route = self._known.get(key)
         if route is None:
             hear = set(self._exact.get(key, ()))
-            for expression, receivers in self._wild.items():
-                if receivers and matches(expression, key):
-                    hear |= receivers
+            own = _ending(key)
+            for ending in (own, f"{own.partition('/')[0]}/{ANY}", ANY):
+                for expression, receivers in self._wild.get(ending, {}).items():
+                    if receivers and matches(expression, key):
+                        hear |= receivers
             names = self._names
             route = [(each, link_of(key, names[each])) for each in sorted(hear, key=self._place.__getitem__)]
             self._known[key] = route
         return route
 
     def _hearing(self, expression: str) -> set[Receiver]:
-        return (self._wild if "*" in expression else self._exact).setdefault(expression, set())
+        among = self._wild.setdefault(_ending(expression), {}) if "*" in expression else self._exact
+        return among.setdefault(expression, set())
 
     def _forget(self, expression: str) -> None:
         """Forget what is no longer so: who hears one key, or, after a change of a wildcard, who hears any."""
@@ -70,3 +77,11 @@ class Routes(Generic[Receiver]):
             self._known.clear()
         else:
             self._known.pop(expression, None)
+
+
+def _ending(expression: str) -> str:
+    """Return what follows the owner in a key or expression: its topic, and the receiver or that it is a wildcard."""
+    topic, *rest = expression.split("/")[3:] or [ANY]
+    if "*" in topic:
+        return ANY
+    return "/".join((topic, ANY if any("*" in part for part in rest) else "/".join(rest)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -58,7 +59,8 @@ def test_a_ros_users_sdk_lists_echoes_and_hands_over_and_the_robots_obey(tmp_pat
             transforms = told["last"]["/tf"]  # a message tells of the robots with news: whichever came last
             assert any(f"robot{n}/odom" in transforms for n in (1, 2, 3)), transforms
             assert "qos='2::,5:" in told["scan"][0], "best effort, depth 5"
-            assert told["called"] == [True, "robot 2 leads"]
+            assert told["called"][0], told["called"]
+            assert re.fullmatch(r"robot [23] leads", told["called"][1])  # a loaded machine may change it before
             eventually(lambda: any(e.get("by") == "operator" for e in run.events()), "the formation was not ordered")
             eventually(lambda: any(e.get("change") == "handed_over" for e in run.events()), "nobody handed over")
             bridged.send_signal(signal.SIGINT)
