@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from lfa.agents.agent import Agent
+from lfa.agents.behaviors.own_behavior import BEHAVIORS
 from lfa.agents.following.plugin import add_controller_file
 from lfa.protocol import clock, incarnations
 from lfa.protocol.config_file.mistake import FileError, RefusedFile, apply_rules
@@ -50,6 +51,8 @@ def start(arguments: argparse.Namespace) -> int:
     """Run one robot of a fleet until it is stopped (Ctrl-C or SIGTERM). Raise `Refused`."""
     if arguments.controller is not None:
         add_controller_file(arguments.controller)
+    for own_code in arguments.behavior:
+        BEHAVIORS.add_file(own_code)
     mission = None if arguments.mission is None else read_mission(arguments.mission)
     endpoint = arguments.connect or default_endpoint()
     if arguments.lockstep is not None:
@@ -101,6 +104,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--spare", action="store_true", help="a robot that the mission does not name: it waits for lfa join")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
     add("--controller", metavar="FILE.py:Class", help="a controller of your own, for a mission that chooses it")
+    add("--behavior", metavar="FILE.py:Class", action="append", default=[],
+        help="a behaviour of your own, for a mission that names it; repeatable")
     add("--faults", action="store_true", help="obey an operator's link conditions (lfa fault cut, loss): for tests")
     add("--lockstep", metavar="START", help="take time and messages from `lfa run --lockstep`, which starts its "
         "agents so; START counts the robot's starts from 1")

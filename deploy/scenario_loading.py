@@ -8,11 +8,11 @@ from pathlib import Path
 
 from lfa.agents.behaviors.own_behavior import OwnBehaviors
 from lfa.agents.config import Gains
-from lfa.agents.following.controller import find_controller
 from lfa.agents.following.factory import gains_of
-from lfa.agents.following.plugin import add_controller_file, make_controller
+from lfa.agents.following.plugin import make_controller
 from lfa.deploy.faults.goals import check_goals
 from lfa.deploy.faults.script import parse
+from lfa.deploy.own_code import OwnFile, load_files, refuse_missing
 from lfa.deploy.recording.run_folder import SCENARIO, scenario_of
 from lfa.protocol.config_file.mistake import Mistake, RefusedValue, Rule
 from lfa.protocol.errors import Refused
@@ -29,28 +29,14 @@ def load_scenario(scenario: str, overrides: Sequence[str] = (), robots: int | No
     return load(scenario, overrides, robots, RULES)
 
 
-def with_controller(overrides: Sequence[str], controller: str | None) -> list[str]:
-    """Return `overrides` with the choice of `controller`, loaded if it is `FILE.py:Class`. Raises Refused."""
-    if controller is None:
-        return list(overrides)
-    return [*overrides, f"mission.following.controller='{add_controller_file(controller)}'"]
+def load_code_of_run(folder: Path, given: Sequence[OwnFile]) -> None:
+    """Load what re-executes a run: the plug-ins `given`, else nothing where the run's own are installed.
 
-
-def load_controller_of_run(folder: Path, controller: str | None) -> None:
-    """Load what re-executes a run: `controller`, if given, else nothing where the run's own is installed.
-
-    Code in a run folder is not run unless it is asked for. Raises Refused with the option that would load the copy of
-    the run's controller.
+    Raises Refused with the option that would load the copy of a plug-in that is missing.
     """
-    if controller is not None:
-        add_controller_file(controller)
-    if not (folder / SCENARIO).is_file():
-        return
-    needed = scenario_of(folder).mission.following.controller
-    try:
-        find_controller(needed)
-    except Refused:
-        raise Refused(f"{folder}: its controller {needed} is not loaded: add --controller {folder / needed}") from None
+    load_files(given)
+    if (folder / SCENARIO).is_file():
+        refuse_missing(scenario_of(folder), folder)
 
 
 def _gains(scenario: Scenario) -> Iterator[Mistake]:

@@ -1,4 +1,5 @@
-"""Plug-ins: classes of a user's own, by name among the installed entry points of a group, or as a script added them.
+"""Plug-ins: classes of a user's own, by name among the installed entry points of a group, from a file `FILE.py:Class`,
+or as a script added them.
 
 A plug-in with parameters of its own names their types in a `Struct` called `Parameters`. Code is loaded only by the
 name of an installed package or from the command line, never because a message or a scenario names a file.
@@ -6,6 +7,7 @@ name of an installed package or from the command line, never because a message o
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -18,15 +20,45 @@ from lfa.protocol.errors import Refused
 
 
 class PlugIns:
-    """Plug-ins of one `kind`, as `sensor`, whose packages name them in the entry points `group`."""
+    """Plug-ins of one `kind`, as `sensor`, whose packages name them in the entry points `group`.
 
-    def __init__(self, kind: str, group: str) -> None:
+    `option` is the word of a command line before a `FILE.py:Class`, with its space; `by_class` says that a class from a
+    file is known by its own name, not as `FILE.py:Class`: for names that stand in keys.
+    """
+
+    def __init__(self, kind: str, group: str, option: str, *, by_class: bool = False) -> None:
         self._kind, self._group = kind, group
+        self.option = option
+        self._by_class = by_class
         self._added: dict[str, Any] = {}
+        self._files: dict[str, str] = {}
 
     def add(self, name: str, make: Any) -> None:
         """Make `make` the plug-in called `name` in this process: for a script or a notebook that simulates."""
         self._added[name] = make
+
+    def add_file(self, text: str) -> str:
+        """Load the class that `FILE.py:Class` names, and return the name by which a scenario chooses it.
+
+        A text without `.py:` is the name of a plug-in, and returned as it is. Raise `Refused` with one line for a file
+        that cannot be read or run, for one that has no such class, and for an unknown name.
+        """
+        if not is_file(text):
+            self.find(text)
+            return text
+        file, _, name = text.rpartition(":")
+        path = Path(file).absolute()
+        make = getattr(_module(path, f"{self.option}{text}"), name, None)
+        if not callable(make):
+            raise Refused(f"{self.option}{text}: {file} has no class {name!r}, must be FILE.py:Class")
+        known_as = name if self._by_class else f"{path.name}:{name}"
+        self.add(known_as, make)
+        self._files[known_as] = f"{path}:{name}"
+        return known_as
+
+    def file_of(self, name: str) -> str | None:
+        """Return the absolute `FILE.py:Class` of a plug-in that was added from a file, else None."""
+        return self._files.get(name)
 
     def names(self) -> list[str]:
         """Return the names of all installed and added plug-ins."""
@@ -43,7 +75,8 @@ class PlugIns:
         points = self._entry_points()
         if name not in points:
             known = ", ".join(self.names()) or "none is installed"
-            raise Refused(f"no {self._kind} {name!r}: must be one of the entry points {self._group}: {known}")
+            right = f"one of the entry points {self._group}: {known}; or given by {self.option}FILE.py:Class"
+            raise Refused(f"no {self._kind} {name!r}: must be {right}")
         try:
             return points[name].load()
         except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
@@ -78,6 +111,28 @@ class PlugIns:
         from importlib.metadata import entry_points
 
         return {point.name: point for point in entry_points(group=self._group)}
+
+
+def is_file(text: str) -> bool:
+    """Return True for `FILE.py:Class`, whether or not there is such a file."""
+    file, colon, _ = text.rpartition(":")
+    return bool(colon) and file.endswith(".py")
+
+
+def _module(path: Path, where: str) -> Any:
+    from importlib.util import module_from_spec, spec_from_file_location
+
+    if not path.is_file():
+        raise Refused(f"{where}: no such file, must be FILE.py:Class")
+    # Under a name that no other module has: the types of its classes are looked up there.
+    spec = spec_from_file_location(f"own code in {path}", path)
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[spec.name] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # noqa: BLE001 - the file of a user may fail in any way
+        raise Refused(f"{where}: {error_text(error)}") from None
+    return module
 
 
 def parameters_of(make: Any) -> type[Struct] | None:

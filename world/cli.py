@@ -14,20 +14,22 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.node import Node
 from lfa.protocol.output import write_line
+from lfa.protocol.plug_in import is_file
 from lfa.protocol.runtime.node_runner import Options, run
 from lfa.protocol.topics import WORLD_NAME, fleet_name
 from lfa.protocol.transport.credentials import credentials
 from lfa.protocol.transport.zenoh_config import LINK_LEASES_MS, default_endpoint
 from lfa.protocol.witness import Witness
+from lfa.world.description.generator import GENERATORS
 from lfa.world.description.load import draw, load
-from lfa.world.description.own_sensor import INSTALLED_RULE
+from lfa.world.description.own_sensor import INSTALLED_RULE, SENSORS
 
 EXTRA = ("numpy", "pymunk", "PIL")
 EXAMPLE = "Example: lfa-world paper_path1 --seed 7 --set world.lidar.beams=90"
 
 
 def start(
-    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")],
+    scenario: Annotated[str, typer.Argument(help="A shipped scenario, a TOML file, or a generator: FILE.py:Class.")],
     seed: Annotated[int, typer.Option(help="Seed of noise, obstacle positions and start poses.")] = 0,
     set_: Annotated[list[str] | None, typer.Option("--set", help="Override a field, a.b=value; repeatable.")] = None,
     robots: Annotated[int | None, typer.Option(help="Team size; the ids become 1 to N.")] = None,
@@ -47,6 +49,9 @@ def start(
             help="The leader drives as the robot of a rosbag2 (FOLDER or FOLDER:TOPIC) or of an MRCLAM FILE.dat."
         ),
     ] = None,
+    sensor: Annotated[
+        list[str] | None, typer.Option(help="Load a sensor that the scenario names: FILE.py:Class; repeatable.")
+    ] = None,
     faults: Annotated[bool, typer.Option("--faults", help="Obey `lfa fault cut` and `loss`; for tests.")] = False,
 ) -> int:
     """Simulate the bodies, sensors and gateways of a team until stopped (Ctrl-C or SIGTERM)."""
@@ -54,6 +59,10 @@ def start(
     from lfa.world.description.recorded_leader import with_leader
     from lfa.world.world import World
 
+    if is_file(scenario):
+        GENERATORS.add_file(scenario)
+    for own_code in sensor or ():
+        SENSORS.add_file(own_code)
     loaded = load(scenario, set_ or (), robots, (INSTALLED_RULE,))
     if leader_from is not None:
         loaded = with_leader(loaded, leader_from)

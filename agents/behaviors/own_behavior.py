@@ -2,7 +2,7 @@
 
 They act in the order in which the mission names them, after the built-in behaviour and before the robot gives way to
 what moves and before all limits: what they want is braked for like any other motion. A behaviour is found by name among
-the entry points `lfa.behaviors`, or those that `add_behavior` has added.
+the entry points `lfa.behaviors`, from a file by `--behavior FILE.py:Class`, or as `add_behavior` has added it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from lfa.protocol.messages.consensus import Role
 from lfa.protocol.mission import Mission
 from lfa.protocol.plug_in import PlugIns, error_text
 
-BEHAVIORS = PlugIns("behavior", "lfa.behaviors")
+BEHAVIORS = PlugIns("behavior", "lfa.behaviors", "--behavior ")
 
 
 class BehaviorInput(Struct, frozen=True):

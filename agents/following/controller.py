@@ -20,7 +20,7 @@ from lfa.protocol.mission import Limits
 from lfa.protocol.plug_in import PlugIns
 
 ENTRY_POINTS = "lfa.controllers"
-CONTROLLERS = PlugIns("controller", ENTRY_POINTS)
+CONTROLLERS = PlugIns("controller", ENTRY_POINTS, "--controller ")
 DEFAULT_CONTROLLER = "law"
 SLOT_SPEED_MIN_MPS = 0.05
 """Slot speed [m/s] below which the slot has no direction: the desired heading is held."""

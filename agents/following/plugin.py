@@ -7,42 +7,25 @@ or a scenario names a file.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from lfa.agents.config import Gains
-from lfa.agents.following.controller import Controller, add_controller, find_controller
+from lfa.agents.following.controller import CONTROLLERS, Controller, find_controller
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Following, Limits, Parameter
-from lfa.protocol.plug_in import converted, error_text, parameters_of
-
-_files: dict[str, str] = {}
-"""Absolute `FILE.py:Class` of each controller that was added from a file, by name."""
+from lfa.protocol.plug_in import converted, error_text, is_file, parameters_of
 
 
 def add_controller_file(text: str) -> str:
-    """Load the class that `FILE.py:Class` names, and return the name by which a mission chooses it: without folders.
+    """Load the controller that `FILE.py:Class` names, and return the name by which a mission chooses it.
 
     A text without `.py:` is the name of an installed controller, and returned as it is. Raise `Refused` with one line
     for a file that cannot be read or run, or that has no such class.
     """
-    file, colon, name = text.rpartition(":")
-    if not colon or not file.endswith(".py"):
-        find_controller(text)
-        return text
-    path = Path(file).absolute()
-    known_as = f"{path.name}:{name}"
-    make = getattr(_module(path, text), name, None)
-    if not callable(make):
-        raise Refused(f"--controller {text}: {file} has no class {name!r}, must be FILE.py:Class")
-    add_controller(known_as, make)
-    _files[known_as] = f"{path}:{name}"
-    return known_as
-
-
-def file_of(name: str) -> str | None:
-    """Return the absolute `FILE.py:Class` of a controller that was added from a file, else None."""
-    return _files.get(name)
+    if is_file(text):
+        return CONTROLLERS.add_file(text)
+    find_controller(text)
+    return text
 
 
 def make_controller(following: Following, gains: Gains, limits: Limits) -> Controller:
@@ -68,21 +51,6 @@ def make_controller(following: Following, gains: Gains, limits: Limits) -> Contr
     if not (callable(getattr(made, "step", None)) and callable(getattr(made, "reset", None))):
         raise Refused(f"controller = {following.controller}: must be a class with the methods reset and step")
     return made
-
-
-def _module(path: Path, text: str) -> Any:
-    from importlib.util import module_from_spec, spec_from_file_location
-
-    if not path.is_file():
-        raise Refused(f"--controller {text}: no such file, must be FILE.py:Class")
-    spec = spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # noqa: BLE001 - the file of a user may fail in any way
-        raise Refused(f"--controller {text}: {error_text(error)}") from None
-    return module
 
 
 def _names(parameters: dict[str, Parameter]) -> str:

@@ -13,11 +13,16 @@ from lfa.deploy.recording.run_folder import toml
 from lfa.deploy.scenario_loading import load_scenario
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
+from lfa.protocol.plug_in import is_file
+from lfa.world.description.generator import GENERATORS
 from lfa.world.description.load import draw
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario (lfa list), a scenario file or a fleet file.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(help="A shipped scenario, a scenario file, a fleet file, or FILE.py:Class."),
+    ],
     seed: Annotated[int, typer.Option(help="Seed that the scenario is drawn for.")] = 0,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="Override a field: world.lidar.beams=90.")
@@ -30,6 +35,8 @@ def command(
         if overrides or robots is not None:
             raise Refused(f"{scenario}: --set and --robots are for a scenario: a fleet file has the keys set and team")
         return _fleet(Path(scenario), show=show, as_json=as_json)
+    if is_file(scenario):
+        GENERATORS.add_file(scenario)
     drawn = draw(load_scenario(scenario, overrides or (), robots), seed)
     if as_json:
         print(msgspec.json.encode(drawn).decode())

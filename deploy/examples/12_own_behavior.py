@@ -24,9 +24,10 @@ class Cautious:
         return Twist(SLOW_MPS, seen.wanted.angular_z * SLOW_MPS / v)
 
 
-add_behavior("cautious", Cautious)
-route = "mission.leading.route_m=[[0.0, 0.0], [6.0, 0.0]]"
-post = "world.obstacles=[{center_m=[3.0, 1.0], radius_m=0.2}]"
-for behaviors in ([], ["cautious"]):
-    done = run("straight", robots=1, set=[post, route, f"mission.behaviors={behaviors}"])
-    print(f"{behaviors!s:12} {done.summary.outcome} after {done.summary.sim_duration_s:.0f} s")
+if __name__ == "__main__":
+    add_behavior("cautious", Cautious)
+    route = "mission.leading.route_m=[[0.0, 0.0], [6.0, 0.0]]"
+    post = "world.obstacles=[{center_m=[3.0, 1.0], radius_m=0.2}]"
+    for behaviors in ([], ["cautious"]):
+        done = run("straight", robots=1, set=[post, route, f"mission.behaviors={behaviors}"])
+        print(f"{behaviors!s:12} {done.summary.outcome} after {done.summary.sim_duration_s:.0f} s")

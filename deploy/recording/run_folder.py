@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from lfa.agents.following.plugin import file_of
+from lfa.deploy.own_code import chosen_files
 from lfa.deploy.recording.provenance import Provenance
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
@@ -38,16 +38,15 @@ class About(Struct, frozen=True):
 def make(out: Path | None, scenario: Scenario) -> Path:
     """Create and return a folder with the scenario in it: `out` or `runs/<scenario>-<time>`, with -2, -3 ... if taken.
 
-    The file of a controller of one's own is copied into it. Raises Refused when it cannot be created.
+    Files of plug-ins that are not installed are copied into it. Raises Refused when it cannot be created.
     """
     path = out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
         path = _free(path)
         path.mkdir(parents=True, exist_ok=True)
         (path / SCENARIO).write_text(toml(scenario), encoding="utf-8")
-        own_code = file_of(scenario.mission.following.controller)
-        if own_code is not None:
-            shutil.copy(own_code.rpartition(":")[0], path)
+        for own_path in {file.path for file in chosen_files(scenario)}:
+            shutil.copy(own_path, path)
     except OSError as error:
         raise Refused(f"--out {path}: cannot be made ({error.strerror}), give a place to write to") from None
     return path

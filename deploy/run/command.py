@@ -7,11 +7,11 @@ from pathlib import Path
 
 from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.faults.script import Fault, parse_all
+from lfa.deploy.own_code import Behavior, Controller, Sensor, with_own_code
 from lfa.deploy.run.finish import Ended, kept_as, report
 from lfa.deploy.run.load import rebuild_scenario
 from lfa.deploy.run.options import (
     AsJson,
-    Controller,
     Faults,
     Figures,
     JUnit,
@@ -24,7 +24,6 @@ from lfa.deploy.run.options import (
     Seed,
     Verbose,
 )
-from lfa.deploy.scenario_loading import with_controller
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario
 
@@ -41,6 +40,8 @@ def scenario_command(run: Run, *, figures_by_default: bool, fit: Fit | None = No
         seed: Seed = None,
         overrides: Overrides = None,
         controller: Controller = None,
+        behavior: Behavior = None,
+        sensor: Sensor = None,
         robots: Robots = None,
         fault: Faults = None,
         out: Out = None,
@@ -51,9 +52,8 @@ def scenario_command(run: Run, *, figures_by_default: bool, fit: Fit | None = No
         verbose: Verbose = False,
         as_json: AsJson = False,
     ) -> int:
-        chosen, number = rebuild_scenario(
-            scenario, with_controller(overrides or (), controller), robots, seed, map_from
-        )
+        chosen_by = with_own_code(scenario, overrides or (), controller, behavior, sensor)
+        chosen, number = rebuild_scenario(scenario, chosen_by, robots, seed, map_from)
         faults = parse_all(chosen.mission, chosen.faults, fault or ())
         if junit is not None:
             check_junit(junit)

@@ -7,12 +7,11 @@ from typing import Annotated, Literal
 
 import typer
 
-ScenarioName = Annotated[str, typer.Argument(help="A shipped scenario (lfa list) or a .toml file.")]
+ScenarioName = Annotated[
+    str, typer.Argument(help="A shipped scenario (lfa list), a .toml file, or a generator, FILE.py:Class.")
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of all that is drawn; default the scenario's.")]
 Overrides = Annotated[list[str] | None, typer.Option("--set", help="Override a field: world.lidar.beams=90.")]
-Controller = Annotated[
-    str | None, typer.Option(help="Controller of the followers: an installed one by name, or yours: FILE.py:Class.")
-]
 Robots = Annotated[int | None, typer.Option(help="Number of robots N, ids 1..N, instead of the scenario's.")]
 Faults = Annotated[list[str] | None, typer.Option(help="Inject a fault: 'kill leader at 20 s'. Repeatable.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder; default runs/<scenario>-<time>.")]

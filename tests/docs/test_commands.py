@@ -111,7 +111,7 @@ def wrong(command: str) -> str | None:
     if options - OPTIONS[name]:
         return f"option {options - OPTIONS[name]}"
     scenario = arguments[0] if name in ("sim", "run") and arguments else "SCENARIO"
-    return None if scenario in SCENARIOS or re.search(r"\.toml$|^-", scenario) else f"scenario {scenario}"
+    return None if scenario in SCENARIOS or re.search(r"\.toml$|^-|\.py:\w+$", scenario) else f"scenario {scenario}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)

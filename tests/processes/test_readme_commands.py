@@ -66,6 +66,12 @@ ELSEWHERE = {
     "lfa export sdf SCENARIO": "tests/deploy/worlds/test_import.py",
     "lfa keys revoke FILE robot3": "tests/deploy/fleet/security/test_secure.py",
     "lfa sim circle --controller carrot": "tests/agents/controllers/test_plug_in.py",
+    **dict.fromkeys(
+        ("lfa sim straight --behavior deploy/examples/12_own_behavior.py:Cautious",
+         "lfa sim straight --sensor deploy/examples/10_own_sensor.py:Light",
+         "lfa sim deploy/examples/09_own_generator.py:Slalom --seed 3"),
+        "tests/deploy/test_own_code.py",
+    ),
     "lfa doctor FILE": "tests/hosts/test_refused.py",
     "lfa-agent": "tests/first_hour/test_hour.py",
     **dict.fromkeys(

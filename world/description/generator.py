@@ -16,7 +16,7 @@ from lfa.protocol.config_file.mistake import FileError, Mistake, RefusedFile, Re
 from lfa.protocol.plug_in import PlugIns, error_text
 from lfa.world.description.scenario import Scenario
 
-GENERATORS = PlugIns("scenario generator", "lfa.scenarios")
+GENERATORS = PlugIns("scenario generator", "lfa.scenarios", "")
 TIME_LIMIT_S = 120.0
 """Time limit [s] of a generated scenario whose generator gives none."""
 

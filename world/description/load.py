@@ -31,6 +31,7 @@ from lfa.protocol.config_file.toml_file import TomlFile, read_toml
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission_checks import MISSION_RULES
 from lfa.protocol.names import whole_number
+from lfa.protocol.plug_in import is_file
 from lfa.protocol.transport.link_model import Radio
 from lfa.world.description.checks import ROBOTS_MAX, SCENARIO_RULES
 from lfa.world.description.course_rules import COURSE_RULE, PLACES
@@ -113,6 +114,13 @@ def load(
     return scenario
 
 
+def sensors_in(name_or_path: str) -> set[str]:
+    """Return the names of the sensors of a user's own in that scenario's file, unchecked. Raises Refused."""
+    world = _file_of(name_or_path).document.get("world", {})
+    sensors = world.get("sensors", {}) if isinstance(world, dict) else {}
+    return set(sensors) if isinstance(sensors, dict) else set()
+
+
 def draw(scenario: Scenario, seed: int) -> Scenario:
     """Return `scenario` as its generator, if it has one, makes it for `seed`, and varied by the seed within its bounds.
 
@@ -174,6 +182,8 @@ def _file_of(name_or_path: str) -> TomlFile:
     if name_or_path in _names():
         return read_toml(SCENARIOS / f"{name_or_path}.toml", "a scenario file")
     path = Path(name_or_path)
+    if is_file(name_or_path) and path.name in GENERATORS.names():  # loaded by the command line
+        return TomlFile(Path(path.name), document_of(path.name), {})
     if path.suffix == ".toml" or len(path.parts) > 1:
         return read_toml(path, "a scenario file")
     generators = GENERATORS.names()

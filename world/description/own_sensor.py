@@ -14,7 +14,7 @@ from lfa.protocol.messages.robot import SENSOR_NAME_MAX
 from lfa.protocol.plug_in import PlugIns
 from lfa.world.description.scenario import Obstacle, Scenario
 
-SENSORS = PlugIns("sensor", "lfa.sensors")
+SENSORS = PlugIns("sensor", "lfa.sensors", "--sensor ", by_class=True)
 
 
 class TrueState(Struct, frozen=True):

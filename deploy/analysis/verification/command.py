@@ -22,9 +22,10 @@ from lfa.deploy.analysis.verification.journals import JournalVerdict, verify
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.analysis.verification.shares import check_share
 from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
+from lfa.deploy.own_code import OwnFile, RunBehavior, RunController, RunSensor, given_files
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import JOURNALS
-from lfa.deploy.scenario_loading import load_controller_of_run
+from lfa.deploy.scenario_loading import load_code_of_run
 from lfa.protocol.errors import Refused
 
 
@@ -52,9 +53,9 @@ class VerifyReport(Struct, frozen=True):
 
 def command(
     folders: Annotated[list[Path], typer.Argument(help="Run folders with journals; several are compared.")],
-    controller: Annotated[
-        str | None, typer.Option(help="FILE.py:Class of the runs' controller, if it is not installed.")
-    ] = None,
+    controller: RunController = None,
+    behavior: RunBehavior = None,
+    sensor: RunSensor = None,
     out: Annotated[
         Path | None, typer.Option(help="Keep the findings here; a second start checks only what is missing.")
     ] = None,
@@ -65,12 +66,13 @@ def command(
     """Check the run folders and print the findings; exit code 1 for a broken invariant or a failed property."""
     if out is None and (shard is not None or jobs != 1):
         raise Refused("--shard and --jobs: must go with --out, the folder of the findings")
+    own_code = given_files(controller, behavior, sensor)
     if out is not None:
-        return _kept(folders, controller, out, WHOLE if shard is None else parse_shard(shard), jobs, as_json)
+        return _kept(folders, own_code, out, WHOLE if shard is None else parse_shard(shard), jobs, as_json)
     checked: list[Checked] = []
     kept: list[Kept] = []
     for folder in folders:
-        load_controller_of_run(folder, controller)
+        load_code_of_run(folder, own_code)
         one, of_it = check(folder)
         checked.append(one)
         kept += [of_it] if of_it.scenario in PATHS else []
@@ -79,11 +81,11 @@ def command(
     return _end(checked, kept, as_json)
 
 
-def _kept(folders: list[Path], controller: str | None, out: Path, shard: Shard, jobs: int, as_json: bool) -> int:
+def _kept(folders: list[Path], own_code: list[OwnFile], out: Path, shard: Shard, jobs: int, as_json: bool) -> int:
     """Check a share of the runs, with the findings kept in `out`; print those of all that are done."""
     for folder in folders:
-        load_controller_of_run(folder, controller)
-    done = check_share(folders, partial(_checked, controller), out, shard, jobs)
+        load_code_of_run(folder, own_code)
+    done = check_share(folders, partial(_checked, own_code), out, shard, jobs)
     checked = [msgspec.convert(one, Checked) for one in done]
     kept = [keep for one in done if (keep := msgspec.convert(one["kept"], Kept)).scenario in PATHS]
     if not as_json:
@@ -92,9 +94,9 @@ def _kept(folders: list[Path], controller: str | None, out: Path, shard: Shard, 
     return _end(checked, kept, as_json)
 
 
-def _checked(controller: str | None, folder: Path) -> tuple[Checked, Kept, str]:
+def _checked(own_code: list[OwnFile], folder: Path) -> tuple[Checked, Kept, str]:
     """Check a run in a process of its own; return also what fails in it."""
-    load_controller_of_run(folder, controller)
+    load_code_of_run(folder, own_code)
     one, of_it = check(folder)
     broken = [f"{violation.name} at {violation.at:.3f} s: {violation.text}" for violation in one.broken]
     return one, of_it, "; ".join(broken + [finding.name for finding in one.shapes if finding.status == "fails"])

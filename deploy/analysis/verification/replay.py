@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import typer
 
-from lfa.deploy.scenario_loading import load_controller_of_run
+from lfa.deploy.own_code import RunBehavior, RunController, RunSensor, given_files
+from lfa.deploy.scenario_loading import load_code_of_run
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name, whole_number
 
@@ -24,13 +25,13 @@ def command(
     speed: Annotated[float, typer.Option(help="Play back: speed relative to the recording.")] = 1.0,
     fleet: Annotated[str, typer.Option(help="Play back: name of the fleet to publish as.")] = PLAYBACK_FLEET,
     connect: Annotated[str | None, typer.Option(help="Play back: endpoint of the router.")] = None,
-    controller: Annotated[
-        str | None, typer.Option(help="FILE.py:Class of the runs' controller, if it is not installed.")
-    ] = None,
+    controller: RunController = None,
+    behavior: RunBehavior = None,
+    sensor: RunSensor = None,
     as_json: Annotated[bool, typer.Option("--json", help="Compare: print the result as JSON.")] = False,
 ) -> int:
     if robot is not None:
-        load_controller_of_run(folder, controller)
+        load_code_of_run(folder, given_files(controller, behavior, sensor))
         return _compare(folder, robot, as_json)
     from lfa.deploy.analysis.verification.playback import play
 

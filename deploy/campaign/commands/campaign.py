@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from lfa.agents.following.plugin import add_controller_file
 from lfa.deploy.campaign.commands.merge import merge
 from lfa.deploy.campaign.commands.sweep import Remote, carry_out, carry_out_on
 from lfa.deploy.campaign.engines.kubernetes import manifest
 from lfa.deploy.campaign.shard import SHARDS_MAX, WHOLE, parse_shard
 from lfa.deploy.campaign.sweep.plan import RUNS_MAX, read_plan
+from lfa.deploy.own_code import PLUG_INS
 from lfa.protocol.errors import Refused
 
 MERGE = "merge"
@@ -36,6 +36,15 @@ def command(
     controller: Annotated[
         list[str] | None, typer.Option(help="Load a controller that the plan names: FILE.py:Class. Repeatable.")
     ] = None,
+    behavior: Annotated[
+        list[str] | None, typer.Option(help="Load a behaviour that the plan names: FILE.py:Class. Repeatable.")
+    ] = None,
+    sensor: Annotated[
+        list[str] | None, typer.Option(help="Load a sensor that the plan names: FILE.py:Class. Repeatable.")
+    ] = None,
+    generator: Annotated[
+        list[str] | None, typer.Option(help="Load a generator that the plan names: FILE.py:Class. Repeatable.")
+    ] = None,
     max_runs: Annotated[int, typer.Option(help="Refuse a plan of more runs than this.")] = RUNS_MAX,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; default runs/<title>-<hash>.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print counts and paths as JSON.")] = False,
@@ -52,8 +61,10 @@ def command(
     if not 1 <= shards <= SHARDS_MAX or jobs < 1 or minutes < 1:
         raise Refused(f"--shards {shards} --jobs {jobs} --minutes {minutes}: each must be at least 1")
     share = WHOLE if shard is None else parse_shard(shard)
-    for own_code in controller or ():
-        add_controller_file(own_code)
+    given = {"controller": controller, "behavior": behavior, "sensor": sensor, "generator": generator}
+    own_code = [(kind, text) for kind, texts in given.items() for text in texts or ()]
+    for kind, text in own_code:
+        PLUG_INS[kind].add_file(text)
     path = Path(words[0])
     plan = read_plan(path, max_runs)
     if on == LOCAL:
@@ -61,7 +72,7 @@ def command(
     if on == "kubernetes":
         print(manifest(path, shards, jobs), end="")
         return 0
-    more = [word for own_code in controller or () for word in ("--controller", str(Path(own_code).absolute()))]
+    more = [word for kind, text in own_code for word in (f"--{kind}", str(Path(text).absolute()))]
     remote = Remote(on, shards, jobs, minutes, _pairs(slurm or ()), [*more, "--max-runs", str(max_runs)])
     return carry_out_on(remote, path, plan, out, as_json)
 

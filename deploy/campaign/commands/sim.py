@@ -10,10 +10,10 @@ from lfa.deploy.campaign.commands.sweep import carry_out
 from lfa.deploy.campaign.shard import WHOLE, parse_shard
 from lfa.deploy.campaign.sweep.plan import plan_of
 from lfa.deploy.campaign.sweep.short_form import plan_file
+from lfa.deploy.own_code import Behavior, Controller, Sensor, with_own_code
 from lfa.deploy.run import simulate
 from lfa.deploy.run.options import (
     AsJson,
-    Controller,
     Faults,
     Figures,
     JUnit,
@@ -26,7 +26,6 @@ from lfa.deploy.run.options import (
     Seed,
     Verbose,
 )
-from lfa.deploy.scenario_loading import with_controller
 from lfa.protocol.errors import Refused
 
 
@@ -38,6 +37,8 @@ def command(
     ] = None,
     overrides: Overrides = None,
     controller: Controller = None,
+    behavior: Behavior = None,
+    sensor: Sensor = None,
     robots: Robots = None,
     fault: Faults = None,
     out: Out = None,
@@ -61,6 +62,8 @@ def command(
                 seed=seed,
                 overrides=overrides,
                 controller=controller,
+                behavior=behavior,
+                sensor=sensor,
                 robots=robots,
                 fault=fault,
                 out=out,
@@ -75,5 +78,6 @@ def command(
     if seed is not None or map_from is not None or junit is not None:
         raise Refused(f"--seeds {seeds}: must go without --seed, --map-from and --junit")
     share = WHOLE if shard is None else parse_shard(shard)
-    file = plan_file(scenario, seeds, with_controller(overrides or (), controller), robots, fault or ())
+    chosen_by = with_own_code(scenario, overrides or (), controller, behavior, sensor)
+    file = plan_file(scenario, seeds, chosen_by, robots, fault or ())
     return carry_out(plan_of(file), out, share, jobs, as_json)

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lfa.agents.following.plugin import add_controller_file
 from lfa.deploy.campaign.combine import Combined
 from lfa.deploy.campaign.merge import sweep_page
 from lfa.deploy.campaign.merge.files import ResultTable, Value
@@ -15,6 +14,7 @@ from lfa.deploy.campaign.merge.report import MergeReport
 from lfa.deploy.campaign.sweep.metrics import METRICS, Metric
 from lfa.deploy.campaign.sweep.runs import facts_of
 from lfa.deploy.faults.script import parse_all
+from lfa.deploy.own_code import load_files
 from lfa.deploy.run import simulate
 from lfa.deploy.scenario_loading import load_scenario
 
@@ -38,9 +38,7 @@ def record(combined: Combined, name: str, folder: Path) -> None:
     facts = facts_of(combined.campaign)
     group, rest = divmod(combined.campaign.names.index(name), len(facts.seeds) * facts.repetitions)
     seed = facts.seeds[rest // facts.repetitions]
-    own_code = facts.groups[group].own_code
-    if own_code is not None:
-        add_controller_file(own_code)
+    load_files(facts.groups[group].own_code)
     with TemporaryDirectory(prefix="lfa-worst-") as place:
         path = Path(place) / f"{facts.scenario}.toml"
         path.write_text(facts.groups[group].scenario, encoding="utf-8")

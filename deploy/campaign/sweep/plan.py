@@ -14,11 +14,11 @@ from typing import Any
 import msgspec
 from msgspec import Struct, field
 
-from lfa.agents.following.plugin import file_of
 from lfa.deploy.campaign.items import name_of
 from lfa.deploy.campaign.sweep import axes as axes_of
 from lfa.deploy.campaign.sweep.axes import Axis, AxisValue
 from lfa.deploy.faults.script import COMMON, parse_all
+from lfa.deploy.own_code import OwnFile, chosen_files, options_of
 from lfa.deploy.recording.run_folder import toml_value
 from lfa.deploy.scenario_loading import load_scenario
 from lfa.protocol.config_file.conversion import convert
@@ -70,10 +70,10 @@ class Group(Struct, frozen=True):
     faults: tuple[str, ...]
     command: str
     """Command line of a run of the group, without its seed."""
-    own_code: str | None = None
-    """`FILE.py:Class` of a controller that is not installed."""
+    own_code: tuple[OwnFile, ...] = ()
+    """Plug-ins that are not installed."""
     code_hash: str = ""
-    """Hash of that file."""
+    """Hash of their files."""
 
     @property
     def label(self) -> str:
@@ -239,20 +239,20 @@ def _group(name: str, robots: int | None, chosen: Sequence[AxisValue], sets: Seq
     words = [name, *([] if robots is None else ["--robots", str(robots)])]
     words += [word for override in overrides for word in ("--set", override)]
     words += [word for fault in faults for word in ("--fault", fault)]
-    own_code = file_of(scenario.mission.following.controller)
-    words += [] if own_code is None else ["--controller", own_code]
+    own_code = chosen_files(scenario)
+    words += options_of(own_code, ("controller", "behavior", "sensor"))
     return Group(
         values=tuple(value.text for value in chosen),
         scenario=scenario,
         faults=faults,
         command="lfa sim " + shlex.join(words),
         own_code=own_code,
-        code_hash="" if own_code is None else _hash(own_code),
+        code_hash=_hash(own_code),
     )
 
 
-def _hash(own_code: str) -> str:
-    return hashlib.sha256(Path(own_code.rpartition(":")[0]).read_bytes()).hexdigest()
+def _hash(own_code: Sequence[OwnFile]) -> str:
+    return " ".join(hashlib.sha256(file.path.read_bytes()).hexdigest() for file in own_code)
 
 
 def _in_plan(file: TomlFile, error: FileError, sets: Sequence[tuple[str, str, Any]]) -> FileError:

@@ -7,7 +7,6 @@ from functools import partial
 import msgspec
 from msgspec import Struct
 
-from lfa.agents.following.plugin import add_controller_file
 from lfa.deploy.analysis.summary import ENDED_WELL, Summary
 from lfa.deploy.campaign.folder import Campaign
 from lfa.deploy.campaign.items import Item, ItemResult
@@ -15,6 +14,7 @@ from lfa.deploy.campaign.sweep.metrics import metrics_of
 from lfa.deploy.campaign.sweep.plan import SweepPlan, run_name
 from lfa.deploy.campaign.work import campaign_of
 from lfa.deploy.faults.script import parse_all
+from lfa.deploy.own_code import OwnFile, load_files
 from lfa.deploy.recording.run_folder import toml
 from lfa.deploy.run.simulate import measure
 from lfa.world.description.load import Scenario
@@ -28,8 +28,8 @@ class GroupFacts(Struct, frozen=True):
     values: tuple[str, ...]
     faults: tuple[str, ...]
     command: str
-    own_code: str | None
-    """`FILE.py:Class` of a controller that is not installed."""
+    own_code: tuple[OwnFile, ...]
+    """Plug-ins that are not installed."""
     scenario: str
     """Scenario in TOML, with every field; `draw` varies it by the seed."""
 
@@ -78,10 +78,9 @@ def facts_of(campaign: Campaign) -> SweepFacts:
     return msgspec.convert(campaign.about, SweepFacts)
 
 
-def done(scenario: Scenario, seed: int, faults: tuple[str, ...], own_code: str | None = None) -> ItemResult:
-    """Do one run and return its result. Nothing of it is recorded. `own_code`: `FILE.py:Class` of its controller."""
-    if own_code is not None:
-        add_controller_file(own_code)
+def done(scenario: Scenario, seed: int, faults: tuple[str, ...], own_code: tuple[OwnFile, ...] = ()) -> ItemResult:
+    """Do one run and return its result. Nothing of it is recorded. `own_code`: its plug-ins that are not installed."""
+    load_files(own_code)
     measured = measure(scenario, seed, parse_all(scenario.mission, scenario.faults, faults))
     summary = measured.summary
     result = SweepResult(summary.outcome, summary.exit_code == 0, metrics_of(summary, measured.seen))

@@ -10,10 +10,9 @@ from msgspec import Struct
 
 from lfa.agents.config import DEFAULT
 from lfa.agents.controllers.headway import Headway
-from lfa.agents.following import plugin
-from lfa.agents.following.controller import Reference
+from lfa.agents.following.controller import CONTROLLERS, Reference, add_controller
 from lfa.agents.following.follower import Follower
-from lfa.agents.following.plugin import add_controller_file, file_of, make_controller
+from lfa.agents.following.plugin import add_controller_file, make_controller
 from lfa.agents.following.predecessor import Sighting
 from lfa.agents.formation.pose_history import PoseHistory
 from lfa.protocol.errors import Refused
@@ -55,7 +54,7 @@ def test_a_fault_of_a_controller_stops_its_robot_and_is_a_line_with_file_and_lin
 ) -> None:
     (tmp_path / "own.py").write_text(CODE.format(ends=ends))
     name = add_controller_file(f"{tmp_path}/own.py:Own")
-    assert file_of(name) == f"{tmp_path}/own.py:Own"
+    assert CONTROLLERS.file_of(name) == f"{tmp_path}/own.py:Own"
     made = make_controller(Following(controller=name), DEFAULT, Limits())
     follower = Follower(DEFAULT, Limits(), made, name=name)
     ahead = Sighting(1, 0, Pose2D(1.5, 0.0, 0.0), Twist(0.2, 0.0), 0.0, 0.0, 0.0, PoseHistory(1.0))
@@ -86,7 +85,7 @@ def test_a_parameter_reaches_the_controller() -> None:
         def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist:
             return Twist(self._headway_s, 0.0)
 
-    plugin.add_controller("seen", Seen)
+    add_controller("seen", Seen)
     made = make_controller(Following(controller="seen", parameters={"headway_s": 0.7}), DEFAULT, Limits())
     reference = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1, Pose2D(), STILL, 1.2, 0.0, True)
     assert made.step(reference, Pose2D(), STILL, 0.02) == Twist(0.7, 0.0)
