@@ -20,7 +20,7 @@ from lfa.deploy.recording import event_log
 from lfa.deploy.view.figures import timeline
 from lfa.deploy.view.figures.paper_figures import distance_error, orientation_error, tracking
 from lfa.deploy.view.figures.path_plot import path_flow
-from lfa.deploy.view.figures.style import COLOURS, LEGEND_MAX, label, look
+from lfa.deploy.view.figures.style import CLEAR, COLOURS, LEGEND_MAX, label, look
 from lfa.deploy.view.figures.time_panels import finish
 
 TERM_SHARE_MIN = 0.15  # share of the run's duration: a shorter bar has no room for its term
@@ -86,7 +86,7 @@ def _leader_timeline(figure: FigureBase, run: Run) -> None:
     for failover in event_log.failovers(run.events, run.leader_terms):
         if failover.leader is not None and failover.first_command_ms is not None:
             axes.annotate(f"first command after {failover.first_command_ms:.0f} ms", (failover.at_s, failover.leader),
-                          xytext=(4, 14), textcoords="offset points", fontsize="small")  # fmt: skip
+                          xytext=(4, 14), textcoords="offset points", fontsize="small", bbox=CLEAR)  # fmt: skip
     finish(axes, run, "Who led", "robot")
     shown = [robot for robot in run.robots if len(run.robots) <= LEGEND_MAX or label(run, robot)]
     axes.set_yticks(shown)

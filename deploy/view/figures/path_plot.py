@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, Polygon
 from lfa.deploy.analysis import tracking_errors
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.recording.mcap_reader import Array
-from lfa.deploy.view.figures.style import label, look
+from lfa.deploy.view.figures.style import CLEAR, label, look
 from lfa.deploy.view.figures.time_panels import POINTS_MAX
 from lfa.world.description.terrain import patches_of
 
@@ -84,4 +84,4 @@ def _stance(axes: Axes, run: Run, t: float, labels: list[Array]) -> None:
     if highest is not None and all(np.hypot(*(highest[1:3] - there)) > LABEL_M for there in labels):
         labels.append(highest[1:3])
         axes.annotate(f"{t:.0f} s", (highest[1], highest[2]), xytext=(0, 7), textcoords="offset points",
-                      fontsize="small", ha="center", color="#333333", zorder=5)  # fmt: skip
+                      fontsize="small", ha="center", color="#333333", zorder=5, bbox=CLEAR)  # fmt: skip

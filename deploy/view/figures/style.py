@@ -14,6 +14,8 @@ from lfa.deploy.robot_colours import PALETTE, as_hex, robot_colour
 
 COLOURS = tuple(map(as_hex, PALETTE))
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
+CLEAR: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.85}
+"""Ground of a text that may stand on lines: they are not printed over it."""
 LEGEND_MAX = 12
 """Maximum number of robots that a legend or an axis names."""
 

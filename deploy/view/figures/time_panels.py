@@ -10,7 +10,7 @@ from lfa.deploy.analysis import episodes
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.mcap_reader import Array
-from lfa.deploy.view.figures.style import LEGEND_MAX, label, look
+from lfa.deploy.view.figures.style import CLEAR, LEGEND_MAX, label, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,8 @@ def finish(axes: Axes, run: Run, title: str, y_label: str, *, last: bool = True,
         axes.axvline(at_s, color="black", linewidth=0.8, linestyle=style)
         if legend:
             axes.annotate(text, (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -9),
-                          textcoords="offset points", fontsize="small", rotation=90, va="top")  # fmt: skip
+                          textcoords="offset points", fontsize="small", rotation=90, va="top",
+                          bbox=CLEAR)  # fmt: skip
     axes.set(title=title, ylabel=y_label, xlim=(0.0, max(run.seen.end_s, 1.0)))
     if last:
         axes.set_xlabel("time [s]")

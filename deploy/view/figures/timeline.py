@@ -11,7 +11,7 @@ from matplotlib.figure import FigureBase
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording import event_log
-from lfa.deploy.view.figures.style import LEGEND_MAX, levels, look
+from lfa.deploy.view.figures.style import CLEAR, LEGEND_MAX, levels, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,8 +80,7 @@ def _labels(
 ) -> None:
     for (at_s, text), level in zip(texts, levels(texts, end_s / LETTERS_WIDE, LINES), strict=True):
         axes.annotate(text, (at_s, lowest + LINE * level), xytext=(2, 0), textcoords="offset points", fontsize="small",
-                      weight=weight, zorder=4,
-                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})  # fmt: skip
+                      weight=weight, zorder=4, bbox=CLEAR)  # fmt: skip
 
 
 def _stretches(steps: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float, float]]:

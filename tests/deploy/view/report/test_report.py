@@ -15,7 +15,7 @@ import pytest
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.faults.script import parse_all
 from lfa.deploy.run.simulate import run
-from lfa.deploy.view.figures.catalogue import FIGURES
+from lfa.deploy.view.figures.catalogue import FIGURES, drawn
 from lfa.deploy.view.figures.style import label
 from lfa.deploy.view.report import command, page
 from lfa.deploy.view.report.html import in_mm
@@ -48,6 +48,15 @@ def test_every_section_and_figure_is_on_the_page(folder: Path) -> None:
     assert len(images) == len(FIGURES)
     assert all(ElementTree.fromstring(image).tag.endswith("svg") for image in images)
     assert len(html.encode()) < BYTES_MAX
+
+
+@pytest.mark.parametrize("name", ["fig07_distance_error", "fig09_path_flow", "lease_timeline", "leader_timeline"])
+def test_no_text_stands_on_a_line_without_a_ground_of_its_own(folder: Path, name: str) -> None:
+    figure = drawn(name, Run(folder))
+    texts = [text for axes in figure.axes for text in axes.texts]
+    assert texts
+    beside_bars = [text for text in texts if text.get_color() != "white"]
+    assert [text.get_text() for text in beside_bars if not text.get_bbox_patch()] == []
 
 
 def test_the_failover_and_the_fault_are_told(folder: Path) -> None:
