@@ -60,15 +60,15 @@ def run(as_json: bool, seeds: int = SEEDS, jobs: int = 1, keep: Keep | None = No
     """Print the leaderboard and write its page; return 0 if every run was good, else 1."""
     if keep is None:
         with tempfile.TemporaryDirectory(prefix="lfa-controllers-") as folder:
-            return _run(as_json, seeds, jobs, Keep(Path(folder)), OUT)
-    return _run(as_json, seeds, jobs, keep, keep.out / "merged")
+            return _run(as_json, seeds, jobs, Keep(Path(folder)), OUT, lasting=False)
+    return _run(as_json, seeds, jobs, keep, keep.out / "merged", lasting=True)
 
 
-def _run(as_json: bool, seeds: int, jobs: int, keep: Keep, out: Path) -> int:
+def _run(as_json: bool, seeds: int, jobs: int, keep: Keep, out: Path, *, lasting: bool) -> int:
     plan = plan_for(seeds)
     items = items_of(plan)
     campaign = describe(plan, items)
-    kept, _ = do_share(keep.out, campaign, items, keep.shard, jobs)
+    kept, _ = do_share(keep.out, campaign, items, keep.shard, jobs, lasting=lasting)
     combined = Combined(campaign, {result.name: result for result in kept.results()})
     report = report_of(combined)
     out.mkdir(parents=True, exist_ok=True)

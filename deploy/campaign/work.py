@@ -16,6 +16,8 @@ from lfa.deploy.version import code_line
 from lfa.protocol.errors import Refused
 from lfa.protocol.output import write_line
 
+LOST = "nothing is kept: with --out DIR the same command does the rest"
+
 
 def campaign_of(kind: str, title: str, items: Sequence[Item], about: Any = None) -> Campaign:
     """Return the description of a campaign of these items, done by this version of the code."""
@@ -24,12 +26,19 @@ def campaign_of(kind: str, title: str, items: Sequence[Item], about: Any = None)
 
 
 def do_share(
-    folder: Path, campaign: Campaign, items: Sequence[Item], shard: Shard = WHOLE, jobs: int = 1, said: str = "runs"
+    folder: Path,
+    campaign: Campaign,
+    items: Sequence[Item],
+    shard: Shard = WHOLE,
+    jobs: int = 1,
+    said: str = "runs",
+    *,
+    lasting: bool = True,
 ) -> tuple[CampaignFolder, int]:
     """Do the missing items of the share; return the folder and the number of items that failed or could not be done.
 
-    After Ctrl-C, say how many are done and where. Raises Refused, before anything is done, for a folder that does not
-    belong to this campaign.
+    After Ctrl-C, say how many are done and, of a `lasting` folder, where. Raises Refused, before anything is done, for
+    a folder that does not belong to this campaign.
     """
     if jobs < 1:
         raise Refused(f"--jobs {jobs}: must be at least 1")
@@ -46,8 +55,8 @@ def do_share(
             complaint = finished.reason if finished.result is None else finished.result.complaint
             progress.step(finished.item.label, complaint)
     except KeyboardInterrupt:
-        write_line(f"interrupted: {progress.counted()}; they are in {folder}, and the same command does the rest",
-                   sys.stderr)  # fmt: skip
+        kept_where = f"they are in {folder}, and the same command does the rest"
+        write_line(f"interrupted: {progress.counted()}; {kept_where if lasting else LOST}", sys.stderr)
         raise
     finally:
         progress.close()

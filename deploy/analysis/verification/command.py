@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -27,6 +28,7 @@ from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.scenario_loading import load_code_of_run
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import write_line
 
 
 class Checked(Struct, frozen=True):
@@ -71,13 +73,19 @@ def command(
         return _kept(folders, own_code, out, WHOLE if shard is None else parse_shard(shard), jobs, as_json)
     checked: list[Checked] = []
     kept: list[Kept] = []
-    for folder in folders:
-        load_code_of_run(folder, own_code)
-        one, of_it = check(folder)
-        checked.append(one)
-        kept += [of_it] if of_it.scenario in PATHS else []
-        if not as_json:
-            _print(one)
+    try:
+        for folder in folders:
+            load_code_of_run(folder, own_code)
+            one, of_it = check(folder)
+            checked.append(one)
+            kept += [of_it] if of_it.scenario in PATHS else []
+            if not as_json:
+                _print(one)
+    except KeyboardInterrupt:
+        if as_json:
+            print(msgspec.json.encode({"runs": checked, "interrupted": True}).decode())
+        write_line(f"interrupted: {len(checked)} of {len(folders)} runs are checked", sys.stderr)
+        raise
     return _end(checked, kept, as_json)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
 from functools import partial
@@ -13,6 +14,7 @@ from msgspec import Struct, structs
 
 from lfa.deploy.process.worker_pool import workers
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import write_line
 
 NEAR = 0.10
 SAME = 0.01
@@ -136,13 +138,22 @@ def _matching(case: Case, values: Sequence[float], glob: str) -> list[BenchRow]:
 
 
 def show(rows: Iterator[list[BenchRow]], as_json: bool) -> int:
-    """Print the rows, one by one (table) or at the end (JSON); return 0 if every row holds, else 1."""
+    """Print the rows, one by one (table) or at the end (JSON); return 0 if every row holds, else 1.
+
+    After Ctrl-C print what is measured so far, say so, and raise KeyboardInterrupt.
+    """
     done: list[BenchRow] = []
-    for some in rows:
-        done += some
-        if not as_json:
-            for one in some:
-                print(line(one), flush=True)
+    try:
+        for some in rows:
+            done += some
+            if not as_json:
+                for one in some:
+                    print(line(one), flush=True)
+    except KeyboardInterrupt:
+        if as_json:
+            print(json.dumps({"rows": [structs.asdict(one) for one in done], "interrupted": True}))
+        write_line(f"interrupted: {len(done)} rows are complete", sys.stderr)
+        raise
     if as_json:
         print(json.dumps({"rows": [structs.asdict(one) for one in done]}))
     failed = [one.name for one in done if not one.ok]

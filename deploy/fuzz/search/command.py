@@ -17,7 +17,15 @@ import typer
 from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
 from lfa.deploy.fuzz.schedules import KINDS
 from lfa.deploy.fuzz.search import systematic
-from lfa.deploy.fuzz.search.searches import Search, Tally, again, explain, play_part, write_explanation
+from lfa.deploy.fuzz.search.searches import (
+    Search,
+    Tally,
+    again,
+    explain,
+    play_part,
+    tally_of_seed,
+    write_explanation,
+)
 from lfa.deploy.fuzz.search.shares import do_fuzz
 from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 from lfa.deploy.process.worker_pool import workers
@@ -182,8 +190,8 @@ def so_far(tally: Tally, of: int, seconds: float) -> str:
 def _played(seeds: range, jobs: int, search: Search) -> Iterator[Tally]:
     chunk = search.chunk
     parts = [(seeds[i : i + chunk], search) for i in range(0, len(seeds), chunk)]
-    if jobs == 1:
-        yield from map(play_part, parts)
+    if jobs == 1:  # seed by seed, so that Ctrl-C loses none
+        yield from (tally_of_seed(seed, played) for seed, played in search.played(seeds))
         return
     with workers(min(jobs, os.cpu_count() or 1)) as pool:
         yield from pool.map(play_part, parts)

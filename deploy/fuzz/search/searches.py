@@ -77,9 +77,14 @@ def play_part(part: tuple[range, Search]) -> Tally:
     seeds, search = part
     tally = Tally()
     for seed, played in search.played(seeds):
-        failed = {seed: [said(v) for v in played.violations]} if played.violations else {}
-        tally.add(Tally(1, played.elections, dict(played.counts), failed))
+        tally.add(tally_of_seed(seed, played))
     return tally
+
+
+def tally_of_seed(seed: int, played: Played) -> Tally:
+    """Return the result of one seed."""
+    failed = {seed: [said(v) for v in played.violations]} if played.violations else {}
+    return Tally(1, played.elections, dict(played.counts), failed)
 
 
 def shrink(schedule: Schedule, name: str, player: Player = play) -> Schedule:
