@@ -11,12 +11,12 @@ import typer
 from lfa.deploy.faults.script import Fault
 from lfa.deploy.lockstep.run import run as lockstep_run
 from lfa.deploy.lockstep.stepping import Pace, pace_of
+from lfa.deploy.own_code import Behavior, Controller, Sensor
 from lfa.deploy.run import launch
 from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.finish import Ended
 from lfa.deploy.run.options import (
     AsJson,
-    Controller,
     Faults,
     Figures,
     JUnit,
@@ -38,6 +38,8 @@ def command(
     seed: Seed = None,
     overrides: Overrides = None,
     controller: Controller = None,
+    behavior: Behavior = None,
+    sensor: Sensor = None,
     robots: Robots = None,
     fault: Faults = None,
     out: Out = None,
@@ -68,6 +70,8 @@ def command(
             seed=seed,
             overrides=overrides,
             controller=controller,
+            behavior=behavior,
+            sensor=sensor,
             robots=robots,
             fault=fault,
             out=out,

@@ -131,6 +131,13 @@ def test_a_file_without_the_class_is_refused_in_one_line(
     assert says in line
 
 
+@pytest.mark.parametrize("name", ["run", "sim"])
+def test_one_run_takes_the_options_of_all_plug_ins(name: str) -> None:
+    said = lfa(name, "--help")
+    assert said.returncode == 0, said.stderr
+    assert [option for option in ("--controller", "--behavior", "--sensor") if option not in said.stdout] == []
+
+
 def test_a_scenario_file_loads_no_code(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text("raise SystemExit(9)")
     with pytest.raises(Refused, match=r"or given by --behavior FILE\.py:Class"):
