@@ -32,8 +32,11 @@ class TeamState:
         """Numbers of table rows received and lost, over all robots; a gap in a sender's numbers counts as lost. They
         show the quality of the radio link."""
         self._table: dict[int, tuple[TableRow, float]] = {}
+        self._robots: tuple[int, ...] = ()
         self._velocity: dict[int, tuple[float, float]] = {}
         """Velocity in `map`, from one row to the next."""
+        self._reach: dict[int, tuple[float, float, float, float]] = {}
+        """Place [m] of each robot's last row, and how far [m] along x and y its extrapolation may take it."""
         self._clocks: dict[int, ClockOffset] = {}
         self.obstacles = SharedObstacles(self.poses)
         """Moving obstacles that other robots reported."""
@@ -44,8 +47,8 @@ class TeamState:
 
     @property
     def robots(self) -> tuple[int, ...]:
-        """Robots of which a row was heard, in the order of their first one."""
-        return tuple(self._table)
+        """Robots of which a row was heard, in the order of their ids."""
+        return self._robots
 
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
         self.sensors, self.sensors_at = sensors, at
@@ -68,10 +71,14 @@ class TeamState:
         if known is not None and known[0].header.incarnation == row.header.incarnation:
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
+        if known is None:
+            self._robots = tuple(sorted((*self._robots, robot)))
         reported = row.progress
         if reported is not None and reported.route == self.route and (row.role is Role.LEADER or self.progress is None):
             self.progress = reported
         self._table[robot] = (row, at)
+        vx, vy = self._velocity[robot]
+        self._reach[robot] = row.x, row.y, GOES_ON_S * abs(vx), GOES_ON_S * abs(vy)
         self._clocks[robot].heard(row.header.stamp, at)
 
     def fresh_sensors(self, now: float) -> Sensors | None:
@@ -92,18 +99,15 @@ class TeamState:
 
         Called at each control step: in a team of a hundred nearly all are passed over by the place in their last row.
         """
-        x, y, table, found = pose.x, pose.y, self._table, []
-        for robot in robots:
-            known = table.get(robot)
-            if known is None:
-                continue
-            row, (vx, vy) = known[0], self._velocity[robot]
-            if abs(row.x - x) > within_m + GOES_ON_S * abs(vx) or abs(row.y - y) > within_m + GOES_ON_S * abs(vy):
-                continue
-            place = self.pose_of(robot, now)
-            if place is not None:
-                found.append((robot, place))
-        return found
+        x, y, reach = pose.x, pose.y, self._reach
+        nearby = [
+            robot
+            for robot in robots
+            if (last := reach.get(robot)) is not None
+            and abs(last[0] - x) <= within_m + last[2]
+            and abs(last[1] - y) <= within_m + last[3]
+        ]
+        return [(robot, place) for robot in nearby if (place := self.pose_of(robot, now)) is not None]
 
     def poses(self, now: float) -> list[Pose2D | None]:
         """Return the poses in `map` of all robots in the table; None for a stale one."""

@@ -187,7 +187,7 @@ class Simulator(VirtualTime):
             process.waiting.append((key, message, payload))
             return
         now = process.clock.local(self.now)
-        if isinstance(message, Local):
+        if not key and isinstance(message, Local):
             process.links.see(message, now)
         self._after(process, process.host.deliver(now, key, message, payload))
 
@@ -209,13 +209,14 @@ class Simulator(VirtualTime):
             self._refresh(process)
         if self.deaf:
             self._declare_again(process)
-        if node.refusal is not None and not self.refused_leave:
-            raise Refused(node.refusal)
+        refusal = node.refusal
+        if refusal is not None and not self.refused_leave:
+            raise Refused(refusal)
         later = reborn(node)
         if later is not None and process.stop_by is None:
             self._leave(process)
             self.add(later, self.reborn(later), process.clock)
-        elif node.refusal is not None or node.finished or (process.stop_by is not None and self.now > process.stop_by):
+        elif refusal is not None or node.finished or (process.stop_by is not None and self.now > process.stop_by):
             self._leave(process)
         else:
             self._plan(process)

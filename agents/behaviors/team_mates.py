@@ -17,6 +17,9 @@ class TeamMates:
         self.own_id = robot_id
         self._team = team
         self.predecessor: Predecessor | None = None
+        self._heard: tuple[int, ...] = ()
+        self._rest: tuple[int, ...] = ()
+        """Robots of which a row was heard, and those of them that are others than this one."""
 
     def places(self, now: float) -> list[Pose2D]:
         """Return the known poses in `map`: the predecessor's from its pose messages, the others' from the table."""
@@ -39,5 +42,9 @@ class TeamMates:
                 mates.append((c * dx + s * dy, c * dy - s * dx))
         return mates
 
-    def _others(self) -> list[int]:
-        return sorted(robot for robot in self._team.robots if robot != self.own_id)
+    def _others(self) -> tuple[int, ...]:
+        """Return the other robots; made anew only when one more has been heard, for each control step asks."""
+        robots = self._team.robots
+        if robots is not self._heard:
+            self._heard, self._rest = robots, tuple(robot for robot in robots if robot != self.own_id)
+        return self._rest

@@ -30,6 +30,8 @@ class Election:
         self._forget: tuple[Member, ...] = ()
         """Incarnations that the operator declared dead, until `forget_until` (E20)."""
         self._timing = timing
+        self._place_of: tuple[Config, int, int] | None = None
+        """Own place in the election order, behind the config and the number of vanishings that it was computed from."""
         majority = mission.cold_start == "majority" and mission.witness
         self._majority_from = now + COLD_START_S if majority else NEVER
         self._quorum_loss_s = mission.continue_after_s if mission.lonely == "continue_after" else NEVER
@@ -54,10 +56,18 @@ class Election:
         if not self.may_lead(config, self.me.id):
             self.at = NEVER
             return
+        self.at = at + self._place(config, peers) * self._timing.rank_step_s
+
+    def _place(self, config: Config, peers: FailureDetector) -> int:
+        """Return the own place in the election order. Each PROPOSE asks for it, and a chain may be of a hundred."""
+        known = self._place_of
+        if known is not None and known[0] is config and known[1] == peers.vanishings:
+            return known[2]
         # A robot without a vote stands last: it is needed only when no voter can lead.
         named = is_first(config) or self.me in config.voters
         place = self.rank(config, self.me.id, peers) + (0 if named else len(config.voters))
-        self.at = at + place * self._timing.rank_step_s
+        self._place_of = config, peers.vanishings, place
+        return place
 
     def held(self, now: float) -> None:
         """Record that a lease is held at `now` [s], which restarts the time to E21."""

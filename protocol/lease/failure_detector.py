@@ -20,6 +20,8 @@ class FailureDetector:
         self._tokens: dict[int, int] = {}
         """Incarnation of the token that is there, by id."""
         self._last_words_s = LAST_WORDS_HEARTBEATS * heartbeat_s
+        self.vanishings = 0
+        """Number of changes of what `is_gone` returns: what follows from it holds until the next one."""
 
     def heard(self, src: Member, now: float) -> None:
         """Record a message of `src`.
@@ -33,12 +35,12 @@ class FailureDetector:
             incarnation, since = self._gone[src.id]
             late = now - since > self._last_words_s
             if is_later(src.incarnation, incarnation) or (src.incarnation == incarnation and late):
-                del self._gone[src.id]
+                self._return(src.id)
 
     def appeared(self, id: int, incarnation: int) -> None:
         self._tokens[id] = incarnation
         if id in self._gone and not is_later(self._gone[id][0], incarnation):
-            del self._gone[id]
+            self._return(id)
 
     def vanished(self, id: int, incarnation: int, now: float) -> None:
         if self._tokens.get(id) == incarnation:
@@ -46,6 +48,7 @@ class FailureDetector:
         if id in self._gone and is_later(self._gone[id][0], incarnation):
             incarnation = self._gone[id][0]
         self._gone[id] = (incarnation, now)
+        self.vanishings += 1
 
     def is_gone(self, member: Member) -> bool:
         """Return True if the token of this incarnation, or of a later one, vanished."""
@@ -61,7 +64,8 @@ class FailureDetector:
 
     def is_superseded(self, member: Member) -> bool:
         """Return True if a later incarnation of it was heard."""
-        return member.id in self._newest and is_later(self._newest[member.id], member.incarnation)
+        newest = self._newest.get(member.id, member.incarnation)
+        return newest != member.incarnation and is_later(newest, member.incarnation)
 
     def later_than(self, member: Member) -> int | None:
         """Return the number of a later incarnation that was heard or whose token vanished; None if there is none."""
@@ -79,3 +83,7 @@ class FailureDetector:
     def has_ended(self, member: Member) -> bool:
         """Return True if no answer of this incarnation is expected: a later one was heard, or its token vanished."""
         return self.is_superseded(member) or self.is_gone(member)
+
+    def _return(self, id: int) -> None:
+        del self._gone[id]
+        self.vanishings += 1

@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.holder import Holder
-from lfa.protocol.lease.membership import chosen, ids, placed, rewritten
+from lfa.protocol.lease.membership import chosen, placed, rewritten
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Config, Member, Roster
 from lfa.protocol.mission import Shrink, TieBreak
@@ -39,17 +39,18 @@ def reshaped(
 
     Dead and retired robots leave the chain, robots that sent HELLO join its tail, and the voters follow, jointly.
     """
+    left = {*left_out, *roster.retired}
 
     def stays(member: Member, silence_s: float) -> bool:
-        return member == me or not (peers.is_superseded(member) or holder.silent(member, now, silence_s))
+        return member == me or not (holder.silent(member, now, silence_s) or peers.is_superseded(member))
 
     def out(member: Member) -> bool:
-        left = member.id in left_out or member.id in roster.retired
-        return peers.is_gone(member) or (left and member != me)
+        return peers.is_gone(member) or (member.id in left and member != me)
 
     here = [m for m in config.chain if not out(m) and stays(m, timing.chain_silence_s)]
     asking = [m for m in holder.said_hello if not peers.is_gone(m) and stays(m, timing.chain_silence_s)]
-    new = tuple(m for m in asking if m.id != WITNESS_ID and m.id not in ids(tuple(here)) and not out(m))
+    present = {m.id for m in here}
+    new = tuple(m for m in asking if m.id != WITNESS_ID and m.id not in present and not out(m))
     chain = placed(tuple(here), new, roster, policy.robots)
     kept = tuple(m for m in config.voters if m.id not in roster.retired and stays(m, timing.remove_silence_s))
     witness = next((m for m in (*kept, *asking) if m.id == WITNESS_ID), None)

@@ -79,6 +79,7 @@ class Lease:
         """
         self._memory = LeaseMemory(me, mission, timing, now, floor)
         self._observer = observer
+        self._chain_of, self._chain = self._memory.config, ids(self._memory.config.chain)
 
     # --- read by the agent --------------------------------------------------------------------------------------
 
@@ -130,8 +131,11 @@ class Lease:
 
     @property
     def chain(self) -> tuple[int, ...]:
-        """Ids of `config.chain`, leader first."""
-        return ids(self._memory.config.chain)
+        """Ids of `config.chain`, leader first; computed anew only when the config has changed."""
+        config = self._memory.config
+        if config is not self._chain_of:
+            self._chain_of, self._chain = config, ids(config.chain)
+        return self._chain
 
     @property
     def term(self) -> Term:

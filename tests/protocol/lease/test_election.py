@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from msgspec import structs
 
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.protocol.lease.effects import BecomeLeader
-from lfa.protocol.lease.election import COLD_START_S
+from lfa.protocol.lease.election import COLD_START_S, Election
+from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.membership import first_config
 from lfa.protocol.messages.consensus import Config, Hello, Member, Prepare, Propose, Release, Term, Version
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.transport.link_model import Radio
@@ -74,6 +77,22 @@ def test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_withi
     assert team.led_at(1.0) - 1.0 <= STD.grant_s + 4 * STD.rank_step_s
     assert team.lease_of(4).chain == (2, 3, 4)
     assert team.safe()
+
+
+def test_e6_a_place_in_the_order_follows_the_tokens_that_vanish_and_come_back() -> None:
+    mission = Mission(robots=(1, 2, 3, 4), leading=Leading(route_m=((1.0, 0.0),)))
+    me, config = Member(4, 1), structs.replace(first_config(mission), version=Version(Term(7), 0))
+    election, peers = Election(me, mission, STD, 0.0), FailureDetector(me, STD.heartbeat_s)
+
+    def place() -> int:
+        election.after(0.0, config, peers)
+        return round(election.at / STD.rank_step_s)
+
+    assert place() == 2  # behind 2 and 3; 1 is the lost leader
+    peers.vanished(2, 0, 1.0)
+    assert place() == 1
+    peers.appeared(2, 1)
+    assert place() == 2
 
 
 def test_e6_the_election_passes_over_those_that_may_not_lead() -> None:
