@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.installed-docs
 PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tests
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench fuzz fuzz-stops model planted why mutants coverage same pages pictures docs clean setup test-driving
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench bench-table soak fuzz fuzz-stops model planted why mutants coverage same pages pictures docs clean setup test-driving
 
 COMPUTE := 'not processes and not hosts and not campaign'
 TEAMS := 'processes and not hosts and not campaign and not wheel'
@@ -82,6 +82,14 @@ lint: $(STAMP)
 
 bench: $(STAMP)
 	$(BIN)/lfa bench lidar
+
+# The performance table of the documentation, from the benches; some rows of them: ROWS='router latency/kill*'
+bench-table: $(STAMP)
+	$(BIN)/python -m tests.bench_table $(ROWS)
+
+# Half an hour of drawn faults on eight robots: nothing may grow, no invariant may fall. Shorter: MINUTES=2
+soak: $(STAMP)
+	$(BIN)/lfa bench soak --minutes $(or $(MINUTES),30)
 
 # A thousand drawn schedules of faults on leases and gateways, systematic and guided ones, and some on whole robots.
 fuzz: $(STAMP)

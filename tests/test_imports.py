@@ -53,7 +53,9 @@ ORDER = (
     "deploy/fleet", "deploy/web", "deploy/bench/harness",
     "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/engines", "deploy/campaign/commands",
     "deploy/bench/control_cases", "deploy/bench/driving", "deploy/bench/agents",
-    "deploy/bench/operate", "deploy/bench/sim", "deploy/bench/web", "deploy/bench", "deploy/cli", "deploy/completion",
+    "deploy/bench/operate", "deploy/bench/sim", "deploy/bench/web",
+    "deploy/bench/router", "deploy/bench/soak", "deploy/bench/lockstep", "deploy/bench", "deploy/bench/latency",
+    "deploy/cli", "deploy/completion",
 )  # fmt: skip
 """Rooms: a folder, or a file that lies directly in a package. Each imports only rooms that stand before it, so there is
 no circle and nothing runs upwards."""

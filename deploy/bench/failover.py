@@ -107,7 +107,7 @@ def run(as_json: bool, rows: str = "*", kills: int = ROUNDS, full: bool = False)
 
 
 def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[BenchRow]]:
-    with _Bench(ROBOTS) as bench:
+    with FailoverBench(ROBOTS) as bench:
         for kind in KINDS:
             if not fnmatchcase(kind.name, glob.split("/")[0]):
                 continue
@@ -118,7 +118,7 @@ def _rows(glob: str, rounds: int, full: bool) -> Iterator[list[BenchRow]]:
             yield [_row(FOLLOWER_KILLED, "follows the new predecessor", "worst", times, FOLLOWS_MS_MAX)]
         yield [row("team", Quantity("had to be started anew", "times", 0.0), float(bench.broken))]
     if fnmatchcase(LARGE_TEAM, glob.split("/")[0]):
-        with _Bench(LARGE) as bench:
+        with FailoverBench(LARGE) as bench:
             took = [bench.round(KINDS[0]) for _ in range(min(rounds, LARGE_ROUNDS_MAX))]
         yield [
             row(LARGE_TEAM, Quantity("not got over", "times", 0.0), float(sum(not one.is_whole for one in took))),
@@ -144,7 +144,7 @@ def quantile(values: Sequence[float], share: float) -> float:
     return sorted(values)[max(0, ceil(share * len(values) - 1e-9) - 1)]
 
 
-class _Bench:
+class FailoverBench:
     """Team under test, restarted as a whole if its chain does not become complete again."""
 
     def __init__(self, robots: int) -> None:
@@ -153,7 +153,7 @@ class _Bench:
         self._random = Random("failover")
         self.broken = 0
 
-    def __enter__(self) -> _Bench:
+    def __enter__(self) -> FailoverBench:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -77,6 +77,7 @@ class _LockstepLaunch:
         started, left, run = clock.now(), [str(fault) for fault in faults], None
         try:
             run = self._started(faults, recorder)
+            started = clock.now()
             self._advance(run, pace)
             verdict, left = run.close(verdict_of(self._interrupts) or self._alone(run)), run.faults_left
             self._team.dismiss(robot_name(robot) for robot in self._drawn.robots)

@@ -1,0 +1,38 @@
+"""`make bench-table`: rows of benches become the table of the performance page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests import bench_table
+
+GOOD = {"name": "open/rays", "value": 7.25e6, "unit": "1/s", "bar": 5e6, "ratio": 1.45, "ok": True}
+SHORT = {"name": "chain of 4/pose to accepted command, p50", "value": 0.7, "unit": "ms", "bar": 0.2, "ratio": 3.5}
+SHORT["ok"] = False
+FREE = {"name": "soak/faults", "value": 12.0, "unit": "times", "bar": None, "ratio": None, "ok": True}
+
+
+def test_a_row_has_value_bar_and_ratio_and_what_falls_short_its_bottleneck() -> None:
+    table = bench_table.text({"lidar": [GOOD], "latency": [SHORT], "soak": [FREE]})
+    assert "| lidar | open/rays | 7.25e+06 1/s | 5e+06 | 1.45 | ok |" in table
+    assert "| latency | chain of 4/pose to accepted command, p50 | 0.7 ms | 0.2 | 3.5 | short |" in table
+    assert "| soak | soak/faults | 12 times |  |  |  |" in table
+    assert "- `latency` chain of 4/pose to accepted command, p50: next bottleneck: two hops through the router" in table
+
+
+def test_without_a_row_below_its_bar_the_table_says_so() -> None:
+    assert bench_table.text({"lidar": [GOOD]}).endswith("Nothing falls short.\n")
+
+
+def test_new_rows_take_the_place_of_old_ones_of_the_same_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench_table, "KEPT", tmp_path)
+    bench_table.keep("lidar", [GOOD, FREE])
+    bench_table.keep("lidar", [GOOD | {"value": 1.0}])
+    assert [row["value"] for row in bench_table.kept()["lidar"]] == [1.0, 12.0]
+
+
+def test_the_page_has_marks_for_the_table() -> None:
+    page = bench_table.PAGE.read_text()
+    assert bench_table.with_table(page, "here\n").count("here\n") == 1
