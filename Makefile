@@ -111,9 +111,10 @@ model: $(STAMP)
 planted: $(STAMP)
 	$(BIN)/python -m tests.protocol.lease.hunt $(PLANTED)
 
-# Faults drawn from seeds: which of them does lfa why name? Some three minutes.
+# Faults drawn from seeds: which of them does lfa why name? And of planted bugs: is the broken rule named? Some four minutes.
 why: $(STAMP)
 	$(BIN)/python -m tests.deploy.analysis.causes.drawn_faults
+	$(BIN)/python -m tests.deploy.analysis.causes.planted_bugs
 
 # The lines of agents, world and protocol that the fast tests of their rooms reach: a short form, for a traced Python takes
 # three times as long. The floor is in pyproject.toml.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Union
 
 from msgspec import Struct, structs
 
+from lfa.deploy.analysis.causes.broken_rules import BrokenRule, RuleWatch
 from lfa.deploy.analysis.verification.checker import Checker, Violation
 from lfa.deploy.analysis.verification.leadership import NextInChain, Steady, StopsWithoutQuorum
 from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS
@@ -45,6 +46,8 @@ class Played(Struct):
     """Number of faults that took effect, by kind."""
     elections: int
     simulation: Simulation
+    broken: BrokenRule | None = None
+    """Rule that the first violation shows to be broken, with its chain of causes; None: no violation, or not shown."""
 
 
 class Faults:
@@ -228,7 +231,10 @@ def _lease_simulation(schedule: Schedule) -> Simulation:
 def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule], Simulation]) -> Played:
     simulation = simulate(schedule)
     simulation.trace = trace
-    checkers = [checker(simulation.timing) for checker in _checkers(schedule)]
+    watch = RuleWatch(simulation.timing)
+    checkers = [watch, *(checker(simulation.timing) for checker in _checkers(schedule))]
+    for checker in checkers:
+        checker.told = watch.note
     simulation.listen(checkers)
     faults = Faults(simulation, schedule)
     if isinstance(simulation, LeaseSimulation):
@@ -244,7 +250,8 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
         checker.over(simulation.now)
     violations = [v for checker in checkers for v in checker.violations]
     elections = sum(1 for _, _, effect in simulation.log if type(effect).__name__ == "BecomeLeader")
-    return Played(schedule, violations, faults.counts, elections, simulation)
+    broken = watch.broken_rules[0][1] if watch.broken_rules else None
+    return Played(schedule, violations, faults.counts, elections, simulation, broken)
 
 
 def _checkers(schedule: Schedule) -> list[type[Checker]]:

@@ -186,6 +186,7 @@ class Hosts(GatewaySimulation):
 
     def _hinted(self, process: Process, hint: tuple[int, int, bool]) -> None:
         if process.alive:
+            self._report(Checker.hinted, self.now, process.member, Member(*hint[:2]))
             self.deliver(process, process.lease.hint, hint)
 
     def _send(self, process: Process, send: Send) -> None:

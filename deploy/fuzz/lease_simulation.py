@@ -160,7 +160,7 @@ class LeaseSimulation(Hosts):
         for observer in observers:
             if self.processes[observer].alive:
                 process = self.processes[observer]
-                self.deliver(process, process.lease.hint, (member.id, member.incarnation, up))
+                self._hinted(process, (member.id, member.incarnation, up))
 
     def step_wall(self, robot_id: int, by_s: float) -> None:
         """Set a host's wall clock wrong by `by_s` [s]; no other clock can be stepped."""

@@ -132,7 +132,7 @@ class StopTraffic:
         """Report it if the wheels of a robot turn, after its gateway has obeyed a command or an order."""
         running = self._team.gateways[robot]
         if running.gateway.twist(running.clock.local(self._team.now)) != STILL:
-            self._team.report(Checker.turns, self._team.now, robot)
+            self._team.report(Checker.turns, self._team.now, robot, running.gateway.stop.known.word)
 
     def started(self, robot: int) -> None:
         """Report that a robot has forgotten what it acknowledged: agent and gateway, before one has told the other."""

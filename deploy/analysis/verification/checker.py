@@ -43,9 +43,13 @@ class Checker:
     def __init__(self, timing: Timing) -> None:
         self.timing = timing
         self.violations: list[Violation] = []
+        self.told: Callable[[Violation], None] | None = None
+        """Function to call with each violation at its moment."""
 
     def broken(self, at: float, text: str) -> None:
         self.violations.append(Violation(self.name, at, text))
+        if self.told is not None:
+            self.told(self.violations[-1])
 
     def leads(self, at: float, who: Member, term: Term, until: float) -> None:
         """Record that `who` holds `term`, new or extended, until true time `until` [s] by its own clock."""
@@ -107,8 +111,11 @@ class Checker:
     def resume_said(self, at: float, word: StopWord) -> None:
         """Record that an operator said this resume for the first time or again."""
 
-    def turns(self, at: float, robot_id: int) -> None:
-        """Record that wheels of `robot_id` turn, by the twist that its gateway lets through."""
+    def turns(self, at: float, robot_id: int, word: StopWord) -> None:
+        """Record that wheels of `robot_id` turn, by the twist that its gateway lets through, which knows `word`."""
+
+    def hinted(self, at: float, who: Member, about: Member) -> None:
+        """Record that `who` saw the token of `about` appear or vanish, true or false (E15)."""
 
 
 class Report(Protocol):

@@ -26,7 +26,7 @@ class StopHolds(Checker):
     def resume_said(self, at: float, word: StopWord) -> None:
         self._resumed = max(self._resumed, word)
 
-    def turns(self, at: float, robot_id: int) -> None:
-        word = self._acknowledged.get(robot_id)
-        if word is not None and word > self._resumed:
-            self.broken(at, f"robot {robot_id} drives after it acknowledged stop {word.epoch}")
+    def turns(self, at: float, robot_id: int, word: StopWord) -> None:
+        acknowledged = self._acknowledged.get(robot_id)
+        if acknowledged is not None and acknowledged > self._resumed:
+            self.broken(at, f"robot {robot_id} drives after it acknowledged stop {acknowledged.epoch}")

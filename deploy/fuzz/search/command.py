@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
 from lfa.deploy.fuzz.schedules import KINDS
 from lfa.deploy.fuzz.search import systematic
@@ -113,6 +114,8 @@ def _one(seed: int, verbose: bool, search: Search = DRAWN, as_json: bool = False
         typer.echo(line)
     for violation in played.violations:
         typer.echo(said(violation))
+    for line in [] if played.broken is None else chain_lines(played.broken):
+        typer.echo(line)
     typer.echo(f"seed {seed}: {len(played.violations)} violations, {played.elections} elections")
     return 1 if played.violations else 0
 

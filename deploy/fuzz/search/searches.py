@@ -9,6 +9,7 @@ from typing import Literal
 
 from msgspec import Struct, structs
 
+from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.fuzz.fault_injector import Played, play, play_whole
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.schedules import Schedule, draw, without
@@ -126,7 +127,8 @@ def explain(seed: int, search: Search) -> str:
     small = shrink(schedule, player(schedule, None).violations[0].name, player)
     lines: list[str] = []
     played = player(small, columns(lines, small))
-    return "\n".join([describe(small), *lines, *(said(v) for v in played.violations)])
+    causes = [] if played.broken is None else chain_lines(played.broken)
+    return "\n".join([describe(small), *lines, *(said(v) for v in played.violations), *causes])
 
 
 def write_explanation(seed: int, text: str, out: Path, search: Search) -> Path:

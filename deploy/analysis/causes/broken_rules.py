@@ -1,0 +1,244 @@
+"""Which rule of the protocol was broken when an invariant falls in a schedule of `lfa fuzz`, by what was observed.
+
+A watch hears the same facts as the checkers, and remembers those that tell rules apart: who granted, promised, started
+and saw tokens vanish, when. The rule of a violation is looked up with them; nothing of the code is looked into.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+from msgspec import Struct
+
+from lfa.deploy.analysis.verification.checker import LONG_AGO, Checker, Violation
+from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
+from lfa.protocol.messages.consensus import Grant, Member, Promise, Propose, Term
+from lfa.protocol.messages.stop import NO_STOP, StopWord
+
+
+class CauseStep(Struct, frozen=True):
+    """One step of the chain, at true time `at_s` [s]."""
+
+    at_s: float
+    text: str
+
+
+class BrokenRule(Struct, frozen=True):
+    """The rules that a violation shows to be broken, and the steps that lead there, the violation last."""
+
+    rules: tuple[str, ...]
+    """Numbers in protocol/README.md, the root first; of two, the second is what the first was to keep."""
+    steps: tuple[CauseStep, ...]
+
+
+class RuleWatch(Checker):
+    """Memory of the facts that tell rules apart, and the rule of a violation by them."""
+
+    name = "rules"
+
+    def __init__(self, timing: Timing) -> None:
+        super().__init__(timing)
+        self._bond_s = (timing.act_s + timing.deadman_s) * (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
+        """T_grant by E2, from the mission's durations alone."""
+        self._granted: dict[Member, list[tuple[float, Term]]] = {}
+        self._proposed: dict[Term, tuple[float, Member, Propose]] = {}
+        self._promised: dict[Term, list[tuple[float, Member]]] = {}
+        self._hinted: dict[tuple[Member, Member], float] = {}
+        self._began: dict[Member, float] = {}
+        self._gateway_began: dict[int, float] = {}
+        self._acknowledged: dict[int, tuple[float, StopWord]] = {}
+        self._turned: tuple[int, StopWord] = (0, NO_STOP)
+        """Robot whose wheels turned last, and what its gateway knew."""
+        self.broken_rules: list[tuple[Violation, BrokenRule | None]] = []
+
+    # --- facts -------------------------------------------------------------------------------------------------
+
+    def lives(self, at: float, who: Member) -> None:
+        self._began[who] = at
+
+    def hinted(self, at: float, who: Member, about: Member) -> None:
+        self._hinted[who, about] = at
+
+    def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
+        self._granted.setdefault(voter, []).append((at, grant.term))
+
+    def promises(self, at: float, who: Member, promise: Promise) -> None:
+        self._promised.setdefault(promise.term, []).append((at, who))
+
+    def proposes(self, at: float, who: Member, propose: Propose) -> None:
+        self._proposed[propose.term] = at, who, propose
+
+    def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
+        self._gateway_began[robot_id] = at
+
+    def stop_acknowledged(self, at: float, robot_id: int, word: StopWord) -> None:
+        self._acknowledged[robot_id] = at, word
+
+    def turns(self, at: float, robot_id: int, word: StopWord) -> None:
+        self._turned = robot_id, word
+
+    # --- the rule ----------------------------------------------------------------------------------------------
+
+    def note(self, violation: Violation) -> None:
+        """Look the rule of a violation up, at the moment at which the violation is found."""
+        explain = _BY_INVARIANT.get(violation.name)
+        found = None if explain is None else explain(self, violation)
+        self.broken_rules.append((violation, found))
+
+    def chain(self, violation: Violation, rules: str, *steps: CauseStep) -> BrokenRule:
+        """Return the chain of a violation of `rules`, such as `E15 E3`: its steps by time, then the violation."""
+        by_time = sorted(steps, key=lambda step: step.at_s)
+        return BrokenRule(
+            tuple(rules.split()), (*by_time, CauseStep(violation.at, f"{violation.name}: {violation.text}"))
+        )
+
+    def last_grant(self, before_s: float) -> tuple[Member, float, Term, float, Term] | None:
+        """Return the voter of the newest grant up to a time, and its last two grants of different terms."""
+        latest = max(
+            self._granted.items(), key=lambda item: max((t for t, _ in item[1] if t <= before_s), default=-1.0)
+        )
+        voter, grants = latest
+        at, term = grants[-1]
+        earlier = [one for one in grants if one[1] != term]
+        return (voter, at, term, *earlier[-1]) if earlier else None
+
+    def overlapping(self, before_s: float) -> tuple[Member, float, Term, float, Term] | None:
+        """Return the newest two grants of one voter, within T_grant, of terms of different holders, and the voter."""
+        found = []
+        for voter, grants in self._granted.items():
+            for (first_s, first), (at, term) in pairwise(grants):
+                apart = at - first_s < self._bond_s * (1.0 - CLOCK_RATE_ERROR) and first != term and at <= before_s
+                if apart and self._proposed[first][2].holder != self._proposed[term][2].holder:
+                    found.append((voter, at, term, first_s, first))
+        return max(found, key=lambda one: one[1], default=None)
+
+    def asked_before(self, term: Term) -> Term | None:
+        """Return a lower term of the same candidate that was promised and never proposed."""
+        same = [one for one in self._promised if (one.issuer, one.incarnation) == (term.issuer, term.incarnation)]
+        return max((one for one in same if one < term and one not in self._proposed), default=None)
+
+    def promise_of_a_newcomer(self, term: Term) -> tuple[float, Member] | None:
+        """Return a promise for `term` that came from a process in its first T_grant."""
+        for at, who in self._promised.get(term, []):
+            if at - self._began.get(who, LONG_AGO) < self._bond_s:
+                return at, who
+        return None
+
+
+def _shown(member: Member) -> str:
+    return "the witness" if member.id == 0 else f"robot {member.id}"
+
+
+def _always(rule: str, text: str) -> Callable[[RuleWatch, Violation], BrokenRule | None]:
+    """Return the rule of an invariant that only one rule keeps, with what it demands."""
+    return lambda watch, violation: watch.chain(violation, rule, CauseStep(violation.at, text))
+
+
+def _exclusive(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    """I1: some voter has granted both leases within T_grant."""
+    both = watch.overlapping(violation.at)
+    if both is None:
+        return None
+    voter, at, term, first_s, first = both
+    steps = _grants(voter, at, term, first_s, first)
+    return watch.chain(
+        violation, "E2", *steps, CauseStep(at, f"a bond outlives its lease: it lasts {watch._bond_s:.3f} s")
+    )
+
+
+def _bond(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    """I4: a fence in vain, a token that vanished, or a grant in spite of the bond."""
+    last = watch.last_grant(violation.at)
+    if last is None:
+        return None
+    voter, at, term, first_s, first = last
+    steps = _grants(voter, at, term, first_s, first)
+    if first in watch._proposed[term][2].fenced:
+        return watch.chain(violation, "E15", *steps, CauseStep(at, "its holder's gateway had not been fenced"))
+    hinted_s = watch._hinted.get((voter, watch._proposed[first][2].holder), LONG_AGO)
+    if hinted_s >= first_s:
+        return watch.chain(
+            violation,
+            "E15 E3",
+            *steps,
+            CauseStep(hinted_s, f"{_shown(voter)} saw the token of the lease's holder vanish, which proves nothing"),
+        )
+    return watch.chain(violation, "E3", *steps)
+
+
+def _grants(voter: Member, at: float, term: Term, first_s: float, first: Term) -> tuple[CauseStep, CauseStep]:
+    return (
+        CauseStep(first_s, f"{_shown(voter)} granted term {first.n} of {first.issuer}, and was bound by it"),
+        CauseStep(at, f"{_shown(voter)} granted term {term.n} of {term.issuer}"),
+    )
+
+
+def _amnesiac(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    """I7: who proposed the term, and what its promises were worth."""
+    term = max(watch._proposed, key=lambda one: watch._proposed[one][0])
+    at, who, propose = watch._proposed[term]
+    if (who.id, who.incarnation) != (term.issuer, term.incarnation) or propose.holder != who:
+        text = f"{_shown(who)} proposed term {term.n} of {term.issuer}, which was handed over, as a new one"
+        return watch.chain(violation, "E16", CauseStep(at, text))
+    promises = watch._promised.get(term, [])
+    if not promises:
+        others = [(t, one) for one, some in watch._promised.items() if one.issuer == who.id for t, _ in some[-1:]]
+        if not others or max(others)[0] < at - watch._bond_s:
+            text = f"{_shown(who)} proposed term {term.n} without having asked for promises"
+            return watch.chain(violation, "E16", CauseStep(at, text))
+        text = f"{_shown(who)} proposed term {term.n} on promises for term {max(others)[1].n}"
+        return watch.chain(violation, "E6", CauseStep(max(others)[0], "promises came"), CauseStep(at, text))
+    newcomer = watch.promise_of_a_newcomer(term)
+    joint = propose.config.previous is not None
+    if newcomer is not None and (joint or at > 2.0 * watch._bond_s):
+        text = f"{_shown(newcomer[1])} promised, which had just started"
+        return watch.chain(violation, "E1", CauseStep(newcomer[0], text))
+    dropped = watch.asked_before(term)
+    if dropped is not None:
+        text = f"{_shown(who)} had promises for term {dropped.n}, and asked for term {term.n}"
+        return watch.chain(violation, "E6", CauseStep(at, text))
+    if not joint:
+        text = f"{_shown(who)} proposed a config that is not joint with all that promised"
+        return watch.chain(violation, "E18", CauseStep(at, text))
+    return watch.chain(violation, "E18", CauseStep(at, f"{_shown(who)} proposed without a quorum that remembers"))
+
+
+def _stop(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    """I10: what the gateway knew while it let the wheels turn."""
+    robot, word = watch._turned
+    at, acknowledged = watch._acknowledged.get(robot, (LONG_AGO, NO_STOP))
+    step = CauseStep(at, f"the gateway of robot {robot} acknowledged stop {acknowledged.epoch}")
+    if word.stand:
+        text = f"it knew stop {word.epoch}, and let the wheels turn"
+        return watch.chain(violation, "E28", step, CauseStep(violation.at, text))
+    began_s = watch._gateway_began.get(robot, LONG_AGO)
+    if began_s > at:
+        text = f"the gateway of robot {robot} started again, and did not stand until it knew"
+        return watch.chain(violation, "E30", step, CauseStep(began_s, text))
+    text = f"it took the older resume {word.epoch} for the newest word"
+    return watch.chain(violation, "E29", step, CauseStep(violation.at, text))
+
+
+def _roster(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    rule = "E34" if violation.text.startswith("retired") else "E33"
+    return watch.chain(violation, rule)
+
+
+_BY_INVARIANT: dict[str, Callable[[RuleWatch, Violation], BrokenRule | None]] = {
+    "I1": _exclusive,
+    "I2": _always("E12", "a gateway obeyed what it must refuse: an old time, or a lower term"),
+    "I4": _bond,
+    "I6": _always("E17", "voters changed without the quorums of both sets"),
+    "I7": _amnesiac,
+    "I9": _always("E25", "one acted on a message of another agreement"),
+    "I10": _stop,
+    "I11": _roster,
+}
+
+
+def lines(broken: BrokenRule) -> list[str]:
+    """Return the chain as plain sentences with times, the rule first."""
+    steps = [f"  {step.at_s:9.4f} s  {step.text}" for step in broken.steps]
+    names = " and so ".join(f"rule {rule}" for rule in broken.rules)
+    return [f"{names} was broken (protocol/README.md):", *steps]

@@ -1,0 +1,86 @@
+"""Planted bugs of the protocol, each in a schedule of `lfa fuzz` that breaks an invariant: is the broken rule named?
+
+The rules come from what was observed, by the code that `lfa fuzz` reports with; it knows nothing of the planted bug.
+`make why` prints all, behind the drawn faults; `--from 100` looks for other schedules of each bug, from that seed on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+import pytest
+
+from lfa.deploy.analysis.causes.broken_rules import BrokenRule, lines
+from lfa.deploy.fuzz.fault_injector import play
+from lfa.deploy.fuzz.schedules import draw
+from tests.protocol.lease.planted import PLANTED, Bug
+
+SHARE_MIN = 0.95
+SEEDS = 60
+"""Schedules in which another one that shows a bug is looked for."""
+SHOWN_IN: dict[str, tuple[str, int]] = {
+    "check, pause, act: the age of stamps is not checked": ("E12", 2),
+    "voters change without a joint config": ("E17", 2),
+    "a new term with every asking": ("E6", 0),
+    "a hint taken as proof": ("E15", 2),
+    "a bond of half the lease": ("E2", 2),
+    "PREPARE and PROPOSE ignore a live grant": ("E3", 0),
+    "a restarted process votes at once": ("E1", 2),
+    "a hand-over writes a new config without phase 1": ("E16", 12),
+    "a full house that is not joint with all of it": ("E18", 0),
+    "rounds that restart": ("E16", 12),
+    "a gateway without the term check": ("E12", 2),
+    "nothing is agreed: whoever has another profile or mission votes": ("E25", 4),
+    "a stop is not held": ("E28", 0),
+    "late and replayed words of a stop are believed": ("E29", 47),
+    "spares vote like others": ("E33", 31),
+}
+"""Bugs of which a schedule breaks an invariant I1 to I11: the planted rule, and the seed of such a schedule."""
+SHOWN: tuple[Bug, ...] = tuple(bug for bug in PLANTED if bug.what in SHOWN_IN)
+
+
+def named(bug: Bug, seed: int) -> BrokenRule | None:
+    """Play a schedule with the bug; return what the report names as broken."""
+    with pytest.MonkeyPatch.context() as patch:
+        bug.plant(patch)
+        return play(draw(seed)).broken
+
+
+def other_seed(bug: Bug, first: int) -> int | None:
+    """Return the first seed from `first` on whose schedule breaks an invariant of safety."""
+    with pytest.MonkeyPatch.context() as patch:
+        bug.plant(patch)
+        for seed in range(first, first + SEEDS):
+            if any(violation.name.startswith("I") for violation in play(draw(seed)).violations):
+                return seed
+    return None
+
+
+def main() -> None:
+    """Print a row a bug, and the share of those whose rule is named, beside its bar."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--from", type=int, dest="first", help="first seed of other schedules than those of the table")
+    parser.add_argument("-v", action="store_true", dest="verbose", help="print the chains of causes")
+    arguments = parser.parse_args()
+    right = shown = 0
+    for bug in SHOWN:
+        rule, known = SHOWN_IN[bug.what]
+        seed = known if arguments.first is None else other_seed(bug, arguments.first)
+        if seed is None:
+            print(f"{rule:>4} {bug.what:<64} in none of {SEEDS} schedules", flush=True)
+            continue
+        found, shown = named(bug, seed), shown + 1
+        rules = () if found is None else found.rules
+        right += rule in rules
+        answer = "named" if rule in rules else "NOT NAMED"
+        print(f"{rule:>4} {bug.what:<64} {' '.join(rules) or '-':<8} {answer}, seed {seed}", flush=True)
+        if arguments.verbose and found is not None:
+            print("\n".join(f"      {line}" for line in lines(found)), flush=True)
+    fine = right >= SHARE_MIN * shown
+    print(f"{right} of {shown} planted bugs: {right / shown:.2f} (bar {SHARE_MIN}) {'ok' if fine else 'FAILS'}")
+    sys.exit(0 if fine else 1)
+
+
+if __name__ == "__main__":
+    main()
