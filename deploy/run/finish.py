@@ -22,6 +22,7 @@ from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.recorder import Recording, parts
 from lfa.deploy.recording.run_folder import JOURNALS, About
 from lfa.protocol.output import write_line
+from lfa.protocol.runtime.state_hashes import HASHES
 
 
 class Ended(Struct, frozen=True):
@@ -106,7 +107,8 @@ def report(
 
 
 def _remove_recording(folder: Path) -> None:
-    """Remove the messages and journals of a run: its summary, events and scenario stay."""
+    """Remove the messages, journals and state hashes of a run: its summary, events and scenario stay."""
     for part in parts(folder):
         part.unlink()
+    (folder / HASHES).unlink(missing_ok=True)
     shutil.rmtree(folder / JOURNALS, ignore_errors=True)
