@@ -1,7 +1,8 @@
 """Speed of simulated teams on one core: agents, world, codec, journals and recording, in processor time.
 
 Beside each in the same run: the bare cost of its messages, each encoded, decoded and recorded once more, while nobody
-sends or hears them. The summary that `lfa sim` computes at the end is no part of it.
+sends or hears them. The summary that `lfa sim` computes at the end is no part of it. A team below its bar is simulated
+a little longer under a profiler, which names the next bottleneck: the folders of the code that take most of the time.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
+from functools import partial
+from itertools import islice
 from math import log
 from pathlib import Path
 from statistics import mean
@@ -17,6 +20,7 @@ from time import process_time
 from msgspec import Struct
 
 from lfa.deploy.bench.harness.rows import BenchRow, Quantity, row, show
+from lfa.deploy.bench.sim.time_shares import profiled
 from lfa.deploy.recording.recorder import Recorder
 from lfa.deploy.run.simulate import SimulatedRun
 from lfa.protocol.messages.codec import Message, decode, encode
@@ -27,6 +31,8 @@ SCENARIO, SEED, BEAMS = "straight", 1, 180
 FROM_S = 1.0
 """Time [s] of a run from which it is measured: the leader leads, and the chain is closed."""
 EXPONENT_MAX = 1.1
+FOLDERS_SHOWN = 5
+"""Number of folders that the profile of a team below its bar names."""
 
 
 class SpeedCase(Struct, frozen=True):
@@ -36,6 +42,8 @@ class SpeedCase(Struct, frozen=True):
     control_hz: float
     until_s: float
     times_min: float | None = None
+    profiled_s: float = 0.5
+    """Time [s] that is simulated under the profiler where the team is below its bar."""
 
     @property
     def name(self) -> str:
@@ -59,6 +67,8 @@ class Cost(Struct, frozen=True):
 
     run_s: float
     messages_s: float
+    shares: dict[str, float] = {}
+    """Share of the time [%] of each folder of the code, the largest first; empty where the bar is met."""
 
 
 def run(as_json: bool, rows: str = "*") -> int:
@@ -75,15 +85,19 @@ def _rows() -> Iterator[list[BenchRow]]:
         yield [
             row(case.name, Quantity("times real time", "1", case.times_min, "at least"), 1.0 / cost.run_s),
             row(case.name, Quantity("times the bare cost of its messages", "1"), cost.run_s / cost.messages_s),
+            *(
+                row(case.name, Quantity(f"share of {folder}", "%"), share)
+                for folder, share in islice(cost.shares.items(), FOLDERS_SHOWN)
+            ),
         ]
     yield [row("growth", Quantity("exponent of cost over robots", "1", EXPONENT_MAX), exponent(costs))]
 
 
 def cost_of(case: SpeedCase) -> Cost:
     """Simulate and return the cost of one simulated second after `FROM_S`."""
-    drawn = draw(
-        load(SCENARIO, [f"mission.control_hz={case.control_hz}", f"world.lidar.beams={BEAMS}"], case.robots), SEED
-    )
+    settings = [f"mission.control_hz={case.control_hz}", f"world.lidar.beams={BEAMS}"]
+    drawn = draw(load(SCENARIO, settings, case.robots), SEED)
+    simulated_s = case.until_s - FROM_S
     said: list[tuple[float, str, Message]] = []
     with tempfile.TemporaryDirectory(prefix="lfa-") as place:
         recorder = Recorder(_folder(place, "run"), {})
@@ -98,11 +112,12 @@ def cost_of(case: SpeedCase) -> Cost:
         began = process_time()
         team.advance(case.until_s)
         run_s = process_time() - began
+        messages_s = _bare_s(said, _folder(place, "bare"))
+        falls_short = case.times_min is not None and simulated_s / run_s < case.times_min
+        shares = profiled(partial(team.advance, case.until_s + case.profiled_s)) if falls_short else {}
         team.close()
         recorder.close()
-        messages_s = _bare_s(said, _folder(place, "bare"))
-    simulated_s = case.until_s - FROM_S
-    return Cost(run_s / simulated_s, messages_s / simulated_s)
+    return Cost(run_s / simulated_s, messages_s / simulated_s, shares)
 
 
 def exponent(costs: dict[int, float]) -> float:

@@ -23,3 +23,10 @@ def test_the_exponent_of_a_power_is_that_power(power: float) -> None:
 def test_a_run_costs_more_than_its_messages() -> None:
     cost = cost_of(SpeedCase(2, 20.0, 1.5))
     assert cost.run_s > cost.messages_s > 0.0
+
+
+def test_a_team_below_its_bar_says_where_its_time_goes() -> None:
+    shares = cost_of(SpeedCase(2, 20.0, 1.2, times_min=1e6, profiled_s=0.2)).shares
+    assert sum(shares.values()) == pytest.approx(100.0)
+    assert list(shares.values()) == sorted(shares.values(), reverse=True)
+    assert {"protocol/lease", "deploy/recording", "agents/following"} < shares.keys()
