@@ -7,6 +7,7 @@ with the team.
 from __future__ import annotations
 
 import sys
+from itertools import chain
 
 import msgspec
 from msgspec import Struct
@@ -51,23 +52,26 @@ def main(task: TrafficTask) -> TrafficCount:
     inbox = _Counting()
     bus = ZenohBus(task.endpoint, inbox)
     bus.follow(frozenset(key(task.fleet, robot_name(robot), topic) for robot in task.hears for topic in HEARS))
-    keys = [(key(task.fleet, robot_name(robot), topic), size) for robot in task.says for topic, size in SAYS.items()]
-    for to, _ in keys:
+    robots = [
+        [(key(task.fleet, robot_name(robot), topic), size) for topic, size in SAYS.items()] for robot in task.says
+    ]
+    for to, _ in chain(*robots):
         bus.publish(to, b"")  # declares the publisher; an empty message counts as none
     clock.sleep(SETTLE_S)
     print("ready", flush=True)
     sys.stdin.readline()
     began, number = clock.now(), 0
     while clock.now() < began + task.duration_s:
+        for place, keys in enumerate(robots):
+            if task.rate_hz > 0.0:  # robots do not speak all at once
+                clock.sleep(max(began + (number + place / len(robots)) / task.rate_hz - clock.now(), 0.0))
+            for to, size in keys:
+                bus.publish(to, bytes(size))
         number += 1
-        for to, size in keys:
-            bus.publish(to, bytes(size))
-        if task.rate_hz > 0.0:
-            clock.sleep(max(began + number / task.rate_hz - clock.now(), 0.0))
     lasted_s = clock.now() - began
     clock.sleep(SETTLE_S)
     bus.close()
-    return TrafficCount(number * len(keys), inbox.received, lasted_s)
+    return TrafficCount(number * len(SAYS) * len(robots), inbox.received, lasted_s)
 
 
 class _Counting(Inbox):
