@@ -1,4 +1,4 @@
-"""One colour for each robot, the same in every figure, page and view. Distinguishable with any colour vision."""
+"""One colour for each robot, the same in figures, reports, films and views. Distinguishable with any colour vision."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from PIL import Image, ImageDraw, ImageFont
 
+from lfa.deploy.robot_colours import as_hex, robot_colour
 from lfa.deploy.view.picture.picture import COLUMNS
 from lfa.protocol.errors import Refused
 
@@ -22,9 +23,9 @@ GIF_FRAMES_MAX, MP4_FRAMES_MAX = 180, 6000
 TRAIL_FRAMES = 120
 MARGIN_M = 1.0
 PAPER, INK, SOFT, WALL, STONE = "#ffffff", "#1b1f24", "#9aa6b2", "#39424c", "#6b7681"
-ROLE_COLOURS = {
-    "leader": "#c77700", "follower": "#0072b2", "waiting": "#7b8591", "gone": "#c23b12", "stopped": "#a0468a",
-}  # fmt: skip
+GOAL, WAITING, STOPPED = "#1b1f24", "#7b8591", "#c23b12"
+RINGS = {"waiting": WAITING, "stopped": STOPPED}
+"""Colour of the ring round a robot of a role, which keeps its own colour whatever its role."""
 
 Point = tuple[float, float]
 
@@ -106,17 +107,25 @@ def _image(
     routes = [item for item in news if item["k"] == "route"]
     laid = {**ground, **routes[-1]} if routes else ground
     _draw_ground(pen, camera, laid, frame, [item for item in news if item["k"] == "obstacle"])
+    colours = robot_colours(ground, frames)
     for row in frame["robots"]:
         past = [place for old in frames[max(0, n - TRAIL_FRAMES) : n + 1] for place in _places(old, row[0])]
         if len(past) > 1:
             pen.line([camera.at(*place) for place in past], fill=SOFT, width=FINER)
     for row in frame["robots"]:
-        _draw_robot(pen, camera, dict(zip(COLUMNS, row, strict=True)), ground["radius"])
+        _draw_robot(pen, camera, dict(zip(COLUMNS, row, strict=True)), ground["radius"], colours[row[0]])
     led = [item for item in news if item["k"] == "lead"]
     who = f"robot {led[-1]['robot']} leads: {led[-1]['why']}" if led else "nobody leads yet"
     font = ImageFont.load_default(13 * FINER)
     pen.text((10 * FINER, FINER * (camera.height + 8)), f"{frame['t']:5.1f} s   {who}", fill=INK, font=font)
     return image.resize((WIDTH, camera.height + FOOT), Image.Resampling.LANCZOS)
+
+
+def robot_colours(ground: dict[str, Any], frames: list[dict[str, Any]]) -> dict[int, str]:
+    """Return the colour of each robot: by its place in the mission, as in every figure; spares come last."""
+    seen = {row[0] for frame in frames for row in frame["robots"]}
+    robots = [*ground["robots"], *sorted(seen - set(ground["robots"]))]
+    return {robot: as_hex(robot_colour(n, len(robots))) for n, robot in enumerate(robots)}
 
 
 def _places(frame: dict[str, Any], robot: int) -> list[Point]:
@@ -134,7 +143,7 @@ def _draw_ground(
         pen.line([camera.at(*point) for point in ground["route"]], fill="#d5dae0", width=2 * FINER)
     if ground.get("goal"):
         x, y = ground["goal"]
-        pen.ellipse(camera.circle(x, y, 0.2), outline=ROLE_COLOURS["leader"], width=2 * FINER)
+        pen.ellipse(camera.circle(x, y, 0.2), outline=GOAL, width=2 * FINER)
     for x1, y1, x2, y2 in ground["walls"]:
         pen.line([camera.at(x1, y1), camera.at(x2, y2)], fill=WALL, width=3 * FINER)
     moved = {index: (x, y) for index, x, y in frame.get("moved", [])}
@@ -145,14 +154,15 @@ def _draw_ground(
         pen.ellipse(camera.circle(item["x"], item["y"], item["radius_m"]), fill=STONE)
 
 
-def _draw_robot(pen: ImageDraw.ImageDraw, camera: _Camera, robot: dict[str, Any], radius_m: float) -> None:
-    """Draw a disc in the colour of the role: with a frame if it leads, a cross if it is gone, else with its heading."""
+def _draw_robot(pen: ImageDraw.ImageDraw, camera: _Camera, robot: dict[str, Any], radius_m: float, colour: str) -> None:
+    """Draw a disc: with a frame if it leads, a cross if it is gone, a ring if it waits or is stopped, its heading."""
     x, y, theta, role = robot["x"], robot["y"], robot["theta"], robot["role"]
-    colour = ROLE_COLOURS.get(role, ROLE_COLOURS["waiting"])
     radius = max(radius_m, 5.0 * FINER / camera.scale)
     pen.ellipse(camera.circle(x, y, radius), fill=colour)
     if role == "leader":
         pen.rectangle(camera.circle(x, y, 1.5 * radius), outline=colour, width=2 * FINER)
+    elif role in RINGS:
+        pen.ellipse(camera.circle(x, y, 1.5 * radius), outline=RINGS[role], width=2 * FINER)
     d = 0.5 * radius
     if role == "gone":
         for sign in (1, -1):

@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.bench.harness.browser import Browser, chromium
+from lfa.deploy.view.figures.style import look
 from lfa.deploy.view.picture.clip import clip_of
-from lfa.deploy.view.picture.film import GIF_FRAMES_MAX
+from lfa.deploy.view.picture.film import GIF_FRAMES_MAX, robot_colours
 from tests.rigs.lfa_runs import lfa
 from tests.rigs.web_page import served
 
@@ -89,6 +91,15 @@ def test_a_gif_shows_the_whole_run(run: Path, tmp_path: Path) -> None:
     assert lfa("view", str(run), "--gif", str(path)).returncode == 0
     with Image.open(path) as film:
         assert 50 < getattr(film, "n_frames", 0) <= GIF_FRAMES_MAX
+
+
+def test_a_robot_has_the_colour_of_the_figures_in_a_film(run: Path) -> None:
+    recorded = Run(run)
+    frames = [{"robots": [(robot, 0.0, 0.0) for robot in (9, 3, 1, 2, 4)]}]
+    colours = robot_colours({"robots": [1, 2, 3, 4]}, frames)
+    of_figures = {robot: look(recorded, robot)["color"] for robot in (1, 2, 3, 4)}
+    assert {robot: colours[robot] for robot in of_figures} == of_figures
+    assert colours[9] not in of_figures.values(), "a spare has a colour of its own"
 
 
 def test_an_mp4_without_ffmpeg_is_refused_in_one_line(
