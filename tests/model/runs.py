@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.model import lease_state, register_state, roster
+from tests.model import lease_state, orders, register_state, roster
 from tests.model.checker import Model
 from tests.model.fleet_stop import fleet_stop
 from tests.model.fleet_stop.fleet_stop import FleetStop
 from tests.model.lease_core import LeaseCore
+from tests.model.orders import OrderModel
 from tests.model.register import Register
 from tests.model.roster import RosterModel
 
@@ -120,6 +121,7 @@ RULES = (
     stop(3, (2,), 1, 1),
     rosters(1),
     rosters(2),
+    Run("orders of operators, 2 robots, 3 terms", lambda: OrderModel(3), short=True),
 )
 
 
@@ -142,6 +144,10 @@ def config_mutant(
 def stop_mutant(mutant: str, robots: int, words: tuple[int, ...], gateways: int = 0, agents: int = 0) -> Run:
     build: Callable[[], Model] = lambda: FleetStop(robots, words, gateways, agents, mutant)  # noqa: E731
     return Run(fleet_stop.MUTANTS[mutant], build, True, mutant)
+
+
+def order_mutant(mutant: str) -> Run:
+    return Run(orders.MUTANTS[mutant][0], lambda: OrderModel(3, mutant), True, mutant)
 
 
 def roster_mutant(mutant: str) -> Run:
@@ -177,4 +183,7 @@ MUTANTS = (
     roster_mutant("retired_returns"),
     roster_mutant("retired_leads"),
     roster_mutant("full_house_of_all"),
+    order_mutant("late_order"),
+    order_mutant("old_leader"),
+    order_mutant("forgets"),
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from tests.protocol.lease import plants_of_orders as orders
 from tests.protocol.lease import plants_of_rosters as rosters
 from tests.protocol.lease import plants_of_stops as stops
 from tests.protocol.lease import plants_of_team as team
@@ -144,6 +145,12 @@ PLANTED: tuple[Bug, ...] = (
         "stop_latch::test_e30_an_agent_may_stop_its_gateway_and_lifts_no_stop"),
     Bug("rule E31", "a replayed order shows that an operator is there", stops.replayed_order_is_a_sign_of_life,
         "stop_latch::test_e31_a_replayed_order_is_no_sign_of_an_operator"),
+    Bug("rule E32", "a late order is carried out", orders.late_orders_are_carried_out,
+        "team_orders::test_e32_late_and_replayed_orders_are_refused"),
+    Bug("rule E32", "the order of an old leader is obeyed", orders.orders_of_an_old_term_are_obeyed,
+        "team_orders::test_e32_an_order_of_an_old_term_or_of_none_is_not_obeyed"),
+    Bug("rule E32", "a new leader forgets what an operator has asked for", orders.new_leader_forgets_proposals,
+        "team_orders::test_e32_a_new_leader_goes_on_with_the_newest_order_whoever_it_came_from"),
     Bug("rule E33", "spares vote like others", rosters.spares_vote_like_others,
         "roster::test_e33_spares_are_fewer_than_the_other_voters_also_when_these_are_lost"),
     Bug("rule E33", "whoever says HELLO is taken in", rosters.strangers_are_taken_in,
