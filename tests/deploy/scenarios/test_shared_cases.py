@@ -77,6 +77,18 @@ def test_frozen_or_lost_sensors_a_scanner_that_hangs_stops_its_robot_before_the_
     assert sum(robot.contacts for robot in ended.summary.robots) == 0
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_frozen_or_lost_sensors_with_the_commonest_cheap_scanners_five_scans_a_second_nobody_is_touched(
+    tmp_path: Path, seed: int
+) -> None:
+    """At five scans a second the speed is halved: lfa sim course.toml --seeds 1..20 --set world.lidar.rate_hz=5."""
+    assert CASES is not None
+    course, settings = str(CASES / "frozen_or_lost_sensors/course.toml"), ("world.lidar.rate_hz=5", "time_limit_s=120")
+    ended = run(course, seed=seed, set=settings, out=tmp_path / "run")
+    assert (ended.summary.outcome, ended.summary.left_behind) == ("goal_reached", [])
+    assert [robot.contacts for robot in ended.summary.robots] == [0, 0, 0]
+
+
 def test_zero_ranges_the_yard_is_explored(tmp_path: Path) -> None:
     ended = _run(tmp_path, "zero_ranges/open.toml")
     assert ended.summary.outcome == "goal_reached"
