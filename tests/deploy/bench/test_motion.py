@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lfa.deploy.bench import motion
-from lfa.deploy.bench.driving import courses, movers, unknown_maps
+from lfa.deploy.bench.driving import courses, movers, step_time, unknown_maps
 from lfa.deploy.bench.driving.course_file import course_text
 from lfa.deploy.bench.driving.one_run import by_cause, complaint, driven, loaded, note, show_failures
 from lfa.deploy.bench.driving.shortest_way import shortest_m
@@ -109,3 +109,8 @@ def test_a_run_that_does_not_end_at_its_goal_is_not_good(goal: float, limit: flo
     with driven(load("straight", sets, 2), 1) as done:
         wrong = complaint(done.summary)
     assert (wrong is None) == good, wrong
+
+
+def test_the_control_steps_of_a_simulated_team_are_timed() -> None:
+    [p99_ms] = step_time.step_ms(until_s=1.0)
+    assert p99_ms > 0.0
