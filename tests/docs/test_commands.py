@@ -62,6 +62,8 @@ TESTED: dict[str, str] = {
     "lfa replay RUN --robot 2": "tests/processes/test_readme_commands.py",
     "lfa watch": "tests/processes/test_readme_commands.py",
     "lfa fault kill leader": "tests/processes/test_readme_commands.py",
+    **dict.fromkeys(("lfa bench NAME", "lfa bench router"), "tests/deploy/bench/test_router.py"),
+    "lfa bench agents": "tests/deploy/bench/test_agents.py",
 }
 """Commands of the site's pages that a test of their own runs."""
 EXECUTED: dict[str, str] = {
