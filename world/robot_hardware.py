@@ -16,7 +16,6 @@ from lfa.protocol.messages.robot import (
     LaserScan,
     Localization,
     SensorReading,
-    Sensors,
 )
 from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.names import robot_name
@@ -104,21 +103,8 @@ class RobotHardware:
 
     def sensors(self, stamp: float, now: float) -> Envelope:
         """Return the odometry as of `stamp`, with the gateway's stamp of `now`."""
-        odometry, gateway = self.odometry, self.gateway
-        message = Sensors(
-            self._outbox.header("sensors", stamp),
-            odometry.pose_odom,
-            odometry.twist,
-            odometry.odometer_m,
-            gateway.stamp(now),
-            gateway.term_max,
-            gateway.latched,
-            sum(gateway.refused.values()),
-            gateway.agent,
-            gateway.stop.known,
-            gateway.stop.holds(now),
-            gateway.grant_s,
-        )
+        odometry, header = self.odometry, self._outbox.header("sensors", stamp)
+        message = self.gateway.sensors(header, odometry.pose_odom, odometry.twist, odometry.odometer_m, now)
         odometry.redraw()
         return self._outbox.envelope("sensors", message)
 

@@ -20,7 +20,7 @@ from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
-from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, SensorReading, Sensors
+from lfa.protocol.messages.robot import CmdVel, Contact, LaserScan, Localization, SensorReading
 from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.messages.team import Ask, MissionNote
 from lfa.protocol.mission import Limits
@@ -157,21 +157,9 @@ class Driver:
 
     def _said(self, reading: Reading, gateway: Gateway, now: float) -> list[Envelope]:
         self._twist = reading.twist
+        header = self._hardware.header("sensors", now)
         sent: list[Message] = [
-            Sensors(
-                self._hardware.header("sensors", now),
-                reading.pose_odom,
-                reading.twist,
-                reading.odometer_m,
-                gateway.stamp(now),
-                gateway.term_max,
-                gateway.latched,
-                sum(gateway.refused.values()),
-                gateway.agent,
-                gateway.stop.known,
-                gateway.stop.holds(now),
-                gateway.grant_s,
-            )
+            gateway.sensors(header, reading.pose_odom, reading.twist, reading.odometer_m, now),
         ]
         topics = ["sensors"]
         if reading.pose_map is not None:

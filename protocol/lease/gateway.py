@@ -11,12 +11,13 @@ from __future__ import annotations
 from math import isfinite
 
 from lfa.protocol.fleet_stop.latch import StopLatch
-from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.incarnations import is_later
 from lfa.protocol.lease.term_window import TermWindow
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
-from lfa.protocol.messages.robot import UNSAID_GRANT_S, CmdVel
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import UNSAID_GRANT_S, CmdVel, Sensors
 from lfa.protocol.mission import Limits
 
 SHUT, OLD_INCARNATION, OLD_TERM, FOREIGN_HOLDER = "shut", "old_incarnation", "old_term", "foreign_holder"
@@ -157,6 +158,23 @@ class Gateway:
     def latched(self) -> bool:
         """True if leader commands of `term_max` are barred."""
         return self._latched is not None and self._latched >= self.term_max
+
+    def sensors(self, header: Header, pose_odom: Pose2D, twist: Twist, odometer_m: float, now: float) -> Sensors:
+        """Return the message of a robot's odometry, with what this gateway tells its agent at `now`."""
+        return Sensors(
+            header,
+            pose_odom,
+            twist,
+            odometer_m,
+            self.stamp(now),
+            self.term_max,
+            self.latched,
+            sum(self.refused.values()),
+            self.agent,
+            self.stop.known,
+            self.stop.holds(now),
+            self.grant_s,
+        )
 
     def stamp(self, now: float) -> GatewayStamp:
         """Return the present time of this gateway, to be echoed in the commands computed from it."""

@@ -127,7 +127,8 @@ def verdicts_of(faults: list[Fault], tests: list[str]) -> Iterator[tuple[int, bo
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         session = WarmSession(faults, lambda *verdict: os.write(writing, "{} {:d} {:d}\n".format(*verdict).encode()))
         exit_code = pytest.main([*OPTIONS, *tests], plugins=[session])
-        print(*session.failed, sep="\n", file=sys.stderr, flush=True)
+        if session.failed:
+            print(*session.failed, sep="\n", file=sys.stderr, flush=True)
         os._exit(exit_code)
     os.close(writing)
     with os.fdopen(reading) as lines:

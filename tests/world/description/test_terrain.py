@@ -16,7 +16,7 @@ from lfa.protocol.geometry import Pose2D
 from lfa.world.description.load import Scenario, draw, load
 from lfa.world.description.obstacle_motion import WALK_LEG_S, way_of
 from lfa.world.description.scenario import Lidar, Noise, Obstacle
-from lfa.world.description.terrain import Bump, Ditch, Pothole, features, patch_of
+from lfa.world.description.terrain import Bump, Ditch, Pothole, features, patch_of, patches_of
 from lfa.world.sensors.ground_sensor import Profiler
 from lfa.world.sensors.noise import HeightNoise, RangeNoise
 
@@ -100,6 +100,17 @@ def test_a_hole_beside_the_tracks_does_not_show_and_one_under_one_wheel_shows_on
     assert left.min() == -0.1
     assert not centre.any()
     assert not right.any()
+
+
+def test_of_two_features_in_one_place_the_first_shows() -> None:
+    """As the wheels find them: potholes before bumps."""
+    hole = "world.potholes=[{center_m=[0.8,0], width_m=0.3, length_m=2, depth_m=0.02}]"
+    bump = "world.bumps=[{center_m=[0.8,0], width_m=0.3, length_m=2, height_m=0.01}]"
+    scenario = world(hole, bump)
+    first = next(patch for patch in patches_of(scenario.world) if patch.covers(0.8, 0.0))
+    assert {patch.height_m for patch in patches_of(scenario.world)} == {-0.02, 0.01}
+    heights = Profiler(scenario).profile([Pose2D()], [0.0])[0]
+    assert heights[1][round((0.8 - 0.1) / 0.05)] == pytest.approx(first.height_m)
 
 
 def test_a_floor_deeper_than_the_sensor_sees_is_minus_infinity() -> None:

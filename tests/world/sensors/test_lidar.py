@@ -152,3 +152,17 @@ def test_bench_rows_have_the_agreed_fields(monkeypatch: pytest.MonkeyPatch) -> N
     (row,) = bench.rows()
     assert row.keys() == {"name", "value", "unit", "bar", "ratio", "ok"}
     assert row["unit"] == "rays/s"
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, pi / 2, -2.0])
+def test_a_pushed_polygon_is_seen_at_its_pose(turned: float) -> None:
+    """Its corners are those of a polygon that is fixed where it was pushed to."""
+    thing = "world.obstacles=[{{center_m=[{x},{y}], corners_m={corners}{mass}}}]"
+    corners = [(-0.2, -0.1), (0.4, -0.3), (0.5, 0.2), (-0.1, 0.3)]
+    c, s = cos(turned), sin(turned)
+    there = [[c * x - s * y, s * x + c * y] for x, y in corners]
+    fixed = look(Pose2D(), thing.format(x=2.0, y=1.0, corners=there, mass=""))
+    scenario = scene(thing.format(x=5.0, y=5.0, corners=[list(corner) for corner in corners], mass=", mass_kg=3"))
+    pushed = Scanner(scenario).scan([Pose2D()], {0: Pose2D(2.0, 1.0, turned)})[0].tolist()
+    assert pushed == pytest.approx(fixed)
+    assert min(pushed) < 2.5

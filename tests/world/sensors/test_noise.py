@@ -14,7 +14,7 @@ import pytest
 from lfa.protocol.geometry import Pose2D, Twist, along_arc, distance
 from lfa.world.description.scenario import Lidar, Noise
 from lfa.world.sensors import noise as sensors
-from lfa.world.sensors.noise import Localizer, RangeNoise, WheelOdometry
+from lfa.world.sensors.noise import HEIGHT_OUTLIER_M, HeightNoise, Localizer, RangeNoise, WheelOdometry
 
 NOISY = Noise(
     localization_m=0.005,
@@ -115,3 +115,24 @@ def test_scan_noise_leaves_inf_alone_and_dropped_beams_are_inf() -> None:
 
 def test_a_clean_scan_is_exact() -> None:
     assert RangeNoise(Noise(), Lidar(), 1, 1).apply(np.array([1.25, inf])) == (1.25, inf)
+
+
+@pytest.mark.parametrize(
+    ("noise", "moves", "turns"),
+    [
+        (Noise(localization_m=0.01), True, False),
+        (Noise(localization_rad=0.01), False, True),
+        (Noise(), False, False),
+    ],
+)
+def test_a_fix_has_the_noise_that_is_asked_for_and_no_other(noise: Noise, moves: bool, turns: bool) -> None:
+    fix = Localizer(noise, 1, 1).fix(Pose2D(1.0, 2.0, 0.5))
+    assert fix is not None
+    assert ((fix.x, fix.y) != (1.0, 2.0), fix.theta != 0.5) == (moves, turns)
+
+
+def test_wrong_heights_lie_on_both_sides_of_the_right_one() -> None:
+    heights = np.array(HeightNoise(Noise(ground_outlier=0.5), 1, 1).apply(np.zeros((3, 200))))
+    assert heights.min() < -0.05
+    assert heights.max() > 0.05
+    assert abs(heights).max() <= HEIGHT_OUTLIER_M
