@@ -32,6 +32,9 @@ from lfa.deploy.run.options import (
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario
 
+OWN = frozenset({"lockstep", "speed", "pause", "step"})
+"""Options that only `lfa run` has; it hands on the others as they are."""
+
 
 def command(
     scenario: ScenarioName,
@@ -61,28 +64,11 @@ def command(
     ] = None,
 ) -> int:
     """Run a scenario as processes; return the exit code. Raises Refused."""
+    shared = {name: value for name, value in locals().items() if name not in OWN}
     if not lockstep and (pause or speed is not None or step is not None):
         raise Refused("--speed, --pause and --step: must go with --lockstep, in real time nothing waits for a process")
     run: Any = _in_lockstep(pace_of(speed, pause, step)) if lockstep else launch.command
-    return int(
-        run(
-            scenario=scenario,
-            seed=seed,
-            overrides=overrides,
-            controller=controller,
-            behavior=behavior,
-            sensor=sensor,
-            robots=robots,
-            fault=fault,
-            out=out,
-            map_from=map_from,
-            figures=figures,
-            record=record,
-            junit=junit,
-            verbose=verbose,
-            as_json=as_json,
-        )
-    )
+    return int(run(**shared))
 
 
 def _in_lockstep(pace: Pace) -> Any:
