@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -13,8 +13,9 @@ from lfa.deploy.lockstep.run import run as lockstep_run
 from lfa.deploy.lockstep.stepping import Pace, pace_of
 from lfa.deploy.own_code import Behavior, Controller, Sensor
 from lfa.deploy.run import launch
-from lfa.deploy.run.command import scenario_command
+from lfa.deploy.run.command import Run, ScenarioRequest, run_requested
 from lfa.deploy.run.finish import Ended
+from lfa.deploy.run.machine_size import fitted
 from lfa.deploy.run.options import (
     AsJson,
     Faults,
@@ -31,9 +32,6 @@ from lfa.deploy.run.options import (
 )
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario
-
-OWN = frozenset({"lockstep", "speed", "pause", "step"})
-"""Options that only `lfa run` has; it hands on the others as they are."""
 
 
 def command(
@@ -64,15 +62,32 @@ def command(
     ] = None,
 ) -> int:
     """Run a scenario as processes; return the exit code. Raises Refused."""
-    shared = {name: value for name, value in locals().items() if name not in OWN}
     if not lockstep and (pause or speed is not None or step is not None):
         raise Refused("--speed, --pause and --step: must go with --lockstep, in real time nothing waits for a process")
-    run: Any = _in_lockstep(pace_of(speed, pause, step)) if lockstep else launch.command
-    return int(run(**shared))
+    request = ScenarioRequest(
+        scenario=scenario,
+        seed=seed,
+        overrides=overrides,
+        controller=controller,
+        behavior=behavior,
+        sensor=sensor,
+        robots=robots,
+        fault=fault,
+        out=out,
+        map_from=map_from,
+        figures=figures,
+        record=record,
+        junit=junit,
+        verbose=verbose,
+        as_json=as_json,
+    )
+    if lockstep:
+        return run_requested(request, _in_lockstep(pace_of(speed, pause, step)))
+    return run_requested(request, launch.run, fitted)
 
 
-def _in_lockstep(pace: Pace) -> Any:
+def _in_lockstep(pace: Pace) -> Run:
     def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]) -> Ended:
         return lockstep_run(scenario, seed, out, faults, pace)
 
-    return scenario_command(run, figures_by_default=True)
+    return run

@@ -1,29 +1,18 @@
-"""The command line that `lfa run` and `lfa sim` share."""
+"""What `lfa run` and `lfa sim` share: a request, and its way from a scenario's name to a summary."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
+
+from msgspec import Struct
 
 from lfa.deploy.analysis.assertions import check_junit
 from lfa.deploy.faults.script import Fault, parse_all
-from lfa.deploy.own_code import Behavior, Controller, Sensor, with_own_code
+from lfa.deploy.own_code import with_own_code
 from lfa.deploy.run.finish import Ended, kept_as, report
 from lfa.deploy.run.load import rebuild_scenario
-from lfa.deploy.run.options import (
-    AsJson,
-    Faults,
-    Figures,
-    JUnit,
-    MapFrom,
-    Out,
-    Overrides,
-    Record,
-    Robots,
-    ScenarioName,
-    Seed,
-    Verbose,
-)
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario
 
@@ -32,38 +21,45 @@ Fit = Callable[[Scenario, frozenset[str]], Scenario]
 """Change of a scenario for the machine that runs it, of other keys than those that are set on the command line."""
 
 
-def scenario_command(run: Run, *, figures_by_default: bool, fit: Fit | None = None) -> Callable[..., int]:
-    """Return the command that runs a scenario by `run`, changed by `fit`, and exits with the code of its summary."""
+class ScenarioRequest(Struct, frozen=True, kw_only=True):
+    """One run as the options of a command ask for it; `options.py` and `own_code.py` say what each means."""
 
-    def command(
-        scenario: ScenarioName,
-        seed: Seed = None,
-        overrides: Overrides = None,
-        controller: Controller = None,
-        behavior: Behavior = None,
-        sensor: Sensor = None,
-        robots: Robots = None,
-        fault: Faults = None,
-        out: Out = None,
-        map_from: MapFrom = None,
-        figures: Figures = figures_by_default,
-        record: Record = "full",
-        junit: JUnit = None,
-        verbose: Verbose = False,
-        as_json: AsJson = False,
-    ) -> int:
-        chosen_by = with_own_code(scenario, overrides or (), controller, behavior, sensor)
-        chosen, number = rebuild_scenario(scenario, chosen_by, robots, seed, map_from)
-        faults = parse_all(chosen.mission, chosen.faults, fault or ())
-        if junit is not None:
-            check_junit(junit)
-        if fit is not None:
-            chosen = fit(chosen, frozenset(word.partition("=")[0].strip() for word in overrides or ()))
-        if record == "none" and out is not None:
-            raise Refused(f"--record none with --out {out}: nothing is kept, must be one of the two")
-        with kept_as(record, out) as place:
-            ended = run(chosen, number, place, faults)
-            figures = figures and ended.signal is None and record == "full"
-            return report(ended, figures=figures, as_json=as_json, junit=junit, verbose=verbose, record=record)
+    scenario: str
+    seed: int | None
+    overrides: list[str] | None
+    controller: str | None
+    behavior: list[str] | None
+    sensor: list[str] | None
+    robots: int | None
+    fault: list[str] | None
+    out: Path | None
+    map_from: Path | None
+    figures: bool
+    record: Literal["full", "summary", "none"]
+    junit: Path | None
+    verbose: bool
+    as_json: bool
 
-    return command
+
+def run_requested(request: ScenarioRequest, run: Run, fit: Fit | None = None) -> int:
+    """Run the requested scenario by `run`, changed by `fit`; return the exit code of its summary. Raises Refused."""
+    overrides, record = request.overrides or [], request.record
+    chosen_by = with_own_code(request.scenario, overrides, request.controller, request.behavior, request.sensor)
+    chosen, number = rebuild_scenario(request.scenario, chosen_by, request.robots, request.seed, request.map_from)
+    faults = parse_all(chosen.mission, chosen.faults, request.fault or ())
+    if request.junit is not None:
+        check_junit(request.junit)
+    if fit is not None:
+        chosen = fit(chosen, frozenset(word.partition("=")[0].strip() for word in overrides))
+    if record == "none" and request.out is not None:
+        raise Refused(f"--record none with --out {request.out}: nothing is kept, must be one of the two")
+    with kept_as(record, request.out) as place:
+        ended = run(chosen, number, place, faults)
+        return report(
+            ended,
+            figures=request.figures and ended.signal is None and record == "full",
+            as_json=request.as_json,
+            junit=request.junit,
+            verbose=request.verbose,
+            record=record,
+        )

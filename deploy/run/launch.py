@@ -24,10 +24,8 @@ from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.provenance import provenance
 from lfa.deploy.recording.run_folder import About, make
 from lfa.deploy.recording.simulation_time import WorldTime
-from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.fault_execution import FaultExecution
 from lfa.deploy.run.finish import Ended, finish, reread, verdict_of
-from lfa.deploy.run.machine_size import fitted
 from lfa.deploy.run.process_table import rows
 from lfa.deploy.run.progress import Progress, progress
 from lfa.deploy.run.progress_rows import ProgressRows
@@ -74,9 +72,6 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
             return reread(folder, interrupts.signal)
     finally:
         shutil.rmtree(sockets, ignore_errors=True)
-
-
-command = scenario_command(run, figures_by_default=True, fit=fitted)
 
 
 def socket_folder() -> Path:

@@ -25,7 +25,6 @@ from lfa.deploy.recording.provenance import provenance
 from lfa.deploy.recording.recorder import Recorder
 from lfa.deploy.recording.run_folder import JOURNALS, About, make
 from lfa.deploy.recording.run_memory import RunMemory
-from lfa.deploy.run.command import scenario_command
 from lfa.deploy.run.finish import Ended, finish, verdict_of
 from lfa.deploy.run.termination import Termination
 from lfa.protocol.errors import Refused
@@ -105,9 +104,6 @@ def refuse_faults(drawn: Scenario, faults: Sequence[Fault]) -> None:
     if common is not None:
         raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
     check_goals(drawn, faults)
-
-
-command = scenario_command(run, figures_by_default=False)
 
 
 class UnrecordedRun(NamedTuple):

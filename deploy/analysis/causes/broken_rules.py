@@ -32,6 +32,25 @@ class BrokenRule(Struct, frozen=True):
     steps: tuple[CauseStep, ...]
 
 
+class TwoGrants(Struct, frozen=True):
+    """Two grants of one voter, of different terms: the earlier and the later, each at its true time [s]."""
+
+    voter: Member
+    earlier_s: float
+    earlier: Term
+    later_s: float
+    later: Term
+
+    def steps(self) -> tuple[CauseStep, CauseStep]:
+        who = _shown(self.voter)
+        return (
+            CauseStep(
+                self.earlier_s, f"{who} granted term {self.earlier.n} of {self.earlier.issuer}, and was bound by it"
+            ),
+            CauseStep(self.later_s, f"{who} granted term {self.later.n} of {self.later.issuer}"),
+        )
+
+
 class RuleWatch(Checker):
     """Memory of the facts that tell rules apart, and the rule of a violation by them."""
 
@@ -93,25 +112,25 @@ class RuleWatch(Checker):
             tuple(rules.split()), (*by_time, CauseStep(violation.at, f"{violation.name}: {violation.text}"))
         )
 
-    def last_grant(self, before_s: float) -> tuple[Member, float, Term, float, Term] | None:
-        """Return the voter of the newest grant up to a time, and its last two grants of different terms."""
+    def last_grants(self, before_s: float) -> TwoGrants | None:
+        """Return the last two grants of different terms of the voter of the newest grant up to a time."""
         latest = max(
             self._granted.items(), key=lambda item: max((t for t, _ in item[1] if t <= before_s), default=-1.0)
         )
         voter, grants = latest
         at, term = grants[-1]
         earlier = [one for one in grants if one[1] != term]
-        return (voter, at, term, *earlier[-1]) if earlier else None
+        return TwoGrants(voter, *earlier[-1], at, term) if earlier else None
 
-    def overlapping(self, before_s: float) -> tuple[Member, float, Term, float, Term] | None:
-        """Return the newest two grants of one voter, within T_grant, of terms of different holders, and the voter."""
+    def overlapping(self, before_s: float) -> TwoGrants | None:
+        """Return the newest two grants of one voter, within T_grant, of terms of different holders."""
         found = []
         for voter, grants in self._granted.items():
             for (first_s, first), (at, term) in pairwise(grants):
                 apart = at - first_s < self._bond_s * (1.0 - CLOCK_RATE_ERROR) and first != term and at <= before_s
                 if apart and self._proposed[first][2].holder != self._proposed[term][2].holder:
-                    found.append((voter, at, term, first_s, first))
-        return max(found, key=lambda one: one[1], default=None)
+                    found.append(TwoGrants(voter, first_s, first, at, term))
+        return max(found, key=lambda two: two.later_s, default=None)
 
     def asked_before(self, term: Term) -> Term | None:
         """Return a lower term of the same candidate that was promised and never proposed."""
@@ -137,41 +156,26 @@ def _always(rule: str, text: str) -> Callable[[RuleWatch, Violation], BrokenRule
 
 def _exclusive(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     """I1: some voter has granted both leases within T_grant."""
-    both = watch.overlapping(violation.at)
-    if both is None:
+    two = watch.overlapping(violation.at)
+    if two is None:
         return None
-    voter, at, term, first_s, first = both
-    steps = _grants(voter, at, term, first_s, first)
-    return watch.chain(
-        violation, "E2", *steps, CauseStep(at, f"a bond outlives its lease: it lasts {watch._bond_s:.3f} s")
-    )
+    text = f"a bond outlives its lease: it lasts {watch._bond_s:.3f} s"
+    return watch.chain(violation, "E2", *two.steps(), CauseStep(two.later_s, text))
 
 
 def _bond(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     """I4: a fence in vain, a token that vanished, or a grant in spite of the bond."""
-    last = watch.last_grant(violation.at)
-    if last is None:
+    two = watch.last_grants(violation.at)
+    if two is None:
         return None
-    voter, at, term, first_s, first = last
-    steps = _grants(voter, at, term, first_s, first)
-    if first in watch._proposed[term][2].fenced:
-        return watch.chain(violation, "E15", *steps, CauseStep(at, "its holder's gateway had not been fenced"))
-    hinted_s = watch._hinted.get((voter, watch._proposed[first][2].holder), LONG_AGO)
-    if hinted_s >= first_s:
-        return watch.chain(
-            violation,
-            "E15 E3",
-            *steps,
-            CauseStep(hinted_s, f"{_shown(voter)} saw the token of the lease's holder vanish, which proves nothing"),
-        )
+    steps = two.steps()
+    if two.earlier in watch._proposed[two.later][2].fenced:
+        return watch.chain(violation, "E15", *steps, CauseStep(two.later_s, "its holder's gateway had not been fenced"))
+    hinted_s = watch._hinted.get((two.voter, watch._proposed[two.earlier][2].holder), LONG_AGO)
+    if hinted_s >= two.earlier_s:
+        text = f"{_shown(two.voter)} saw the token of the lease's holder vanish, which proves nothing"
+        return watch.chain(violation, "E15 E3", *steps, CauseStep(hinted_s, text))
     return watch.chain(violation, "E3", *steps)
-
-
-def _grants(voter: Member, at: float, term: Term, first_s: float, first: Term) -> tuple[CauseStep, CauseStep]:
-    return (
-        CauseStep(first_s, f"{_shown(voter)} granted term {first.n} of {first.issuer}, and was bound by it"),
-        CauseStep(at, f"{_shown(voter)} granted term {term.n} of {term.issuer}"),
-    )
 
 
 def _amnesiac(watch: RuleWatch, violation: Violation) -> BrokenRule | None:

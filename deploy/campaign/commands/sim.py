@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -12,6 +12,7 @@ from lfa.deploy.campaign.sweep.plan import plan_of
 from lfa.deploy.campaign.sweep.short_form import plan_file
 from lfa.deploy.own_code import Behavior, Controller, Sensor, with_own_code
 from lfa.deploy.run import simulate
+from lfa.deploy.run.command import ScenarioRequest, run_requested
 from lfa.deploy.run.options import (
     AsJson,
     Faults,
@@ -55,26 +56,24 @@ def command(
     if seeds is None:
         if jobs != 1 or shard is not None:
             raise Refused("--jobs and --shard: must go with --seeds, for many runs")
-        run: Any = simulate.command
-        return int(
-            run(
-                scenario=scenario,
-                seed=seed,
-                overrides=overrides,
-                controller=controller,
-                behavior=behavior,
-                sensor=sensor,
-                robots=robots,
-                fault=fault,
-                out=out,
-                map_from=map_from,
-                figures=figures,
-                record=record,
-                junit=junit,
-                verbose=verbose,
-                as_json=as_json,
-            )
+        request = ScenarioRequest(
+            scenario=scenario,
+            seed=seed,
+            overrides=overrides,
+            controller=controller,
+            behavior=behavior,
+            sensor=sensor,
+            robots=robots,
+            fault=fault,
+            out=out,
+            map_from=map_from,
+            figures=figures,
+            record=record,
+            junit=junit,
+            verbose=verbose,
+            as_json=as_json,
         )
+        return run_requested(request, simulate.run)
     if seed is not None or map_from is not None or junit is not None:
         raise Refused(f"--seeds {seeds}: must go without --seed, --map-from and --junit")
     share = WHOLE if shard is None else parse_shard(shard)
