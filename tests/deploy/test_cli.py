@@ -65,7 +65,7 @@ def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
 def test_bash_completes_commands_options_scenarios_and_choices(script: Path) -> None:
     assert _completed(script, "lfa", "re") == ["restart", "resume", "retire", "record", "report", "replay"]
-    assert _completed(script, "lfa", "sim", "--se") == ["--seed", "--seeds", "--set"]
+    assert _completed(script, "lfa", "sim", "--se") == ["--seed", "--seeds", "--set", "--sensor"]
     assert _completed(script, "lfa", "run", "paper_path") == [n for n in shipped() if n.startswith("paper_path")]
     assert _completed(script, "lfa", "topic", "e") == ["echo"]
     assert "--no-figures" in _completed(script, "lfa", "run", "--no")

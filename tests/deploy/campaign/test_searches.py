@@ -81,8 +81,8 @@ def test_a_bench_in_shares_has_the_rows_of_a_whole_one(
     assert "case/a/good" in (tmp_path / "out" / CSV).read_text()
 
 
-def test_each_seed_of_a_motion_bench_is_a_part_of_its_own() -> None:
-    case = next(case for case in motion.cases(3) if case.name == "scenario/straight")
+def test_each_seed_of_a_motion_bench_is_a_part_of_its_own(tmp_path: Path) -> None:
+    case = next(case for case in motion.cases(3, tmp_path) if case.name == "scenario/straight")
     assert [part.facts for part in case.parts] == [1, 2, 3]
 
 
