@@ -3,7 +3,7 @@
 The rows: every shipped scenario; the BARN worlds (`lfa bench barn`, and with the noise of `explore`); gaps, traps,
 corners and a closing door; whatever moves; maps that nobody knows; the time of one control step. A run is good if it
 ends at its goal without contact, without a violated invariant and without a robot left behind. What falls short is
-listed by cause, each run with its folder, in which `lfa explain`, `lfa plot` and `lfa view` show it again.
+listed by cause, each run with its folder, in which `lfa why`, `lfa plot` and `lfa view` show it again.
 Maps and worlds of others are searched in `shared`, beside the checkout or above it; without them their rows are
 skipped with a message.
 """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from secrets import token_hex
+from random import SystemRandom
 from threading import get_ident
 from typing import Any
 
@@ -59,7 +59,7 @@ class ZenohBus:
         self._pulled: frozenset[str] = frozenset()
         self._spelled: dict[str, str] = {}
         """Spelling under which each followed key expression is declared at the moment; only its samples count."""
-        self._name, self._turn = token_hex(4), 0
+        self._name, self._turn = f"{SystemRandom().getrandbits(32):08x}", 0
         """Whose spellings are used (an observer has none of its own), and how often all were declared again."""
         self._token: zenoh.LivelinessToken | None = None
         self._links = self._session.info.declare_transport_events_listener(
