@@ -20,6 +20,8 @@ SHARP_RADIUS_M = 0.6
 SHARP_RAD = 2.4
 """Turn [rad] beyond which a corner is sharp whatever its radius: its arc would begin far before the way-point."""
 SPACING_M = 0.1
+LONG_M, COARSE_M = 50.0, 1.0
+"""Length [m] of a straight above which it has coarser points except at its ends: a step lays a route of kilometres."""
 PASS_SHARE = 1.2
 """Length of a leg of the route, at most, as a multiple of its straight length."""
 BEND_SPAN_M = 0.3
@@ -159,14 +161,21 @@ def _rounded(points: Sequence[Point], radius_m: float, miss_m: float) -> list[Po
 
 
 def _resampled(points: Sequence[Point], spacing_m: float) -> list[Point]:
-    """Return the polyline with segments of at most `spacing_m` and without repeated points."""
+    """Return the polyline with segments of at most `spacing_m` and without repeated points.
+
+    A straight longer than `LONG_M` has segments of up to `COARSE_M` farther than that from both of its ends.
+    """
     out = [points[0]]
     for a, b in pairwise(points):
         length = hypot(b[0] - a[0], b[1] - a[1])
         if length < 1e-9:
             continue
-        steps = ceil(length / spacing_m)
-        out += [(a[0] + (b[0] - a[0]) * n / steps, a[1] + (b[1] - a[1]) * n / steps) for n in range(1, steps + 1)]
+        near = COARSE_M / length
+        ends = (0.0, near, 1.0 - near, 1.0) if length > LONG_M else (0.0, 1.0)
+        for (low, high), gap_m in zip(pairwise(ends), (spacing_m, COARSE_M, spacing_m), strict=False):
+            steps = ceil((high - low) * length / gap_m)
+            shares = [low + (high - low) * n / steps for n in range(1, steps + 1)]
+            out += [(a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share) for share in shares]
     return out if len(out) > 1 else [points[0], (points[0][0] + 1e-3, points[0][1])]
 
 

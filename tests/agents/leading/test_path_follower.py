@@ -164,3 +164,14 @@ def test_corners_are_passed_within_the_tolerance() -> None:
         course = driven(Leading(route_m=corner), Pose2D())
         missed = [min(hypot(pose.x - x, pose.y - y) for pose, _ in course) for x, y in corner]
         assert max(missed) <= 0.15, f"{corner} is missed by {missed}"
+
+
+def test_a_route_of_kilometres_is_laid_within_a_step_and_bends_as_a_short_one_does() -> None:
+    """`lfa go 9999 9999` kept each robot from its step for so long that the leader's lease ran out."""
+    short, long = Route(((0.0, 0.0), (8.0, 0.0), (8.0, 8.0))), Route(((-9999.0, 0.0), (8.0, 0.0), (8.0, 9999.0)))
+    assert len(long.points) < 1.1 * long.length_m
+    corner_s, corner_l = short.nearest(8.0, 0.0), long.nearest(8.0, 0.0)
+    for ahead_m in (-2.0, -0.5, 0.0, 0.5, 2.0):
+        (x, y), (far_x, far_y) = short.point(corner_s + ahead_m), long.point(corner_l + ahead_m)
+        assert hypot(x - far_x, y - far_y) < 0.01
+    assert max(long.curvature) == pytest.approx(max(short.curvature), rel=0.02)
