@@ -281,8 +281,8 @@ class AgentSimulation:
                 self._report(Checker.ends, self.now, process.member)
             if isinstance(effect, BecomeLeader):
                 self.log.append((self.now, process.id, effect))
-            grant_s = self.timing.grant_s / process.clock.rate
-            report_effect(self._report, effect, process.member, self.now, grant_s, process.clock.true)
+            bound_until = self.now + self.timing.grant_s / process.clock.rate
+            report_effect(self._report, effect, process.member, self.now, bound_until, process.clock.true)
 
     def _hear(self, _now: float, key: str, payload: bytes, message: Message) -> None:
         if isinstance(message, CmdVel) and message.as_leader:

@@ -143,7 +143,7 @@ def _report_lease(
             agreed = node.lease.agreed
             report(Checker.holds, at, me, agreed)
         for effect in effects:
-            report_effect(report, effect, me, at, timing.grant_s, float)
+            report_effect(report, effect, me, at, entry.at + timing.grant_s, float)
     report(Checker.leads_no_more, at, me)
 
 

@@ -11,9 +11,11 @@ from lfa.protocol.names import robot_id_of
 
 
 def report_effect(
-    report: Report, effect: Effect, me: Member, at: float, bond_s: float, true: Callable[[float], float]
+    report: Report, effect: Effect, me: Member, at: float, bound_until: float, true: Callable[[float], float]
 ) -> None:
-    """Report the facts of an effect. `bond_s`: a voter's bond [s, true time]. `true`: maps node time to true time."""
+    """Report the facts of an effect. `bound_until`: end of the bond by a grant of this call [s, true time]; it counts
+    from the arrival of what was granted, also where the process took that late. `true`: maps node time to true time.
+    """
     match effect:
         case BecomeLeader(term, expiry) | LeaseExtended(term, expiry):
             report(Checker.leads, at, me, term, true(expiry))
@@ -25,9 +27,9 @@ def report_effect(
             report(Checker.proposes, at, me, body)
             if body.holder == me:  # implies the grant of its own voter
                 own = Grant(body.term, body.round, body.config.version, 0.0)
-                report(Checker.grants, at, me, own, at + bond_s)
+                report(Checker.grants, at, me, own, bound_until)
         case Send(_, Grant() as body):
-            report(Checker.grants, at, me, body, at + bond_s)
+            report(Checker.grants, at, me, body, bound_until)
         case Send(_, Release() as body):
             report(Checker.releases, at, body.term)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from lfa.deploy.analysis.verification.checker import EARLY_S, Checker
+from lfa.deploy.analysis.verification.lease_observer import report_effect
 from lfa.deploy.analysis.verification.safety import (
     Acting,
     JointChange,
@@ -18,6 +21,7 @@ from lfa.deploy.analysis.verification.safety import (
     RosterHolds,
 )
 from lfa.protocol.geometry import STILL
+from lfa.protocol.lease.effects import Send
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, timing_of
 from lfa.protocol.messages.consensus import (
     Config,
@@ -216,6 +220,24 @@ def test_i4_the_last_bond_counts_and_the_same_holder_may_be_granted_again() -> N
     assert found(checker) == 0
     checker.grants(1.5, THREE, grant(MIDDLE), 2.5)
     assert found(checker) == 1
+
+
+@pytest.mark.parametrize(("apart_s", "broken"), [(STD.grant_s - 0.1, 1), (STD.grant_s + 0.1, 0)])
+def test_i4_a_process_that_wakes_up_late_is_bound_from_the_arrival_of_what_it_grants(
+    apart_s: float, broken: int
+) -> None:
+    """It takes both proposals at 5 s; they had arrived `apart_s` apart, and by the second the first's bond was over."""
+    checker, woke_at = OneBond(STD), 5.0
+    first_at, second_at = woke_at - apart_s, woke_at
+    checker.proposes(first_at, ONE, propose(LOW, ONE))
+    checker.proposes(second_at, TWO, propose(MIDDLE, TWO))
+
+    def report(fact: Any, *arguments: Any) -> None:
+        getattr(checker, fact.__name__)(*arguments)
+
+    for term, arrived_at in ((LOW, first_at), (MIDDLE, second_at)):
+        report_effect(report, Send("robot1", grant(term)), THREE, woke_at, arrived_at + STD.grant_s, float)
+    assert found(checker) == broken
 
 
 def test_i4_a_release_frees_the_voters_of_its_term() -> None:
