@@ -166,14 +166,11 @@ class Estimator:
         self._clock = ClockOffset()
         self._history.clear()
         self._map_odom = None
-        self._fix_at = None
         self._pending = None
-        self._unfixed_m = 0.0
-        self._outliers_in_a_row = 0
 
     def _correct(self, fix: Localization) -> None:
         odometry = _at(self._history, fix.header.stamp)
-        if self._map_odom is None or self._fix_at is None:
+        if self._map_odom is None:
             self._relocate(fix, odometry)
             return
         predicted = compose(self._map_odom, odometry.pose_odom)
@@ -227,7 +224,6 @@ class Estimator:
         self._fix_at = odometry
         self._covariance = Covariance(*self._fix_variances(fix))
         self._outliers_in_a_row, self._unfixed_m = 0, 0.0
-        self._outlier = None
 
 
 def _near(step: Pose2D, noise: EstimatorNoise) -> bool:

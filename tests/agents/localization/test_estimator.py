@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot, pi, sin, sqrt
+from math import hypot, inf, pi, sin, sqrt
 from random import Random
 
 import pytest
@@ -42,7 +42,10 @@ class Drive:
         self._tick = 0
 
     def step(self, twist: Twist, fix: Pose2D | None = None, *, silent: bool = False) -> tuple[float, float]:
-        """(position error [m], heading error [rad]) after a step with `twist`; `fix` overrides the localisation."""
+        """(position error [m], heading error [rad]) before a step with `twist`, infinite without a pose.
+
+        `fix` overrides the localisation.
+        """
         noise_m, noise_rad, odometry, dropout, offset_s = self._noise
         gauss = self.chance.gauss
         header = Header("driver", 1, self._tick, self.now - offset_s)
@@ -55,7 +58,7 @@ class Drive:
         if fix is not None:
             self.estimator.localization(Localization(header, fix), self.now + 0.003)
         known = self.estimator.pose_at(self.now + 0.003)
-        error = (0.0, 0.0)
+        error = (inf, inf)
         if known is not None:
             pose = known[0]
             error = hypot(pose.x - self.true.x, pose.y - self.true.y), abs(wrap(pose.theta - self.true.theta))
