@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import pi
+from typing import NamedTuple
 
 from lfa.agents.formation.formation import Formation, named, slots_of
 from lfa.agents.leading.path_follower import PathFollower
@@ -29,6 +30,14 @@ BEND_AHEAD_M = 5.0
 """Distance [m] ahead within which bends are checked: enough for a chain of four to form a column at cruise speed."""
 OPEN_M = 3.0
 """Progress [m] without a narrow place after which the team takes its formation again."""
+
+
+class LedTeam(NamedTuple):
+    """Team of a leader at one moment: its followers in their order, the leader's term, the time [s]."""
+
+    followers: Sequence[int]
+    term: Term
+    now: float
 
 
 class FormationCommands:
@@ -81,7 +90,7 @@ class FormationCommands:
             self._next += 1
         if now >= self._check_at:
             self._check_at = now + BEND_CHECK_S
-            self._column_where_narrow(lead, followers, term, now, narrow)
+            self._column_where_narrow(lead, LedTeam(followers, term, now), narrow)
         if now >= self._repeat_at:
             self._say(self._slots(followers), term, now)
 
@@ -114,54 +123,41 @@ class FormationCommands:
             self._formation.slot_of(slot.robot) if self._formation.is_named(slot.robot) else slot for slot in ordered
         )
 
-    def _column_where_narrow(
-        self,
-        lead: PathFollower,
-        followers: Sequence[int],
-        term: Term,
-        now: float,
-        narrow: Callable[[], str | None],
-    ) -> None:
+    def _column_where_narrow(self, lead: PathFollower, team: LedTeam, narrow: Callable[[], str | None]) -> None:
         """Order column before a bend that the formation cannot follow, before what is narrow, and where obstacles are
         known (the route passes them).
         """
-        slots = [self._formation.slot_of(robot) for robot in followers]
+        slots = [self._formation.slot_of(robot) for robot in team.followers]
         if self._formation.trace:
             return
         if self._narrow_m is not None:
-            self._open_again(lead, followers, term, now, narrow)
+            self._open_again(lead, team, narrow)
             return
         if all(map(_behind, slots)):
             return
         if self._mission.leading.known_m:
-            self._fold(slots, followers, term, now)
+            self._fold(slots, team)
             return
         reason = narrow()
         if reason is not None:
             self._narrow_m, self._side = lead.progress_m, self._formation.side or self._mission.formation.side
-            self.order("column", reason, followers, term, now)
+            self.order("column", reason, *team)
             return
         ahead_m = lead.narrow_bend_m(slots, BEND_AHEAD_M)
         if ahead_m is not None:
-            self.order("column", f"bend in {ahead_m:.1f} m", followers, term, now)
+            self.order("column", f"bend in {ahead_m:.1f} m", *team)
 
-    def _open_again(
-        self,
-        lead: PathFollower,
-        followers: Sequence[int],
-        term: Term,
-        now: float,
-        narrow: Callable[[], str | None],
-    ) -> None:
+    def _open_again(self, lead: PathFollower, team: LedTeam, narrow: Callable[[], str | None]) -> None:
         """Order the formation of before the narrow place once the team is well behind it."""
         if self._narrow_m is None or narrow() is not None:
             self._narrow_m = lead.progress_m
         elif lead.progress_m - self._narrow_m >= OPEN_M:
             self._narrow_m = None
-            self.order(self._side, "the narrow place is passed", followers, term, now)
+            self.order(self._side, "the narrow place is passed", *team)
 
-    def _fold(self, slots: Sequence[Slot], followers: Sequence[int], term: Term, now: float) -> None:
+    def _fold(self, slots: Sequence[Slot], team: LedTeam) -> None:
         """Order column past known obstacles, starting with the last hop that is not yet in column."""
+        followers, term, now = team
         if now < self._fold_at:
             return
         self._fold_at = now + FOLD_S

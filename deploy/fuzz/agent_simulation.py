@@ -15,10 +15,10 @@ from lfa.agents.agent import Agent
 from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
 from lfa.deploy.analysis.verification.lease_observer import report_effect
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.fuzz import network
 from lfa.deploy.fuzz.agent_processes import AgentProcess, WorldProcess, unread
-from lfa.deploy.fuzz.network import Trace
+from lfa.deploy.fuzz.network import Trace, effect_text
 from lfa.deploy.fuzz.observers import GatewayObserver
+from lfa.deploy.fuzz.partition import Partitioned
 from lfa.deploy.fuzz.schedules import Schedule
 from lfa.protocol.incarnations import drawn_at
 from lfa.protocol.lease.agreement import agreement_of, digest
@@ -34,7 +34,6 @@ from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
 from lfa.protocol.node import Node, NodeObserver, PeerDown, PeerUp
 from lfa.protocol.runtime.journal import Journal
 from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import LinkModel
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
@@ -50,7 +49,7 @@ ASIDE_M = 3.0
 """Distance [m] of spares from the road and from each other."""
 
 
-class AgentSimulation:
+class AgentSimulation(Partitioned):
     """Simulation of a team with the same operations as `LeaseSimulation`."""
 
     def __init__(self, schedule: Schedule, road_m: float = ROAD_M) -> None:
@@ -61,7 +60,6 @@ class AgentSimulation:
         self.mission = Mission(robots, witness=schedule.witness, profile=schedule.profile, leading=leading)
         self.timing = timing_of(schedule.profile)
         self.trace: Trace | None = None
-        self.cuts: set[tuple[int, int]] = set()
         self.wall_ms: dict[int, int] = {}
         """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
         spares = tuple(spare for spare in schedule.spares if spare not in robots)
@@ -80,6 +78,7 @@ class AgentSimulation:
         self._agreed: dict[int, int] = {}
         """Digest of what the newest incarnation of each id holds to be agreed."""
         self.simulator = Simulator(schedule.radio, schedule.seed)
+        self.link_model = self.simulator.link_model
         self.simulator.refused_leave = True
         self.simulator.taps.append(self._hear)
         self.simulator.reborn = self._reborn
@@ -95,11 +94,6 @@ class AgentSimulation:
     def now(self) -> float:
         """True time [s]."""
         return self.simulator.now
-
-    @property
-    def link_model(self) -> LinkModel:
-        """Link model between the hosts."""
-        return self.simulator.link_model
 
     def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None:
         """Schedule the call `what(*arguments)` at true time `time` [s]."""
@@ -221,20 +215,7 @@ class AgentSimulation:
 
     # --- the network -------------------------------------------------------------------------------------------
 
-    def part(self, pairs: set[tuple[int, int]]) -> None:
-        """Block all messages from the first to the second id of each pair."""
-        self._cut_exactly(self.cuts | pairs)
-
-    def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
-        """Remove the cuts of these directed pairs."""
-        self._cut_exactly(self.cuts - pairs)
-
-    def heal(self) -> None:
-        """Remove all cuts."""
-        self._cut_exactly(set())
-
-    def _cut_exactly(self, pairs: set[tuple[int, int]]) -> None:
-        self.cuts, self.link_model.cuts = pairs, network.links(pairs)
+    def _tell_cuts(self) -> None:
         self._report(Checker.parts, self.now, self.cuts)
 
     def lose_late(self, within_s: float) -> None:
@@ -275,7 +256,7 @@ class AgentSimulation:
         if observed.event is LeaseEvent.PROMISE:
             self._report(Checker.promises, self.now, *observed.given)
         for effect in observed.effects:
-            self._say(process.id, network.effect_text(effect))
+            self._say(process.id, effect_text(effect))
             if isinstance(effect, StandAside):
                 self._report(Checker.leads_no_more, self.now, process.member)
                 self._report(Checker.ends, self.now, process.member)

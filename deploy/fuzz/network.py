@@ -6,15 +6,14 @@ cut link is lost; one already in transit arrives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from random import Random
 
 from lfa.deploy.analysis.verification.checker import Arguments, Checker, CheckerGroup
+from lfa.deploy.fuzz.partition import Partitioned, place
 from lfa.protocol.lease.effects import AdoptChain, BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.messages.consensus import Grant, Hello, LeaseBody, Propose, Superseded, Term
-from lfa.protocol.names import WITNESS_ID, robot_name
-from lfa.protocol.topics import WORLD_NAME
-from lfa.protocol.transport.link_model import Link, LinkModel, Radio
+from lfa.protocol.transport.link_model import LinkModel, Radio
 from lfa.world.virtual_time import VirtualTime
 
 Filter = Callable[[int, int, LeaseBody], float | None]
@@ -25,7 +24,7 @@ Trace = Callable[[float, int, str], None]
 """Function (true time [s], id, text of the action) that writes a readable trace."""
 
 
-class Network(VirtualTime):
+class Network(Partitioned, VirtualTime):
     """Simulated network between `ids`: time, random numbers, link model, cuts.
 
     A gateway's address is minus its robot's id.
@@ -39,8 +38,6 @@ class Network(VirtualTime):
         self.link_model = LinkModel(radio, self.random)
         self.filter: Filter | None = None
         self.trace: Trace | None = None
-        self.cuts: set[tuple[int, int]] = set()
-        """Directed pairs of ids between which no message passes."""
         self._gateways_at = gateways_at
         self._places = {i: place(i) for i in ids}
         self.listen(())
@@ -61,20 +58,7 @@ class Network(VirtualTime):
         sides = [*groups, rest]
         self.part({(a, b) for one in sides for other in sides if one is not other for a in one for b in other})
 
-    def part(self, pairs: set[tuple[int, int]]) -> None:
-        """Block all messages from the first to the second id of each pair."""
-        self._cut_exactly(self.cuts | pairs)
-
-    def heal_partition(self, pairs: set[tuple[int, int]]) -> None:
-        """Remove the cuts of these directed pairs."""
-        self._cut_exactly(self.cuts - pairs)
-
-    def heal(self) -> None:
-        """Remove all cuts."""
-        self._cut_exactly(set())
-
-    def _cut_exactly(self, pairs: set[tuple[int, int]]) -> None:
-        self.cuts, self.link_model.cuts = pairs, links(pairs)
+    def _tell_cuts(self) -> None:
         self._report(Checker.parts, self.now, self.cuts)
 
     # --- messages ----------------------------------------------------------------------------------------------
@@ -89,16 +73,6 @@ class Network(VirtualTime):
         if here == there:
             return (0.0001 + 0.0004 * self.random.random(),)
         return self.link_model.delays(self._places[here], self._places[there])
-
-
-def place(host: int) -> str:
-    """Return the place of a host in the link model; id 0 is the host of the witness and the world."""
-    return WORLD_NAME if host == WITNESS_ID else robot_name(host)
-
-
-def links(pairs: Set[tuple[int, int]]) -> frozenset[Link]:
-    """Return the links between these hosts."""
-    return frozenset((place(one), place(other)) for one, other in pairs)
 
 
 def effect_text(effect: Effect) -> str:

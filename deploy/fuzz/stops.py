@@ -11,7 +11,7 @@ from random import Random
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.client.stop_call import StopCall, StopOutcome
 from lfa.deploy.fuzz.lease_processes import Hosts, Process
-from lfa.deploy.fuzz.network import place
+from lfa.deploy.fuzz.partition import place
 from lfa.deploy.fuzz.schedules import ScheduledFault
 from lfa.protocol.errors import Refused
 from lfa.protocol.fleet_stop.memory import ASK_S

@@ -19,6 +19,7 @@ from lfa.deploy.client.operator import Operator
 from lfa.deploy.faults.link_faults import goal_of, note
 from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, GOAL, LEADER, ORDERS, RESTART, SIGNALS
 from lfa.deploy.operate import go
+from lfa.deploy.operate.options import AsJson, FleetName
 from lfa.deploy.process.identity import Identity, own_processes, send_signal
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
@@ -45,8 +46,8 @@ def command(
             "for obstacle: x,y,radius; for goal: x,y; for formation: a side."
         ),
     ] = "",
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    fleet: FleetName = None,
+    as_json: AsJson = False,
 ) -> int:
     """Inject a fault into a fleet that runs on this machine. Raises Refused."""
     if action not in FAULT_ACTIONS:

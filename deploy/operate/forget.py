@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -10,6 +9,7 @@ import typer
 
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
+from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.consensus import Role
@@ -25,10 +25,10 @@ ANSWER_S_MAX = 6.0
 
 def command(
     robots: Annotated[list[int], typer.Argument(help="Ids of dead robots; they must stay off until this is done.")],
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
+    as_json: AsJson = False,
 ) -> int:
     """Declare robots permanently lost and wait for a leader; return 0 if one leads, else 1. Raises Refused."""
     for robot in robots:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -11,6 +10,7 @@ import typer
 from lfa.agents.formation.formation import named
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
+from lfa.deploy.operate.options import Connect, FleetName, Keys
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.team import Event
 from lfa.protocol.mission import FormationSpec
@@ -22,9 +22,9 @@ JOINED_S = 0.2  # time [s] until a newly declared subscription receives messages
 
 def command(
     side: Annotated[str, typer.Argument(help="left, right, column or zigzag.")],
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the leader's answer as JSON.")] = False,
 ) -> int:
     """Ask the leader for the formation `side`; return 0 if it acknowledged, else 1. Raises Refused."""

@@ -10,6 +10,7 @@ import typer
 from lfa.deploy.client.mission_changes import Points, along, to_goal, unchanged
 from lfa.deploy.client.order_fleet import walls_of
 from lfa.deploy.operate import pause
+from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol.errors import Refused
 
 ROUTE_POINTS_MAX = 1000
@@ -20,10 +21,10 @@ def command(
     y: Annotated[float | None, typer.Argument(help="Goal y [m] in map.")] = None,
     theta: Annotated[float | None, typer.Argument(help="Heading [degrees] in which to arrive.")] = None,
     route: Annotated[Path | None, typer.Option(help="File with a way-point `x y` [m] on each line.")] = None,
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
+    as_json: AsJson = False,
 ) -> int:
     """Change the team's goal; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
     points = _points(x, y, theta, route)

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from lfa.deploy.client.mission_changes import along
 from lfa.deploy.client.order_call import Change
 from lfa.deploy.client.order_fleet import walls_of
 from lfa.deploy.client.session import Subscriber
 from lfa.deploy.operate import pause
+from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol.mission import Mission
 
 
 def command(
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
+    as_json: AsJson = False,
 ) -> int:
     """Send the team to the mission's first way-point; return 0 if a leader has acknowledged it, else 1."""
 

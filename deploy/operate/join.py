@@ -12,6 +12,7 @@ from lfa.agents.orders.roster_orders import JOIN, ROBOT_MAX
 from lfa.deploy.client.roster.roster_call import RosterOutcome
 from lfa.deploy.client.roster.roster_fleet import TOPICS, change_roster
 from lfa.deploy.client.session import find, listen
+from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 
@@ -21,10 +22,10 @@ def command(
     slot_of: Annotated[
         int, typer.Option("--for", help="Lost robot whose place in the chain it takes; 0: the tail.")
     ] = 0,
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
+    as_json: AsJson = False,
 ) -> int:
     """Admit a robot to the team; return 0 if quorums have accepted it, else 1. Raises Refused."""
     return say(JOIN, robot, slot_of, fleet, connect, keys, as_json)

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
-import typer
 
 from lfa.deploy.client.mission_changes import unchanged
 from lfa.deploy.client.order_call import Change
 from lfa.deploy.client.order_fleet import TOPICS, order_fleet
 from lfa.deploy.client.session import Subscriber, find, listen
+from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 
 
 def command(
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
+    as_json: AsJson = False,
 ) -> int:
     """Pause the team; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
     return say("pause", lambda subscriber: unchanged, fleet, connect, keys, as_json, paused=True)

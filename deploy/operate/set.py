@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -12,6 +11,7 @@ from msgspec import structs
 from lfa.deploy.client.mission_changes import unchanged
 from lfa.deploy.client.order_call import Change
 from lfa.deploy.operate import pause
+from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import FormationSpec, Leading, Mission
 from lfa.protocol.mission_checks import check_mission
@@ -22,10 +22,10 @@ IN_FORMATION = ("separation_m", "angle_rad", "side")
 
 def command(
     values: Annotated[list[str], typer.Argument(help="Changes as key=value, such as cruise_mps=0.3 side=column.")],
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")] = False,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
+    as_json: AsJson = False,
 ) -> int:
     """Change the mission's values; return 0 if a leader has acknowledged it, else 1. Raises Refused."""
     change = to_values(values)

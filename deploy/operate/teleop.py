@@ -7,13 +7,13 @@ import select
 import sys
 import termios
 import tty
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
+from lfa.deploy.operate.options import Connect, FleetName, Keys
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.message_bus import send
@@ -30,9 +30,9 @@ KEYS: dict[str, tuple[float, float]] = {"w": (1.0, 0.0), "s": (-1.0, 0.0), "a": 
 def command(
     speed: Annotated[float, typer.Option(help="Speed [m/s] forward and back.")] = 0.3,
     turn: Annotated[float, typer.Option(help="Turn rate [rad/s].")] = 0.4,
-    fleet: Annotated[str | None, typer.Option(help="Name of the fleet, if several run here.")] = None,
-    connect: Annotated[str | None, typer.Option(help="Router, if not the fleet's own on this machine.")] = None,
-    keys: Annotated[Path | None, typer.Option(help="Key folder from `lfa keys`, for a secured fleet.")] = None,
+    fleet: FleetName = None,
+    connect: Connect = None,
+    keys: Keys = None,
 ) -> int:
     """Drive until q or Ctrl-C; return 0. Raises Refused without a terminal, or for speeds that are none."""
     if not (0.0 < speed < float("inf") and 0.0 < turn < float("inf")):

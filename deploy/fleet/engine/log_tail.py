@@ -1,8 +1,9 @@
-"""Tail of a log file, which a supervisor publishes on an order `logs`."""
+"""Tails of logs, which a supervisor publishes on an order `logs`."""
 
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from pathlib import Path
 
 FOLLOW_S = 5.0
@@ -12,13 +13,12 @@ READ_BYTES_MAX = 16 * 1024
 LINES_MAX = 1000
 
 
-class Tail:
-    """Reader of the last lines of a file, then of the lines appended to it."""
+class LogTail(ABC):
+    """Tail of a log: its last lines, then the lines appended to it, until `FOLLOW_S` after the newest order."""
 
-    def __init__(self, path: Path, lines: int, now: float) -> None:
-        self._path = path
+    def __init__(self, last: tuple[str, ...], now: float) -> None:
+        self._first = last
         self._until = now + FOLLOW_S
-        self._at, self._first = _last(path, min(lines, LINES_MAX))
 
     def prolong(self, now: float) -> None:
         self._until = now + FOLLOW_S
@@ -27,10 +27,24 @@ class Tail:
         return now > self._until
 
     def take(self, now: float) -> tuple[str, ...]:
-        """Return the complete lines appended since the last call, at most READ_BYTES_MAX, for one message."""
+        """Return the complete lines appended since the last call, enough for one message."""
         first, self._first = self._first, ()
-        if first:
-            return first
+        return first or self._appended()
+
+    @abstractmethod
+    def _appended(self) -> tuple[str, ...]:
+        """Read what has been appended since the last reading."""
+
+
+class FileTail(LogTail):
+    """Tail of a file, READ_BYTES_MAX at a time."""
+
+    def __init__(self, path: Path, lines: int, now: float) -> None:
+        self._path = path
+        self._at, last = _last(path, min(lines, LINES_MAX))
+        super().__init__(last, now)
+
+    def _appended(self) -> tuple[str, ...]:
         try:
             with self._path.open("rb") as file:
                 file.seek(self._at)

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from lfa.deploy.fleet.engine.engine import ROUTER_FIRST_S, KnownProcess, LogSource, Waitable
-from lfa.deploy.fleet.engine.log_tail import Tail
+from lfa.deploy.fleet.engine.log_tail import FileTail
 from lfa.deploy.fleet.engine.watchdog import HangDetector, SignSocket
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
@@ -188,7 +188,7 @@ class OwnEngine:
         return tuple(managed.report(self._processes.pid(name), now) for name, managed in self._managed.items())
 
     def logs(self, name: str, lines: int, now: float) -> LogSource:
-        return Tail(self._processes.log(name), lines, now)
+        return FileTail(self._processes.log(name), lines, now)
 
     def known(self) -> Iterator[KnownProcess]:
         for name, managed in self._managed.items():

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from lfa.deploy.fleet.engine.engine import KnownProcess, LogSource, Waitable
-from lfa.deploy.fleet.engine.log_tail import FOLLOW_S, LINE_CHARACTERS_MAX, LINES_MAX
+from lfa.deploy.fleet.engine.log_tail import LINE_CHARACTERS_MAX, LINES_MAX, LogTail
 from lfa.deploy.fleet.engine.units import Scope, unit_of
 from lfa.deploy.process.identity import identify
 from lfa.deploy.process.process_group import ROUTER_NAME
@@ -182,25 +182,17 @@ def _ended(name: str, unit: Mapping[str, str]) -> str:
     return f"{name} ended ({how})"
 
 
-class JournalTail:
-    """Last lines of a unit in the journal, then the new ones, from journalctl's cursor on."""
+class JournalTail(LogTail):
+    """Tail of a unit in the journal, by journalctl's cursor."""
 
     def __init__(self, scope: Scope, unit: str, lines: int, now: float) -> None:
         self._scope = scope
         self._unit = unit
-        self._until = now + FOLLOW_S
         self._cursor = ""
-        self._first = self._read("--lines", str(min(lines, LINES_MAX)))
+        super().__init__(self._read("--lines", str(min(lines, LINES_MAX))), now)
 
-    def prolong(self, now: float) -> None:
-        self._until = now + FOLLOW_S
-
-    def over(self, now: float) -> bool:
-        return now > self._until
-
-    def take(self, now: float) -> tuple[str, ...]:
-        first, self._first = self._first, ()
-        return first or self._read(*([f"--after-cursor={self._cursor}"] if self._cursor else ["--lines", "0"]))
+    def _appended(self) -> tuple[str, ...]:
+        return self._read(*([f"--after-cursor={self._cursor}"] if self._cursor else ["--lines", "0"]))
 
     def _read(self, *words: str) -> tuple[str, ...]:
         wanted = ("--unit", self._unit, "--output", "cat", "--show-cursor", *words)
