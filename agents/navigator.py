@@ -134,9 +134,9 @@ class Navigator:
         return self._last
 
     def see(self, scan: LaserScan, now: float) -> None:
-        """Update with a scan; one that only repeats the last counts as none."""
-        known = self.estimator.pose_at(now)
-        if known is not None and self.scan_age.update(scan, known[0], now):
+        """Update with a scan; one that only repeats the last, shows nothing or is old counts as none."""
+        known, late_s = self.estimator.pose_at(now), self.estimator.late_s(scan.header, now)
+        if known is not None and self.scan_age.update(scan, known[0], now, late_s):
             mates = self._mates.places(now)
             self._obstacles.see(scan, known[0], mates, now)
             self.leading.see(scan, known[0], known[1], mates)

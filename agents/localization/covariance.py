@@ -36,6 +36,11 @@ class Covariance:
         """Standard deviation [m] of the position, in its worse axis."""
         return sqrt(max(self._rows[0][0], self._rows[1][1]))
 
+    @property
+    def heading_rad(self) -> float:
+        """Standard deviation [rad] of the heading."""
+        return sqrt(max(0.0, self._rows[2][2]))
+
     def admits(self, innovation: tuple[float, float, float], variances: tuple[float, float], sigma: float) -> bool:
         """Return whether each component of a measured pose error is within `sigma` standard deviations."""
         position, heading = variances

@@ -15,8 +15,9 @@ from msgspec import Struct
 
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.localization.covariance import Covariance
-from lfa.agents.localization.plausibility import plausible
+from lfa.agents.localization.plausibility import FrozenOdometry, plausible
 from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, slowed, wrap
+from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import Localization, Sensors
 from lfa.protocol.topics import TOPIC
 
@@ -33,8 +34,12 @@ TURN_M_PER_RAD = 0.3
 """Way [m] that a turn of one radian counts as."""
 UNFIXED_MPS = 0.2
 """Speed [m/s] at which a robot drives the last part of the way that it may drive without a fix, at most."""
-SIGMA_M_MAX = 0.3
-"""Standard deviation [m] of the position beyond which there is no pose, and of a fix beyond which it is none."""
+SIGMA_M_MAX, SIGMA_RAD_MAX = 0.3, 0.35
+"""Standard deviations of position [m] and heading [rad] beyond which there is no pose, and of a fix beyond which it is
+none: by 20 degrees astray, a robot is 0.35 m off its line after one metre."""
+BACKWARD_TO_RESTART = 10
+"""Number of successive odometry messages with stamps before the newest one, after which the sender's clock counts as
+set back."""
 
 
 class EstimatorNoise(Struct, frozen=True, forbid_unknown_fields=True):
@@ -67,6 +72,7 @@ class Estimator:
     def __init__(self, noise: EstimatorNoise = NOISE) -> None:
         self._noise = noise
         self._clock = ClockOffset()
+        self._wheels = FrozenOdometry()
         self._incarnation: int | None = None
         self._history: deque[_Odometry] = deque(maxlen=ODOMETRY_KEPT)
         self._map_odom: Pose2D | None = None
@@ -74,7 +80,7 @@ class Estimator:
         self._fix_at: _Odometry | None = None
         self._pending: Localization | None = None
         self._outlier: Pose2D | None = None
-        self._outliers_in_a_row = 0
+        self._outliers_in_a_row, self._backward_in_a_row = 0, 0
         self.refused = 0
         self.outliers = 0
         self.relocations = 0
@@ -84,7 +90,7 @@ class Estimator:
     def sensors(self, sensors: Sensors, received_at: float) -> bool:
         """Update with wheel odometry; return False when it is refused (not finite, implausible, out of order)."""
         header = sensors.header
-        if header.incarnation != self._incarnation:
+        if header.incarnation != self._incarnation or self._is_set_back(header.stamp):
             self._restart(header.incarnation)
         newest = self._history[-1].stamp if self._history else None
         fine = plausible(sensors.pose_odom, sensors.twist) and isfinite(sensors.odometer_m)
@@ -98,6 +104,7 @@ class Estimator:
             last = self._history[-1]
             turn = abs(wrap(sensors.pose_odom.theta - last.pose_odom.theta))
             self._unfixed_m += abs(sensors.odometer_m - last.odometer_m) + TURN_M_PER_RAD * turn
+        self._wheels.update(sensors.pose_odom, sensors.twist, header.stamp)
         self._history.append(_Odometry(header.stamp, sensors.pose_odom, sensors.twist, sensors.odometer_m))
         if self._pending is not None and header.stamp >= self._pending.header.stamp:
             fix, self._pending = self._pending, None
@@ -107,7 +114,8 @@ class Estimator:
     def localization(self, fix: Localization, received_at: float) -> bool:
         """Accept a fix, applied as soon as the odometry reaches its stamp; return False when it is refused."""
         stamp = fix.header.stamp
-        if not (isfinite(stamp) and plausible(fix.pose_map, Twist()) and fix.sigma_m <= SIGMA_M_MAX):
+        sure = fix.sigma_m <= SIGMA_M_MAX and fix.sigma_rad <= SIGMA_RAD_MAX
+        if not (isfinite(stamp) and plausible(fix.pose_map, Twist()) and sure):
             self.refused += 1
             return False
         if self._history and stamp < self._history[0].stamp:
@@ -126,10 +134,11 @@ class Estimator:
         There is one from the first fix on that could be joined to the odometry, while the odometry is fresh and the
         robot has not driven far since the last fix.
         """
-        if self.age_s(now) > ODOMETRY_S_MAX:
+        if self._wheels.frozen or self.age_s(now) > ODOMETRY_S_MAX:
             return "odometry"
-        lost = self._unfixed_m > UNFIXED_M_MAX or self._covariance.position_m > SIGMA_M_MAX
-        return "localization" if self._map_odom is None or lost else None
+        unsure = self._covariance.position_m > SIGMA_M_MAX or self._covariance.heading_rad > SIGMA_RAD_MAX
+        lost = self._map_odom is None or self._unfixed_m > UNFIXED_M_MAX or unsure
+        return "localization" if lost else None
 
     @property
     def unfixed(self) -> bool:
@@ -160,13 +169,32 @@ class Estimator:
         """Return the age of the newest odometry [s]; infinite before the first."""
         return now - self._history[-1].stamp - self._clock.offset(now) if self._history else float("inf")
 
+    def late_s(self, header: Header, now: float) -> float:
+        """Return how long [s] a message of the own hardware took to arrive at `now`, by the clock of the odometry.
+
+        0 before the first odometry, and for a message of another driver than that of the odometry.
+        """
+        if header.incarnation != self._incarnation or not self._clock.known:
+            return 0.0
+        return now - header.stamp - self._clock.offset(now)
+
+    def _is_set_back(self, stamp: float) -> bool:
+        """Return True at the last of many stamps in a row before the newest: the sender's clock was set back.
+
+        Its odometry would otherwise be refused until that clock has caught up, for hours or days.
+        """
+        backward = bool(self._history) and stamp < self._history[-1].stamp
+        self._backward_in_a_row = self._backward_in_a_row + 1 if backward else 0
+        return self._backward_in_a_row >= BACKWARD_TO_RESTART
+
     def _restart(self, incarnation: int) -> None:
-        """Restart for a new driver, which has a new clock and a new `odom`."""
+        """Restart for a new driver, or one with a new clock: `odom` may be another."""
         self._incarnation = incarnation
-        self._clock = ClockOffset()
+        self._clock, self._wheels = ClockOffset(), FrozenOdometry()
         self._history.clear()
         self._map_odom = None
         self._pending = None
+        self._backward_in_a_row = 0
 
     def _correct(self, fix: Localization) -> None:
         odometry = _at(self._history, fix.header.stamp)

@@ -1,7 +1,8 @@
 """Age of the last scan that counts, and the speed that it allows: a robot that sees nothing any more slows and stands.
 
 A scanner that hangs publishes nothing, or the same scan again and again. A repeated scan counts as none once the robot
-has moved far enough for its ranges to change.
+has moved far enough for its ranges to change. So does a scan in which no beam has measured anything, as under a cap or
+with a dead laser, and one that was made long before it arrived.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections import deque
 from itertools import pairwise
 from math import cos, hypot, inf, sin
 
+from lfa.agents.perception.scan import READING_M_MIN
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, wrap
 from lfa.protocol.messages.robot import LaserScan
 from lfa.protocol.topics import TOPIC
@@ -40,9 +42,13 @@ class ScanAge:
         self._at: float | None = None
         self._periods: deque[float] = deque(maxlen=PERIODS)
 
-    def update(self, scan: LaserScan, pose: Pose2D, now: float) -> bool:
-        """Take a scan made at `pose` in `map`; return whether it counts."""
-        if scan.ranges_m == self._ranges:
+    def update(self, scan: LaserScan, pose: Pose2D, now: float, late_s: float = 0.0) -> bool:
+        """Take a scan made at `pose` in `map`, which took `late_s` [s] to arrive; return whether it counts."""
+        if late_s > SCAN_S_MAX or not _has_measured(scan):
+            if self._at is None:  # there is a scanner, and its age counts from its first message
+                self._at = now
+            return False
+        if self._ranges is not None and _are_equal(scan.ranges_m, self._ranges):
             if _must_differ(scan, self._pose, pose):
                 return False
         else:
@@ -80,6 +86,17 @@ class ScanAge:
         if share >= 1.0:
             return wanted
         return STILL if share <= 0.0 else Twist(share * wanted.linear_x, share * wanted.angular_z)
+
+
+def _has_measured(scan: LaserScan) -> bool:
+    """Return whether any beam has a reading: a distance, or nothing within the range."""
+    return any(r >= READING_M_MIN for r in scan.ranges_m)
+
+
+def _are_equal(ranges_m: tuple[float, ...], others_m: tuple[float, ...]) -> bool:
+    """Return whether two scans are equal beam by beam; a bad beam, nan, equals a bad beam."""
+    pairs = zip(ranges_m, others_m, strict=False)
+    return len(ranges_m) == len(others_m) and all(r == o or (r != r and o != o) for r, o in pairs)  # noqa: PLR0124
 
 
 def _must_differ(scan: LaserScan, before: Pose2D, now: Pose2D) -> bool:

@@ -40,6 +40,9 @@ class Reading(Struct, frozen=True):
     """Bearing [rad] in `base_link` of a bumper contact."""
     own: dict[str, dict[str, float]] = {}
     """New measurements of sensors of your own: by the sensor's name, finite values by theirs."""
+    sigma_m: float = 0.0
+    """Standard deviation [m] of `pose_map` by the localisation itself, in the worse axis; 0: as the agent assumes."""
+    sigma_rad: float = 0.0
 
 
 class Base(Protocol):

@@ -163,7 +163,8 @@ class Driver:
         ]
         topics = ["sensors"]
         if reading.pose_map is not None:
-            sent.append(Localization(self._hardware.header("localization", now), reading.pose_map))
+            header = self._hardware.header("localization", now)
+            sent.append(Localization(header, reading.pose_map, reading.sigma_m, reading.sigma_rad))
             topics.append("localization")
         if (scan := reading.scan) is not None:
             turn = (scan.angle_min, scan.angle_increment, scan.range_min_m, scan.range_max_m, scan.ranges_m)

@@ -7,11 +7,12 @@ whatever the ROS graph says, and the driver is silent: a token may outlive a fro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from math import hypot
+from collections.abc import Callable, Sequence
+from math import hypot, inf, isfinite, sqrt
 from typing import Any
 
-from lfa.agents.localization.plausibility import plausible
+from lfa.agents.localization.estimator import SIGMA_M_MAX, SIGMA_RAD_MAX
+from lfa.agents.localization.plausibility import FrozenOdometry, plausible
 from lfa.deploy.robot.base import Reading, Scan
 from lfa.deploy.robot.ros_frames import FrameTree
 from lfa.deploy.robot.ros_presets import RosPreset, full_name
@@ -32,6 +33,9 @@ PLACED_S = 5.0
 """Time [s] without any pose in `map` that is worth a warning."""
 TF_S_MAX = 2.0
 """Age [s] above which `map` -> `odom` on /tf counts no more."""
+POSE_M_MAX = 1.0
+"""Way [m] driven since the last pose of the localisation beyond which it counts no more: twice the way after which slow
+ones say the next. A topic's last value outlives the localisation."""
 JUMP_M, JUMP_MPS = 0.5, 5.0
 """Motion between two odometry messages that no robot makes: more than JUMP_M [m] and faster than JUMP_MPS [m/s]."""
 CLOCK_S_MAX = 0.1
@@ -56,7 +60,12 @@ class RosBase:
         self._odom: tuple[float, Pose2D, Twist] | None = None
         self._odom_frame, self._base_frame = "odom", "base_link"
         self._odometer_m = 0.0
+        self._wheels = FrozenOdometry()
         self._map_odom: Pose2D | None = None
+        self._posed_at_m: float | None = None
+        """Odometer at the localisation's last pose [m]; None before the first."""
+        self._sigma = 0.0, 0.0
+        """Standard deviations [m, rad] of the localisation's last pose; infinite if that is none."""
         self._from_tf = False
         self._fix_due = 0.0
         self._placed_by: float | None = None
@@ -92,14 +101,18 @@ class RosBase:
             if self._odom is not None:
                 self._warn("silent", f"no odometry for {ODOM_S_MAX:g} s: says nothing, drives nothing until it returns")
             return None
+        if self._wheels.frozen:
+            self._warn("frozen", "odometry says that it moves, and stays the same: says nothing until it moves")
+            return None
         arrived, pose, twist = self._odom
         pose_odom = along_arc(pose, twist, now - arrived)
         self._locate(now)
         pose_map = None
-        if self._map_odom is not None and now >= self._fix_due:
+        if self._map_odom is not None and now >= self._fix_due and self._is_sure():
             self._fix_due = now + FIX_S
             pose_map = compose(self._map_odom, pose_odom)
-        return Reading(pose_odom, twist, self._odometer_m, pose_map, scan)
+        sigma_m, sigma_rad = self._sigma
+        return Reading(pose_odom, twist, self._odometer_m, pose_map, scan, sigma_m=sigma_m, sigma_rad=sigma_rad)
 
     def _take_odom(self, message: Any, arrived: float) -> None:
         place, turn, twist = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
@@ -118,6 +131,7 @@ class RosBase:
             else:
                 self._odometer_m += step_m
         self._odom = (arrived, pose, moving)
+        self._wheels.update(pose, moving, arrived)
         self._odom_frame, self._base_frame = message.header.frame_id or "odom", message.child_frame_id or "base_link"
         stamp_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         off_s = 1e-9 * self._wall_ns() - stamp_s
@@ -135,8 +149,26 @@ class RosBase:
             place, yaw = message.pose.pose.position, yaw_of(message.pose.pose.orientation)
             if yaw is None or not plausible(Pose2D(place.x, place.y, yaw), STILL):
                 self._warn("pose", "the pose in map has numbers that are not finite or of no robot: dropped")
+                continue
+            self._sigma = _deviations(message.pose.covariance)
+            if self._sigma[0] > SIGMA_M_MAX or self._sigma[1] > SIGMA_RAD_MAX:
+                bound = f"more than {SIGMA_M_MAX:g} m or {SIGMA_RAD_MAX:g} rad"
+                self._warn("sigma", f"the pose in map is uncertain by {bound}, or has no covariance: it is no pose")
             elif self._odom is not None:
+                self._posed_at_m = self._odometer_m
                 self._map_odom, self._from_tf = compose(Pose2D(place.x, place.y, yaw), inverse(self._odom[1])), False
+
+    def _is_sure(self) -> bool:
+        """Return True if the place in `map` is no guess: of a localisation that is certain and still says poses.
+
+        The agent drives on by its wheels for a while, then slows, and has no pose.
+        """
+        if self._sigma[0] > SIGMA_M_MAX or self._sigma[1] > SIGMA_RAD_MAX:
+            return False
+        if self._from_tf or self._posed_at_m is None or self._odometer_m - self._posed_at_m <= POSE_M_MAX:
+            return True
+        self._warn("poses", f"no pose of the localisation for {POSE_M_MAX:g} m: no pose in map until then")
+        return False
 
     def _locate(self, now: float) -> None:
         """Prefer `map` -> `odom` from /tf, which is smooth; without any localisation begin at `start_map`."""
@@ -177,3 +209,14 @@ class RosBase:
                 self._warn(kind, words)
             return scan
         return None
+
+
+def _deviations(covariance: Sequence[float]) -> tuple[float, float]:
+    """Return the standard deviations [m, rad] of position, in its worse axis, and yaw; infinite for no covariance.
+
+    `covariance` is that of x, y, z, roll, pitch and yaw, row by row. Zeros are those of a sender that knows none.
+    """
+    variances = [float(covariance[at]) for at in (0, 7, 35)]
+    if not all(isfinite(one) and one >= 0.0 for one in variances):
+        return inf, inf
+    return sqrt(max(variances[:2])), sqrt(variances[2])

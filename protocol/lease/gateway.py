@@ -102,7 +102,7 @@ class Gateway:
             return TWO_HOLDERS
         if cmd.gateway.incarnation != self.incarnation:
             return FOREIGN_STAMP
-        if cmd.gateway.time > now:
+        if not cmd.gateway.time <= now:  # nor is nan a time that it has given out
             return FUTURE_STAMP
         if now - cmd.gateway.time > self._deadman_s or cmd.gateway.time < self._stamped_at:
             return OLD_STAMP

@@ -11,6 +11,7 @@ from lfa.agents.localization.estimator import (
     ODOMETRY_S_MAX,
     OUTLIERS_TO_RELOCATE,
     SIGMA_M_MAX,
+    SIGMA_RAD_MAX,
     UNFIXED_M_MAX,
     Estimator,
 )
@@ -226,3 +227,50 @@ def test_absurd_and_old_readings_are_refused_and_counted() -> None:
             drive.estimator.localization(Localization(header, Pose2D(nan, 0.0, 0.0)), drive.now)
     assert drive.estimator.refused >= 5
     assert drive.estimator.pose_at(drive.now) == before
+
+
+@pytest.mark.parametrize("wrong", [SIGMA_RAD_MAX + 0.01, float("nan"), float("inf")])
+def test_a_fix_whose_heading_is_uncertain_is_none(wrong: float) -> None:
+    drive = Drive()
+    header = Header("driver", 1, 0, 0.0)
+    drive.estimator.sensors(Sensors(header, Pose2D(), STILL, 0.0, GatewayStamp(1, 0.0), NO_TERM), 0.0)
+    assert not drive.estimator.localization(Localization(header, Pose2D(), 0.0, wrong), 0.0)
+    assert not drive.estimator.localization(Localization(header, Pose2D(), wrong, 0.0), 0.0)
+    assert drive.estimator.missing(0.0) == "localization"
+
+
+def test_odometry_that_repeats_itself_under_fresh_stamps_and_says_that_it_moves_is_none() -> None:
+    drive = Drive()
+    for _ in range(50):
+        drive.step(Twist(0.3, 0.0))
+    frozen = drive.odom
+    for _ in range(30):
+        drive.step(Twist(0.3, 0.0))
+        drive.odom = frozen
+    assert drive.estimator.missing(drive.now) == "odometry"
+    for _ in range(5):
+        drive.step(Twist(0.3, 0.0))
+    assert drive.estimator.missing(drive.now) is None, "it moves again"
+
+
+@pytest.mark.parametrize("back_s", [1.0, 3600.0, 30 * 86400.0])
+def test_a_driver_whose_clock_is_set_back_or_forward_loses_its_pose_for_a_moment(back_s: float) -> None:
+    drive = Drive()
+    for _ in range(50):
+        drive.step(Twist(0.3, 0.0))
+    for offset_s in (back_s, 0.0):
+        drive._noise = (0.0, 0.0, 0.0, 0.0, offset_s)
+        errors = [drive.step(Twist(0.3, 0.0)) for _ in range(50)]
+        assert drive.estimator.missing(drive.now) is None
+        assert max(error for error, _ in errors[30:]) < 0.01
+
+
+def test_how_late_a_message_of_the_own_hardware_comes() -> None:
+    drive = Drive(offset_s=5.0)
+    assert drive.estimator.late_s(Header("driver", 1, 0, 0.0), 9.0) == 0.0
+    for _ in range(50):
+        drive.step(STILL)
+    assert drive.estimator.late_s(Header("driver", 1, 0, drive.now - 5.0), drive.now + 1.0) == pytest.approx(
+        1.0, abs=0.01
+    )
+    assert drive.estimator.late_s(Header("driver", 2, 0, 0.0), drive.now + 1.0) == 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, inf, sin
+from math import cos, inf, nan, sin
 from pathlib import Path
 
 import pytest
@@ -95,3 +95,30 @@ def test_a_team_with_slow_scanners_drives_slowly_and_warns(tmp_path: Path) -> No
     assert {line["robot"] for line in said if line.get("state") == "slow"} == {1, 2}
     assert ended.summary.outcome == "goal_reached"
     assert ended.summary.sim_duration_s > 4.0 / 0.25, "lfa sim straight --robots 2 --set world.lidar.rate_hz=5"
+
+
+@pytest.mark.parametrize("bad", [nan, 0.0, -inf], ids=["nan", "0", "-inf"])
+def test_a_repeated_scan_with_bad_beams_is_a_repeated_scan(bad: float) -> None:
+    age = ScanAge()
+    for n in range(20):
+        ranges = (*WALL_AHEAD, float(str(bad)), float(str(bad)))  # as two decoded messages: not the same objects
+        age.update(scan(*ranges), Pose2D(0.04 * n, 0.0, 0.0), 0.1 * n)
+    assert age.limited(GO, 1.9) == STILL
+
+
+@pytest.mark.parametrize("bad", [nan, 0.0, -inf, 0.01], ids=["nan", "0", "-inf", "too near"])
+def test_a_scanner_that_measures_nothing_stops_its_robot(bad: float) -> None:
+    """Also from the first scan on: a robot with a cap on its scanner is none without a scanner."""
+    age = ScanAge()
+    for n in range(20):
+        assert not age.update(scan(*(bad,) * 8), Pose2D(), 0.1 * n)
+    assert age.limited(GO, 1.9) == STILL
+    assert age.update(scan(inf, bad), Pose2D(), 2.0), "nothing within the range is a reading"
+
+
+def test_a_scan_that_was_made_long_ago_is_none() -> None:
+    age = ScanAge()
+    for n in range(20):
+        age.update(scan(1.0 + 0.01 * n), Pose2D(), 0.1 * n, late_s=SCAN_S_MAX + 0.01)
+    assert age.limited(GO, 1.9) == STILL
+    assert age.update(scan(0.9), Pose2D(), 2.0, late_s=SCAN_S_MAX - 0.01)

@@ -114,6 +114,59 @@ def test_a_latched_pose_of_the_localisation_places_it_too(robot: Robot) -> None:
     assert (pose.x, pose.y) == pytest.approx((3.0, 4.0))
 
 
+def _taken(robot: Robot, covariance: list[float]) -> None:
+    assert robot.base._poses is not None
+    fix = to_cdr(ros_values.pose_with_covariance(0, Pose2D(3.0, 4.0, 0.0), covariance))
+    robot.base._poses._receive("", fix, b"")
+
+
+UNSURE = [(0, 0.1), (7, 0.1), (35, 0.13), (0, nan), (35, inf), (7, -1.0)]
+
+
+@pytest.mark.parametrize(("at", "variance"), UNSURE)
+def test_a_pose_whose_covariance_is_too_great_or_none_is_no_pose(robot: Robot, at: int, variance: float) -> None:
+    robot.reads()
+    covariance = [0.0] * 36
+    covariance[0], covariance[7], covariance[35] = 0.04, 0.01, 0.0625
+    _taken(robot, covariance)
+    reading = robot.base.read(clock.now() + 1.0)  # hands over what waits, however old the odometry
+    assert robot.reads("pose_map").x == pytest.approx(3.0)
+    covariance[at] = variance
+    _taken(robot, covariance)
+    for _ in range(3):
+        robot.moves(0.0)
+        clock.sleep(0.11)
+        reading = robot.base.read(clock.now())
+        assert reading is None or reading.pose_map is None
+    assert "sigma" in robot.warned
+
+
+def test_a_localisation_that_ended_gives_no_pose_after_a_metre(robot: Robot) -> None:
+    """A topic's last value outlives its sender."""
+    robot.reads()
+    _taken(robot, [0.0] * 36)
+    assert robot.reads("pose_map").x == pytest.approx(3.0)
+    robot.base._odometer_m += 0.9
+    assert robot.reads("pose_map").x == pytest.approx(3.0)
+    robot.base._odometer_m += 0.2
+    robot.reads()
+    assert not robot.base._is_sure()
+    assert "poses" in robot.warned
+    _taken(robot, [0.0] * 36)
+    assert robot.reads("pose_map").x == pytest.approx(3.0)
+
+
+def test_odometry_that_moves_by_its_words_alone_is_none(robot: Robot) -> None:
+    robot.reads()
+    _, pose, _ = robot.base._odom
+    odom = from_cdr(*reversed(messages.odometry(0, pose, Twist(0.3, 0.0), 0.0, "odom", "base")))
+    begun = clock.now()
+    for n in range(30):
+        robot.base._take_odom(odom, begun + 0.02 * n)
+    assert robot.base.read(begun + 0.6) is None
+    assert "frozen" in robot.warned
+
+
 @pytest.mark.parametrize("robot", [{"at": Pose2D(-1.2, 0.0, 0.0)}], indirect=True)
 def test_without_localisation_it_begins_where_at_says(robot: Robot) -> None:
     assert robot.reads("pose_map").x == pytest.approx(-1.2)
