@@ -121,7 +121,8 @@ class Recorder:
     def record(self, t: float, key: str, message: Message) -> None:
         """Record `message`, sent on `key` at `t` [s] since the run's start; a negative `t` is recorded as 0."""
         t = t if t > 0.0 else 0.0
-        if not self._caps.admits(t, key):
+        allowance = self._caps.admits(t, key)
+        if allowance is None:
             return
         channel = self._channels.get(key)
         if channel is None:
@@ -130,10 +131,12 @@ class Recorder:
         body = mcap_channels.encode(message)
         self._writer.add_message(channel, stamp_ns, body, stamp_ns, message.header.seq)
         self._messages += 1
-        line = self._lines.lines(t, key, message)
-        if line:
-            self._events.append(line)
-        self._caps.spend(key, len(body) + len(line))
+        allowance.left -= len(body)
+        if type(message) in HEARD:
+            line = self._lines.lines(t, key, message)
+            if line:
+                self._events.append(line)
+                allowance.left -= len(line)
         if t >= self._flushed_at + FLUSH_S:
             self.flush_when_due(t)
 

@@ -20,7 +20,7 @@ OWNERS_MAX = 128
 OTHERS = "others"
 
 
-class _Allowance:
+class Allowance:
     """What one member may still have recorded: `left` bytes at the time `since` [s], negative after a large message."""
 
     def __init__(self, owner: str, t: float) -> None:
@@ -39,13 +39,13 @@ class SenderCaps:
     """
 
     def __init__(self) -> None:
-        self._allowances: dict[str, _Allowance] = {}
-        self._of_key: dict[str, _Allowance] = {}
+        self._allowances: dict[str, Allowance] = {}
+        self._of_key: dict[str, Allowance] = {}
         """Allowance of each key that has been admitted."""
         self.left_out: dict[str, int] = {}
 
-    def admits(self, t: float, key: str) -> bool:
-        """Return True if a message on `key` may be recorded at `t` [s]; otherwise count it."""
+    def admits(self, t: float, key: str) -> Allowance | None:
+        """Return the allowance to spend from if a message on `key` may be recorded at `t` [s]; otherwise count it."""
         known = self._of_key.get(key)
         allowance = self._allowance(t, key) if known is None else known
         if t > allowance.since:
@@ -54,23 +54,19 @@ class SenderCaps:
             allowance.since = t
         if allowance.left <= 0.0 or (known is None and allowance.keys >= CHANNELS_MAX):
             self._leave_out(allowance)
-            return False
+            return None
         if known is None:
             allowance.keys += 1
             self._of_key[key] = allowance
-        return True
+        return allowance
 
-    def spend(self, key: str, count: int) -> None:
-        """Take `count` bytes, which were recorded, from the allowance of the owner of `key`."""
-        self._of_key[key].left -= count
-
-    def _allowance(self, t: float, key: str) -> _Allowance:
+    def _allowance(self, t: float, key: str) -> Allowance:
         owner = key.split("/", 3)[2]
         if owner not in self._allowances and len(self._allowances) >= OWNERS_MAX:
             owner = OTHERS
-        return self._allowances.setdefault(owner, _Allowance(owner, t))
+        return self._allowances.setdefault(owner, Allowance(owner, t))
 
-    def _leave_out(self, allowance: _Allowance) -> None:
+    def _leave_out(self, allowance: Allowance) -> None:
         owner = allowance.owner
         if owner not in self.left_out:
             limit = f"{allowance.rate / 1e6:.1f} MB/s on {CHANNELS_MAX} keys"
