@@ -153,12 +153,18 @@ def address(key: str) -> Address | None:
 
 def message_in(key: str, payload: bytes) -> Message | None:
     """Return the message of the topic of `key` in `payload`; None for a foreign key and bytes that do not decode."""
-    where = address(key)
-    topic = TOPIC.get(where.topic) if where is not None else None
+    expected = _type_on(key)
     try:
-        return None if topic is None else decode(payload, topic.type)
+        return None if expected is None else decode(payload, expected)
     except BadMessage:
         return None
+
+
+@lru_cache(maxsize=4096)
+def _type_on(key: str) -> type | None:
+    """Return the type of the messages on `key`; None for a foreign key."""
+    where = address(key)
+    return None if where is None or where.topic not in TOPIC else TOPIC[where.topic].type
 
 
 def may_sign(where: Address, topic: Topic, sender: str) -> bool:

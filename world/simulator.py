@@ -263,13 +263,12 @@ class Simulator(VirtualTime):
         message = sender.host.decoded(key, payload)
         if message is None:
             return
-        if isinstance(message, Truth):
+        if type(message) is Truth:
             self.link_model.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        echoes = key.split("/", 4)[3] not in NO_ECHO
         for process, link in self._routes.of(key):
-            if process is sender and not echoes:
+            if process is sender and key.split("/", 4)[3] in NO_ECHO:
                 continue
             if self.deaf and (process.node.name, sender.node.name) in self.deaf:
                 continue

@@ -54,6 +54,8 @@ SHOW_EVERY_S = 5.0  # of wall-clock time
 LOOK_EVERY_S = 0.1  # of virtual time, between two looks at what may end a run from outside
 LEADER_WAIT_S = 0.01  # polling period of a fault that waits for a leader
 ORDER_STEP_S = 0.02  # period in which an operator looks whether the team knows an order
+_ANSWERS = (OrderNote, Event)
+"""Types of the messages by which a team answers an order."""
 MakeHost = Callable[[Node, Journal, Sequence[NodeObserver]], NodeHost]
 
 
@@ -303,7 +305,7 @@ class SimulatedRun:
         self._record(now, key, message)
         if self._termination.see(message) is not None:
             self._simulator.halt()
-        if isinstance(message, OrderNote | Event):
+        if isinstance(message, _ANSWERS):
             self._orders.hear(message)
 
     def _say(self, kind: str, **data: object) -> None:

@@ -48,7 +48,7 @@ class JournalEntry(Struct, frozen=True, array_like=True, gc=False):
     digest: int
 
 
-_encoder = msgspec.msgpack.Encoder()
+_encode = msgspec.msgpack.Encoder().encode
 _entry_decoder = msgspec.msgpack.Decoder(JournalEntry)
 _heading_decoder = msgspec.msgpack.Decoder(Heading)
 
@@ -82,12 +82,15 @@ class Journal:
                 raise Refused(f"--journal {directory}: {error.strerror}: must be a folder to write to") from None
             self._end(path, str(error.strerror))
             return
-        self._append(heading)
+        body = _encode(heading)
+        self._pending += len(body).to_bytes(4, "little") + body
         self.flush()
 
     def add(self, kind: str, at: float, key: str, payload: bytes, sent: Sequence[tuple[str, bytes]]) -> None:
         if self._file is not None:
-            self._append(JournalEntry(kind, at, key, payload, digest(sent)))
+            body = _encode((kind, at, key, payload, digest(sent) if sent else 0))  # as a `JournalEntry`
+            self._pending += len(body).to_bytes(4, "little")
+            self._pending += body
 
     def flush(self) -> None:
         """Write all added entries to the file. On a full disk the journal ends and the robot continues."""
@@ -108,11 +111,6 @@ class Journal:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-    def _append(self, entry: Struct) -> None:
-        body = _encoder.encode(entry)
-        self._pending += len(body).to_bytes(4, "little")
-        self._pending += body
 
 
 def read(path: Path) -> tuple[Heading, Iterator[JournalEntry]]:

@@ -31,9 +31,11 @@ class NodeHost:
 
     def decoded(self, key: str, payload: bytes) -> Message | None:
         """Return the message in `payload`; if foreign, malformed or in another's name, count it and return None."""
-        where, message = address(key), message_in(key, payload)
-        if where is not None and message is not None and may_sign(where, TOPIC[where.topic], message.header.sender):
-            return message
+        message = message_in(key, payload)
+        if message is not None:
+            where, sender = address(key), message.header.sender
+            if where is not None and (sender == where.owner or may_sign(where, TOPIC[where.topic], sender)):
+                return message
         self.undecodable += 1
         return None
 
@@ -45,12 +47,11 @@ class NodeHost:
     def deliver(self, at: float, key: str, message: Message | Local, payload: bytes) -> Sent:
         """Deliver a decoded message with its bytes, or a local event (`key`, `payload` empty), and journal the call."""
         received = Received(at, key, message)
-        for observer in self._observers:
-            observer.before(received)
-        envelopes = self.node.receive(received)
-        for observer in self._observers:
-            observer.after(received)
-        sent = _encoded(envelopes)
+        if self._observers:
+            envelopes = self._observed(received)
+        else:
+            envelopes = self.node.receive(received)
+        sent = _encoded(envelopes) if envelopes else []
         if key:
             self.journal.add("message", at, key, payload, sent)
         else:
@@ -62,6 +63,14 @@ class NodeHost:
         sent = _encoded(self.node.tick(now))
         self.journal.add("tick", now, "", b"", sent)
         return sent
+
+    def _observed(self, received: Received) -> list[Envelope]:
+        for observer in self._observers:
+            observer.before(received)
+        envelopes = self.node.receive(received)
+        for observer in self._observers:
+            observer.after(received)
+        return envelopes
 
     def end(self) -> None:
         """Close the journal of a node that has ended."""

@@ -19,6 +19,7 @@ ENDED = "-"
 """Hash of a process that does not run."""
 FLUSH_ROWS = 50
 _time = struct.Struct("<d").pack
+_crc32 = zlib.crc32
 
 
 class HashedJournal(Journal):
@@ -31,9 +32,9 @@ class HashedJournal(Journal):
 
     def add(self, kind: str, at: float, key: str, payload: bytes, sent: Sequence[tuple[str, bytes]]) -> None:
         super().add(kind, at, key, payload, sent)
-        self.inputs = zlib.crc32(payload, zlib.crc32(_time(at) + key.encode(), self.inputs))
+        self.inputs = _crc32(payload, _crc32(_time(at) + key.encode(), self.inputs))
         for to, said in sent:
-            self.outputs = zlib.crc32(said, zlib.crc32(to.encode(), self.outputs))
+            self.outputs = _crc32(said, _crc32(to.encode(), self.outputs))
 
 
 class StateHashes:
