@@ -55,12 +55,13 @@ class Attendance:
 
 def _is_there(robot: int, lease: Lease, team: TeamState, now: float) -> bool:
     """Return True if anything shows that `robot` runs: its token, its table row, its HELLO."""
-    return lease.peers.is_here(robot) or team.row_age(robot, now) <= ROW_S_MAX or _says_hello(robot, lease, now)
+    return is_heard(robot, lease, now) or team.row_age(robot, now) <= ROW_S_MAX
 
 
-def _says_hello(robot: int, lease: Lease, now: float) -> bool:
+def is_heard(robot: int, lease: Lease, now: float) -> bool:
+    """Return True if the token of `robot` is there, or its HELLO was heard lately."""
     hello = lease.hello_of(robot)
-    return hello is not None and now - hello[1] <= HELLO_S_MAX
+    return lease.peers.is_here(robot) or (hello is not None and now - hello[1] <= HELLO_S_MAX)
 
 
 def _why_outside(robot: int, lease: Lease, now: float) -> str:

@@ -155,8 +155,8 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "web": (*RUNS, "websockets"), "import": (*RUNS, "yaml"),
 }  # fmt: skip
 """Modules outside the base install without which a command can do nothing."""
-TAKES_NUMBERS = frozenset({"go"})
-"""Commands whose arguments may begin with a minus sign, as in `lfa go 3 -1.5`."""
+TAKES_NUMBERS = frozenset({"go", "join", "retire", "forget"})
+"""Commands whose arguments are numbers, which may begin with a minus sign, as in `lfa go 3 -1.5`."""
 EXTRAS = {
     "numpy": "world", "PIL": "world", "pymunk": "world", "yaml": "world", "matplotlib": "view", "mcap": "view",
     "rerun": "view", "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from lfa.agents.attendance import is_heard
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.machine.lease import Lease
@@ -70,7 +71,11 @@ class RosterOrders:
         if (robot in team_of(roster, self._robots)) == (command == JOIN):
             return [], False
         if command == JOIN:
-            return lease.request_roster(joined(roster, self._robots, lease.chain, robot, slot_of), now), False
+            newer = joined(roster, self._robots, lease.chain, robot, slot_of)
+            if not is_heard(robot, lease, now):
+                started = f"lfa-agent --id {robot}{'' if robot in self._robots else ' --spare'}"
+                raise Refused(f"join {robot}: nobody of this id is heard, must run first: {started}")
+            return lease.request_roster(newer, now), False
         newer = retired(roster, self._robots, lease.chain, robot)
         if robot != self._id:
             return lease.request_roster(newer, now), False

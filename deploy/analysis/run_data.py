@@ -41,7 +41,8 @@ class Run:
 
     @property
     def robots(self) -> tuple[int, ...]:
-        return self.scenario.mission.robots
+        """Ids of all robots in the world, in the mission's order, the spares last."""
+        return self.scenario.robots
 
     @cached_property
     def errors(self) -> dict[int, TrackingErrors]:

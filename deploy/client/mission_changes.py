@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, isfinite, radians, sin
+from math import cos, dist, hypot, isfinite, radians, sin
 
 from msgspec import structs
 
@@ -15,6 +15,9 @@ from lfa.world.description.reachability import parted
 APPROACH_M = 0.8
 """Distance [m] before a goal from which a team drives straight at it, in the heading that it is to have there."""
 
+REACH_M = 1000.0
+"""Distance [m] from every way-point of the mission beyond which a goal is a mistake: open ground has no other edge."""
+
 Points = tuple[tuple[float, float], ...]
 Walls = tuple[tuple[float, float, float, float], ...]
 
@@ -25,12 +28,22 @@ def unchanged(mission: Mission, _first: Mission) -> Mission:
 
 
 def along(points: Points, walls: Walls) -> Change:
-    """Return the change to a route through `points` [m]. It raises Refused for one in or behind a wall."""
+    """Return the change to a route through `points` [m]. It raises Refused for one behind a wall, or too far away.
 
-    def change(mission: Mission, _first: Mission) -> Mission:
+    Each point is in reach of the mission's way-points, as it began or as it holds, or of the points before.
+    """
+
+    def change(mission: Mission, first: Mission) -> Mission:
         motion = "path_following" if mission.leading.motion == "trajectory" else mission.leading.motion
         leading = structs.replace(mission.leading, route_m=points, motion=motion, times_s=(), orientations=())
         changed = check_mission(structs.replace(mission, leading=leading))
+        near = {*mission.leading.route_m, *first.leading.route_m}
+        for point in points:
+            least_m = min((dist(point, other) for other in near), default=0.0)
+            if least_m > REACH_M:
+                where = f"{least_m:.0f} m from all way-points"
+                raise Refused(f"goal ({point[0]:g}, {point[1]:g}): {where}, must be at most {REACH_M:g} m from one")
+            near.add(point)
         for point in points:
             if any(_distance(point, wall) < mission.radius_m for wall in walls):
                 right = f"must be {mission.radius_m:g} m clear of it"

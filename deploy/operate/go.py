@@ -61,9 +61,9 @@ def _read(path: Path) -> Points:
             continue
         try:
             x, y = map(float, words)
-        except ValueError:
+            points += to_goal(x, y, None)
+        except ValueError:  # a Refused is one too
             raise Refused(f"{path}:{number}: {line.strip()!r}: must be a way-point x y [m]") from None
-        points += to_goal(x, y, None)
     if not 1 <= len(points) <= ROUTE_POINTS_MAX:
         raise Refused(f"--route {path}: {len(points)} way-points, must be 1 to {ROUTE_POINTS_MAX}")
     return points

@@ -27,7 +27,7 @@ def command(
     keys: Keys = None,
     as_json: AsJson = False,
 ) -> int:
-    """Admit a robot to the team; return 0 if quorums have accepted it, else 1. Raises Refused."""
+    """Admit a robot to the team; return 0 if quorums have accepted it, else 1. Raises Refused, as the leader may."""
     return say(JOIN, robot, slot_of, fleet, connect, keys, as_json)
 
 
@@ -35,10 +35,14 @@ def say(
     what: str, robot: int, slot_of: int, fleet: str | None, connect: str | None, keys: Path | None, as_json: bool
 ) -> int:
     """Change a fleet's team, print what became of it, and return the exit code. Raises Refused."""
-    if not (1 <= robot <= ROBOT_MAX and 0 <= slot_of <= ROBOT_MAX):
-        raise Refused(f"{what} {robot}: must be a robot's number, 1 or higher")
+    if not 1 <= robot <= ROBOT_MAX:
+        raise Refused(f"{what} {robot}: must be a robot's id, from 1 to {ROBOT_MAX}")
+    if not 0 <= slot_of <= ROBOT_MAX:
+        raise Refused(f"{what} {robot} --for {slot_of}: must be a robot's id, or 0 for the tail")
     with listen(find(fleet, connect, keys), TOPICS) as ear:
         outcome = change_roster(ear, what, robot, slot_of)
+    if outcome.reason:
+        raise Refused(outcome.reason)
     print(msgspec.json.encode(outcome).decode() if as_json else outcome_text(what, outcome))
     return 0 if outcome.accepted else 1
 
@@ -48,8 +52,6 @@ def outcome_text(what: str, outcome: RosterOutcome) -> str:
     name, chain = robot_name(outcome.robot), list(outcome.chain)
     if outcome.leader is None:
         return f"{what} {outcome.robot}: no leader has answered"
-    if outcome.reason:
-        return f"{what}: {robot_name(outcome.leader)} refuses it: {outcome.reason}"
     if not outcome.accepted:
         return f"{what} {outcome.robot}: no quorum has accepted it in time; the chain is {chain}"
     if what != JOIN:

@@ -12,6 +12,7 @@ from lfa.deploy.client.order_call import Change
 from lfa.deploy.client.order_fleet import TOPICS, order_fleet
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
+from lfa.protocol.errors import Refused
 
 
 def command(
@@ -37,13 +38,13 @@ def say(
     """Change a fleet's mission as `make` says, print what became of it, and return the exit code. Raises Refused."""
     with listen(find(fleet, connect, keys), TOPICS) as subscriber:
         outcome = order_fleet(subscriber, make(subscriber), paused=paused)
+    if outcome.reason:
+        raise Refused(f"{what}: robot{outcome.leader} refuses it: {outcome.reason}")
     if as_json:
         print(msgspec.json.encode(outcome).decode())
     elif outcome.leader is None:
         print(f"{what}: no leader has answered")
-    elif outcome.reason:
-        print(f"{what}: robot{outcome.leader} refuses it: {outcome.reason}")
     else:
         known = f"{len(outcome.robots)} robots know it"
         print(f"{what}: order {outcome.version} carried out by robot{outcome.leader}, {known}")
-    return 0 if outcome.leader is not None and not outcome.reason else 1
+    return 0 if outcome.leader is not None else 1

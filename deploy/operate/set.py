@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from math import isfinite
+from typing import Annotated, get_args
 
 import msgspec
 import typer
@@ -13,11 +14,13 @@ from lfa.deploy.client.order_call import Change
 from lfa.deploy.operate import pause
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol.errors import Refused
-from lfa.protocol.mission import FormationSpec, Leading, Mission
+from lfa.protocol.mission import FormationSpec, Leading, Mission, Motion, Side
 from lfa.protocol.mission_checks import check_mission
 
 IN_LEADING = ("motion", "cruise_mps", "acceleration_mps2", "goal_tolerance_m", "waypoint_tolerance_m")
 IN_FORMATION = ("separation_m", "angle_rad", "side")
+CHOICES: dict[str, tuple[str, ...]] = {"motion": get_args(Motion), "side": get_args(Side)}
+"""Values that are words; all others are numbers."""
 
 
 def command(
@@ -34,19 +37,21 @@ def command(
 
 def to_values(values: list[str]) -> Change:
     """Return the change to these values, each `key=value`. Raises Refused for a key that cannot change."""
-    pairs = dict(_pair(value) for value in values)
+    pairs: dict[str, str] = {}
+    for value in values:
+        key, text = _pair(value)
+        if key in pairs:
+            raise Refused(f"set {value}: {key} is given twice, must be given once")
+        pairs[key] = text
 
     def change(mission: Mission, _first: Mission) -> Mission:
         leading = {**msgspec.to_builtins(mission.leading), **_part(pairs, IN_LEADING)}
         formation = {**msgspec.to_builtins(mission.formation), **_part(pairs, IN_FORMATION)}
-        try:
-            changed = structs.replace(
-                mission,
-                leading=msgspec.convert(leading, Leading, strict=False),
-                formation=msgspec.convert(formation, FormationSpec, strict=False),
-            )
-        except msgspec.ValidationError as error:
-            raise Refused(f"set: {error}") from None
+        changed = structs.replace(
+            mission,
+            leading=msgspec.convert(leading, Leading, strict=False),
+            formation=msgspec.convert(formation, FormationSpec, strict=False),
+        )
         return check_mission(changed)
 
     return change if pairs else unchanged
@@ -57,7 +62,18 @@ def _pair(value: str) -> tuple[str, str]:
     key = key.removeprefix("mission.").removeprefix("leading.").removeprefix("formation.")
     if not equals or key not in (*IN_LEADING, *IN_FORMATION):
         raise Refused(f"set {value}: must be key=value with one of {', '.join((*IN_LEADING, *IN_FORMATION))}")
+    if key in CHOICES and text not in CHOICES[key]:
+        raise Refused(f"set {value}: must be one of {', '.join(CHOICES[key])}")
+    if key not in CHOICES and not _is_number(text):
+        raise Refused(f"set {value}: must be a number")
     return key, text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _part(pairs: dict[str, str], keys: tuple[str, ...]) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import hypot
+from pathlib import Path
 
 import pytest
 from msgspec import structs
@@ -15,6 +16,7 @@ from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome
 from lfa.deploy.fuzz.agent_simulation import FLEET, AgentSimulation
 from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import draw
+from lfa.deploy.operate import go
 from lfa.deploy.operate.set import to_values
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
@@ -153,6 +155,41 @@ def test_a_goal_in_or_behind_a_wall_is_refused_in_one_line(point: tuple[float, f
 def test_a_goal_that_is_no_number_is_refused() -> None:
     with pytest.raises(Refused, match="must be finite"):
         to_goal(float("nan"), 1.0, None)
+
+
+def test_a_goal_out_of_reach_is_refused_and_one_farther_along_a_route_is_not() -> None:
+    scene = Commanded()
+    mission = scene.team.mission
+    with pytest.raises(Refused, match=r"goal \(9999, 9999\): \d+ m from all way-points, must be at most 1000 m"):
+        scene.say(along(((9999.0, 9999.0),), ()))
+    assert scene.run(1.0).truth[1][2] > 0.1
+    along(((900.0, 0.0), (1800.0, 0.0), (2700.0, 0.0)), ())(mission, mission)
+
+
+@pytest.mark.parametrize(
+    ("values", "line"),
+    [
+        (["cruise_mps=x"], "set cruise_mps=x: must be a number"),
+        (["cruise_mps=nan"], "set cruise_mps=nan: must be a number"),
+        (["cruise_mps="], "set cruise_mps=: must be a number"),
+        (["side=up"], "set side=up: must be one of left, right, column, zigzag"),
+        (["side=left", "formation.side=right"], "set formation.side=right: side is given twice, must be given once"),
+        (["robots=3"], "set robots=3: must be key=value with one of motion, "),
+    ],
+)
+def test_values_that_are_none_are_refused_in_one_line(values: list[str], line: str) -> None:
+    with pytest.raises(Refused) as refused:
+        to_values(values)
+    assert str(refused.value).startswith(line)
+
+
+@pytest.mark.parametrize("text", ["nan 3", "1e400 3", "3", "1 2 3", "x y"])
+def test_a_route_file_names_the_line_that_is_no_way_point(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "route.txt"
+    path.write_text(f"# x y\n1 2\n{text}\n", encoding="utf-8")
+    with pytest.raises(Refused) as refused:
+        go.command(route=path)
+    assert str(refused.value) == f"{path}:3: {text!r}: must be a way-point x y [m]"
 
 
 def _driven(scene: Commanded, for_s: float, v_mps: object, omega_radps: float) -> None:

@@ -121,3 +121,37 @@ def test_e33_e34_what_cannot_be_is_refused_before_it_is_said(command: str, robot
         team.say(command, robot)
     assert str(refused.value) == line
     assert team.team.lease_of(1).config.roster == team.team.lease_of(2).config.roster
+
+
+@pytest.mark.parametrize(
+    ("robot", "ended", "line"),
+    [
+        (9, (), "join 9: nobody of this id is heard, must run first: lfa-agent --id 9 --spare"),
+        (7, (7,), "join 7: nobody of this id is heard, must run first: lfa-agent --id 7 --spare"),
+    ],
+)
+def test_e33_a_robot_that_nobody_hears_does_not_join(robot: int, ended: tuple[int, ...], line: str) -> None:
+    team = Operated()
+    for other in ended:
+        team.team.kill(other)
+    team.run(5.0)
+    before = team.team.lease_of(1).config
+    outcome = team.say(JOIN, robot)
+    assert (outcome.accepted, outcome.reason) == (False, line)
+    assert team.team.lease_of(1).config == before
+
+
+def test_e34_a_retired_robot_whose_process_has_ended_does_not_join_again() -> None:
+    team = Operated()
+    assert team.say(RETIRE, 3).accepted
+    team.team.kill(3)
+    team.run(5.0)
+    assert team.say(JOIN, 3).reason == "join 3: nobody of this id is heard, must run first: lfa-agent --id 3"
+
+
+def test_e34_the_last_of_the_chain_does_not_retire() -> None:
+    team = Operated()
+    for robot in (2, 3):
+        assert team.say(RETIRE, robot).accepted
+    with pytest.raises(Refused, match="retire 1: robot1 is the last of the chain, must leave another one there"):
+        team.say(RETIRE, 1)

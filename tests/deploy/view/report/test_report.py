@@ -50,6 +50,13 @@ def test_every_section_and_figure_is_on_the_page(folder: Path) -> None:
     assert len(html.encode()) < BYTES_MAX
 
 
+def test_a_spare_is_drawn_as_the_last_robot(tmp_path: Path) -> None:
+    scenario = load("straight", ["time_limit_s=2.0", "world.spares=[{id=7, start=[-3.0, -2.0, 0.0]}]"], 2)
+    spared = Run(run(scenario, 1, tmp_path / "run", ()).folder)
+    assert [label(spared, robot) for robot in spared.truth] == ["robot 1", "robot 2", "robot 7"]
+    assert drawn("fig09_path_flow", spared).axes
+
+
 @pytest.mark.parametrize("name", ["fig07_distance_error", "fig09_path_flow", "lease_timeline", "leader_timeline"])
 def test_no_text_stands_on_a_line_without_a_ground_of_its_own(folder: Path, name: str) -> None:
     figure = drawn(name, Run(folder))
