@@ -142,7 +142,6 @@ def _sees(circles: Floats) -> Bools:
     dx = circles[:, 0] - circles[:, 0:1]
     dy = circles[:, 1] - circles[:, 1:2]
     sees: Bools = np.sqrt(dx * dx + dy * dy) > OVERLAP_SEEN * 2.0 * circles[:, 2]
-    np.fill_diagonal(sees, False)
     return sees
 
 

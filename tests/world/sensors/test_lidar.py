@@ -14,8 +14,8 @@ from lfa.deploy.bench import lidar as bench
 from lfa.protocol.geometry import TAU, Pose2D
 from lfa.world.description.load import Lidar, load
 from lfa.world.description.placement import to_segment
-from lfa.world.description.scenario import Scenario
-from lfa.world.sensors.lidar import ANGLE_MIN, Scanner, cast, robot_outlines
+from lfa.world.description.scenario import Obstacle, Scenario
+from lfa.world.sensors.lidar import ANGLE_MIN, Scanner, cast, outline, robot_outlines
 
 BEAMS = 72
 AHEAD, LEFT, BEHIND, RIGHT = BEAMS // 2, BEAMS * 3 // 4, 0, BEAMS // 4
@@ -166,3 +166,38 @@ def test_a_pushed_polygon_is_seen_at_its_pose(turned: float) -> None:
     pushed = Scanner(scenario).scan([Pose2D()], {0: Pose2D(2.0, 1.0, turned)})[0].tolist()
     assert pushed == pytest.approx(fixed)
     assert min(pushed) < 2.5
+
+
+BEAK = ((-0.2, -0.1), (0.4, -0.3), (0.5, 0.2), (-0.1, 0.3))
+"""Body without any symmetry."""
+
+
+def test_a_robots_sides_are_those_of_its_body_turned_and_set_down_at_its_pose() -> None:
+    """The same as those of an obstacle of that shape there."""
+    poses = [Pose2D(2.0, 1.0, 0.6), Pose2D(-3.0, 5.0, -2.0)]
+    bodies = robot_outlines(np.array([(p.x, p.y, p.theta) for p in poses]), BEAK, 0.5)
+    thing = Obstacle((0.0, 0.0), corners_m=BEAK)
+    circles, sides = outline((thing, pose) for pose in poses)
+    assert not circles
+    assert bodies.sides.ravel().tolist() == pytest.approx([number for side in sides for number in side])
+    assert bodies.circles.tolist() == [[2.0, 1.0, 0.5], [-3.0, 5.0, 0.5]]
+
+
+def test_round_robots_have_no_sides() -> None:
+    assert robot_outlines(np.array([(1.0, 2.0, 3.0)]), (), 0.5).sides.shape == (0, 4)
+
+
+@pytest.mark.parametrize("footprint", [(), BEAK])
+@pytest.mark.parametrize("aside", [(1.0, 0.0), (0.0, -1.0), (0.6, 0.8)])
+@pytest.mark.parametrize("origin", [(0.0, 0.0), (7.0, -4.0), (-3.0, 6.0)])
+def test_a_robot_that_stands_in_anothers_place_is_not_seen_and_one_beside_it_is(
+    origin: tuple[float, float], aside: tuple[float, float], footprint: tuple[tuple[float, float], ...]
+) -> None:
+    """Up to nine tenths of two radii; wherever they are, to whatever side."""
+    lidar = Lidar(beams=360)
+    for apart_m, seen in ((0.0, False), (0.17, False), (0.19, True)):
+        other = (origin[0] + apart_m * aside[0], origin[1] + apart_m * aside[1], 0.0)
+        poses = np.array([(*origin, 0.0), other])
+        nothing = np.empty((0, 3)), np.empty((0, 4))
+        ranges = cast(poses, robot_outlines(poses, footprint, 0.1), *nothing, lidar)
+        assert [bool((row < inf).any()) for row in ranges] == [seen, seen], apart_m

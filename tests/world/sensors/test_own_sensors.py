@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import inf
 from pathlib import Path
 
 import msgspec
@@ -12,10 +13,12 @@ from lfa.agents.perception.own_readings import SENSORS_MAX, OwnReadings
 from lfa.deploy.scenario_loading import load_scenario
 from lfa.deploy.simulate import read, run
 from lfa.protocol.errors import Refused
+from lfa.protocol.geometry import STILL, Pose2D
 from lfa.protocol.messages.codec import BadMessage, decode, encode
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import SensorReading
-from lfa.world.description.own_sensor import SENSORS
+from lfa.world.description.own_sensor import SENSORS, TrueState
+from lfa.world.sensors.own_sensors import OwnSensors
 from tests.rigs.installed_plug_in import install
 from tests.rigs.lfa_runs import lfa
 from tests.rigs.world_rig import Rig, of
@@ -82,6 +85,51 @@ def test_a_fault_of_a_sensor_fails_the_run_with_its_reason(
     summary = run("straight", robots=1, set=sets, out=tmp_path / "run").summary
     assert (summary.outcome, summary.exit_code) == ("failed", 1)
     assert summary.reason == f"sensor broken of robot 1: {says}"
+
+
+LONG = "n" * 65
+BAD_VALUES = {
+    "a number that no core could hold": ({"c": 1e10}, "measure returned c = 10000000000.0, must be a finite number"),
+    "infinite": ({"c": -inf}, "measure returned c = -inf, must be a finite number"),
+    "a name that is no text": ({5: 1.0}, "measure returned the name 5, must be a text of at most 64 characters"),
+    "a long name": (
+        {"n" * 65: 1.0},
+        f"measure returned the name '{'n' * 65}', must be a text of at most 64 characters",
+    ),
+    "many values": ({f"v{n}": 1.0 for n in range(65)}, "measure returned 65 values, at most 64 fit"),
+}
+
+
+def own_sensors(answers: list[object], monkeypatch: pytest.MonkeyPatch) -> tuple[OwnSensors, TrueState]:
+    """The sensor `said` of two robots, which give these answers in turn, and the state of the second robot."""
+
+    class Said:
+        def __init__(self, *_: object) -> None: ...
+
+        def measure(self, _: object) -> object:
+            return answers.pop(0)
+
+    monkeypatch.setattr(SENSORS, "_added", {"said": Said})
+    scenario = load_scenario("straight", ["world.sensors.said.rate_hz=5", "mission.robots=[1, 2]"])
+    return OwnSensors(scenario, 1, (1, 2)), TrueState(2, 0.0, Pose2D(), STILL, 0.0, {}, ())
+
+
+@pytest.mark.parametrize("kind", BAD_VALUES)
+def test_a_sensor_with_a_bad_answer_is_told_of_once_and_not_called_again(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer, says = BAD_VALUES[kind]
+    answers: list[object] = [answer, {"c": 1.0}]
+    sensors, state = own_sensors(answers, monkeypatch)
+    assert sensors.measure("said", state) == f"sensor said of robot 2: {says}"
+    assert sensors.measure("said", state) is None
+    assert answers == [{"c": 1.0}]
+
+
+def test_what_fits_just_so_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    most = {f"{n:064}": (-1e9, 1e9, 3)[n % 3] for n in range(64)}
+    sensors, state = own_sensors([most], monkeypatch)
+    assert sensors.measure("said", state) == most
 
 
 def test_a_run_is_read_where_its_sensor_is_not_installed(light: Path, monkeypatch: pytest.MonkeyPatch) -> None:
