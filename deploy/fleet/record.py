@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
 from math import inf
 from pathlib import Path
 from typing import Annotated
@@ -67,60 +68,68 @@ def command(
     plan = None if hosts is None else load(hosts)
     found = find(fleet, connect, keys)
     with listen(found, frozenset({"**"}), every=True) as subscriber, Interrupts() as interrupts:
-        world = world_of_fleet(found)
-        folder = _folder(found, out, world[0] if world else None)
-        name, seed = (world[0].name, world[1]) if world else (found.name, 0)
-        about = About(name, "recorded", seed, found.name, provenance())
-        recorder = Recorder(folder, about.metadata(), split_bytes=round(1e6 * split_mb), keep=keep)
+        followed = _Followed(found, out, round(1e6 * split_mb), keep)
         kept = journals.of_processes(found.name)
-        write_line(f"records fleet {found.name} into {folder}", sys.stderr if as_json else sys.stdout)
-        begun, seen = clock.now(), WorldTime()
-        followed = _Followed(recorder, seen, begun, world[0] if world else None)
-        send(subscriber.bus, Operator(found.name, incarnations.drawn()).ask("mission", begun))
-        while interrupts.signal is None and not 0.0 < seconds <= clock.now() - begun:
-            clock.sleep(POLL_S)
-            followed.write(subscriber)
-        recording = recorder.close()
-        lasted_s = clock.now() - begun
-    came = journals.copy(kept | journals.of_processes(found.name), folder)
+        write_line(f"records fleet {found.name} into {followed.folder}", sys.stderr if as_json else sys.stdout)
+        recording = followed.record(subscriber, interrupts, seconds)
+    came = journals.copy(kept | journals.of_processes(found.name), followed.folder)
+    wrong: list[str] = []
     if plan is not None:
-        fetched, wrong = journals.fetch(plan, folder)
+        fetched, wrong = journals.fetch(plan, followed.folder)
         came += fetched
-        for line in wrong:
-            print(f"lfa: {line}", file=sys.stderr)
-    recording.dropped = subscriber.dropped
-    recording.missing, recording.holes = followed.holes.missing, followed.holes.widest()
-    summary = followed.summarize(folder, about, recording, lasted_s)
-    code = 0 if recording.messages and not recording.dropped and not recording.unwritten else 1
-    for line in recording.losses():
+    summary = followed.summarize(recording)
+    for line in (*wrong, *recording.losses()):
         print(f"lfa: {line}", file=sys.stderr)
     if as_json:
-        facts = {"folder": str(folder), "fleet": found.name, "journals": came, "summary": summary}
+        facts = {"folder": str(followed.folder), "fleet": found.name, "journals": came, "summary": summary}
         print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
-        return code
-    files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
+    else:
+        print("\n".join(_lines(followed.folder, recording, came, summary)))
+    whole = recording.messages and not recording.dropped and not recording.unwritten
+    return 1 if not whole else 0 if as_json or summary is None else summary.exit_code
+
+
+def _lines(folder: Path, recording: Recording, came: int, summary: Summary | None) -> Iterator[str]:
+    """Yield what a person is told of a recording with so many journals."""
     if summary is not None:
-        print(text(summary, folder))
-        code = code or summary.exit_code
+        yield text(summary, folder)
+    files = f"{recording.files} file{'s' * (recording.files > 1)} of {recording.bytes / 1e6:.1f} MB"
     lost = recording.dropped + sum(hole.missing for hole in recording.holes)
     with_holes = ", with holes" if recording.holes else ""
-    print(f"{recording.messages} messages, {lost} lost, {files}, {came} journals: {folder}{with_holes}")
-    return code
+    yield f"{recording.messages} messages, {lost} lost, {files}, {came} journals: {folder}{with_holes}"
 
 
 class _Followed:
-    """What is recorded of a fleet, and what becomes of its run meanwhile."""
+    """Recording of a fleet, and what becomes of the fleet's run meanwhile."""
 
-    def __init__(self, recorder: Recorder, seen: WorldTime, begun: float, scenario: Scenario | None) -> None:
-        self._recorder = recorder
-        self._seen = seen
-        self._begun = begun
-        self._scenario = scenario
+    def __init__(self, fleet: FleetAddress, out: Path | None, split_bytes: int, keep: int) -> None:
+        """Create the run folder. Raises Refused."""
+        world = world_of_fleet(fleet)
+        self._scenario = world[0] if world else None
+        name, seed = (world[0].name, world[1]) if world else (fleet.name, 0)
+        self.folder = _folder(fleet, out, self._scenario)
+        self._about = About(name, "recorded", seed, fleet.name, provenance())
+        self._recorder = Recorder(self.folder, self._about.metadata(), split_bytes=split_bytes, keep=keep)
+        self._seen = WorldTime()
+        self._begun = clock.now()
+        self._lasted_s = 0.0
         self._mission: Mission | None = None
-        self.holes = Holes()
-        self._termination = None if scenario is None else Termination(scenario)
+        self._holes = Holes()
+        self._termination = None if self._scenario is None else Termination(self._scenario)
 
-    def write(self, subscriber: Subscriber) -> None:
+    def record(self, subscriber: Subscriber, interrupts: Interrupts, seconds: float) -> Recording:
+        """Record for `seconds`, or without an end if these are 0, until a signal comes; return what was recorded."""
+        send(subscriber.bus, Operator(self._about.fleet, incarnations.drawn()).ask("mission", self._begun))
+        while interrupts.signal is None and not 0.0 < seconds <= clock.now() - self._begun:
+            clock.sleep(POLL_S)
+            self._write(subscriber)
+        recording = self._recorder.close()
+        self._lasted_s = clock.now() - self._begun
+        recording.dropped = subscriber.dropped
+        recording.missing, recording.holes = self._holes.missing, self._holes.widest()
+        return recording
+
+    def _write(self, subscriber: Subscriber) -> None:
         """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
         for arrival, message in subscriber.take():
             if isinstance(message, Truth):
@@ -131,22 +140,23 @@ class _Followed:
                 self._termination.see(message)
             at_s = self._seen.of(arrival.at) if self._seen.known else arrival.at - self._begun
             self._recorder.record(at_s, arrival.key, message)
-            self.holes.see(at_s, arrival.key, message.header)
+            self._holes.see(at_s, arrival.key, message.header)
 
-    def summarize(self, folder: Path, about: About, recording: Recording, lasted_s: float) -> Summary | None:
+    def summarize(self, recording: Recording) -> Summary | None:
         """Write the summary of what was recorded and return it; None if not even the mission is known."""
         if self._scenario is None:
             if self._mission is None:
                 return None
-            fleet = Scenario(title=f"Fleet {about.fleet}", mission=self._mission, time_limit_s=max(lasted_s, 1.0))
-            (folder / SCENARIO).write_text(toml(fleet), encoding="utf-8")
+            limit_s = max(self._lasted_s, 1.0)
+            fleet = Scenario(title=f"Fleet {self._about.fleet}", mission=self._mission, time_limit_s=limit_s)
+            (self.folder / SCENARIO).write_text(toml(fleet), encoding="utf-8")
         verdict = (self._termination.verdict if self._termination is not None else None) or Verdict("recorded")
-        summary = summarize(folder, about, verdict, lasted_s, ())
+        summary = summarize(self.folder, self._about, verdict, self._lasted_s, ())
         summary.recording, summary.warnings = recording, recording.losses()
         if not self._seen.known:
             summary.warnings.append("no ground truth was heard: errors, contacts and separation are not known")
             summary.assertions = [one for one in summary.assertions if one.name not in NEED_TRUTH]
-        write_summary(folder, summary)
+        write_summary(self.folder, summary)
         return summary
 
 
