@@ -123,6 +123,8 @@ PLANTED: tuple[Bug, ...] = (
         "term_window::test_e26_a_made_up_term_stops_no_team", (2**53,)),
     Bug("rule E8", "the chain forgets its order", team.chain_forgets_its_order,
         "election::test_l6_after_a_silent_death_of_the_leader_the_next_in_the_chain_leads_within_its_bond", (0,)),
+    Bug("rule E9", "a robot in place without a vote says HELLO to all", team.hello_goes_to_all,
+        "membership::test_e9_a_robot_in_place_without_a_vote_says_hello_to_its_leader_alone_and_stays_in_the_chain"),
     Bug("rule E23", "an earlier incarnation is dropped in silence", team.earlier_incarnation_not_told,
         "incarnations::test_e23_a_robot_that_returns_with_another_clock_joins_at_the_tail", (-60.0,)),
     Bug("rule E23", "the highest number is the latest", team.highest_number_is_the_latest,

@@ -204,3 +204,7 @@ def gateway_term_kept_back(patch: pytest.MonkeyPatch) -> None:
         return effects
 
     patch.setattr(Lease, "gateway_term", gateway_term)
+
+
+def hello_goes_to_all(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(lfa.protocol.lease.machine.voting, "_greeted", lambda m: "all")
