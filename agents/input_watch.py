@@ -1,4 +1,6 @@
-"""Events about the inputs of one robot's own hardware: which is lost, or too slow, and when it is back."""
+"""Events about the inputs of one robot: which of its own hardware's is lost, or too slow, and when it is back; and who
+of the fleet says more than is taken.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,32 @@ from lfa.agents.navigator import Navigator
 from lfa.protocol.messages.consensus import Term
 from lfa.protocol.messages.robot import UNSAID_GRANT_S, Sensors
 from lfa.protocol.outbox import Outbox
+
+TOLD_S = 10.0
+"""Time [s] without a further refusal after which a member counts as quiet again."""
+
+
+class RefusalWatch:
+    """Watch over what this process refuses of others: an event when a member begins, and a text while it goes on."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+        self._last: dict[str, tuple[int, float]] = {}
+        """Number refused of each member, and the time [s] at which it last grew."""
+
+    def update(self, refused: tuple[tuple[str, int], ...], term: Term, now: float) -> None:
+        """Take the numbers of the members of which most was refused; publish an event for each that begins."""
+        for member, number in refused:
+            before, grew_at = self._last.get(member, (0, float("-inf")))
+            if number > before:
+                self._last[member] = number, now
+                if now - grew_at > TOLD_S:
+                    self._outbox.event("excess", now, term, {"member": member, "refused": number})
+
+    def text(self, now: float) -> str:
+        """Return whose messages or tokens are refused at present, and how many since the start; empty for nobody's."""
+        present = ((member, number) for member, (number, at) in self._last.items() if now - at <= TOLD_S)
+        return ", ".join(f"{number} messages or tokens of {member} refused" for member, number in present)
 
 
 class InputWatch:

@@ -15,7 +15,7 @@ from lfa.agents.attendance import Attendance
 from lfa.agents.avoidance.safety import obeyed
 from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
-from lfa.agents.input_watch import InputWatch
+from lfa.agents.input_watch import InputWatch, RefusalWatch
 from lfa.agents.leading.formation_commands import FormationCommands
 from lfa.agents.navigator import Navigator
 from lfa.agents.orders.roster_orders import JOIN, RETIRE, RosterOrders
@@ -91,6 +91,7 @@ class RobotCore:
         self._attendance = Attendance(robot_id, mission.robots)
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
         self._input_watch = InputWatch(outbox, self.navigator, self.lease.grant_s)
+        self._refusal_watch = RefusalWatch(outbox)
         self._period_s = mission.control_period_s
         self._next_control = now
         self._arrived = False
@@ -159,8 +160,10 @@ class RobotCore:
                 self._take_order(message, now)
             case Vitals():
                 self._attendance.update(lease, self._team, now)
+                self._refusal_watch.update(message.refused, lease.term, now)
                 stopped = self._stop_listener.text() if lease.chain else ""
                 held = stopped or self._roster_orders.text() or self._attendance.text()
+                held = held or self._refusal_watch.text(now)
                 gateway = self._input_watch.text()
                 self._reports.status(message, navigator, self._team, lease, self._role(), held, gateway, now)
             case Stop():

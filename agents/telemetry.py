@@ -221,7 +221,8 @@ def _health(navigator: Navigator, lease: Lease, role: Role, others: tuple[str, .
     `others` are further warnings, the empty ones of which do not hold.
     """
     if lease.missing:
-        return f"waiting for {', '.join(robot_name(i) for i in lease.missing)}", Level.WARN
+        awaited = f"waiting for {', '.join(robot_name(i) for i in lease.missing)}"
+        return ", ".join(filter(None, (awaited, *others))), Level.WARN
     lost = navigator.limits.lost_input(now)
     if lost is None:
         slow_hz = navigator.scan_age.slow_hz

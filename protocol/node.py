@@ -42,6 +42,8 @@ class Vitals(Struct, frozen=True, array_like=True, tag="vitals"):
     rss_mib: float
     tick_p99_s: float = 0.0
     """Processor time [s] of a tick, 99th percentile of the newest ticks."""
+    refused: tuple[tuple[str, int], ...] = ()
+    """The members of which most was refused, for their rates or numbers of tokens, with the numbers since the start."""
 
 
 class Stop(Struct, frozen=True, array_like=True, tag="stop"):

@@ -8,6 +8,9 @@ from lfa.protocol.messages.consensus import Member
 LAST_WORDS_HEARTBEATS = 2.0
 """Time, in heartbeats, after its token vanished in which messages of a dead process may still arrive."""
 
+IDS_MAX = 1024
+"""Maximum number of ids of which anything is remembered: a name may hold any number, a team has hundreds at most."""
+
 
 class FailureDetector:
     def __init__(self, me: Member, heartbeat_s: float) -> None:
@@ -28,6 +31,8 @@ class FailureDetector:
 
         An incarnation heard over two heartbeats after its token vanished is alive; earlier messages may be its last.
         """
+        if self._is_one_too_many(src.id):
+            return
         self._heard_at[src.id] = now
         if src.id not in self._newest or is_later(src.incarnation, self._newest[src.id]):
             self._newest[src.id] = src.incarnation
@@ -38,11 +43,15 @@ class FailureDetector:
                 self._return(src.id)
 
     def appeared(self, id: int, incarnation: int) -> None:
+        if self._is_one_too_many(id):
+            return
         self._tokens[id] = incarnation
         if id in self._gone and not is_later(self._gone[id][0], incarnation):
             self._return(id)
 
     def vanished(self, id: int, incarnation: int, now: float) -> None:
+        if self._is_one_too_many(id):
+            return
         if self._tokens.get(id) == incarnation:
             del self._tokens[id]
         if id in self._gone and is_later(self._gone[id][0], incarnation):
@@ -83,6 +92,10 @@ class FailureDetector:
     def has_ended(self, member: Member) -> bool:
         """Return True if no answer of this incarnation is expected: a later one was heard, or its token vanished."""
         return self.is_superseded(member) or self.is_gone(member)
+
+    def _is_one_too_many(self, id: int) -> bool:
+        known = (self._newest, self._tokens, self._gone)
+        return not any(id in of for of in known) and any(len(of) >= IDS_MAX for of in known)
 
     def _return(self, id: int) -> None:
         del self._gone[id]

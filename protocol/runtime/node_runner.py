@@ -258,7 +258,9 @@ def _loop(
             notify.alive()
             waited_for = _say_waits(runners[0].node, waited_for)
             for runner in runners:
-                runner.tell(vitals.of(runner.inbox.dropped, runner.host.undecodable, runner.tick_p99_s()), now)
+                inbox = runner.inbox
+                measured = vitals.of(inbox.dropped, runner.host.undecodable, runner.tick_p99_s(), inbox.refused)
+                runner.tell(measured, now)
         if stop.requested and stop_by is None:
             stop_by = now + STOP_GRACE_S
             for runner in runners:

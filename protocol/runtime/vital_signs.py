@@ -36,10 +36,14 @@ class VitalSigns:
         self._since, self._cpu_s = now, cpu_s
         return True
 
-    def of(self, dropped: int, undecodable: int, tick_p99_s: float) -> Vitals:
-        """Return the measurements for one node, given its counters and the length [s] of its ticks."""
+    def of(
+        self, dropped: int, undecodable: int, tick_p99_s: float, refused: tuple[tuple[str, int], ...] = ()
+    ) -> Vitals:
+        """Return the measurements for one node, given its counters, the length [s] of its ticks, and what was refused
+        of which members.
+        """
         lag_s, self._lag_s = self._lag_s, 0.0
-        return Vitals(lag_s, dropped, undecodable, self._cpu_percent, _resident_mib(), tick_p99_s)
+        return Vitals(lag_s, dropped, undecodable, self._cpu_percent, _resident_mib(), tick_p99_s, refused)
 
 
 def keep_one_heap() -> None:

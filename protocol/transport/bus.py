@@ -22,6 +22,13 @@ OWNER_RATE_MAX_HZ = 500.0
 OWNER_BURST_MAX = 1000.0
 """Maximum number of events accepted at once from one owner, after a link or a process stalled."""
 OWNERS_MAX = 256
+TOKENS_MAX = 16
+"""Maximum number of liveliness tokens of one owner at a time. It has one; those of incarnations that died with their
+machine remain until a link times out."""
+TOKEN_OWNERS_MAX = 1024
+"""Maximum number of owners of tokens; a team of 100 robots has some 300."""
+TOLD_MAX = 3
+"""Number of owners that `Inbox.refused` names."""
 
 
 class Arrival(Struct, frozen=True, gc=False):
@@ -101,17 +108,29 @@ class Inbox:
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
         """Remaining number of events that an owner may queue, and the time [s] of that number."""
+        self._tokens = TokenCaps()
+        self._refused: dict[str, int] = {}
+        """Number of arrivals that were dropped for the rate or the number of tokens of their owner."""
         self._wake = wake or Wake()
         self.dropped = 0
 
+    @property
+    def refused(self) -> tuple[tuple[str, int], ...]:
+        """The owners of which most was dropped for their rates or numbers of tokens, with the numbers since the start,
+        the greatest first.
+        """
+        with self._lock:
+            most = sorted(self._refused.items(), key=lambda item: (-item[1], item[0]))
+        return tuple(most[:TOLD_MAX])
+
     def put(self, arrival: Arrival) -> None:
-        """Add an arrival, on any thread; drop and count it if the queue is full or its owner exceeds its rate."""
+        """Add an arrival, on any thread; drop and count it if the queue is full or its owner exceeds its caps."""
         where = address(arrival.key)
         topic = TOPIC.get(where.topic) if where is not None else None
         with self._lock:
             if topic is not None and topic.state and not self._every:
                 self._newest[arrival.key] = arrival
-            elif len(self._queue) >= self._size_max or not (self._every or self._allows(where, arrival.at)):
+            elif len(self._queue) >= self._size_max or not self._admits(arrival, where):
                 self.dropped += 1
                 return
             else:
@@ -128,6 +147,15 @@ class Inbox:
         if where.topic != "lease":
             return False
         return self._defer_hellos if where.to == TO_HELLO else self.defer_grants and where.to != TO_ALL
+
+    def _admits(self, arrival: Arrival, where: Address | None) -> bool:
+        """Return whether the caps of its owner admit an arrival; count it otherwise."""
+        token = arrival.payload if isinstance(arrival.payload, PeerUp | PeerDown) else None
+        admits = token is None or self._tokens.admits(token)  # first: which tokens are there must stay known
+        admits = admits and (self._every or self._allows(where, arrival.at))
+        if not admits and where is not None and (where.owner in self._refused or len(self._refused) < OWNERS_MAX):
+            self._refused[where.owner] = self._refused.get(where.owner, 0) + 1
+        return admits
 
     def _allows(self, where: Address | None, now: float) -> bool:
         """Apply one token bucket per owner, so that a flooding owner takes neither time nor space from the others."""
@@ -151,6 +179,31 @@ class Inbox:
             self._newest.clear()
         arrivals.sort(key=_at)
         return arrivals
+
+
+class TokenCaps:
+    """Tokens that are there, up to a number of each owner: access rules name the keys of tokens and no numbers."""
+
+    def __init__(self) -> None:
+        self._there: dict[str, set[int]] = {}
+
+    def admits(self, event: PeerUp | PeerDown) -> bool:
+        """Return False for a token beyond the caps, when it appears and when it vanishes."""
+        owner, number = event.name, event.incarnation
+        there = self._there.get(owner)
+        if isinstance(event, PeerDown):
+            if there is None or number not in there:
+                return there is None or len(there) < TOKENS_MAX
+            there.discard(number)
+            if not there:
+                del self._there[owner]
+            return True
+        if there is None and len(self._there) < TOKEN_OWNERS_MAX:
+            there = self._there[owner] = set()
+        if there is None or (number not in there and len(there) >= TOKENS_MAX):
+            return False
+        there.add(number)
+        return True
 
 
 class Tokens:

@@ -6,6 +6,8 @@ from lfa.protocol.node import Local, PeerDown, PeerUp, RouterLost
 
 ANEW_S = (1.5, 6.5)
 """Delays [s] from a liveliness event: routers retry links every second, and a busy machine takes longer."""
+NAMES_MAX = 1024
+"""Maximum number of names whose vanished tokens are remembered."""
 AGAIN_S = (3.0, 12.0)
 """First and maximum interval [s] while a process lacks messages; each is twice the one before.
 
@@ -25,7 +27,8 @@ class Links:
 
     def __init__(self) -> None:
         self._due: list[float] = []
-        self._gone: set[tuple[str, int]] = set()
+        self._gone: dict[str, int] = {}
+        """Incarnation of the token that vanished last, by name."""
         self._cut_off = False
         self._again_at = float("inf")
         self._again_s = AGAIN_S[0]
@@ -37,9 +40,11 @@ class Links:
     def see(self, event: Local, now: float) -> None:
         match event:
             case PeerDown(name, incarnation):
-                self._gone.add((name, incarnation))
-            case PeerUp(name, incarnation) if self._cut_off or (name, incarnation) in self._gone:
-                self._gone.discard((name, incarnation))
+                if len(self._gone) >= NAMES_MAX:
+                    self._gone.clear()
+                self._gone[name] = incarnation
+            case PeerUp(name, incarnation) if self._cut_off or self._gone.get(name) == incarnation:
+                self._gone.pop(name, None)
             case RouterLost():
                 self._cut_off = True
                 return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfa.protocol.incarnations import NUMBERS, after, drawn_at, is_later
+from lfa.protocol.lease.failure_detector import IDS_MAX, FailureDetector
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import Hello, Member, Superseded, Term
@@ -153,3 +154,15 @@ def test_e24_a_learner_is_heard_as_well() -> None:
     team.run(3.0 + SETTLED_S)
     assert team.gateways[9].gateway.term_max == team.lease_of(1).term > far
     assert team.safe()
+
+
+def test_ids_without_end_take_no_memory_without_end() -> None:
+    peers = FailureDetector(Member(1, 1), 0.1)
+    for n in range(2, 3 * IDS_MAX):
+        peers.appeared(n, 1)
+        peers.heard(Member(n, 1), 0.0)
+        peers.vanished(n, 1, 0.0)
+    assert max(len(peers._newest), len(peers._tokens), len(peers._gone)) <= IDS_MAX
+    assert peers.is_gone(Member(2, 1))
+    peers.appeared(2, 1)
+    assert not peers.is_gone(Member(2, 1)), "those that are known are still heard"

@@ -14,6 +14,9 @@ from lfa.protocol.transport.bus import (
     OWNER_RATE_MAX_HZ,
     OWNERS_MAX,
     TOKEN_HOLD_S,
+    TOKEN_OWNERS_MAX,
+    TOKENS_MAX,
+    TOLD_MAX,
     Arrival,
     Inbox,
     Tokens,
@@ -166,3 +169,34 @@ def test_names_without_end_take_no_memory_without_end() -> None:
     for n in range(10 * OWNERS_MAX):
         inbox.put(Arrival(0.0, f"lfa/f/stranger{n}/lease/all", b""))
     assert len(inbox._allowances) <= OWNERS_MAX
+
+
+def test_of_one_members_tokens_only_a_few_come_in_and_the_rest_is_counted_once_each() -> None:
+    inbox = Inbox(size_max=10**6)
+    for n in range(20_000):
+        inbox.put(token(n / 100.0, PeerUp("robot3", n)))
+    inbox.put(token(200.0, PeerUp("robot2", 7)))
+    assert len(inbox.take()) == TOKENS_MAX + 1
+    assert inbox.refused == (("robot3", 20_000 - TOKENS_MAX),)
+    for n in range(20_000):
+        inbox.put(token(200.0 + n / 100.0, PeerDown("robot3", n)))
+    assert {a.payload.incarnation for a in inbox.take()} >= set(range(TOKENS_MAX))  # type: ignore[union-attr]
+    inbox.put(token(500.0, PeerUp("robot3", 99)))
+    assert len(inbox.take()) == 1, "there is room again"
+
+
+def test_tokens_of_names_without_end_take_no_memory_without_end() -> None:
+    inbox = Inbox(size_max=10**6)
+    for n in range(4 * TOKEN_OWNERS_MAX):
+        inbox.put(token(0.0, PeerUp(f"robot{n}", 1)))
+    assert len(inbox.take()) == TOKEN_OWNERS_MAX
+    assert len(inbox._refused) <= OWNERS_MAX
+
+
+def test_those_of_whom_most_was_refused_are_named() -> None:
+    inbox = Inbox(size_max=10**6)
+    for robot in range(1, 6):
+        for _ in range(int(OWNER_BURST_MAX) + robot):
+            inbox.put(Arrival(0.0, f"lfa/f/robot{robot}/lease/all", b""))
+    assert inbox.refused == tuple((f"robot{n}", n) for n in (5, 4, 3))
+    assert len(inbox.refused) == TOLD_MAX

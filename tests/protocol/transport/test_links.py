@@ -11,7 +11,7 @@ import zenoh
 
 from lfa.protocol.node import PeerDown, PeerUp, RouterLost
 from lfa.protocol.topics import TOPICS, alive_key, key
-from lfa.protocol.transport.links import AGAIN_S, ANEW_S, Links
+from lfa.protocol.transport.links import AGAIN_S, ANEW_S, NAMES_MAX, Links
 from lfa.protocol.transport.spelling import TURNS, respelled
 
 
@@ -145,3 +145,11 @@ def test_a_declaration_that_a_link_lost_comes_back_though_a_neighbour_follows_th
     """The link loses HELLO, by a rule of the far router; both clients of the near one have declared it."""
     done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, timeout=90, check=False)
     assert done.stdout.strip() == "True", done.stdout + done.stderr
+
+
+def test_vanished_tokens_of_numbers_without_end_take_no_memory_without_end() -> None:
+    links = Links()
+    for n in range(5000):
+        links.see(PeerDown("robot3", n), 0.0)
+        links.see(PeerDown(f"robot{n}", 1), 0.0)
+    assert len(links._gone) <= NAMES_MAX
