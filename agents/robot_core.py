@@ -249,8 +249,10 @@ class RobotCore:
         leads = lease.role is Role.LEADER
         if note.header.sender == OPERATOR_NAME:
             changed = orders.propose(note.order, leads, lease.term, now)
+        elif leads:
+            changed = orders.hear_robot(note, lease.term, now)
         else:
-            changed = not leads and orders.hear(note, lease.config.version.term, now)
+            changed = orders.hear(note, lease.config.version.term, now)
         if changed:
             self._change_mission(now)
 
@@ -363,6 +365,8 @@ class RobotCore:
             self._team_orders.lead(lease.term, now)
             narrow = partial(navigator.narrow_ahead, pose)
             self._formation_commands.lead(navigator.lead, self._place.ids[1:], lease.term, now, narrow)
+        elif role is Role.FOLLOWER:
+            self._team_orders.follow(lease.config.version.term, now)
         if role is Role.LEADER and not self._arrived and navigator.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)

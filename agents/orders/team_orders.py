@@ -1,7 +1,9 @@
 """The operator's orders to the team at one robot: what it may change of the mission, and from whom (E32).
 
 Every robot hears what the operator proposes, and keeps the newest. The leader checks it, carries it out, and says it
-again once a second under its term; a new leader goes on with the newest order that it knows.
+again once a second under its term; a new leader goes on with the newest order that it knows. Two operators may have
+counted on from the same order, each heard by another leader: of two orders of one version, that of the later term
+holds. A robot that knows a higher version than its leader says tells the leader.
 """
 
 from __future__ import annotations
@@ -9,13 +11,15 @@ from __future__ import annotations
 from msgspec import structs
 
 from lfa.protocol.errors import Refused
-from lfa.protocol.messages.consensus import Term
+from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.orders import OrderNote, TeamOrder
 from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import check_mission
 from lfa.protocol.outbox import Outbox
 
 REPEAT_S = 1.0
+REMIND_S = 2.0
+"""Time [s] for which a leader may say no order before a robot that knows one tells it, longer than `REPEAT_S`."""
 QUESTION = "team_order"
 
 
@@ -30,6 +34,10 @@ class TeamOrders:
         self._proposed: TeamOrder | None = None
         """Newest order of an operator that no leader has been heard to carry out."""
         self._repeat_at = float("-inf")
+        self._carried = NO_TERM
+        """Term under which this robot heard the order last, or carries it itself."""
+        self._reminded = NO_TERM
+        """Newest known term; its leader is told of the order at `_repeat_at` unless it says it."""
 
     def propose(self, order: TeamOrder, leads: bool, term: Term, now: float) -> bool:
         """Process an operator's order: as leader, carry it out or say why not. Return True if the mission changes."""
@@ -44,7 +52,7 @@ class TeamOrders:
             self._refuse(order, f"version {self.order.version} holds already", term, now)
             return False
         try:
-            self._adopt(order)
+            self._adopt(order, term)
         except Refused as refused:
             self._refuse(order, str(refused), term, now)
             return False
@@ -53,18 +61,28 @@ class TeamOrders:
 
     def hear(self, note: OrderNote, newest: Term, now: float) -> bool:
         """Process what a leader carries; `newest` is the newest known term. Return True if the mission changes."""
-        if note.term is None or note.term < newest or note.order.version <= self.order.version:
+        order, term = note.order, note.term
+        if term is None or term < newest or order.version == 0:
+            return False
+        if (order.version, term) <= (self.order.version, self._carried):
+            return False
+        if order == self.order:
+            self._carried = term
             return False
         try:
-            self._adopt(note.order)
+            self._adopt(order, term)
         except Refused:
             return False
-        self._outbox.event("order", now, note.term, {"version": note.order.version})
+        self._outbox.event("order", now, term, {"version": order.version})
         return True
+
+    def hear_robot(self, note: OrderNote, term: Term, now: float) -> bool:
+        """Process, as leader of `term`, an order that another robot knows. Return True if the mission changes."""
+        return note.order.version > self.order.version and self.propose(note.order, True, term, now)
 
     def begin(self, term: Term, now: float) -> bool:
         """Start a term as leader, with the newest order. Return True if the mission changes."""
-        self._repeat_at = now
+        self._repeat_at, self._carried = now, term
         proposed, self._proposed = self._proposed, None
         newer = proposed is not None and proposed.version > self.order.version
         return proposed is not None and newer and self.propose(proposed, True, term, now)
@@ -74,14 +92,23 @@ class TeamOrders:
         if self.order.version > 0 and now >= self._repeat_at:
             self.say(term, now)
 
+    def follow(self, newest: Term, now: float) -> None:
+        """Tell a leader that does not say this robot's order of it; `newest` is the newest known term."""
+        if self.order.version == 0 or self._carried >= newest:
+            return
+        if self._reminded != newest:
+            self._reminded, self._repeat_at = newest, now + REMIND_S
+        elif now >= self._repeat_at:
+            self.say(self._carried, now)
+
     def say(self, term: Term, now: float) -> None:
-        """Publish the order as the leader of `term` carries it."""
+        """Publish the order as the leader of `term` carries it, or carried it."""
         self._repeat_at = now + REPEAT_S
         self._outbox.publish("team_order", OrderNote(self._outbox.header("team_order", now), self.order, term))
 
-    def _adopt(self, order: TeamOrder) -> None:
+    def _adopt(self, order: TeamOrder, term: Term) -> None:
         self.mission = check_mission(structs.replace(self.mission, leading=order.leading, formation=order.formation))
-        self.order = order
+        self.order, self._carried = order, term
 
     def _say(self, term: Term, now: float) -> None:
         self.say(term, now)

@@ -185,5 +185,6 @@ MUTANTS = (
     roster_mutant("full_house_of_all"),
     order_mutant("late_order"),
     order_mutant("old_leader"),
+    order_mutant("equal_versions"),
     order_mutant("forgets"),
 )

@@ -44,11 +44,16 @@ def drop_candidacy(m: LeaseMemory, now: float) -> None:
 
 
 def adopt(m: LeaseMemory, config: Config, now: float) -> None:
-    """Adopt `config` if newer; step down if another leads it, as the own lease is then fenced or expired."""
+    """Adopt `config` if newer; step down if another leads it, as the own lease is then fenced or expired.
+
+    A candidate that it has retired gives up, however it came by the config (E34).
+    """
     if config.version > m.config.version:
         if config.chain[0] != m.me:
             step_down(m, now, "deposed")
         m.config = config
+        if not m.election.may_lead(config, m.me.id):
+            drop_candidacy(m, now)
         m.effects.append(AdoptChain(config))
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from msgspec import structs
 
-from lfa.agents.orders.team_orders import QUESTION
+from lfa.agents.agent import Agent
+from lfa.agents.orders.team_orders import QUESTION, TeamOrders
 from lfa.deploy.client.mission_changes import along, to_goal, unchanged
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_call import Change, OrderCall, OrderOutcome
@@ -81,6 +82,11 @@ class Commanded:
         self.team.run(self.team.now + for_s)
         return self
 
+    def orders_of(self, robot: int) -> TeamOrders:
+        node = self.team.processes[robot].node
+        assert isinstance(node, Agent) and node.core is not None
+        return node.core._team_orders
+
     def leader(self) -> int:
         (leader,) = self.team.leaders()
         return leader
@@ -120,6 +126,20 @@ def test_e32_a_leader_that_dies_right_after_the_order_leaves_it_to_the_next(afte
     assert outcome.leader in (1, 2)
     assert scene.run(1.0).leader() == 2
     scene.run(18.0)
+    assert hypot(scene.truth[2][0] - goal[0], scene.truth[2][1] - goal[1]) < NEAR_M
+
+
+def test_e32_an_acknowledged_order_is_not_lost_where_the_next_leader_has_missed_it() -> None:
+    scene = Commanded()
+    x, y, _ = scene.truth[1]
+    goal = (x + 4.0, y + 1.5)
+    with pytest.MonkeyPatch.context() as patch:  # robot 2 hears of the order neither from the operator nor the leader
+        patch.setattr(scene.orders_of(2), "propose", lambda *_: False)
+        patch.setattr(scene.orders_of(2), "hear", lambda *_: False)
+        assert scene.say(along((goal,), ())).robots == (1, 3)
+        scene.kill_leader()
+    assert scene.run(1.0).leader() == 2
+    scene.run(20.0)
     assert hypot(scene.truth[2][0] - goal[0], scene.truth[2][1] - goal[1]) < NEAR_M
 
 

@@ -30,6 +30,19 @@ def orders_of_an_old_term_are_obeyed(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(TeamOrders, "hear", hear)
 
 
+def orders_of_one_version_are_one(patch: pytest.MonkeyPatch) -> None:
+    honest = TeamOrders.hear
+
+    def hear(self: TeamOrders, note: OrderNote, newest: Term, now: float) -> bool:
+        return note.order.version > self.order.version and honest(self, note, newest, now)
+
+    patch.setattr(TeamOrders, "hear", hear)
+
+
+def nobody_tells_a_new_leader(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(TeamOrders, "follow", lambda self, newest, now: None)
+
+
 def new_leader_forgets_proposals(patch: pytest.MonkeyPatch) -> None:
     honest = TeamOrders.begin
 

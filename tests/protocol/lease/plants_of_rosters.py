@@ -10,6 +10,8 @@ import lfa.protocol.lease.membership
 import lfa.protocol.lease.reconfiguration
 from lfa.protocol.lease.candidate import Candidate
 from lfa.protocol.lease.election import Election
+from lfa.protocol.lease.machine import resigning
+from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.messages.consensus import Config, Roster
 
 
@@ -29,6 +31,17 @@ def strangers_are_taken_in(patch: pytest.MonkeyPatch) -> None:
 
 def retired_robots_stand(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Election, "may_lead", lambda self, config, robot_id: robot_id != 0)
+
+
+def retired_candidates_go_on(patch: pytest.MonkeyPatch) -> None:
+    honest = resigning.adopt
+
+    def adopt(m: LeaseMemory, config: Config, now: float) -> None:
+        candidate = m.candidate
+        honest(m, config, now)
+        m.candidate = candidate
+
+    patch.setattr(resigning, "adopt", adopt)
 
 
 def retired_robots_are_taken_in_again(patch: pytest.MonkeyPatch) -> None:

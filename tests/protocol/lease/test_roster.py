@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from msgspec import structs
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.lease.membership import is_spare, joined, retired
-from lfa.protocol.messages.consensus import Prepare, Roster, Spare
-from tests.rigs.lease_scenes import Team
+from lfa.protocol.messages.consensus import LeaseBody, Prepare, Promise, Propose, Roster, Spare, Version
+from tests.rigs.lease_scenes import Team, sent
 
 ROBOTS = (1, 2, 3, 4)
 
@@ -173,6 +174,27 @@ def test_e34_a_candidate_that_learns_of_its_retirement_gives_up() -> None:
     team.run(8.0)
     assert team.leaders() == [3]
     assert team.safe()
+
+
+def test_e34_a_candidate_gives_up_too_when_a_late_propose_tells_it_of_its_retirement() -> None:
+    team = Operated(3)
+    lease = team.lease_of(2)
+    config = lease.config
+    heard = structs.replace(config, version=Version(config.version.term, config.version.seq + 1))
+    heard = structs.replace(heard, chain=config.chain[::2], roster=Roster(retired=(2,)))
+    heard = structs.replace(heard, voters=tuple(voter for voter in config.voters if voter.id != 2))
+    asked: list[LeaseBody] = []
+    while not asked:
+        stands_at = lease.next_deadline()
+        asked = sent(lease.tick(stands_at), Prepare)
+    [prepare] = asked
+    assert isinstance(prepare, Prepare)
+    leader = config.chain[0]
+    lease.receive(leader, Propose(config.version.term, heard, 9, leader, agreed=lease.agreed), stands_at)
+    promises = [Promise(prepare.term, heard, None, False)] * 3
+    effects = [e for m, p in zip(config.voters, promises, strict=False) for e in lease.receive(m, p, stands_at)]
+    assert lease.config == heard
+    assert sent([*effects, *lease.tick(stands_at + 1.0)], Prepare) == sent(effects, Propose) == []
 
 
 def test_e34_a_retired_robot_never_leads_also_when_nobody_else_is_left() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec import structs
 
-from lfa.agents.orders.team_orders import TeamOrders
+from lfa.agents.orders.team_orders import REMIND_S, TeamOrders
 from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.orders import OrderNote, TeamOrder
@@ -22,6 +22,10 @@ class Robot:
     def __init__(self) -> None:
         self._outbox = Outbox("f", "robot1", 1)
         self.orders = TeamOrders(self._outbox, MISSION)
+
+    def told(self) -> list[tuple[int, Term | None]]:
+        said = [envelope.message for envelope in self._outbox.drain()]
+        return [(message.order.version, message.term) for message in said if isinstance(message, OrderNote)]
 
     def events(self) -> list[tuple[str, int]]:
         said = [envelope.message for envelope in self._outbox.drain()]
@@ -76,6 +80,37 @@ def test_e32_a_new_leader_does_not_return_to_an_order_that_a_later_one_has_repla
     assert robot.orders.hear(carried(to(8.0, 2), OLD), OLD, 0.1)
     assert not robot.orders.begin(NEW, 0.2)
     assert robot.orders.mission.goal_m == (8.0, 0.0)
+
+
+def test_e32_of_two_orders_that_count_from_the_same_one_that_of_the_later_leader_holds_at_all() -> None:
+    first, second, third = Robot(), Robot(), Robot()
+    mine, other = to(7.0, 1), to(8.0, 1)
+    second.orders.propose(other, False, OLD, 0.0)
+    assert first.orders.propose(mine, True, OLD, 0.0)
+    assert third.orders.hear(carried(mine, OLD), OLD, 0.1)
+    assert second.orders.begin(NEW, 0.2), "the first leader is lost, and this one never heard its order"
+    assert all(robot.orders.hear(carried(other, NEW), NEW, 0.3) for robot in (first, third))
+    assert not third.orders.hear(carried(mine, OLD), OLD, 0.4), "nor does a late word of the first leader change it"
+    assert first.orders.order == second.orders.order == third.orders.order == other
+
+
+def test_e32_a_leader_that_says_no_order_is_told_of_it_once_it_had_time_to() -> None:
+    robot, leader = Robot(), Robot()
+    order = to(7.0, 1)
+    robot.orders.hear(carried(order, OLD), OLD, 0.0)
+    robot.orders.follow(OLD, 9.0)
+    robot.orders.follow(NEW, 10.0)
+    robot.orders.follow(NEW, 10.0 + REMIND_S - 0.01)
+    assert robot.told() == []
+    robot.orders.follow(NEW, 10.0 + REMIND_S)
+    assert robot.told() == [(1, OLD)]
+    leader.orders.begin(NEW, 10.0)
+    assert leader.orders.hear_robot(carried(order, OLD), NEW, 12.0)
+    assert leader.told() == [(1, NEW)]
+    assert not leader.orders.hear_robot(carried(to(9.0, 1), OLD), NEW, 12.0)
+    assert not robot.orders.hear(carried(order, NEW), NEW, 12.0), "it knows it"
+    robot.orders.follow(NEW, 20.0)
+    assert robot.told() == []
 
 
 def test_e32_an_order_of_an_old_term_or_of_none_is_not_obeyed() -> None:
