@@ -10,15 +10,18 @@ from msgspec import Struct, structs
 
 from lfa.deploy.analysis.causes.broken_rules import BrokenRule, RuleWatch
 from lfa.deploy.analysis.verification.checker import Checker, Violation
+from lfa.deploy.analysis.verification.fleet_stop import LatchKept
 from lfa.deploy.analysis.verification.leadership import NextInChain, Steady, StopsWithoutQuorum
 from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS
 from lfa.deploy.analysis.verification.safety import SAFETY
+from lfa.deploy.analysis.verification.words_kept import WORDS_KEPT
 from lfa.deploy.fuzz.held_messages import MessageHolder
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.roster_calls import RosterCalls
 from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
 from lfa.deploy.fuzz.stops import StopTraffic
+from lfa.deploy.fuzz.tricks import Tricks
 from lfa.protocol.lease.membership import team_of
 from lfa.protocol.lease.quorum import is_quorum
 from lfa.protocol.messages.consensus import Member
@@ -47,7 +50,7 @@ class Played(Struct):
     elections: int
     simulation: Simulation
     broken: BrokenRule | None = None
-    """Rule that the first violation shows to be broken, with its chain of causes; None: no violation, or not shown."""
+    """Rule that the first violation to show one shows to be broken, with its chain of causes; None: none does."""
 
 
 class Faults:
@@ -244,22 +247,22 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
         simulation.listen([*checkers, traffic.observer])
         rosters = RosterCalls(simulation)
         rosters.begin(schedule.rosters)
+        Tricks(simulation).begin(schedule.tricks)
     simulation.start_all()
     simulation.run(DURATION_S)
     for checker in checkers:
         checker.over(simulation.now)
     violations = [v for checker in checkers for v in checker.violations]
     elections = sum(1 for _, _, effect in simulation.log if type(effect).__name__ == "BecomeLeader")
-    broken = watch.broken_rules[0][1] if watch.broken_rules else None
+    broken = next((rule for _, rule in watch.broken_rules if rule is not None), None)
     return Played(schedule, violations, faults.counts, elections, simulation, broken)
 
 
 def _checkers(schedule: Schedule) -> list[type[Checker]]:
     """Return the checkers of all invariants that apply to this schedule."""
-    kinds = [*SAFETY, *AFTER_FAULTS, StopsWithoutQuorum]
-    if (
-        not (schedule.faults or schedule.rosters) and schedule.profile != "fast"
-    ):  # 20 % loss may cost "fast" its leader (design, 7)
+    kinds = [*SAFETY, *WORDS_KEPT, LatchKept, *AFTER_FAULTS, StopsWithoutQuorum]
+    disturbed = schedule.faults or schedule.rosters or schedule.tricks
+    if not disturbed and schedule.profile != "fast":  # 20 % loss may cost "fast" its leader (design, 7)
         kinds.append(Steady)
     if schedule.is_single:
         kinds.append(NextInChain)

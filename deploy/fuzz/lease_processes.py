@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from msgspec import structs
+
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.gateways import GatewaySimulation
 from lfa.deploy.fuzz.network import effect_text
@@ -18,8 +20,12 @@ from lfa.protocol.messages.consensus import (
     NO_TERM,
     GatewayStamp,
     Grant,
+    Hello,
     LeaseBody,
     Member,
+    Nack,
+    Prepare,
+    Promise,
     Propose,
     Release,
     Role,
@@ -39,6 +45,8 @@ ROUNDING_S = 1e-9
 INBOX_SIZE_MAX = 500
 """Maximum number of messages kept for a paused process."""
 NEVER = float("inf")
+VERSIONS_APART = 2
+"""Versions of the messages between those of a foreign process and of all others, whichever reads."""
 
 Call = Callable[..., list[Effect]]
 Transition = tuple[LeaseEvent, LeaseState, LeaseState]
@@ -74,6 +82,8 @@ class Hosts(GatewaySimulation):
         self.transitions: set[Transition] = set()
         """Transitions that any lease has made; coverage for a guided search."""
         self.processes: dict[int, Process] = {}
+        self.foreign: set[Member] = set()
+        """Processes that speak a version of the messages which the others cannot read (E35)."""
         self.log: list[tuple[float, int, Effect]] = []
         """`BecomeLeader`, `StepDown` and `StandAside` effects, each with its true time [s] and the id."""
         self._addresses = {name: to for i in self.ids for name, to in ((robot_name(i), i), (f"gateway{i}", -i))}
@@ -92,11 +102,13 @@ class Hosts(GatewaySimulation):
         """Call a method of the lease at its local time, and execute the effects."""
         self.carry_out(process, method(*arguments, process.clock.local(self.now)))
 
-    def observed(self, observed: Observed) -> None:
-        """Note the transition, and notify the checkers of a promise that a lease receives."""
+    def observed(self, who: Member, observed: Observed) -> None:
+        """Note a transition of `who`, and notify the checkers of a promise and of a RELEASE that a lease receives."""
         self.transitions.add((observed.event, observed.before, observed.after))
         if observed.event is LeaseEvent.PROMISE:
             self._report(Checker.promises, self.now, *observed.given)
+        elif observed.event is LeaseEvent.RELEASE:
+            self._report(Checker.hears_release, self.now, who, observed.given[1].term)
 
     def wake_at(self, process: Process, true: float) -> None:
         """Schedule a wake-up of the process at a true time [s], unless an earlier one is scheduled."""
@@ -119,6 +131,10 @@ class Hosts(GatewaySimulation):
     def _arrive(self, src: Member, to: int, body: LeaseBody) -> None:
         process = self.processes.get(to)
         if process is not None and process.alive:
+            if (src in self.foreign) != (process.member in self.foreign) and isinstance(
+                body, Prepare | Propose | Hello
+            ):
+                body = structs.replace(body, wire=body.wire + VERSIONS_APART)
             self.deliver(process, process.lease.receive, (src, body))
 
     def _at_gateway(self, src: Member, robot_id: int, body: LeaseBody) -> None:
@@ -222,6 +238,8 @@ class Hosts(GatewaySimulation):
                 self._tell_grant(process, Grant(body.term, body.round, body.config.version, 0.0))
         elif isinstance(body, Release):
             self._report(Checker.releases, self.now, body.term)
+        elif isinstance(body, Promise | Nack | Prepare):
+            self._report(Checker.says, self.now, process.member, body)
 
     def _tell_grant(self, process: Process, grant: Grant) -> None:
         until = self.now + self._grant_s / process.clock.rate

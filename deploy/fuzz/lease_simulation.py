@@ -6,6 +6,10 @@ and gateways with the true time, which no process knows.
 
 from __future__ import annotations
 
+from functools import partial
+
+from msgspec import structs
+
 from lfa.deploy.analysis.verification.checker import Checker
 from lfa.deploy.fuzz.lease_processes import FOLLOW_PERIOD_S, Hosts, Process
 from lfa.deploy.fuzz.network import FAIR
@@ -79,7 +83,9 @@ class LeaseSimulation(Hosts):
         clock = LocalClock(self.random.uniform(0.0, 1000.0), self.rates.get(robot_id, 1.0))
         floor = max(round(self.now * 1000.0) + self.wall_ms.get(robot_id, 0), 0)
         mission = mission or self.mission
-        lease = Lease(member, mission, timing_for(mission), clock.local(self.now), floor, self.observed)
+        lease = Lease(
+            member, mission, timing_for(mission), clock.local(self.now), floor, partial(self.observed, member)
+        )
         process = Process(member, lease, clock, self.mission.robots)
         self.processes[robot_id] = process
         if self.trace is not None:
@@ -166,6 +172,13 @@ class LeaseSimulation(Hosts):
         """Set a host's wall clock wrong by `by_s` [s]; no other clock can be stepped."""
         self.wall_ms[robot_id] = round(by_s * 1000.0)
         self._report(Checker.wall_steps, self.now, robot_id)
+
+    def command_ahead(self, robot_id: int, by_s: float) -> None:
+        """Send a follower's command to a robot's gateway that echoes a time `by_s` [s] ahead of its clock (E12)."""
+        process, stamp = self.processes[robot_id], self.stamp(robot_id)
+        if stamp is not None:
+            ahead = structs.replace(stamp, time=stamp.time + by_s)
+            self.command(robot_id, self._drawn(process, process.lease.term, process.lease.chain[0], False, ahead))
 
     def lose_late(self, within_s: float) -> None:
         """Drop the messages in transit that would arrive later than `within_s` [s] from now."""

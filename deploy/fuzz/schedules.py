@@ -11,6 +11,7 @@ from random import Random
 from msgspec import Struct, structs
 
 from lfa.deploy.fuzz.network import FAIR
+from lfa.protocol.lease.term_window import FREE, FRESH, LAST
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
 from lfa.protocol.mission import Profile
 from lfa.protocol.transport.link_model import Radio
@@ -24,8 +25,19 @@ STOPS_MAX = 20
 ROSTER_SHARE = 0.3
 """Fraction of schedules with spares, and with operators who let robots join and retire."""
 ROSTER_CALLS_MAX = 6
+TRICK_SHARE = 0.3
+"""Fraction of schedules with tricks: faults that are rare and broad."""
+TRICKS_MAX = 3
+TRICKS_UNTIL_S = 1.8
+"""Time [s] of the last trick: who has promised a made-up term waits 20 heartbeats for its lease (E5)."""
+BLACKOUT_LATER_S = 1.2
+"""How much later [s] than other tricks a blackout may come: after more elections."""
+MADE_UP_TERMS = (LAST, LAST - 1, FREE + FRESH + 1, FREE)
+"""Numbers of terms that nobody can have come to (E26)."""
 CALM_SHARE = 0.05
 """Fraction of schedules without a fault, in which no leader may step down (L5)."""
+LOSSY_SHARE, CALM_LOSS, PAIR_SHARE = 0.7, 0.2, 0.5
+"""Fraction of those at the greatest loss that L5 allows for, and of pairs without witness."""
 SINGLE_SHARE = 0.05
 """Fraction of schedules with the kill of a leader as only fault, after which the next in the chain leads (L6)."""
 LEADER_SHARE = 0.4
@@ -76,12 +88,15 @@ class Schedule(Struct, frozen=True):
     """Robots that run and that the mission does not name (E33)."""
     rosters: tuple[ScheduledFault, ...] = ()
     """Calls of operators: `join` of an id, by `value` in the place of another, and `retire` of one."""
+    tricks: tuple[ScheduledFault, ...] = ()
+    """`blackout` of all processes and of the gateways of some robots, on clocks set wrong by `value` [s]; terms
+    `made_up`; a command that echoes a time `ahead` by `value` [s]; a process that speaks another `version`."""
 
     @property
     def is_single(self) -> bool:
         """Schedule with perfect links and one fault: the leader is killed, and no message is held back."""
         kinds = [fault.kind for fault in self.faults]
-        changed = self.held or self.rosters
+        changed = self.held or self.rosters or self.tricks
         return kinds == ["kill"] and self.faults[0].targets == (LEADER,) and self.radio == FAIR and not changed
 
 
@@ -123,12 +138,13 @@ def draw(seed: int) -> Schedule:
     share = random.random()
     radio = _radio(random)
     spares, rosters = _rosters(Random(f"roster-{seed}"), ids)
+    tricks = _tricks(Random(f"trick-{seed}"), ids)
     faults = [draw_fault(random, kinds, ids + spares) for _ in range(_count(random, FAULTS_MEAN))]
     if share < CALM_SHARE:
         faults = []
     elif share < CALM_SHARE + SINGLE_SHARE:
         faults, radio = [ScheduledFault(random.uniform(1.5, FAULTS_UNTIL_S), "kill", (LEADER,))], FAIR
-    return Schedule(
+    schedule = Schedule(
         seed=seed,
         robots=robots,
         witness=witness,
@@ -137,14 +153,29 @@ def draw(seed: int) -> Schedule:
         rates={i: _rate(random) for i in (*ids, 0, *(-i for i in ids))},
         faults=tuple(sorted(faults, key=_when)),
         radio=radio,
-        stops=_stops(Random(f"operator-{seed}"), ids),
+        stops=draw_stops(Random(f"operator-{seed}"), ids),
         spares=spares,
         rosters=rosters,
+        tricks=() if share < CALM_SHARE + SINGLE_SHARE else tricks,
         revive_all=random.random() < 0.5,
+    )
+    return _calm(schedule) if share < CALM_SHARE else schedule
+
+
+def _calm(schedule: Schedule) -> Schedule:
+    """Return a schedule without a fault, often at a fifth of all messages lost (L5), and of a pair without witness."""
+    random = Random(f"calm-{schedule.seed}")
+    if random.random() < LOSSY_SHARE:
+        schedule = structs.replace(schedule, radio=structs.replace(FAIR, loss=CALM_LOSS))
+    if random.random() >= PAIR_SHARE:
+        return schedule
+    stops = draw_stops(random, (1, 2))
+    return structs.replace(
+        schedule, robots=2, witness=False, gateways_at_world=False, stops=stops, spares=(), rosters=()
     )
 
 
-def _stops(random: Random, ids: tuple[int, ...]) -> tuple[ScheduledFault, ...]:
+def draw_stops(random: Random, ids: tuple[int, ...]) -> tuple[ScheduledFault, ...]:
     """Return the calls of operators, at hosts among `ids`; stops, resumes and replays come in any order."""
     times = sorted(random.uniform(WARM_UP_S, FAULTS_UNTIL_S) for _ in range(random.randint(0, STOPS_MAX)))
     return tuple(
@@ -166,6 +197,36 @@ def _rosters(random: Random, ids: tuple[int, ...]) -> tuple[tuple[int, ...], tup
         slot_of = random.choice((0, *ids))
         calls.append(ScheduledFault(at, kind, (robot,), random.uniform(0.3, 1.5), float(slot_of)))
     return spares, tuple(calls)
+
+
+def _tricks(random: Random, ids: tuple[int, ...]) -> tuple[ScheduledFault, ...]:
+    """Return the tricks of a schedule; none in most schedules."""
+    if random.random() >= TRICK_SHARE:
+        return ()
+    times = sorted(random.uniform(WARM_UP_S, TRICKS_UNTIL_S) for _ in range(random.randint(1, TRICKS_MAX)))
+    return tuple(draw_trick(random, at, ids) for at in times)
+
+
+def draw_trick(random: Random, at: float, ids: tuple[int, ...]) -> ScheduledFault:
+    """Draw one trick at time `at` [s] on a team of robots `ids`."""
+    kind, target = random.choice(("blackout", "blackout", "made_up", "ahead", "version")), random.choice(ids)
+    match kind:
+        case "blackout":
+            share = random.choice((0.0, 0.5, 1.0, 1.0))
+            gateways = tuple(i for i in ids if random.random() < share)
+            return ScheduledFault(
+                at + random.uniform(0.0, BLACKOUT_LATER_S),
+                kind,
+                gateways,
+                random.uniform(0.02, 0.3),
+                random.choice((0.0, 0.0, -3600.0)),
+            )
+        case "made_up":
+            return ScheduledFault(at, kind, (target,), value=float(random.randrange(len(MADE_UP_TERMS))))
+        case "ahead":
+            return ScheduledFault(at, kind, (target,), value=random.choice((0.05, 1.0, 1e9)))
+        case _:
+            return ScheduledFault(at, kind, (target,), random.uniform(0.5, FAULTS_UNTIL_S))
 
 
 def _count(random: Random, mean: float) -> int:

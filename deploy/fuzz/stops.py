@@ -39,6 +39,8 @@ class StopTraffic:
         self._said: list[StopOrder] = []
         self._acknowledged: dict[int, StopWord] = {}
         """Greatest stop that each robot's gateway has acknowledged, as kept by its agent too."""
+        self._relying: set[int] = set()
+        """Robots whose agent and gateway have forgotten, while more than half of the agents know: they ask (E30)."""
         self._answers = 0
         self.outcomes: list[tuple[float, float, StopOutcome]] = []
         """Results of the calls that have ended, with the times [s] of their begin and end."""
@@ -109,6 +111,7 @@ class StopTraffic:
             return
         gateway, local = running.gateway, running.clock.local(self._team.now)
         gateway.stop.order(order, local)
+        self._team.report(Checker.hears_order, self._team.now, robot, gateway.incarnation, order)
         self._answers += 1
         header = Header(f"driver{robot}", gateway.incarnation, self._answers, local)
         state = StopState(header, gateway.stop.known, gateway.twist(local) == STILL, gateway.stop.kept)
@@ -135,14 +138,35 @@ class StopTraffic:
             self._team.report(Checker.turns, self._team.now, robot, running.gateway.stop.known.word)
 
     def started(self, robot: int) -> None:
-        """Report that a robot has forgotten what it acknowledged: agent and gateway, before one has told the other."""
+        """Report that a robot has forgotten what it acknowledged: agent and gateway, before one has told the other.
+
+        More than half of the agents remember for it: it is held to its word as long as none of them starts anew.
+        """
         word = self._acknowledged.get(robot)
         process, running = self._team.processes.get(robot), self._team.gateways.get(robot)
         known_there = process is not None and process.alive and process.stop.known.word >= (word or NO_STOP)
         known = running.gateway.stop.known if running is not None and running.alive else None
         if word is not None and not known_there and not (known is not None and known.certain and known.word >= word):
-            del self._acknowledged[robot]
-            self._team.report(Checker.stop_forgotten, self._team.now, robot)
+            if self._most_know(word):
+                self._relying.add(robot)
+            else:
+                self._forgets(robot)
+
+    def agent_started(self, robot: int) -> None:
+        """Report what is forgotten now that the agent of `robot` begins anew."""
+        for other in self._relying - {robot}:
+            self._forgets(other)
+        self.started(robot)
+
+    def _forgets(self, robot: int) -> None:
+        self._acknowledged.pop(robot, None)
+        self._relying.discard(robot)
+        self._team.report(Checker.stop_forgotten, self._team.now, robot)
+
+    def _most_know(self, word: StopWord) -> bool:
+        agents = (self._team.processes.get(robot) for robot in self._robots)
+        knowing = sum(one is not None and one.alive and one.stop.known.word >= word for one in agents)
+        return 2 * knowing > len(self._robots)
 
     def _ask_all(self) -> None:
         self._team.at(self._team.now + ASK_S / 2.0, self._ask_all)
@@ -184,4 +208,4 @@ class _Observer(Checker):
         self._traffic.started(robot_id)
 
     def lives(self, at: float, who: Member) -> None:
-        self._traffic.started(who.id)
+        self._traffic.agent_started(who.id)

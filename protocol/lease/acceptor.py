@@ -46,7 +46,8 @@ class Acceptor:
             return None  # E1
         bond = self.bound(now)
         foreign = bond is not None and bond.holder != src
-        if (foreign and not holder_gone) or body.term < self.promised or config.version > body.version:
+        outdated = body.term < self.promised or body.term <= self.released or config.version > body.version
+        if (foreign and not holder_gone) or outdated:
             return self.refusal(body.term, config, now)
         self.promised = body.term
         needs_fence = Grantee(bond.term, bond.holder) if bond is not None else None

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from lfa.protocol.messages.consensus import LeaseBody, Nack, Prepare, Propose, Release
 
+LAST = 2**53
+"""Greatest number of a message: no term comes after it."""
 FREE = 2**43
 """Greatest term number that is believed at once; as milliseconds since 1970 it is the year 2248."""
 RATE_HZ = 1000.0

@@ -229,6 +229,31 @@ def _roster(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     return watch.chain(violation, rule)
 
 
+_OF_WORDS: tuple[tuple[str, str], ...] = (
+    ("released", "E4"),
+    ("its lease of", "E7"),
+    ("after the RELEASE", "E4"),
+    ("has heard the RELEASE", "E4"),
+    ("has given nothing above", "E3"),
+    ("had come to term", "E1"),
+    ("while it is shut", "E13"),
+    ("ms ahead", "E12"),
+    ("that it had said to refuse", "E11"),
+    ("that no message can carry", "E26"),
+    ("that no quorum has granted", "E10"),
+    ("wrote the chain", "E8"),
+    ("may not know of a stop", "E30"),
+    ("which knows a stop", "E28"),
+    ("which knows an older resume", "E29"),
+)
+"""Rules of the invariants I12 to I16, which see a broken rule at once: by what they say."""
+
+
+def _word(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    rule = next((rule for part, rule in _OF_WORDS if part in violation.text), None)
+    return None if rule is None else watch.chain(violation, rule)
+
+
 _BY_INVARIANT: dict[str, Callable[[RuleWatch, Violation], BrokenRule | None]] = {
     "I1": _exclusive,
     "I2": _always("E12", "a gateway obeyed what it must refuse: an old time, or a lower term"),
@@ -238,6 +263,11 @@ _BY_INVARIANT: dict[str, Callable[[RuleWatch, Violation], BrokenRule | None]] = 
     "I9": _always("E25", "one acted on a message of another agreement"),
     "I10": _stop,
     "I11": _roster,
+    "I12": _word,
+    "I13": _word,
+    "I14": _word,
+    "I15": _word,
+    "I16": _word,
 }
 
 

@@ -12,9 +12,9 @@ from typing import Any, Protocol, TypeVarTuple
 from msgspec import Struct
 
 from lfa.protocol.lease.timing import Timing
-from lfa.protocol.messages.consensus import Config, Grant, Member, Promise, Propose, Term
+from lfa.protocol.messages.consensus import Config, Grant, LeaseBody, Member, Promise, Propose, Term
 from lfa.protocol.messages.robot import CmdVel
-from lfa.protocol.messages.stop import StopWord
+from lfa.protocol.messages.stop import StopOrder, StopWord
 
 Arguments = TypeVarTuple("Arguments")
 
@@ -69,6 +69,15 @@ class Checker:
 
     def releases(self, at: float, term: Term) -> None:
         """Record that a RELEASE of `term` left its holder."""
+
+    def hears_release(self, at: float, who: Member, term: Term) -> None:
+        """Record that a RELEASE of `term` reached the voter `who` (simulations only)."""
+
+    def says(self, at: float, who: Member, body: LeaseBody) -> None:
+        """Record that `who` sends this PREPARE, promise or refusal (simulations only)."""
+
+    def hears_order(self, at: float, robot_id: int, incarnation: int, order: StopOrder) -> None:
+        """Record that an order of the fleet stop reached that incarnation of a gateway (simulations only)."""
 
     def bars(self, at: float, robot_id: int, below: Term) -> None:
         """Record that the gateway of `robot_id` from now on refuses terms under `below`, by a fence or a command."""

@@ -15,13 +15,22 @@ from lfa.protocol.messages.robot import CmdVel
 
 
 class Steady(Checker):
-    """Checker of L5: without faults the leader does not change."""
+    """Checker of L5: without faults the leader does not change, and nobody leaves its chain."""
 
     name = "L5"
 
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)
         self._holder: Member | None = None
+        self._chain: set[Member] = set()
+
+    def adopts(self, at: float, who: Member, config: Config) -> None:
+        if config.chain[0] != who:
+            return
+        lost = sorted(shown(member) for member in self._chain - set(config.chain))
+        if lost:
+            self.broken(at, f"{shown(who)} closed the chain over {', '.join(lost)}, and nothing happened to them")
+        self._chain = set(config.chain)
 
     def leads(self, at: float, who: Member, term: Term, until: float) -> None:
         if self._holder is None:

@@ -5,6 +5,8 @@ L1-L4 are in `liveness.py`, L5-L7 in `leadership.py`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, WithFences, shown
 from lfa.deploy.analysis.verification.fleet_stop import StopHolds
 from lfa.protocol.lease.membership import is_spare
@@ -199,6 +201,11 @@ class NoAmnesiacVote(Checker):
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)
         self._promised: dict[Term, dict[Member, bool]] = {}
+        self._named: frozenset[int] = frozenset()
+        """Robots that the mission names, where that is known: a unanimous start needs them all (E18)."""
+
+    def names(self, at: float, robots: tuple[int, ...]) -> None:
+        self._named = frozenset(robots)
 
     def promises(self, at: float, who: Member, promise: Promise) -> None:
         self._promised.setdefault(promise.term, {})[who] = promise.blank
@@ -209,10 +216,13 @@ class NoAmnesiacVote(Checker):
             return
         promised = {**self._promised.get(propose.term, {}), who: False}
         previous = config.previous
-        full = previous is not None and previous.rule == "all" and set(previous.voters) <= set(promised)
+        full = previous is not None and previous.rule == "all" and self._is_full(previous.voters, promised)
         remembering = {m for m, blank in promised.items() if not blank}
         if not is_quorum(config, remembering) and not full:
             self.broken(at, f"{shown(propose.term)} proposed on promises of {sorted(shown(m) for m in promised)}")
+
+    def _is_full(self, voters: tuple[Member, ...], promised: Iterable[Member]) -> bool:
+        return set(voters) <= set(promised) and self._named <= {voter.id for voter in voters}
 
 
 class Residual(WithFences):

@@ -14,7 +14,17 @@ from msgspec import structs
 from lfa.deploy.fuzz.fault_injector import Played
 from lfa.deploy.fuzz.lease_processes import Hosts, Transition
 from lfa.deploy.fuzz.network import Trace
-from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, KINDS, WARM_UP_S, HeldMessage, Schedule, draw, draw_fault
+from lfa.deploy.fuzz.schedules import (
+    FAULTS_UNTIL_S,
+    KINDS,
+    TRICKS_UNTIL_S,
+    WARM_UP_S,
+    HeldMessage,
+    Schedule,
+    draw,
+    draw_fault,
+    draw_trick,
+)
 from lfa.deploy.fuzz.search.systematic import HOLDS_S, MESSAGES, schedule
 
 ISLAND = 100
@@ -59,7 +69,7 @@ def _next(seed: int, corpus: list[Schedule]) -> Schedule:
 def mutated(one: Schedule, other: Schedule, random: Random) -> Schedule:
     """Return `one` with one thing changed; faults and link conditions may come from `other`."""
     faults = list(one.faults)
-    match random.choice(("drop", "again", "shift", "add", "add", "hold", "hold", "splice", "radio", "ids")):
+    match random.choice(("drop", "again", "shift", "add", "add", "hold", "hold", "splice", "radio", "ids", "trick")):
         case "drop" if faults:
             faults.pop(random.randrange(len(faults)))
         case "again" if faults:
@@ -76,6 +86,10 @@ def mutated(one: Schedule, other: Schedule, random: Random) -> Schedule:
             one = structs.replace(one, held=(*one.held[-2:], held))
         case "splice":
             faults += [fault for fault in other.faults if all(target <= one.robots for target in fault.targets)]
+        case "trick":
+            at = random.uniform(WARM_UP_S, TRICKS_UNTIL_S)
+            trick = draw_trick(random, at, tuple(range(1, one.robots + 1)))
+            one = structs.replace(one, tricks=(*one.tricks[-1:], trick))
         case "radio":
             one = structs.replace(one, radio=other.radio)
         case _:

@@ -91,13 +91,15 @@ def tally_of_seed(seed: int, played: Played) -> Tally:
 def shrink(schedule: Schedule, name: str, player: Player = play) -> Schedule:
     """Return a schedule with fewer faults that still violates invariant `name`.
 
-    Halves of the faults are left out first, then quarters, and so on down to single faults; then delayed messages.
+    Halves of the faults are left out first, then quarters, and so on down to single faults; then delayed messages, and
+    tricks.
     """
     schedule = _fewer_faults(schedule, name, player)
-    for held in schedule.held:
-        tried = structs.replace(schedule, held=tuple(one for one in schedule.held if one != held))
-        if any(v.name == name for v in player(tried, None).violations):
-            schedule = tried
+    for field in ("held", "tricks"):
+        for one in getattr(schedule, field):
+            tried = structs.replace(schedule, **{field: tuple(o for o in getattr(schedule, field) if o != one)})
+            if any(v.name == name for v in player(tried, None).violations):
+                schedule = tried
     return schedule
 
 

@@ -2,17 +2,18 @@
 
 Three robots and the witness on perfect links and the worst clocks; a leader holds its lease, then one or two faults end
 its term, so a schedule goes through two terms or three. Up to three messages after the first fault are late or lost.
-Within a level, schedules are taken at equal distances, so a search that ends early has seen all of its kinds. Emmi,
-Qadeer, Rakamaric, Delay-bounded scheduling (2011).
+Within a level, schedules are taken at equal distances, so a search that ends early has seen all of its kinds. In every
+second one operators stop and resume the team. Emmi, Qadeer, Rakamaric, Delay-bounded scheduling (2011).
 """
 
 from __future__ import annotations
 
 from itertools import accumulate, product
 from math import comb, gcd
+from random import Random
 
 from lfa.deploy.fuzz.network import FAIR
-from lfa.deploy.fuzz.schedules import FIRST_AT_S, LEADER, HeldMessage, Schedule, ScheduledFault
+from lfa.deploy.fuzz.schedules import FIRST_AT_S, LEADER, HeldMessage, Schedule, ScheduledFault, draw_stops
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
 
 ROBOTS = 3
@@ -21,8 +22,8 @@ MESSAGES = 60
 """Number of messages after the first fault that may be delayed: those of an election and of the rounds after it."""
 HOLDS_S: tuple[float | None, ...] = (0.03, 0.2, None)
 """How late [s] a message comes: behind its round, or behind its lease; None: lost."""
-OFFSETS_S = (0.01, 0.06, 0.15, 0.4)
-"""Times [s] from the first fault to the second."""
+OFFSETS_S = (0.01, 0.06, 0.2, 0.4)
+"""Times [s] from the first fault to the second; the third is T_act without a heartbeat: a lease is about to end."""
 SECOND, LAST = 2, 3
 
 #         kind           targets        duration value
@@ -105,9 +106,10 @@ def schedule(number: int) -> Schedule:
     for message in _combination(combination, delays):
         rest, hold = divmod(rest, len(HOLDS_S))
         held.append(HeldMessage(message, HOLDS_S[hold]))
+    stops = draw_stops(Random(f"operator-{number}"), tuple(range(1, ROBOTS + 1))) if number % 2 else ()
     return Schedule(
         seed=number, robots=ROBOTS, witness=True, profile="std", gateways_at_world=False, rates=WORST_RATES,
-        faults=tuple(chosen), radio=FAIR, stops=(), revive_all=True, held=tuple(held),
+        faults=tuple(chosen), radio=FAIR, stops=stops, revive_all=True, held=tuple(held),
     )  # fmt: skip
 
 

@@ -31,6 +31,9 @@ def describe(schedule: Schedule) -> str:
     for fault in schedule.faults:
         targets = ", ".join("leader" if t < 0 else str(t) for t in fault.targets)
         lines.append(f"{fault.at * 1000.0:8.1f}  {fault.kind} {targets} ({fault.duration_s:.3f} s, {fault.value:.2f})")
+    for trick in schedule.tricks:
+        targets = ", ".join(map(str, trick.targets))
+        lines.append(f"{trick.at * 1000.0:8.1f}  {trick.kind} {targets} ({trick.duration_s:.3f} s, {trick.value:g})")
     for call in schedule.rosters:
         place = f" for {call.value:.0f}" if call.value else ""
         lines.append(f"{call.at * 1000.0:8.1f}  {call.kind} {call.targets[0]}{place} (within {call.duration_s:.3f} s)")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.protocol.lease.hunt import begin_of, on_page
+from tests.protocol.lease.hunt import DRAWN, Table, begin_of, on_page
 from tests.protocol.lease.planted import PLANTED, Bug
 
 PAGE = Path(__file__).parents[3] / "protocol" / "README.md"
@@ -30,9 +30,10 @@ def test_every_usual_bug_and_every_failed_wording_is_planted() -> None:
     assert where.count("wording") == WORDINGS
 
 
-def test_the_page_has_a_row_for_every_planted_bug_in_their_order() -> None:
+@pytest.mark.parametrize("table", [DRAWN], ids=lambda table: table.mark)
+def test_the_page_has_a_row_for_every_planted_bug_in_their_order(table: Table) -> None:
     """Else: make planted PLANTED=--write."""
-    rows = [row for row in on_page() if row.startswith(("| bug", "| mutant", "| wording", "| rule"))]
+    rows = [row for row in on_page(table) if row.startswith(("| bug", "| mutant", "| wording", "| rule"))]
     assert rows == [begin_of(bug) for bug in PLANTED]
 
 

@@ -15,9 +15,10 @@ from lfa.deploy.fuzz.schedules import draw
 from lfa.protocol.lease.machine.deadlines import DEADLINES
 from lfa.protocol.lease.machine.lease import EVENTS, Observed
 from lfa.protocol.lease.machine.table import ACTIONS, TRANSITIONS, LeaseEvent, LeaseState, Transition
+from lfa.protocol.messages.consensus import Member
 from tests.protocol.lease import page
 
-SEEDS = 30
+SEEDS = 40
 IN_NO_SCHEDULE = {
     (LeaseEvent.FORGET, LeaseState.FOLLOWER),  # an operator's word: test_forget.py
     (LeaseEvent.FORGET_OVER, LeaseState.CANDIDATE),
@@ -33,7 +34,7 @@ def observed() -> Counter[tuple[LeaseEvent, LeaseState, LeaseState]]:
     """How often each event led from which state to which, over schedules of faults."""
     seen: Counter[tuple[LeaseEvent, LeaseState, LeaseState]] = Counter()
 
-    def see(_: LeaseSimulation, step: Observed) -> None:
+    def see(_: LeaseSimulation, _who: Member, step: Observed) -> None:
         seen[step.event, step.before, step.after] += 1
 
     with patch.object(LeaseSimulation, "observed", see):
