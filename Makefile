@@ -143,17 +143,10 @@ pages: $(STAMP)
 	$(BIN)/lfa schema --markdown >> world/SCENARIO.md
 	$(BIN)/python -m tests.protocol.lease.page
 
-# The pictures of the tutorial: figures of its own run, and its report in a browser, in 64 colours: the site bounds their size.
-pictures: REPORT := deploy/docs/pictures/report.png
+# The pictures of the pages, made anew; needs chromium, xvfb, mesa-vulkan-drivers. Some of them: PICTURES='view web'
 pictures: $(STAMP)
 	rm -rf build/pictures
-	$(BIN)/lfa sim leader_killed --seed 7 --figures --out build/pictures
-	$(BIN)/lfa view build/pictures --gif deploy/docs/pictures/killed.gif
-	$(BIN)/lfa report build/pictures
-	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1500 --virtual-time-budget=3000 \
-	    --screenshot=$(REPORT) file://$(CURDIR)/build/pictures/report.html
-	$(BIN)/python -c "from PIL import Image; Image.open('$(REPORT)').convert('RGB').quantize(64).save('$(REPORT)', optimize=True)"
-	cp $(foreach name,fig07_distance_error fig09_path_flow lease_timeline,build/pictures/figures/$(name).png) deploy/docs/pictures
+	$(BIN)/python -m tests.docs.pictures $(PICTURES)
 
 # The documentation site in build/site, from the pages of the repository and its docstrings, and tests of what was built.
 docs: $(STAMP) $(DOCS_STAMP)

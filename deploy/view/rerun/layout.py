@@ -14,6 +14,8 @@ HALF_VIEW = 0.5
 """Half of what the view shows, upwards, of a plane at distance 1; and its width for each unit of its height."""
 ASPECT = 1.5
 LIVE_S = 60.0
+BESIDE = 0.16
+"""Share of a panel's width that is left free behind the newest value, for the legend to lie beside the curves."""
 
 
 def layout(
@@ -25,8 +27,8 @@ def layout(
     Without a scenario the viewer chooses the bounds of the world.
     """
     few = robots <= NAMED_MAX
-    axis = rrb.TimeAxis(view_range=_shown(lasted_s))
-    legend = rrb.PlotLegend(visible=few)
+    axis = rrb.TimeAxis(view_range=_shown(lasted_s, BESIDE if few else 0.0))
+    legend = rrb.PlotLegend(visible=few, corner=rrb.Corner2D.RightTop)
 
     def plot(origin: str, name: str, y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
         return rrb.TimeSeriesView(origin=origin, name=name, axis_x=axis, axis_y=y, plot_legend=legend)
@@ -39,7 +41,9 @@ def layout(
         eye_controls=_from_above(scenario),
     )
     lease = rrb.StateTimelineView(
-        origin="lease" if few else "lease/leader", name="Leader, term and roles", time_view=axis
+        origin="lease" if few else "lease/leader",
+        name="Leader, term and roles",
+        time_view=rrb.TimeAxis(view_range=_shown(lasted_s)),
     )
     percent = rrb.ScalarAxis(range=(-2.0, 102.0))
     below = rrb.Horizontal(lease, plot("radio", "Radio: rows of the table lost [%]", percent), column_shares=[3, 2])
@@ -67,12 +71,15 @@ def layout(
     )
 
 
-def _shown(lasted_s: float | None) -> rr.TimeRange:
+def _shown(lasted_s: float | None, free: float = 0.0) -> rr.TimeRange:
+    """Return the times that a panel shows, the last `free` of its width behind the end."""
+    length_s = LIVE_S if lasted_s is None else max(lasted_s, 1.0)
+    behind_s = length_s * free / (1.0 - free)
     if lasted_s is None:
         cursor = rr.TimeRangeBoundary.cursor_relative
-        return rr.TimeRange(start=cursor(seconds=-LIVE_S), end=cursor(seconds=0.0))
+        return rr.TimeRange(start=cursor(seconds=-length_s), end=cursor(seconds=behind_s))
     ends = rr.TimeRangeBoundary.absolute
-    return rr.TimeRange(start=ends(seconds=0.0), end=ends(seconds=max(lasted_s, 1.0)))
+    return rr.TimeRange(start=ends(seconds=0.0), end=ends(seconds=length_s + behind_s))
 
 
 def _from_above(scenario: Scenario | None) -> rrb.EyeControls3D | None:

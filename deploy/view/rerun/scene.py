@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from math import atan2, hypot, nan, pi
+from math import atan2, cos, hypot, nan, pi, sin
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,12 @@ SOFT, GHOST = (150, 150, 150), (190, 190, 190)
 BODY_M = 0.1
 """Height [m] of a robot's disc."""
 DOT = rr.components.Radius.ui_points(4.5)
-"""A robot is never drawn smaller, however far the view is zoomed out."""
+"""A robot is never drawn smaller, however far the view is zoomed out: below its disc, which hides it when near."""
+INK = (20, 20, 20)
+"""Names are dark, for the viewer draws them on grey."""
+NAME_M, NAME = 0.7, 0.04
+"""The name of a way-point is this far above, that of the goal behind it, more on a long route, which is shown smaller:
+clear of a robot that is there, of its name below, and of those that follow."""
 OUTLINE = rr.components.Radius.ui_points(1.8)
 """Line width of a robot's outline, visible at any zoom."""
 ROUTE, TRAIL = rr.components.Radius.ui_points(1.0), rr.components.Radius.ui_points(1.3)
@@ -86,13 +91,17 @@ class Scene:
         self._mission_known, self._radius_m = True, float(mission.radius_m)
         self._named = len(mission.robots) <= NAMED_MAX
         route = [(float(x), float(y)) for x, y in mission.leading.route_m]
+        off_m = max(NAME_M, NAME * max(hypot(x, y) for x, y in route))
         if mission.leading.motion != "explore":  # an exploring leader's route is drawn as `planned`
             self._always("world/route", rr.LineStrips3D([flat([(0.0, 0.0), *route])], colors=SOFT, radii=ROUTE))
         if route[:-1]:
-            names = [f"{n}" for n in range(1, len(route))] if len(route) <= NAMED_MAX else None
-            points = rr.Points3D(flat(route[:-1]), colors=SOFT, radii=0.08, labels=names)
-            self._always("world/way-points", points)
-        self._always("world/goal", rr.Points3D(flat(route[-1:]), colors=LEADS, radii=0.15, labels=["goal"]))
+            self._always("world/way-points", rr.Points3D(flat(route[:-1]), colors=SOFT, radii=0.08))
+            if len(route) <= NAMED_MAX:
+                above = [(x, y + off_m) for x, y in route[:-1]]
+                names = _names(above, [f"{n}" for n in range(1, len(route))])
+                self._always("world/way-points/names", names)
+        self._always("world/goal", rr.Points3D(flat(route[-1:]), colors=LEADS, radii=0.15))
+        self._always("world/goal/name", _names([_behind(route, off_m)], ["goal"]))
         for n, robot in enumerate(mission.robots):
             self._dress(robot, n, len(mission.robots))
 
@@ -154,6 +163,8 @@ class Scene:
         if robot not in self._roles:
             self._role(t, robot, str(message.role))
         self._row("transform", f"world/robot{robot}", t, (x, y, theta))
+        if self._named:  # beside the robot's own frame, which turns: below the robot, whatever its heading
+            self._row("points", f"world/names/robot{robot}", t, np.array([[x, y - 1.5 * self._radius_m, BODY_M]]))
         if robot not in self._placed:  # before its first pose it would be drawn at the origin
             self._placed.add(robot)
             self._body(t, robot, self._roles[robot])
@@ -238,18 +249,19 @@ class Scene:
         self._say(t, f"lease/robot{robot}", rr.StateChange(state=role))
 
     def _body(self, t: float, robot: int, role: str) -> None:
-        """Draw a robot as a disc in its own colour with a white nose, and its role as a ring around it."""
+        """Draw a robot as a disc in its own colour with a white line ahead, and its role as a ring around it."""
         r, colour = self._radius_m, self._colours.get(robot, WAITS) if role != "gone" else WAITS
         ring = static_scene.circle(1.3 * r)
-        nose = [(-0.4 * r, 0.6 * r), (0.8 * r, 0.0), (-0.4 * r, -0.6 * r), (-0.4 * r, 0.6 * r)]
+        nose = [(0.0, 0.0), (0.9 * r, 0.0)]
         disc = rr.Cylinders3D(lengths=BODY_M, radii=r, colors=colour, fill_mode=rr.components.FillMode.Solid)
         self._say(t, f"world/robot{robot}/body", disc)
-        lines = [flat([*ring, ring[0]], BODY_M), flat(nose, BODY_M)]
+        lines, widths = [flat([*ring, ring[0]], BODY_M), flat(nose, BODY_M)], np.append(OUTLINE, 0.15 * r)
         colours = [ROLE_COLOURS.get(role, WAITS), (255, 255, 255)]
-        self._say(t, f"world/robot{robot}/role", rr.LineStrips3D(lines, colors=colours, radii=OUTLINE))
+        self._say(t, f"world/robot{robot}/role", rr.LineStrips3D(lines, colors=colours, radii=widths))
+        self._say(t, f"world/robot{robot}/dot", rr.Points3D([(0.0, 0.0, 0.0)], colors=colour, radii=DOT))
         if self._named:
-            name = rr.Points3D([(0.0, 0.0, BODY_M)], colors=colour, radii=DOT, labels=[f"{robot} {role}"])
-            self._say(t, f"world/robot{robot}/name", name)
+            name = f"{robot}" if role == "follower" else f"{robot} {role}"
+            self._say(t, f"world/names/robot{robot}", rr.Points3D.from_fields(colors=INK, radii=0.0, labels=[name]))
 
     def _lead(self, t: float, robot: int, term: int) -> None:
         leader = f"robot {robot}, term {self._terms.number(term)}"
@@ -273,6 +285,17 @@ class Scene:
     def _say(self, t: float, entity: str, what: Any) -> None:
         self._stream.set_time(TIMELINE, duration=t)
         self._stream.log(entity, what)
+
+
+def _names(points: Sequence[tuple[float, float]], names: list[str]) -> Any:
+    return rr.Points3D(flat(points, 0.01), colors=INK, radii=0.0, labels=names)
+
+
+def _behind(route: Sequence[tuple[float, float]], off_m: float) -> tuple[float, float]:
+    """Return a point behind the end of `route`, a little above its line: the viewer draws a name below its point."""
+    (from_x, from_y), (x, y) = ((0.0, 0.0), *route)[-2:]
+    heading = atan2(y - from_y, x - from_x)
+    return x + 1.1 * off_m * cos(heading), y + off_m * (0.35 + 0.65 * sin(heading))
 
 
 def _transforms(rows: Sequence[tuple[float, float, float]]) -> Any:

@@ -20,7 +20,7 @@ SIZE, SCALE = "1600x1000", "2"
 """Window size in the toolkit's points, and pixels per point, which would else depend on the screen's density."""
 SCREEN = "6600x4200x24"
 """Size and depth of the virtual screen: so large that the pointer, at its centre, is outside the window: no tooltip."""
-SHOT_S_MAX = 120.0
+SHOT_S_MAX = 300.0
 LAYOUT_AT_END = ".rbl"
 """Suffix of the layout that shows the end of a recording, for a picture; the recording's own layout plays it."""
 
