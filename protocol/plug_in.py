@@ -18,6 +18,13 @@ from msgspec import Struct
 from lfa.protocol.config_file.mistake import Mistake, RefusedValue
 from lfa.protocol.errors import Refused
 
+_TERMINATED = 143
+"""Exit code of a process that SIGTERM ends, also while a plug-in is at work."""
+FAULTS = (Exception, SystemExit)
+"""What a plug-in may raise: one that ends the program has failed, and the program goes on."""
+OWN_FILES: set[str] = set()
+"""Absolute paths of the plug-ins' files that this process has loaded."""
+
 
 class PlugIns:
     """Plug-ins of one `kind`, as `sensor`, whose packages name them in the entry points `group`.
@@ -78,9 +85,12 @@ class PlugIns:
             right = f"one of the entry points {self._group}: {known}; or given by {self.option}FILE.py:Class"
             raise Refused(f"no {self._kind} {name!r}: must be {right}")
         try:
-            return points[name].load()
+            found = points[name].load()
         except Exception as error:  # noqa: BLE001 - the package of a plug-in may fail in any way
             raise Refused(f"{self._kind} {name}: {points[name].value} cannot be loaded: {error_text(error)}") from None
+        if not points[name].module.startswith("lfa."):
+            OWN_FILES.add(str(getattr(sys.modules.get(points[name].module), "__file__", "")))
+        return found
 
     def make(self, name: str, given: Mapping[str, Any], key: str, *arguments: Any) -> Any:
         """Return a plug-in made with `arguments` and, if its class has `Parameters`, with `given` as these.
@@ -103,8 +113,9 @@ class PlugIns:
             raise RefusedValue(mistake._replace(key=f"{key}.{mistake.key}")) from None
         try:
             return make(*arguments, *own)
-        except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-            raise RefusedValue(Mistake(key, f": {self._kind} {name} cannot be made: {error_text(error)}")) from None
+        except FAULTS as error:
+            says = f": {self._kind} {name} cannot be made: {error_text(error, make)}"
+            raise RefusedValue(Mistake(key, says)) from None
 
     def _entry_points(self) -> dict[str, Any]:
         # Imported here, for a name that is no default: it costs 3 MB of memory.
@@ -128,9 +139,10 @@ def _module(path: Path, where: str) -> Any:
     spec = spec_from_file_location(f"own code in {path}", path)
     assert spec is not None and spec.loader is not None
     module = sys.modules[spec.name] = module_from_spec(spec)
+    OWN_FILES.add(str(path))
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # noqa: BLE001 - the file of a user may fail in any way
+    except FAULTS as error:
         raise Refused(f"{where}: {error_text(error)}") from None
     return module
 
@@ -168,13 +180,32 @@ def _as_whole(value: Any, kind: Any) -> Any:
     return [_as_whole(item, kind) for item in value] if isinstance(value, list | tuple) else value
 
 
-def error_text(error: Exception) -> str:
-    """Return an exception of a user's own code in one line, with file and line where it was raised."""
+def error_text(error: BaseException, code: Any = None) -> str:
+    """Return an exception of a user's own code in one line, with the place in the user's file that led to it.
+
+    `code` is the class, function or method that was called: where it starts is the place of a call that Python refused.
+    Raise `error` again if it is the end of this process by a signal.
+    """
     import traceback
 
-    frames = traceback.extract_tb(error.__traceback__)
-    where = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}: " if frames else ""
+    if isinstance(error, SystemExit) and error.code == _TERMINATED:
+        raise error
     if isinstance(error, SyntaxError):
-        where = f"{Path(error.filename or '').name}:{error.lineno}: "
-        return f"{where}{type(error).__name__}: {error.msg}"
+        return f"{Path(error.filename or '').name}:{error.lineno}: {type(error).__name__}: {error.msg}"
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if frame.filename in OWN_FILES]
+    where = place_of(code) if code is not None and not own else ""
+    if not where and frames:
+        last = (own or frames)[-1]
+        where = f"{Path(last.filename).name}:{last.lineno}: "
     return f"{where}{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def place_of(code: Any) -> str:
+    """Return where a class, function or method starts, as `own.py:12: `; empty where Python does not know the place."""
+    import inspect
+
+    try:
+        return f"{Path(inspect.getsourcefile(code) or '').name}:{inspect.getsourcelines(code)[1]}: "
+    except (OSError, TypeError):
+        return ""

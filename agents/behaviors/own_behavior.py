@@ -8,18 +8,18 @@ the entry points `lfa.behaviors`, from a file by `--behavior FILE.py:Class`, or 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
 from typing import Protocol
 
 from msgspec import Struct
 
+from lfa.agents.following.checked_controller import is_finite_twist
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point
 from lfa.protocol.config_file.mistake import Mistake, RefusedValue
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.mission import Mission
-from lfa.protocol.plug_in import PlugIns, error_text
+from lfa.protocol.plug_in import FAULTS, PlugIns, error_text, place_of
 
 BEHAVIORS = PlugIns("behavior", "lfa.behaviors", "--behavior ")
 
@@ -79,13 +79,14 @@ class OwnBehaviors:
                 answer = behavior.step(
                     BehaviorInput(seen.now, seen.role, seen.pose, seen.last, wanted, seen.still, seen.moving)
                 )
-            except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way, and its robot must come to rest
-                self.failure = f"behavior {name}: {error_text(error)}"
+            except FAULTS as error:
+                self.failure = f"behavior {name}: {error_text(error, behavior.step)}"
                 return STILL
             if answer is None:
                 continue
-            if not (isinstance(answer, Twist) and isfinite(answer.linear_x) and isfinite(answer.angular_z)):
-                self.failure = f"behavior {name}: step returned {answer!r}, must be a Twist of finite numbers or None"
+            if not is_finite_twist(answer):
+                says = f"{place_of(behavior.step)}step returned {answer!r}"
+                self.failure = f"behavior {name}: {says}, must be a Twist of finite numbers or None"
                 return STILL
             wanted = answer
         return wanted

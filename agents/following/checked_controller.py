@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from math import isfinite
-from pathlib import Path
+from typing import TypeGuard
 
 from lfa.agents.following.controller import Controller, Reference
 from lfa.protocol.geometry import Pose2D, Twist
-from lfa.protocol.plug_in import error_text
+from lfa.protocol.plug_in import FAULTS, error_text, place_of
 
 
 class CheckedController:
@@ -25,8 +25,8 @@ class CheckedController:
             return
         try:
             self._controller.reset(own_pose, own_twist)
-        except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way, and its robot must come to rest
-            self.failure = f"controller {self._name}: {error_text(error)}"
+        except FAULTS as error:
+            self.failure = f"controller {self._name}: {error_text(error, self._controller.reset)}"
 
     def step(self, reference: Reference, own_pose: Pose2D, own_twist: Twist, dt: float) -> Twist | None:
         """Return the controller's twist; None once it has failed."""
@@ -34,28 +34,25 @@ class CheckedController:
             return None
         try:
             wanted = self._controller.step(reference, own_pose, own_twist, dt)
-            if isfinite(wanted.linear_x) and isfinite(wanted.angular_z):
-                return wanted
-        except Exception as error:  # noqa: BLE001 - as above
-            # An answer of another type fails in this file: it has no linear_x, or one that is no number.
-            last = error.__traceback__
-            while last is not None and last.tb_next is not None:
-                last = last.tb_next
-            if last is None or last.tb_frame.f_code.co_filename != __file__:
-                self.failure = f"controller {self._name}: {error_text(error)}"
-                return None
-        self.failure = f"controller {self._name}: {_place(self._controller)}step returned {_shown(wanted)}, must be " \
-                       "a Twist of finite numbers"  # fmt: skip
+        except FAULTS as error:
+            self.failure = f"controller {self._name}: {error_text(error, self._controller.step)}"
+            return None
+        if is_finite_twist(wanted):
+            return wanted
+        says = f"{place_of(self._controller.step)}step returned {_shown(wanted)}"
+        self.failure = f"controller {self._name}: {says}, must be a Twist of finite numbers"
         return None
+
+
+def is_finite_twist(answer: object) -> TypeGuard[Twist]:
+    """Return True for a Twist of finite numbers: what a user's own code has to answer."""
+    try:
+        return isinstance(answer, Twist) and isfinite(answer.linear_x) and isfinite(answer.angular_z)
+    except (TypeError, OverflowError):  # a text, or a whole number beyond all floats
+        return False
 
 
 def _shown(wanted: object) -> str:
     if isinstance(wanted, Twist):
         return f"Twist({wanted.linear_x}, {wanted.angular_z})"
     return "nothing" if wanted is None else f"a value of type {type(wanted).__name__}"
-
-
-def _place(controller: Controller) -> str:
-    """Return file and line of the controller's `step`, as a prefix; empty where Python does not know it."""
-    code = getattr(type(controller).step, "__code__", None)
-    return "" if code is None else f"{Path(code.co_filename).name}:{code.co_firstlineno}: "

@@ -13,7 +13,7 @@ from lfa.agents.config import Gains
 from lfa.agents.following.controller import CONTROLLERS, Controller, find_controller
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Following, Limits, Parameter
-from lfa.protocol.plug_in import converted, error_text, is_file, parameters_of
+from lfa.protocol.plug_in import FAULTS, converted, error_text, is_file, parameters_of
 
 
 def add_controller_file(text: str) -> str:
@@ -46,8 +46,8 @@ def make_controller(following: Following, gains: Gains, limits: Limits) -> Contr
         )
     except Refused:
         raise
-    except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-        raise Refused(f"controller = {following.controller}: cannot be made: {error_text(error)}") from None
+    except FAULTS as error:
+        raise Refused(f"controller = {following.controller}: cannot be made: {error_text(error, make)}") from None
     if not (callable(getattr(made, "step", None)) and callable(getattr(made, "reset", None))):
         raise Refused(f"controller = {following.controller}: must be a class with the methods reset and step")
     return made

@@ -40,7 +40,10 @@ class Ended(Struct, frozen=True):
 
 def verdict_of(interrupts: Interrupts) -> Verdict | None:
     """Return the verdict `interrupted` once a signal has come, else None."""
-    return None if interrupts.signal is None else Verdict("interrupted", interrupts.signal.name)
+    if interrupts.signal is None:
+        return None
+    held = "" if interrupts.held_in is None else f" in {interrupts.held_in}, which did not return"
+    return Verdict("interrupted", f"{interrupts.signal.name}{held}")
 
 
 def reread(folder: Path, ended_by: signal.Signals | None) -> Ended:

@@ -35,6 +35,7 @@ from lfa.protocol.messages.team import Event, OperatorNote
 from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.node import Node, NodeObserver
 from lfa.protocol.output import write_line
+from lfa.protocol.plug_in import OWN_FILES
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
 from lfa.protocol.runtime.node_host import NodeHost
 from lfa.protocol.runtime.state_hashes import HashedJournal, StateHashes
@@ -73,7 +74,7 @@ def run(
     recorder = Recorder(folder, about.metadata())
     run = SimulatedRun(drawn, seed, faults, recorder.record, folder / JOURNALS, drivers)
     started = time.perf_counter()
-    with Interrupts() as interrupts:
+    with Interrupts(OWN_FILES) as interrupts:
         run.advance(inf, lambda: interrupts.signal is not None)
         verdict = run.close(verdict_of(interrupts))
     recording = recorder.close()
@@ -91,7 +92,7 @@ def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Unre
     refuse_faults(drawn, faults)
     about = About(scenario.name, MODE, seed, FLEET)
     run = SimulatedRun(drawn, seed, faults, memory.record, None)
-    with Interrupts() as interrupts:
+    with Interrupts(OWN_FILES) as interrupts:
         run.advance(inf, lambda: interrupts.signal is not None)
         verdict = run.close(verdict_of(interrupts))
     if interrupts.signal is not None:

@@ -13,7 +13,7 @@ import msgspec
 
 from lfa.protocol.config_file.conversion import convert
 from lfa.protocol.config_file.mistake import FileError, Mistake, RefusedFile, RefusedValue
-from lfa.protocol.plug_in import PlugIns, error_text
+from lfa.protocol.plug_in import FAULTS, PlugIns, error_text, place_of
 from lfa.world.description.scenario import Scenario
 
 GENERATORS = PlugIns("scenario generator", "lfa.scenarios", "")
@@ -55,15 +55,20 @@ def generated(scenario: Scenario, seed: int) -> tuple[Scenario, list[Mistake]]:
     made: ScenarioGenerator = GENERATORS.make(name, chosen.parameters, "generator")
     try:
         drawn = made.generate(scenario, Random(f"{seed}/generator {name}"))
-    except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-        raise RefusedValue(Mistake("generator", f": {name} with seed {seed}: {error_text(error)}")) from None
+    except FAULTS as error:
+        says = f": {name} with seed {seed}: {error_text(error, made.generate)}"
+        raise RefusedValue(Mistake("generator", says)) from None
     if not isinstance(drawn, Scenario):
         found = "nothing" if drawn is None else f"a value of type {type(drawn).__name__}"
-        raise RefusedValue(Mistake("generator", f": {name}: generate returned {found}, must be a Scenario"))
+        raise RefusedValue(
+            Mistake("generator", f": {name}: {place_of(made.generate)}generate returned {found}, must be a Scenario")
+        )
     try:
         fields = _plain(msgspec.to_builtins(drawn))
     except TypeError as error:
-        raise RefusedValue(Mistake("generator", f": {name}: generate returned no plain values: {error}")) from None
+        raise RefusedValue(
+            Mistake("generator", f": {name}: {place_of(made.generate)}generate returned no plain values: {error}")
+        ) from None
     fields.pop("generator", None)
     fields.pop("name", None)
     typed, mistakes = convert(fields, Scenario)

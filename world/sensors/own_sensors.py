@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 
 from lfa.protocol.geometry import NUMBER_MAX
 from lfa.protocol.messages.robot import SENSOR_NAME_MAX, SENSOR_VALUES_MAX
-from lfa.protocol.plug_in import error_text
+from lfa.protocol.plug_in import FAULTS, error_text, place_of
 from lfa.world.description.own_sensor import OwnSensor, TrueState, make_sensor
 from lfa.world.description.scenario import Scenario
 from lfa.world.sensors.noise import chance_of
@@ -33,22 +32,35 @@ class OwnSensors:
         """
         if name in self._failed:
             return None
+        measure = self._sensors[name, state.robot].measure
         try:
-            answer = self._sensors[name, state.robot].measure(state)
-        except Exception as error:  # noqa: BLE001 - a plug-in may fail in any way
-            return self._fail(name, state, error_text(error))
+            answer = measure(state)
+        except FAULTS as error:
+            return self._fail(name, state, error_text(error, measure))
         if answer is None:
             return None
         if not isinstance(answer, Mapping):
-            return self._fail(name, state, f"measure returned a value of type {type(answer).__name__}, must be a dict")
+            return self._fail(
+                name,
+                state,
+                f"{place_of(measure)}measure returned a value of type {type(answer).__name__}, must be a dict",
+            )
         if len(answer) > SENSOR_VALUES_MAX:
-            return self._fail(name, state, f"measure returned {len(answer)} values, at most {SENSOR_VALUES_MAX} fit")
+            return self._fail(
+                name,
+                state,
+                f"{place_of(measure)}measure returned {len(answer)} values, at most {SENSOR_VALUES_MAX} fit",
+            )
         for value_name, value in answer.items():
             if not isinstance(value_name, str) or len(value_name) > SENSOR_NAME_MAX:
                 right = f"a text of at most {SENSOR_NAME_MAX} characters"
-                return self._fail(name, state, f"measure returned the name {value_name!r}, must be {right}")
-            if not isinstance(value, int | float) or not (isfinite(value) and abs(value) <= NUMBER_MAX):
-                return self._fail(name, state, f"measure returned {value_name} = {value}, must be a finite number")
+                return self._fail(
+                    name, state, f"{place_of(measure)}measure returned the name {value_name!r}, must be {right}"
+                )
+            if not (isinstance(value, int | float) and abs(value) <= NUMBER_MAX):
+                return self._fail(
+                    name, state, f"{place_of(measure)}measure returned {value_name} = {value}, must be a finite number"
+                )
         return {value_name: float(value) for value_name, value in answer.items()}
 
     def _fail(self, name: str, state: TrueState, says: str) -> str:

@@ -10,6 +10,7 @@ from msgspec import Struct
 
 from lfa.agents.config import DEFAULT
 from lfa.agents.controllers.headway import Headway
+from lfa.agents.following.checked_controller import CheckedController
 from lfa.agents.following.controller import CONTROLLERS, Reference, add_controller
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.plugin import add_controller_file, make_controller
@@ -46,7 +47,10 @@ class Own:
         ("return Twist(float('nan'), 0.0)", "own.py:11: step returned Twist(nan, 0.0), must be"),
         ("return Twist('fast', 0.0)", "own.py:11: step returned Twist(fast, 0.0), must be"),
         ("return None", "own.py:11: step returned nothing, must be"),
+        ("return Twist(10**400, 0.0)", "own.py:11: step returned Twist(1000"),
         ("return reference.no_such_field", "own.py:15: AttributeError: "),
+        ("import json; json.loads('{')", "own.py:15: JSONDecodeError: "),
+        ("raise SystemExit(0)", "own.py:15: SystemExit: 0"),
     ],
 )
 def test_a_fault_of_a_controller_stops_its_robot_and_is_a_line_with_file_and_line(
@@ -63,6 +67,37 @@ def test_a_fault_of_a_controller_stops_its_robot_and_is_a_line_with_file_and_lin
     assert driven[-1] == STILL
     assert follower.failure is not None
     assert follower.failure.startswith(f"controller own.py:Own: {says}")
+
+
+@pytest.mark.parametrize("method", ["step", "reset"])
+def test_a_method_that_takes_other_arguments_is_told_where_it_starts(tmp_path: Path, method: str) -> None:
+    code = CODE.format(ends="")
+    start = f"def {method}(self"
+    (tmp_path / "own.py").write_text(code.replace(start, f"{start}, more"))
+    name = add_controller_file(f"{tmp_path}/own.py:Own")
+    made = CheckedController(make_controller(Following(controller=name), DEFAULT, Limits()), name)
+    made.reset(Pose2D(), STILL)
+    made.step(Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1, Pose2D(), STILL, 1.2, 0.0, True), Pose2D(), STILL, 0.02)
+    line = next(n for n, text in enumerate(code.splitlines(), 1) if start in text)
+    assert made.failure is not None
+    assert made.failure.startswith(f"controller own.py:Own: own.py:{line}: TypeError: ")
+
+
+@pytest.mark.parametrize(
+    ("takes", "says"),
+    [
+        ("self", "own.py:4: TypeError: "),
+        ("self, gains, limits, *, more", "own.py:4: TypeError: "),
+        ("self, gains, limits, x=__import__('sys').exit", "own.py:6: SystemExit: 3"),
+    ],
+)
+def test_a_controller_that_cannot_be_made_is_refused_with_its_place(tmp_path: Path, takes: str, says: str) -> None:
+    own = CODE.format(ends="").replace("self, gains, limits", takes).replace("self.left = 3", "self.left = 3; x(3)")
+    (tmp_path / "own.py").write_text(own)
+    name = add_controller_file(f"{tmp_path}/own.py:Own")
+    with pytest.raises(Refused) as refused:
+        make_controller(Following(controller=name), DEFAULT, Limits())
+    assert f"cannot be made: {says}" in str(refused.value)
 
 
 @pytest.mark.parametrize(
@@ -103,6 +138,7 @@ def test_a_controller_without_parameters_refuses_them() -> None:
         ("own.py:Other", "class Own: pass", "has no class 'Other'"),
         ("own.py:Own", "class Own\n    pass", "own.py:1: SyntaxError"),
         ("own.py:Own", "x = 1\nraise ValueError('no')", "own.py:2: ValueError: no"),
+        ("own.py:Own", "import sys\nsys.exit(0)", "own.py:2: SystemExit: 0"),
     ],
 )
 def test_a_file_without_a_controller_is_refused_in_one_line(

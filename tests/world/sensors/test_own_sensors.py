@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from math import inf
 from pathlib import Path
@@ -69,10 +70,12 @@ def test_a_further_sensor_changes_nothing_else(light: Path) -> None:
 @pytest.mark.parametrize(
     ("does", "says"),
     [
+        ("raise SystemExit(0)", "broken_sensor.py:7: SystemExit: 0"),
         ("return 1 / 0", "broken_sensor.py:7: ZeroDivisionError: division by zero"),
-        ("return 3.5", "measure returned a value of type float, must be a dict"),
-        ("return {'c': float('nan')}", "measure returned c = nan, must be a finite number"),
-        ("return {'c': 'warm'}", "measure returned c = warm, must be a finite number"),
+        ("return 3.5", "broken_sensor.py:6: measure returned a value of type float, must be a dict"),
+        ("return {'c': float('nan')}", "broken_sensor.py:6: measure returned c = nan, must be a finite number"),
+        ("return {'c': 10**400}", f"broken_sensor.py:6: measure returned c = 1{400 * '0'}, must be a finite number"),
+        ("return {'c': 'warm'}", "broken_sensor.py:6: measure returned c = warm, must be a finite number"),
     ],
 )
 def test_a_fault_of_a_sensor_fails_the_run_with_its_reason(
@@ -121,7 +124,9 @@ def test_a_sensor_with_a_bad_answer_is_told_of_once_and_not_called_again(
     answer, says = BAD_VALUES[kind]
     answers: list[object] = [answer, {"c": 1.0}]
     sensors, state = own_sensors(answers, monkeypatch)
-    assert sensors.measure("said", state) == f"sensor said of robot 2: {says}"
+    said = sensors.measure("said", state)
+    assert isinstance(said, str)
+    assert re.fullmatch(rf"sensor said of robot 2: test_own_sensors\.py:\d+: {re.escape(says)}", said)
     assert sensors.measure("said", state) is None
     assert answers == [{"c": 1.0}]
 
