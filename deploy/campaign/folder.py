@@ -87,6 +87,10 @@ class CampaignFolder:
             found = read_json(path, StoredResult)
         except DamagedFile as error:
             raise Refused(f"{path}: half-written or damaged ({error}): remove it, and it is done again") from None
+        except OSError as error:
+            raise Refused(
+                f"{path}: {error.strerror}: must be a file that can be read; removed, it is done again"
+            ) from None
         if found.name != name:
             raise Refused(f"{path}: the result of {found.name}: remove it, and {name} is done again")
         if (found.plan, found.lfa) != (self.campaign.plan, self.campaign.lfa):

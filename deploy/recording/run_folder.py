@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,8 @@ def toml_value(value: Any) -> str:
         return "{" + ", ".join(f"{k} = {toml_value(v)}" for k, v in value.items() if v is not None) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml_value(item) for item in value) + "]"
+    if isinstance(value, float) and not isfinite(value):
+        return str(value)  # nan, inf, -inf
     return msgspec.json.encode(value).decode()
 
 

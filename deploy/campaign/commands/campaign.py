@@ -9,6 +9,7 @@ import typer
 
 from lfa.deploy.campaign.commands.merge import merge
 from lfa.deploy.campaign.commands.sweep import Remote, carry_out, carry_out_on
+from lfa.deploy.campaign.engines.dispatch import check_engine
 from lfa.deploy.campaign.engines.kubernetes import manifest
 from lfa.deploy.campaign.shard import SHARDS_MAX, WHOLE, parse_shard
 from lfa.deploy.campaign.sweep.plan import RUNS_MAX, read_plan
@@ -60,6 +61,9 @@ def command(
         raise Refused(f"--on {on} with --shard {shard}: must be one of the two")
     if not 1 <= shards <= SHARDS_MAX or jobs < 1 or minutes < 1:
         raise Refused(f"--shards {shards} --jobs {jobs} --minutes {minutes}: each must be at least 1")
+    if max_runs < 1:
+        raise Refused(f"--max-runs {max_runs}: must be at least 1")
+    check_engine(on)
     share = WHOLE if shard is None else parse_shard(shard)
     given = {"controller": controller, "behavior": behavior, "sensor": sensor, "generator": generator}
     own_code = [(kind, text) for kind, texts in given.items() for text in texts or ()]

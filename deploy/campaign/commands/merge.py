@@ -54,11 +54,18 @@ def merge(folders: Sequence[Path], out: Path | None, as_json: bool) -> int:
 
 
 def report_of(combined: Combined) -> MergeReport:
-    """Return the report on a combined campaign, by its kind. Raises Refused for a kind without a report."""
+    """Return the report on a combined campaign, by its kind.
+
+    Raises Refused for a kind without a report, and for a description or results that are not those of the kind.
+    """
     module = REPORTS.get(combined.campaign.kind)
     if module is None:
         raise Refused(f"a campaign of the kind {combined.campaign.kind}: must be one of {', '.join(REPORTS)}")
-    found: MergeReport = import_module(module).report(combined)
+    try:
+        found: MergeReport = import_module(module).report(combined)
+    except (msgspec.ValidationError, LookupError, TypeError) as error:
+        kind = combined.campaign.kind
+        raise Refused(f"campaign.json or a result is damaged ({error}): must be those of a {kind}") from error
     return found
 
 

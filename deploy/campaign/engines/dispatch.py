@@ -25,11 +25,16 @@ LOST = -1
 def engine(on: str, folder: Path, commands: Sequence[list[str]], minutes: int, jobs: int, options: Mapping[str, str]
            ) -> AbstractContextManager[list[Handle]]:  # fmt: skip
     """Return the submission of the shares to the engine named by `--on`. Raises Refused for another name."""
+    check_engine(on)
     if on.startswith(DASK):
         return on_dask(on, commands)
-    if on == "slurm":
-        return on_submitit(folder, commands, on, minutes, jobs, options)
-    raise Refused(f"--on {on}: must be one of {', '.join(ENGINES)}")
+    return on_submitit(folder, commands, on, minutes, jobs, options)
+
+
+def check_engine(on: str) -> None:
+    """Raise Refused for a name of `--on` that is no engine."""
+    if on not in ENGINES and not on.startswith(DASK):
+        raise Refused(f"--on {on}: must be one of {', '.join(ENGINES)}")
 
 
 def watch(handles: Sequence[Handle], kept: CampaignFolder) -> int:

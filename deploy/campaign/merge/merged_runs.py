@@ -13,6 +13,7 @@ from lfa.deploy.campaign.sweep import statistics
 from lfa.deploy.campaign.sweep.metrics import Metric
 from lfa.deploy.campaign.sweep.runs import SweepFacts, SweepResult, facts_of
 from lfa.deploy.campaign.sweep.statistics import Values
+from lfa.protocol.errors import Refused
 
 NONE = "–"
 
@@ -41,7 +42,7 @@ class MergedSweep(Struct, frozen=True):
 
 
 def read(combined: Combined) -> MergedSweep:
-    """Return the runs of a combined campaign with their groups and seeds."""
+    """Return the runs of a combined campaign with their groups and seeds. Raises Refused for a damaged result."""
     facts = facts_of(combined.campaign)
     per_group = len(facts.seeds) * facts.repetitions
     runs = []
@@ -50,7 +51,10 @@ def read(combined: Combined) -> MergedSweep:
         if stored is not None:
             group, rest = divmod(number, per_group)
             seed, repetition = divmod(rest, facts.repetitions)
-            result = msgspec.convert(stored.data, SweepResult)
+            try:
+                result = msgspec.convert(stored.data, SweepResult)
+            except msgspec.ValidationError as error:
+                raise Refused(f"results/{name}.json: damaged ({error}): remove it, and it is done again") from None
             runs.append(MergedRun(name, group, facts.seeds[seed], repetition + 1, result, stored.complaint))
     labels = tuple(", ".join(group.values) or facts.scenario for group in facts.groups)
     return MergedSweep(facts, labels, tuple(runs))

@@ -94,8 +94,10 @@ METRICS: tuple[Metric, ...] = (
 
 
 def metrics_of(summary: Summary, seen: RecordedRun) -> dict[str, float]:
-    """Return the quantities of a run that have a value in it."""
+    """Return the quantities of a run that have a finite value in it: no other can be stored."""
     followed = (tracking_errors.of_follower(seen, robot.id) for robot in summary.robots)
     run = RunData(summary, seen, [errors for errors in followed if errors is not None])
     found = {metric.name: metric.of(run) for metric in METRICS}
-    return {name: float(f"{value:.{DIGITS}g}") for name, value in found.items() if value is not None}
+    return {
+        name: float(f"{value:.{DIGITS}g}") for name, value in found.items() if value is not None and isfinite(value)
+    }

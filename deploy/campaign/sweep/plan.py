@@ -32,6 +32,7 @@ from lfa.world.description.placement import SEED_MAX
 RUNS_MAX = 100_000
 """Default of `--max-runs`."""
 REPETITIONS_MAX = 100
+NO_SUCH = "no such key"
 SEEDS_MAX = 1_000_000
 
 
@@ -219,7 +220,9 @@ def _groups(
         except RefusedFile as refused:
             for error in refused.errors:
                 placed = _in_plan(file, error, sets)
-                errors.setdefault(str(placed), placed)
+                # Of a key that no scenario has, its values are no mistakes of their own.
+                place = f"{placed.file}:{placed.line}:{error.key}"
+                errors.setdefault(place if NO_SUCH in placed.text else str(placed), placed)
         except Refused as refused:
             place = next((value.where for value in chosen if value.faults), "scenario")
             placed = file.error(Mistake(place, f": {refused}"))

@@ -8,6 +8,7 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import msgspec
 import pytest
@@ -277,3 +278,39 @@ def test_a_share_runs_from_the_command_line_and_says_how_far_it_is(
     assert {one.name for one in (tmp_path / "out" / "results").iterdir()} == {
         f"{name}.json" for name in combine([whole]).campaign.names[1::4]
     }
+
+
+@pytest.mark.parametrize(
+    "data", [None, [1], {}, {"outcome": "ended", "ok": 3, "metrics": {}}, {"outcome": "", "ok": True, "metrics": None}]
+)
+def test_a_result_of_another_shape_is_named_and_nothing_is_merged(whole: Path, tmp_path: Path, data: object) -> None:
+    campaign = combine([whole]).campaign
+    part = open_folder(tmp_path / "part", campaign)
+    part.store(campaign.names[0], ItemResult(data))
+    with pytest.raises(Refused, match=rf"results/{campaign.names[0]}\.json: damaged .*: remove it"):
+        merge([part.path], None, as_json=False)
+    assert not (part.path / "merged").exists()
+
+
+@pytest.mark.parametrize("about", [None, {}, {"scenario": 3}])
+def test_a_description_without_its_facts_is_refused(whole: Path, tmp_path: Path, about: object) -> None:
+    broken = msgspec.structs.replace(combine([whole]).campaign, about=about)
+    with pytest.raises(Refused, match=r"campaign\.json or a result is damaged .*: must be those of a sweep"):
+        merge([open_folder(tmp_path / "part", broken).path], None, as_json=False)
+
+
+def test_a_folder_in_the_place_of_a_result_is_named(whole: Path, tmp_path: Path) -> None:
+    campaign = combine([whole]).campaign
+    part = open_folder(tmp_path / "part", campaign)
+    (part.path / "results" / f"{campaign.names[0]}.json").mkdir()
+    with pytest.raises(Refused, match="removed, it is done again"):
+        merge([part.path], None, as_json=False)
+
+
+@pytest.mark.parametrize("options", [{"max_runs": 0}, {"on": "grid"}, {"on": "slurmm"}, {"shards": 0}, {"jobs": 0}])
+def test_an_option_that_is_none_is_refused_before_a_folder_is_made(
+    plan_path: Path, tmp_path: Path, options: dict[str, Any]
+) -> None:
+    with pytest.raises(Refused, match="must be"):
+        command([str(plan_path)], out=tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()
