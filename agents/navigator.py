@@ -26,7 +26,7 @@ from lfa.agents.leading.hand_driving import HandDriving
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
 from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.localization.estimator import Estimator
-from lfa.agents.perception.obstacle_model import ObstacleModel, resting
+from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.own_readings import OwnReadings
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
@@ -137,10 +137,11 @@ class Navigator:
         """Update with a scan; one that only repeats the last, shows nothing or is old counts as none."""
         known, late_s = self.estimator.pose_at(now), self.estimator.late_s(scan.header, now)
         if known is not None and self.scan_age.update(scan, known[0], now, late_s):
-            mates = self._mates.places(now)
-            self._obstacles.see(scan, known[0], mates, now)
-            self.leading.see(scan, known[0], known[1], mates)
-            self._follow_slot.see(scan, known[0], known[1], mates)
+            self._obstacles.see(scan, known[0], self._mates.nearby(known[0], MATES_M, now), now)
+            if self.explore is not None or self._follow_slot.catches_up:  # a map needs all of them
+                mates = self._mates.places(now)
+                self.leading.see(scan, known[0], known[1], mates)
+                self._follow_slot.see(scan, known[0], known[1], mates)
 
     def update_ground(self, profile: GroundProfile, now: float) -> None:
         """Update the ground map with a profile of the floor ahead."""

@@ -185,14 +185,17 @@ def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: fl
     Only approaches count: an obstacle that is already near and moves away is no conflict.
     """
     least = inf
+    if not moving:
+        return least
+    times = [n * STEP_S for n in range(1, round(within_s / STEP_S) + 1)]
+    way = [(later, along_arc(pose, twist, later)) for later in times]
     for feature in moving:
-        first = hypot(feature.x - pose.x, feature.y - pose.y)
-        for n in range(1, round(within_s / STEP_S) + 1):
-            later = n * STEP_S
-            there, (x, y) = along_arc(pose, twist, later), feature.at(later)
-            apart = hypot(x - there.x, y - there.y)
-            if apart < first:
-                least = min(least, apart - feature.radius_m)
+        x, y, vx, vy, radius_m = feature.x, feature.y, feature.vx, feature.vy, feature.radius_m
+        first = hypot(x - pose.x, y - pose.y)
+        for later, there in way:
+            apart = hypot(x + vx * later - there.x, y + vy * later - there.y)
+            if apart < first and apart - radius_m < least:
+                least = apart - radius_m
     return least
 
 

@@ -29,6 +29,12 @@ class TeamMates:
             places.append(None if sighting is None else sighting.pose)
         return [place for place in places if place is not None]
 
+    def nearby(self, pose: Pose2D, within_m: float, now: float) -> list[Pose2D]:
+        """Return those of `places` that may be within `within_m` of `pose`."""
+        near = [place for _, place in self._team.near(self._others(), pose, within_m, now)]
+        sighting = None if self.predecessor is None else self.predecessor.at(now)
+        return near if sighting is None else [*near, sighting.pose]
+
     def strangers(self, pose: Pose2D, within_m: float, now: float) -> list[Point]:
         """Return those that this robot does not follow, in `base_link`: no controller keeps a distance to them.
 

@@ -8,10 +8,11 @@ from math import sqrt
 class Covariance:
     """Symmetric 3x3 covariance: the error of a pose in `map` axes [m, m, rad]."""
 
-    __slots__ = ("_rows",)
+    __slots__ = ("_rows", "heading_rad", "position_m")
 
     def __init__(self, position: float = 0.0, heading: float = 0.0) -> None:
         self._rows = [[position, 0.0, 0.0], [0.0, position, 0.0], [0.0, 0.0, heading]]
+        self._spread()
 
     def move(self, dx: float, dy: float) -> None:
         """Propagate a motion by (dx, dy): a heading error before it is a lateral error after it."""
@@ -23,6 +24,7 @@ class Covariance:
         p[1][0] = p[0][1]
         p[0][2] = p[2][0] = xt - dy * tt
         p[1][2] = p[2][1] = yt + dx * tt
+        self._spread()
 
     def grow(self, position: float, heading: float) -> None:
         """Add variances [m^2, rad^2]."""
@@ -30,16 +32,15 @@ class Covariance:
         p[0][0] += position
         p[1][1] += position
         p[2][2] += heading
+        self._spread()
 
-    @property
-    def position_m(self) -> float:
+    def _spread(self) -> None:
+        """Compute what each control step asks for, and only a fix changes."""
+        rows = self._rows
+        self.position_m = sqrt(max(rows[0][0], rows[1][1]))
         """Standard deviation [m] of the position, in its worse axis."""
-        return sqrt(max(self._rows[0][0], self._rows[1][1]))
-
-    @property
-    def heading_rad(self) -> float:
+        self.heading_rad = sqrt(max(0.0, rows[2][2]))
         """Standard deviation [rad] of the heading."""
-        return sqrt(max(0.0, self._rows[2][2]))
 
     def admits(self, innovation: tuple[float, float, float], variances: tuple[float, float], sigma: float) -> bool:
         """Return whether each component of a measured pose error is within `sigma` standard deviations."""
@@ -61,4 +62,5 @@ class Covariance:
                 correction[a] += column[a] * rest
                 for b in range(3):
                     self._rows[a][b] -= column[a] * column[b] * weight
+        self._spread()
         return correction[0], correction[1], correction[2]

@@ -12,11 +12,11 @@ SPEED_MAX = 50.0
 def plausible(pose: Pose2D, twist: Twist) -> bool:
     """Return whether a robot of the fleet can have this pose and twist; False if not finite (nan compares false)."""
     return (
-        abs(pose.x) < POSITION_MAX_M
-        and abs(pose.y) < POSITION_MAX_M
-        and abs(pose.theta) < POSITION_MAX_M
-        and abs(twist.linear_x) < SPEED_MAX
-        and abs(twist.angular_z) < SPEED_MAX
+        -POSITION_MAX_M < pose.x < POSITION_MAX_M
+        and -POSITION_MAX_M < pose.y < POSITION_MAX_M
+        and -POSITION_MAX_M < pose.theta < POSITION_MAX_M
+        and -SPEED_MAX < twist.linear_x < SPEED_MAX
+        and -SPEED_MAX < twist.angular_z < SPEED_MAX
     )
 
 

@@ -11,7 +11,7 @@ from math import cos, hypot, inf, sin
 from lfa.agents.perception.ground_map import GroundMap
 from lfa.agents.perception.obstacle import BlockingObstacle
 from lfa.agents.perception.obstacle_tracker import Feature, Tracker
-from lfa.agents.perception.scan import Point, Surroundings
+from lfa.agents.perception.scan import SIGHT_M, Point, Surroundings
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D, Twist, along_arc
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
@@ -23,6 +23,9 @@ TRAP_M = 0.8
 MATE_M = 0.6
 """Distance [m] to a team-mate's expected position below which an obstacle is that team-mate: table rows are half a
 second old."""
+MATES_M = 2.0 * SIGHT_M + MATE_M + 0.1
+"""Distance [m] beyond which no team-mate matters to a scan: an obstacle's centre is at most half its width behind the
+nearest of its points."""
 OWN_M = 0.15
 """Distance [m] to the surface of a moving obstacle below which a scan point belongs to it."""
 NEAR_M = 0.3
@@ -41,7 +44,10 @@ class ObstacleModel:
         self.ground = GroundMap(limits)
 
     def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> None:
-        """Update with a scan made at `pose`, and assign its points to obstacles."""
+        """Update with a scan made at `pose`, and assign its points to obstacles.
+
+        `mates` are the team-mates within `MATES_M`, and may hold farther ones.
+        """
         self._scan.scan(scan, pose, now)
         places = [(mate.x, mate.y) for mate in mates]
         self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now)
@@ -89,8 +95,13 @@ def resting(points: list[Point], pose: Pose2D, moving: Sequence[Feature]) -> lis
         return points
     c, s = cos(pose.theta), sin(pose.theta)
 
-    def belongs(point: Point) -> bool:
+    things = [(feature.x, feature.y, feature.radius_m + OWN_M) for feature in moving]
+    left: list[Point] = []
+    for point in points:  # a loop, as this is done for each point in each control step
         x, y = pose.x + c * point[0] - s * point[1], pose.y + s * point[0] + c * point[1]
-        return any(hypot(x - f.x, y - f.y) < f.radius_m + OWN_M for f in moving)
-
-    return [point for point in points if not belongs(point)]
+        for at_x, at_y, own_m in things:
+            if hypot(x - at_x, y - at_y) < own_m:
+                break
+        else:
+            left.append(point)
+    return left

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from itertools import pairwise
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, isnan, sin
 
 from lfa.agents.perception.scan import READING_M_MIN
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, wrap
@@ -41,6 +41,8 @@ class ScanAge:
         self._pose = Pose2D()
         self._at: float | None = None
         self._periods: deque[float] = deque(maxlen=PERIODS)
+        self.slow_hz: float | None = None
+        """Rate [Hz] of the scans, if it is lower than the braking margin assumes; None otherwise."""
 
     def update(self, scan: LaserScan, pose: Pose2D, now: float, late_s: float = 0.0) -> bool:
         """Take a scan made at `pose` in `map`, which took `late_s` [s] to arrive; return whether it counts."""
@@ -55,6 +57,7 @@ class ScanAge:
             self._ranges, self._pose = scan.ranges_m, pose
         if self._at is not None:
             self._periods.append(now - self._at)
+            self.slow_hz = _slow_hz(self._periods)
         self._at = now
         return True
 
@@ -65,14 +68,6 @@ class ScanAge:
     def lost(self, now: float) -> bool:
         """Return whether the robot stands for want of a scan."""
         return self.age_s(now) >= 2.0 * SCAN_S_MAX
-
-    @property
-    def slow_hz(self) -> float | None:
-        """Rate [Hz] of the scans, if it is lower than the braking margin assumes; None otherwise."""
-        if len(self._periods) < PERIODS:
-            return None
-        period_s = sorted(self._periods)[PERIODS // 2]
-        return 1.0 / period_s if period_s > PERIOD_SLACK * PERIOD_S else None
 
     def speed_max_mps(self, usual_mps: float) -> float:
         """Return the speed [m/s] at which a robot drives no farther from scan to scan than at `usual_mps` with scans
@@ -88,6 +83,13 @@ class ScanAge:
         return STILL if share <= 0.0 else Twist(share * wanted.linear_x, share * wanted.angular_z)
 
 
+def _slow_hz(periods: deque[float]) -> float | None:
+    if len(periods) < PERIODS:
+        return None
+    period_s = sorted(periods)[PERIODS // 2]
+    return 1.0 / period_s if period_s > PERIOD_SLACK * PERIOD_S else None
+
+
 def _has_measured(scan: LaserScan) -> bool:
     """Return whether any beam has a reading: a distance, or nothing within the range."""
     return any(r >= READING_M_MIN for r in scan.ranges_m)
@@ -95,13 +97,19 @@ def _has_measured(scan: LaserScan) -> bool:
 
 def _are_equal(ranges_m: tuple[float, ...], others_m: tuple[float, ...]) -> bool:
     """Return whether two scans are equal beam by beam; a bad beam, nan, equals a bad beam."""
-    pairs = zip(ranges_m, others_m, strict=False)
-    return len(ranges_m) == len(others_m) and all(r == o or (r != r and o != o) for r, o in pairs)  # noqa: PLR0124
+    if ranges_m == others_m:
+        return True
+    if len(ranges_m) != len(others_m) or not isnan(sum(ranges_m)):
+        return False  # without a bad beam they are equal as tuples or not at all
+    pairs = zip(ranges_m, others_m, strict=True)
+    return all(r == o or (r != r and o != o) for r, o in pairs)  # noqa: PLR0124
 
 
 def _must_differ(scan: LaserScan, before: Pose2D, now: Pose2D) -> bool:
     """Return whether the motion from `before` to `now` must have changed the ranges of `scan`."""
     seen = {r for r in scan.ranges_m if r < inf}
+    if not seen:
+        return False
     if abs(wrap(now.theta - before.theta)) > MOVED_RAD:
         return len(seen) > 1
     if distance(before, now) <= MOVED_M:
