@@ -13,13 +13,22 @@ class ChainPlace:
         self._id = robot_id
         self._lease = lease
         self._config = lease.config
-        self._ids = lease.chain
+        self._take(lease.chain)
+
+    def _take(self, chain: tuple[int, ...]) -> None:
+        self._ids: tuple[int, ...] = chain
+        self._neighbours: tuple[int, ...] = ()
+        if self._id in chain:
+            place = chain.index(self._id)
+            self._neighbours = chain[max(0, place - 1) : place] + chain[place + 1 : place + 2]
 
     @property
     def ids(self) -> tuple[int, ...]:
         """Ids of the chain, leader first; computed anew only when the config has changed (read many times a step)."""
-        if self._lease.config is not self._config:
-            self._config, self._ids = self._lease.config, self._lease.chain
+        config = self._lease.config
+        if config is not self._config:
+            self._config = config
+            self._take(self._lease.chain)
         return self._ids
 
     @property
@@ -43,10 +52,7 @@ class ChainPlace:
         place = chain.index(self._id)
         return chain[place - 1] if place > 0 else None
 
+    @property
     def neighbours(self) -> tuple[int, ...]:
-        """Return the robots directly before and behind; empty outside of the chain."""
-        chain = self.ids
-        if self._id not in chain:
-            return ()
-        place = chain.index(self._id)
-        return chain[max(0, place - 1) : place] + chain[place + 1 : place + 2]
+        """Robots directly before and behind; empty outside of the chain."""
+        return self._neighbours if self.ids else ()

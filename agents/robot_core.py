@@ -74,6 +74,8 @@ class RobotCore:
         self.defer_grants = False
         self.refusal: str | None = None
         """What this robot's mission says otherwise than its team's (E25); None if nothing."""
+        self.leaves = False
+        """True once an exit was requested, or others know a later incarnation (E23)."""
         self._id = robot_id
         self._outbox = outbox
         self._team = TeamState()
@@ -142,6 +144,7 @@ class RobotCore:
                 source = robot_id_of(message.header.sender)
                 if source is not None:
                     self._apply(lease.receive(Member(source, message.header.incarnation), message.body, now), now)
+                    self.leaves = self._pending_release or lease.superseded_by is not None
             case PoseStamped() | TableRow() | ObstacleNote() | FormationNote():
                 robot = robot_id_of(message.header.sender)
                 if robot is not None and robot != self._id:
@@ -179,6 +182,7 @@ class RobotCore:
                 navigator.estimator.sensors(message, now)
                 self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
                 lease.learn_incarnation(message.agent)
+                self.leaves = self._pending_release or lease.superseded_by is not None
             case Localization():
                 navigator.estimator.localization(message, now)
             case LaserScan():
@@ -280,7 +284,7 @@ class RobotCore:
     def _stop(self, now: float) -> None:
         """Brake and release the lease; finished when the last messages are sent."""
         if not self._pending_release:
-            self._pending_release = True
+            self._pending_release = self.leaves = True
             self._commands.publish(STILL, now, as_leader=False)
             self._apply(self.lease.request_release(now), now)
 
@@ -339,7 +343,8 @@ class RobotCore:
         """Run one control step: pose, role, command, then the reports."""
         lease, navigator = self.lease, self.navigator
         self.defer_grants = lease.is_settled(now + EASE_PERIODS * self._period_s)
-        self._input_watch.step(lease.term, now)
+        term = lease.term
+        self._input_watch.step(term, now)
         self._stop_listener.step(now)
         if self._asks == self._stop_listener.memory.certain:
             self._subscribe()
@@ -356,8 +361,8 @@ class RobotCore:
         self._commands.publish(command, now, as_leader=role is Role.LEADER)
         published = obeyed(navigator.last, twist)
         for kind, data in navigator.leading.drain():
-            self._event(kind, now, data, lease.term)
-        self._reports.step(navigator, self._team, self._place.neighbours(), role, lease.term, pose, published, now)
+            self._event(kind, now, data, term)
+        self._reports.step(navigator, self._team, self._place.neighbours, role, term, pose, published, now)
         if self._stuck_policy.step(role, pose, lease, navigator, now):
             self._hand_over(now)
             return
@@ -374,7 +379,7 @@ class RobotCore:
     def _control_without_pose(self, role: Role, now: float) -> None:
         """Run one control step of a robot that has no pose: it brakes, and tells its team that it has none."""
         self._commands.publish(self.navigator.hold(now), now, as_leader=role is Role.LEADER)
-        self._reports.step_without_pose(self.navigator, self._team, self._place.neighbours(), role, now)
+        self._reports.step_without_pose(self.navigator, self._team, self._place.neighbours, role, now)
         if self._stuck_policy.step(role, None, self.lease, self.navigator, now):
             self._hand_over(now)
 

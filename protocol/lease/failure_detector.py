@@ -25,6 +25,8 @@ class FailureDetector:
         self._last_words_s = LAST_WORDS_HEARTBEATS * heartbeat_s
         self.vanishings = 0
         """Number of changes of what `is_gone` returns: what follows from it holds until the next one."""
+        self.renewals = 0
+        """Number of changes of what `is_superseded` returns."""
 
     def heard(self, src: Member, now: float) -> None:
         """Record a message of `src`.
@@ -36,6 +38,7 @@ class FailureDetector:
         self._heard_at[src.id] = now
         if src.id not in self._newest or is_later(src.incarnation, self._newest[src.id]):
             self._newest[src.id] = src.incarnation
+            self.renewals += 1
         if src.id in self._gone:
             incarnation, since = self._gone[src.id]
             late = now - since > self._last_words_s

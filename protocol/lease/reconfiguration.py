@@ -5,6 +5,8 @@ Rules E8, E9, E17, E22, E33 and E34.
 
 from __future__ import annotations
 
+from math import inf
+
 from msgspec import Struct
 
 from lfa.protocol.lease.failure_detector import FailureDetector
@@ -29,6 +31,44 @@ class Policy(Struct, frozen=True):
         """Return the number of ids of the team by `roster`, the witness included."""
         robots = {*self.robots, *(spare.id for spare in roster.spares)} - set(roster.retired)
         return len(robots) + self.witness
+
+
+class Calm:
+    """Knowledge that a config stays, without another look at each of its members: a chain may be of a hundred.
+
+    A leader asks with each round, and with each HELLO of a robot that has no vote.
+    """
+
+    def __init__(self) -> None:
+        self._of: tuple[Config, Holder] | None = None
+        self._members: frozenset[Member] = frozenset()
+        self._oldest = 0.0
+        """Time [s] at which the member heard longest ago was heard, or before; none but the leader is left out."""
+        self._changes = (0, 0)
+
+    def note(
+        self, config: Config, holder: Holder, me: Member, peers: FailureDetector, left_out: frozenset[int]
+    ) -> None:
+        """Note that `reshaped` keeps `config`, if only silence, a token, an incarnation or a newcomer changes that."""
+        self._of, members = None, frozenset((*config.chain, *config.voters))
+        if config.previous is not None or left_out or config.roster.retired or not holder.committed(config):
+            return
+        others = members - {me}
+        if members.issuperset(holder.said_hello) and not any(map(peers.has_ended, others)):
+            self._of, self._members = (config, holder), members
+            self._oldest = min((holder.heard_at.get(m, holder.began_at) for m in others), default=inf)
+            self._changes = peers.vanishings, peers.renewals
+
+    def holds(
+        self, config: Config, holder: Holder, peers: FailureDetector, left_out: frozenset[int], timing: Timing,
+        now: float,
+    ) -> bool:  # fmt: skip
+        """Return True if `reshaped` keeps `config` at `now` [s], under its own roster."""
+        if self._of is None or self._of[0] is not config or self._of[1] is not holder or left_out:
+            return False
+        heard = now - self._oldest <= min(timing.chain_silence_s, timing.remove_silence_s)
+        same = self._changes == (peers.vanishings, peers.renewals)
+        return heard and same and self._members.issuperset(holder.said_hello)
 
 
 def reshaped(

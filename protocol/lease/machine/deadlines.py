@@ -117,5 +117,15 @@ def wakes_by_state(deadlines: tuple[Deadline, ...]) -> dict[LeaseState, tuple[Wh
     }
 
 
+def dues_by_state(deadlines: tuple[Deadline, ...]) -> dict[LeaseState, tuple[When | None, ...]]:
+    """Return for each state the time of each deadline in their order; None where its event does nothing in it."""
+    return {
+        state: tuple(deadline.due if (deadline.event, state) in ACTIONS else None for deadline in deadlines)
+        for state in LeaseState
+    }
+
+
 WAKES = wakes_by_state(DEADLINES)
 """What `next_deadline` asks, several hundred times a second."""
+DUES = dues_by_state(DEADLINES)
+"""What `tick` asks."""

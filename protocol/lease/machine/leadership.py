@@ -30,7 +30,13 @@ def change_roster(m: LeaseMemory, roster: Roster, now: float) -> None:
     """Write and propose the next config under `roster`, and chain and voters by it (E33, E34)."""
     holder = m.holder
     assert holder is not None
+    calm, own = m.calm, roster is m.config.roster
+    if own and calm.holds(m.config, holder, m.peers, m.left_out, m.timing, now):
+        holder.said_hello.clear()
+        return
     newer = reshaped(m.config, holder, m.me, m.peers, m.left_out, m.policy, m.timing, now, roster)
+    if own and newer is m.config:
+        calm.note(m.config, holder, m.me, m.peers, m.left_out)
     holder.said_hello.clear()
     if newer is not m.config:
         resigning.adopt(m, newer, now)

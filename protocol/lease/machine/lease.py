@@ -13,7 +13,7 @@ from lfa.protocol.lease.agreement import understands
 from lfa.protocol.lease.effects import Effect
 from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.machine import resigning, voting
-from lfa.protocol.lease.machine.deadlines import DEADLINES, NEVER, WAKES, expiry
+from lfa.protocol.lease.machine.deadlines import DEADLINES, DUES, NEVER, WAKES, expiry
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState, refusal, state_of
 from lfa.protocol.lease.membership import ids, is_first
@@ -80,6 +80,9 @@ class Lease:
         self._memory = LeaseMemory(me, mission, timing, now, floor)
         self._observer = observer
         self._chain_of, self._chain = self._memory.config, ids(self._memory.config.chain)
+        self._deadline_for: float | None = None
+        self._deadline = NEVER
+        """Last answer of `next_deadline`, and what it was asked for; None: something has happened since."""
 
     # --- read by the agent --------------------------------------------------------------------------------------
 
@@ -197,6 +200,7 @@ class Lease:
     def receive(self, src: Member, body: LeaseBody, now: float) -> list[Effect]:
         """Process a message of another process or of the own gateway (FENCED: `src.id` is the gateway's robot)."""
         m = self._memory
+        self._deadline_for = None
         self._expire(now)
         if src.id != m.me.id or isinstance(body, Fenced):
             event = self._heard(src, body, now)
@@ -206,20 +210,25 @@ class Lease:
 
     def tick(self, now: float, again_at: float = SOONEST) -> list[Effect]:
         """Do what is due at `now` [s]; send a round now if it falls due before `again_at` [s], the next tick."""
-        for deadline in DEADLINES:
-            m = self._memory
-            if now >= deadline.due(m, again_at) and (deadline.event, state_of(m)) in ACTIONS:
+        m = self._memory
+        dues = DUES[state_of(m)]
+        for place, deadline in enumerate(DEADLINES):
+            due = dues[place]
+            if due is not None and now >= due(m, again_at):
                 self._fire(deadline.event, now)
-        return self._memory.drain()
+                dues = DUES[state_of(m)]
+        return m.drain()
 
     def next_deadline(self, again_at: float = SOONEST) -> float:
         """Return the time [s] of the next tick, for a process that ticks at `again_at` [s] anyway."""
-        m, at = self._memory, NEVER
-        for wakes in WAKES[state_of(m)]:
-            when = wakes(m, again_at)
-            if when < at:
-                at = when
-        return at
+        if self._deadline_for != again_at:
+            m, at = self._memory, NEVER
+            for wakes in WAKES[state_of(m)]:
+                when = wakes(m, again_at)
+                if when < at:
+                    at = when
+            self._deadline_for, self._deadline = again_at, at
+        return self._deadline
 
     def hint(self, id: int, incarnation: int, up: bool, now: float) -> list[Effect]:
         """Process a liveliness event, which proves nothing; a leader closes the chain over a vanished follower (E8)."""
@@ -308,6 +317,7 @@ class Lease:
 
     def _fire(self, event: LeaseEvent, now: float, *given: Any) -> None:
         """Do what the table says for the event in the present state."""
+        self._deadline_for = None
         before = state_of(self._memory)
         action = ACTIONS.get((event, before))
         first = len(self._memory.effects)

@@ -10,7 +10,7 @@ from lfa.protocol.lease.election import Election
 from lfa.protocol.lease.failure_detector import FailureDetector
 from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.membership import first_config
-from lfa.protocol.lease.reconfiguration import Policy
+from lfa.protocol.lease.reconfiguration import Calm, Policy
 from lfa.protocol.lease.step_down import PendingRelease
 from lfa.protocol.lease.term_window import FREE, TermWindow
 from lfa.protocol.lease.timing import Timing
@@ -52,6 +52,7 @@ class LeaseMemory:
         self.election = Election(me, mission, timing, now)
         self.census = Census(agreement, me.id, self.election.all_member_ids, now)
         self.policy = Policy(mission.tiebreak, mission.shrink, mission.robots, mission.witness)
+        self.calm = Calm()
         self.peers = FailureDetector(me, timing.heartbeat_s)
         self.hello_at = now
         self.hellos: dict[int, tuple[Member, float]] = {}
