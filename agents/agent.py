@@ -110,6 +110,14 @@ class Agent:
         return self._stopped if self._core is None else self._core.finished
 
     @property
+    def may_end(self) -> bool:
+        """False while this robot takes part, under its number, and was not asked to leave."""
+        core = self._core
+        if core is None:
+            return self._stopped or self._refusal is not None
+        return core.refusal is not None or core.leaves
+
+    @property
     def waits_for(self) -> str | None:
         """What this robot waits for before it can take part: its mission, or robots of its team (E18)."""
         if self._core is None:

@@ -46,8 +46,9 @@ def wrap(angle: float) -> float:
 
 def compose(a_b: Pose2D, b_c: Pose2D) -> Pose2D:
     """Return the pose of c in a, from b in a and c in b."""
-    c, s = cos(a_b.theta), sin(a_b.theta)
-    return Pose2D(a_b.x + c * b_c.x - s * b_c.y, a_b.y + s * b_c.x + c * b_c.y, wrap(a_b.theta + b_c.theta))
+    c, s, x, y = cos(a_b.theta), sin(a_b.theta), b_c.x, b_c.y
+    theta = (a_b.theta + b_c.theta + pi) % TAU - pi  # as `wrap`
+    return Pose2D(a_b.x + c * x - s * y, a_b.y + s * x + c * y, pi if theta == -pi else theta)
 
 
 def inverse(a_b: Pose2D) -> Pose2D:
@@ -58,15 +59,25 @@ def inverse(a_b: Pose2D) -> Pose2D:
 
 def between(a_b: Pose2D, a_c: Pose2D) -> Pose2D:
     """Return the pose of c in b, from b and c in a."""
-    return compose(inverse(a_b), a_c)
+    c, s, x, y = cos(a_b.theta), sin(a_b.theta), a_b.x, a_b.y
+    back = wrap(-a_b.theta)
+    theta = (back + a_c.theta + pi) % TAU - pi  # as `compose(inverse(a_b), a_c)`, to the last bit, in one call
+    to_c, to_s = cos(back), sin(back)
+    return Pose2D(
+        -c * x - s * y + to_c * a_c.x - to_s * a_c.y,
+        s * x - c * y + to_s * a_c.x + to_c * a_c.y,
+        pi if theta == -pi else theta,
+    )
 
 
 def along_arc(pose: Pose2D, twist: Twist, duration_s: float) -> Pose2D:
     """Return a unicycle's pose after `duration_s` of constant `twist`: equation (1) integrated exactly as an arc."""
     turn = twist.angular_z * duration_s
-    chord = twist.linear_x * duration_s * sinc(0.5 * turn)
-    middle = pose.theta + 0.5 * turn
-    return Pose2D(pose.x + chord * cos(middle), pose.y + chord * sin(middle), wrap(pose.theta + turn))
+    half = 0.5 * turn
+    # `sinc` and `wrap`, without a call for each: this is called a hundred times a second for each robot.
+    chord = twist.linear_x * duration_s * (sin(half) / half if not -1e-6 <= half <= 1e-6 else 1.0 - half * half / 6.0)
+    middle, theta = pose.theta + half, (pose.theta + turn + pi) % TAU - pi
+    return Pose2D(pose.x + chord * cos(middle), pose.y + chord * sin(middle), pi if theta == -pi else theta)
 
 
 def part_of_arc(step: Pose2D, part: float) -> Pose2D:

@@ -132,6 +132,15 @@ def lacks_messages(node: Node) -> bool:
     return lacks
 
 
+def may_end(node: Node) -> bool:
+    """Return False if the node says that nothing ends it: it is asked after each call, and then for nothing more.
+
+    True for a node that does not say it: its `refusal`, `reborn` and `finished` are asked.
+    """
+    says: bool = getattr(node, "may_end", True)
+    return says
+
+
 def waits_for(node: Node) -> str | None:
     """Return what a node waits for before it can take part, as text for its terminal; None when it takes part."""
     missing: str | None = getattr(node, "waits_for", None)

@@ -45,7 +45,8 @@ class Outbox:
         return self.envelope("event", Event(self.header("event", now), kind, term, data))
 
     def publish(self, topic: str, message: Message, to: str | None = None) -> None:
-        self._out.append(self.envelope(topic, message, to))
+        own = self._keys[topic]
+        self._out.append(Envelope(own if to is None else f"{own}/{to}", message))
 
     def event(self, kind: str, now: float, term: Term | None, data: dict[str, Any]) -> None:
         """Publish an event."""

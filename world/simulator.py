@@ -24,6 +24,7 @@ from lfa.protocol.node import (
     Stop,
     Vitals,
     lacks_messages,
+    may_end,
     reborn,
 )
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
@@ -186,7 +187,8 @@ class Simulator(VirtualTime):
         if process.paused:
             process.waiting.append((key, message, payload))
             return
-        now = process.clock.local(self.now)
+        clock = process.clock
+        now = clock.offset_s + clock.rate * self.now
         if not key and isinstance(message, Local):
             process.links.see(message, now)
         self._after(process, process.host.deliver(now, key, message, payload))
@@ -209,6 +211,9 @@ class Simulator(VirtualTime):
             self._refresh(process)
         if self.deaf:
             self._declare_again(process)
+        if process.stop_by is None and not may_end(node):
+            self._plan(process)
+            return
         refusal = node.refusal
         if refusal is not None and not self.refused_leave:
             raise Refused(refusal)
@@ -230,10 +235,9 @@ class Simulator(VirtualTime):
 
     def _plan(self, process: _SimulatedNode) -> None:
         deadline = process.node.next_deadline()
-        if deadline == process.deadline:
-            return
-        process.deadline = deadline
-        self.at(max(process.clock.true(deadline), self.now), self._due, process, deadline)
+        if deadline != process.deadline:
+            process.deadline = deadline
+            self.at(max(process.clock.true(deadline), self.now), self._due, process, deadline)
 
     def _due(self, process: _SimulatedNode, deadline: float) -> None:
         if process.deadline == deadline:
@@ -267,13 +271,14 @@ class Simulator(VirtualTime):
             self.link_model.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
         for tap in self.taps:
             tap(self.now, key, payload, message)
+        now, at, give, delays = self.now, self.at, self._give, self.link_model.delays
         for process, link in self._routes.of(key):
             if process is sender and key.split("/", 4)[3] in NO_ECHO:
                 continue
             if self.deaf and (process.node.name, sender.node.name) in self.deaf:
                 continue
-            for delay_s in LOCAL_DELAYS_S if link is None else self.link_model.delays(*link):
-                self.at(self.now + delay_s, self._give, process, key, message, payload)
+            for delay_s in LOCAL_DELAYS_S if link is None else delays(*link):
+                at(now + delay_s, give, process, key, message, payload)
 
     def _refresh(self, process: _SimulatedNode) -> None:
         """Apply the node's changed interests; it also gets liveliness events for tokens that already exist."""

@@ -36,6 +36,11 @@ from lfa.world.sensors.lidar import Scanner
 from lfa.world.sensors.own_sensors import OwnSensors
 from lfa.world.time_grid import TimeGrid
 
+FIX_HZ, GROUND_HZ, TRUTH_HZ, CLOCK_HZ = (
+    TOPIC[topic].rate_hz or 0.0 for topic in ("localization", "ground", "truth", "clock")
+)
+"""Rates [Hz] of what the world says besides sensors and scans."""
+
 
 class World:
     """Simulation of a drawn `scenario` without its agents; `seed` draws the noise. Implements the Node interface.
@@ -252,7 +257,7 @@ class World:
     def _speak(self, stamp: float, now: float, touches: list[Touch]) -> list[Envelope]:
         """Return the messages that are due at this point of the time grid."""
         sent: list[Envelope] = []
-        poses = self._bodies.poses
+        poses, samples = self._bodies.poses, self._time.samples
         simulated = self._simulated
         for touch in touches:
             robot = self._robots[touch.robot]
@@ -262,26 +267,26 @@ class World:
                 sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
             sent.append(self._event("contact", None, data | {"t": self._time.elapsed_s}, stamp))
-        if self._samples(self._scenario.mission.control_hz):
+        if samples(self._scenario.mission.control_hz):
             driven = [robot for _, robot in simulated if not robot.hangs("driver")]
             sent += [robot.sensors(stamp, now) for robot in driven]
             sent += [rests for robot in driven if (rests := robot.come_to_rest(now)) is not None]
-        if self._samples(TOPIC["localization"].rate_hz):
+        if samples(FIX_HZ):
             fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated if not robot.hangs("localization"))
             sent += [fix for fix in fixes if fix is not None]
-        if self._samples(self._scenario.world.lidar.rate_hz):
+        if samples(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, self._bodies.moved())
             sent += [robot.scan(stamp, ranges[n]) for n, robot in simulated if not robot.hangs("scanner")]
-        if not self._profiler.flat and self._samples(TOPIC["ground"].rate_hz):
+        if not self._profiler.flat and samples(GROUND_HZ):
             heights = self._profiler.profile(poses, self._bodies.standing_m())
             seeing = [(n, robot) for n, robot in simulated if not robot.hangs("driver")]
             sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in seeing]
         for name, rate_hz in self._own_sensors.rates_hz.items():
-            if self._samples(rate_hz):
+            if samples(rate_hz):
                 sent += self._readings(name, stamp)
-        if self._samples(TOPIC["truth"].rate_hz):
+        if samples(TRUTH_HZ):
             sent.append(self._truth(stamp))
-        if self._samples(TOPIC["clock"].rate_hz):
+        if samples(CLOCK_HZ):
             clock = Clock(self._truths.header("clock", stamp), self._time.elapsed_s)
             sent.append(self._truths.envelope("clock", clock))
         return sent
@@ -305,11 +310,6 @@ class World:
             elif measured is not None:
                 sent.append(robot.reading(stamp, name, measured))
         return sent
-
-    def _samples(self, rate_hz: float | None) -> bool:
-        """Return True if a message of a topic with this rate is due at this point of the time grid."""
-        assert rate_hz is not None
-        return self._time.samples(rate_hz)
 
     def _truth(self, stamp: float) -> Envelope:
         robots = tuple(

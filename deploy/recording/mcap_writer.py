@@ -10,7 +10,7 @@ from __future__ import annotations
 import zlib
 from collections import defaultdict
 from collections.abc import Iterable
-from struct import Struct
+from struct import Struct, pack
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -23,7 +23,6 @@ from mcap.records import (
     Footer,
     Header,
     McapRecord,
-    MessageIndex,
     Metadata,
     MetadataIndex,
     Schema,
@@ -35,9 +34,14 @@ from mcap.writer import MCAP0_MAGIC
 from lfa.protocol.output import AppendedFile
 
 COMPRESSION = "zstd"
+_OPCODE = int(Opcode.MESSAGE)
 _MESSAGE = Struct("<BQHIQQ")
 """Record header (opcode, length), then message header (channel, sequence, log time, publish time)."""
 _FIELDS_BYTES = _MESSAGE.size - 9
+_INDEX_BYTES = 2 + 4
+"""Length [bytes] of a message index without entries: channel, length of the array."""
+_ENTRY_BYTES = 8 + 8
+"""Length [bytes] of an entry of a message index: log time, place in the chunk."""
 _FOOTER = Struct("<BQQQ")
 """First part of the footer, which the summary's CRC covers: opcode, length, starts of summary and summary offsets."""
 _FOOTER_BYTES = 20
@@ -95,14 +99,13 @@ class ChunkWriter:
             self._chunk_from_ns = log_time
         if log_time > self._chunk_until_ns:
             self._chunk_until_ns = log_time
-        index = self._indexes.get(channel_id)
+        index, chunk = self._indexes.get(channel_id), self._chunk
         if index is None:
-            index = self._indexes[channel_id] = MessageIndex(channel_id, [])
-        index.records.append((log_time, len(self._chunk)))
-        size = _FIELDS_BYTES + len(data)
-        self._chunk += _MESSAGE.pack(Opcode.MESSAGE, size, channel_id, sequence, log_time, publish_time)
-        self._chunk += data
-        if len(self._chunk) > self._size_max:
+            index = self._indexes[channel_id] = []
+        index += (log_time, len(chunk))
+        chunk += _MESSAGE.pack(_OPCODE, _FIELDS_BYTES + len(data), channel_id, sequence, log_time, publish_time)
+        chunk += data
+        if len(chunk) > self._size_max:
             self._end_chunk()
 
     def flush(self) -> None:
@@ -152,7 +155,8 @@ class ChunkWriter:
 
     def _begin_chunk(self) -> None:
         self._chunk = bytearray()
-        self._indexes: dict[int, MessageIndex] = {}
+        self._indexes: dict[int, list[int]] = {}
+        """Log time [ns] and place of each message in the chunk, one after the other, by channel."""
         self._chunk_from_ns, self._chunk_until_ns = 0, 0
 
     def _end_chunk(self) -> None:
@@ -172,7 +176,7 @@ class ChunkWriter:
         index_at, offsets, indexes = offset + len(written), dict[int, int](), bytearray()
         for channel_id, index in self._indexes.items():
             offsets[channel_id] = index_at + len(indexes)
-            indexes += _bytes_of([index])
+            indexes += _message_index(channel_id, index)
         if not self._file.append(written + indexes):
             self._drop_chunk()
             return
@@ -197,13 +201,20 @@ class ChunkWriter:
         self._from_ns = min(self._from_ns, self._chunk_from_ns) if self._chunks else self._chunk_from_ns
         self._until_ns = max(self._until_ns, self._chunk_until_ns)
         for channel_id, index in self._indexes.items():
-            self._counts[channel_id] += len(index.records)
+            self._counts[channel_id] += len(index) // 2
 
     def _drop_chunk(self) -> None:
         """Count the messages of the chunk, and begin the next with the schemas and channels that it may have held."""
-        self.unwritten += sum(len(index.records) for index in self._indexes.values())
+        self.unwritten += sum(len(index) // 2 for index in self._indexes.values())
         self._begin_chunk()
         self._chunk += _bytes_of([*self._schemas, *self._channels])
+
+
+def _message_index(channel_id: int, index: list[int]) -> bytes:
+    """Return a message index record; the library writes it number by number."""
+    size = len(index) // 2 * _ENTRY_BYTES
+    head = (Opcode.MESSAGE_INDEX, _INDEX_BYTES + size, channel_id, size)
+    return pack(f"<BQHI{len(index)}Q", *head, *index)
 
 
 def _bytes_of(records: Iterable[McapRecord]) -> bytes:

@@ -111,6 +111,8 @@ class LinkModel:
             return []
         if radio.loss > 0.0 and self._lost(sender, receiver):
             return []
+        if radio.duplication == radio.tail == radio.reorder == 0.0:
+            return [radio.delay_s + radio.jitter_s * self._random.random()]
         delays = [self._delay_s()]
         if radio.duplication > 0.0 and self._random.random() < radio.duplication:
             lag_s = radio.duplication_lag_s * self._random.random() if radio.duplication_lag_s > 0.0 else 0.0

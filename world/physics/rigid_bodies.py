@@ -61,6 +61,9 @@ class Physics:
         if self._footprint_m:
             self._inertia = pymunk.moment_for_poly(mass_kg, self._footprint_m)
         self._mass_kg, self._push_n, self._torque_nm = mass_kg, world.body.push_n, world.body.push_n * radius_m
+        self._dv_max = self._push_n / self._mass_kg * self._dt_s
+        self._dw_max = self._torque_nm / self._inertia * self._dt_s
+        """Most that a step changes the speeds [m/s, rad/s] of a robot by, as its wheels grip."""
         self._robots = [self._add_robot(n, robot_name(robot_id), radius_m) for n, robot_id in enumerate(mission.robots)]
         self._velocity = [(0.0, 0.0, 0.0)] * len(self._robots)
         self._floor = Floor(scenario)
@@ -146,9 +149,11 @@ class Physics:
         chord = twist.linear_x * sinc(0.5 * turn)
         middle = self.poses[n].theta + 0.5 * turn
         dx, dy, dw = chord * cos(middle) - now[0], chord * sin(middle) - now[1], twist.angular_z - now[2]
-        dv_max, dw_max = self._push_n / self._mass_kg * self._dt_s, self._torque_nm / self._inertia * self._dt_s
+        if not touching and dx == dy == dw == 0.0:
+            return  # the engine keeps the velocity of a body that nothing touches
         if not held_hard:
-            grip = min(1.0, dv_max / max(hypot(dx, dy), 1e-12))
+            dw_max = self._dw_max
+            grip = min(1.0, self._dv_max / max(hypot(dx, dy), 1e-12))
             dx, dy, dw = grip * dx, grip * dy, max(-dw_max, min(dw_max, dw))
         body = self._robots[n]
         if touching:
