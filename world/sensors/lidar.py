@@ -203,8 +203,7 @@ def _beams_within(low: Floats, high: Floats, robot: Ints, beams: int) -> tuple[I
     width = TAU / beams
     first = np.ceil(low / width - ROUNDING).astype(np.int64)
     count = np.minimum(np.floor(high / width + ROUNDING).astype(np.int64) - first + 1, beams)
-    np.maximum(count, 0, out=count)
     ends = np.cumsum(count)
     pair = np.repeat(np.arange(len(count)), count)
-    number = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
+    number = np.arange(ends[-1]) + np.repeat(first - (ends - count), count)
     return pair, number * width, np.repeat(robot * beams, count) + number % beams

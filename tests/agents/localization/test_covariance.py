@@ -23,6 +23,7 @@ def test_moves_growth_and_fixes_are_those_of_the_kalman_filter_in_matrices() -> 
         p += np.diag([more, more, turned])
         own.grow(more, turned)
         assert own.position_m == pytest.approx(max(p[0, 0], p[1, 1]) ** 0.5)
+        assert own.heading_rad == pytest.approx(p[2, 2] ** 0.5)
         innovation = (chance.gauss(0.0, 0.3), chance.gauss(0.0, 0.3), chance.gauss(0.0, 0.3))
         gain = p @ np.linalg.inv(p + np.diag([0.02, 0.02, 0.03]))
         p = (np.eye(3) - gain) @ p

@@ -8,8 +8,10 @@ import pytest
 from msgspec.structs import replace
 
 from lfa.agents.localization.estimator import (
+    BACKWARD_TO_RESTART,
     ODOMETRY_S_MAX,
     OUTLIERS_TO_RELOCATE,
+    SIGMA_RAD_MAX,
     UNFIXED_M_MAX,
     Estimator,
     EstimatorNoise,
@@ -105,6 +107,41 @@ def test_a_fix_between_two_samples_is_compared_with_the_place_between_them() -> 
     assert where(one, 1.4) == pytest.approx((0.5, 0.0, 0.0))
     assert one.localization(fix(1.15, Pose2D(0.21, 0.0, 0.0)), 1.4)
     assert one.outliers == 1
+
+
+@pytest.mark.parametrize(("error", "outliers"), [(0.48, 0), (0.52, 1)])
+def test_up_to_a_fix_between_two_samples_the_robot_has_driven_a_part_of_the_way_between_them(
+    error: float, outliers: int
+) -> None:
+    """3 m and half of 2 m since the last fix: five deviations of 5 cm a root of a metre are half a metre."""
+    one = estimator(replace(SURE, per_metre_m=0.05))
+    for at, x in ((1.1, 3.0), (1.3, 5.0)):
+        one.sensors(odometry(at, Pose2D(x, 0.0, 0.0), x), at)
+    one.localization(fix(1.2, Pose2D(4.0 + error, 0.0, 0.0)), 1.3)
+    assert one.outliers == outliers
+
+
+def test_a_robot_that_turned_under_refused_fixes_has_no_pose_once_its_heading_is_uncertain() -> None:
+    """Its position may be as sure as ever: it stood."""
+    one = estimator(replace(SURE, per_radian_rad=SIGMA_RAD_MAX))
+    for n, known in ((1, None), (2, "localization")):
+        at, turned = 1.0 + 0.1 * n, Pose2D(0.0, 0.0, 0.9 * n)
+        one.sensors(odometry(at, turned), at)
+        one.localization(fix(at, Pose2D(3.0, 0.0, turned.theta)), at)
+        assert (one.outliers, one.missing(at)) == (n, known)
+
+
+def test_a_clock_was_set_back_when_so_many_stamps_in_a_row_are_before_the_newest() -> None:
+    """One that goes on from the newest in between shows that it was not."""
+    one = estimator()
+    late = [0.5 + 0.01 * n for n in range(BACKWARD_TO_RESTART - 1)]
+    for newest in (1.1, 1.2):
+        assert [one.sensors(odometry(at), 1.05) for at in late] == [False] * len(late)
+        assert one.sensors(odometry(newest), newest)
+    assert [one.sensors(odometry(at), 1.25) for at in late] == [False] * len(late)
+    assert one.missing(1.25) is None
+    assert one.sensors(odometry(0.6), 1.25)
+    assert one.missing(1.25) == "localization"
 
 
 def test_a_turn_on_the_spot_counts_as_way_driven_without_a_fix() -> None:

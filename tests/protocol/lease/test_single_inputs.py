@@ -1,0 +1,221 @@
+"""One message, one word of the gateway or one token at a lease of robot 1 of two, and what follows from that alone."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from lfa.protocol.geometry import Twist
+from lfa.protocol.lease.effects import BecomeLeader, StepDown
+from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.term_window import BURST, FREE
+from lfa.protocol.messages.consensus import (
+    NO_TERM,
+    Config,
+    Fence,
+    GatewayStamp,
+    Grant,
+    Member,
+    Nack,
+    Prepare,
+    Promise,
+    Propose,
+    Term,
+    Version,
+)
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import NEVER_STOPPED
+from tests.rigs.lease_scenes import HIGH, LOW, OTHERS, STD, A, B, alone, ask, config_of, elected, proposed, sent, voter
+
+ME, (WITNESS, OTHER) = Member(1, 7), OTHERS
+TRIO = (ME, OTHER, WITNESS)
+
+
+def led_by_other(lease: Lease, term: Term, now: float) -> Config:
+    """Let the other robot lead under `term`, by a PROPOSE that this process grants; return its config."""
+    config = Config(Version(term), TRIO, WITNESS, None, (OTHER, ME))
+    effects = lease.receive(OTHER, Propose(term, config, 0, OTHER, agreed=lease.agreed), now)
+    assert len(sent(effects, Grant)) == 1
+    return config
+
+
+def committed() -> tuple[Lease, float]:
+    """A lease whose config is joint with none any more and has been accepted by all, and when that was."""
+    lease, _, at, effects = elected(slow_s=0.001)
+    assert not lease.is_committed, "joint with the unanimous start"
+    while not lease.is_committed:
+        at = max(at, lease.next_deadline())
+        newest = sent([*effects, *lease.tick(at)], Propose)[-1]
+        assert isinstance(newest, Propose)
+        grant = Grant(newest.term, newest.round, newest.config.version, at)
+        effects = [effect for other in OTHERS for effect in lease.receive(other, grant, at)]
+    return lease, at
+
+
+# --- what an agent reads -----------------------------------------------------------------------------------------
+
+
+def test_a_leader_is_committed_and_settled_while_no_change_is_under_way() -> None:
+    lease, at = committed()
+    assert lease.is_committed
+    assert lease.is_settled(at + 0.9 * STD.act_s)
+    assert not lease.is_settled(at + 1.1 * STD.act_s), "the lease is over by then"
+    lease.gateway_term(replace(lease.term, n=lease.term.n + 5), at)
+    assert not lease.is_settled(at + 0.1 * STD.act_s), "E10: it raises its term"
+
+
+def test_who_does_not_lead_is_neither_committed_nor_settled_and_has_no_successor() -> None:
+    lease = alone()
+    assert not lease.is_committed
+    assert not lease.is_settled(-1.0)
+    assert lease.successor(0.0) is None
+
+
+def test_e16_the_successor_of_a_leader_is_the_next_that_it_has_heard() -> None:
+    lease, at = committed()
+    assert lease.successor(at) == OTHER.id
+    assert lease.successor(at + STD.chain_silence_s + 0.01) is None
+
+
+# --- tokens, and words of the own gateway --------------------------------------------------------------------------
+
+
+def test_e7_a_token_that_changes_after_the_leases_end_ends_it_first() -> None:
+    for up in (True, False):
+        lease, asked_at, _, _ = elected(slow_s=0.001)
+        effects = lease.hint(OTHER.id, OTHER.incarnation, up, asked_at + STD.act_s)
+        assert isinstance(effects[0], StepDown)
+
+
+def test_a_token_that_returns_makes_its_process_one_that_is_there() -> None:
+    lease = alone()
+    lease.hint(OTHER.id, OTHER.incarnation, False, 0.1)
+    assert lease.peers.is_gone(OTHER)
+    lease.hint(OTHER.id, OTHER.incarnation, True, 0.2)
+    assert not lease.peers.is_gone(OTHER)
+
+
+def test_e24_an_own_term_is_above_the_highest_that_the_own_gateway_has_seen() -> None:
+    lease = alone()
+    for n in (50, 40):
+        lease.gateway_term(Term(n, 2, 4), 0.1)
+    [prepare] = sent(lease.tick(STD.grant_s), Prepare)
+    assert isinstance(prepare, Prepare)
+    assert prepare.term == Term(51, ME.id, ME.incarnation)
+
+
+def test_e24_a_refused_holder_is_told_the_term_of_the_gateway_also_when_it_asks_again() -> None:
+    """Whoever promises less than its gateway has seen would be the holder's voter and not move for it."""
+    lease = alone()
+    lease.gateway_term(Term(50, 2, 4), 0.1)
+    low = Term(9, OTHER.id, OTHER.incarnation)
+    propose = Propose(low, Config(Version(low), TRIO, WITNESS, None, (OTHER, ME)), 0, OTHER, agreed=lease.agreed)
+    for at in (STD.grant_s + 0.1, STD.grant_s + 0.2):
+        [refusal] = sent(lease.receive(OTHER, propose, at), Nack)
+        assert isinstance(refusal, Nack)
+        assert refusal.promised == Term(50, 2, 4)
+
+
+def test_e23_a_number_that_only_its_gateway_knows_is_a_later_life_of_this_process() -> None:
+    lease = alone()
+    for known, newest in ((None, None), (ME.incarnation, None), (ME.incarnation - 1, None), (9, 9), (8, 9), (10, 10)):
+        lease.learn_incarnation(known)
+        assert lease.superseded_by == newest
+
+
+# --- answers to candidates and holders -----------------------------------------------------------------------------
+
+
+def test_e20_a_candidate_that_forgets_this_process_is_refused_and_told_so() -> None:
+    lease = alone()
+    at = STD.grant_s + 0.1
+    lease.receive(OTHER, Prepare(Term(9, 2, 4), Version(Term(3, 2, 4)), (), lease.agreed), at)
+    [refusal] = sent(lease.receive(OTHER, Prepare(HIGH, Version(LOW), (ME,), lease.agreed), at), Nack)
+    assert isinstance(refusal, Nack)
+    assert refusal.term == HIGH
+
+
+def test_e3_what_was_granted_is_promised() -> None:
+    """Without a PREPARE before it, too: when the bond is over, no lower term is promised."""
+    free = voter()
+    assert isinstance(ask(free, B, HIGH, 10.0), Grant)
+    refusal = free.prepare(A, Prepare(LOW, Version(HIGH)), config_of(HIGH), 10.0 + STD.grant_s)
+    assert isinstance(refusal, Nack)
+    assert refusal.promised == HIGH
+
+
+def test_promises_and_grants_of_another_term_count_for_nothing() -> None:
+    lease, asked_at = alone(), STD.grant_s + 0.001
+    [prepare] = sent(lease.tick(STD.grant_s), Prepare)
+    assert isinstance(prepare, Prepare)
+    other = replace(prepare.term, n=prepare.term.n - 1)
+    for source in OTHERS:
+        assert lease.receive(source, Promise(other, lease.config, None, True), asked_at) == []
+    lease = alone()
+    propose = proposed(lease, asked_at)
+    for term in (replace(propose.term, n=propose.term.n - 1), replace(propose.term, n=propose.term.n + 1)):
+        for source in OTHERS:
+            assert lease.receive(source, Grant(term, propose.round, propose.config.version, 0.0), asked_at) == []
+    assert not lease.may_command(asked_at)
+
+
+def test_a_leader_begins_with_the_config_that_its_voters_have_granted() -> None:
+    lease, asked_at = alone(), STD.grant_s + 0.001
+    propose = proposed(lease, asked_at)
+    grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
+    effects = [effect for source in OTHERS for effect in lease.receive(source, grant, asked_at)]
+    assert any(isinstance(effect, BecomeLeader) for effect in effects)
+    assert lease.config == propose.config
+
+
+def test_e16_a_term_that_names_this_process_without_its_own_nonce_is_not_taken_over() -> None:
+    """From no time of its own clock could the lease count."""
+    for nonce, leads in ((None, False), (STD.grant_s + 0.29, True)):
+        lease = alone()
+        config = led_by_other(lease, Term(9, 2, 4), STD.grant_s + 0.2)
+        given = Propose(Term(10, 2, 4), config, 1, ME, (), nonce, lease.agreed)
+        at = STD.grant_s + 0.3
+        effects = lease.receive(OTHER, given, at)
+        for source in OTHERS:
+            effects += lease.receive(source, Grant(given.term, 1, config.version, at), at)
+        assert any(isinstance(effect, BecomeLeader) for effect in effects) == leads
+
+
+def test_e16_grants_that_come_before_their_hand_over_count_when_it_comes() -> None:
+    """Those of terms that are over by then do not."""
+    lease, at = alone(), STD.grant_s + 0.3
+    config = led_by_other(lease, Term(9, 2, 4), STD.grant_s + 0.2)
+    for n in (9, 10):
+        for source in OTHERS:
+            assert lease.receive(source, Grant(Term(n, 2, 4), 1, config.version, at), at) == []
+    effects = lease.receive(OTHER, Propose(Term(10, 2, 4), config, 1, ME, (), at - 0.01, lease.agreed), at)
+    assert any(isinstance(effect, BecomeLeader) for effect in effects)
+    assert lease.may_command(at)
+
+
+def test_e26_an_own_term_above_the_free_ones_does_not_use_up_what_is_believed_of_others() -> None:
+    lease = alone()
+    lease.gateway_term(Term(FREE + 5 * BURST, 2, 4), 0.1)
+    lease.tick(STD.grant_s)
+    beyond = Term(FREE + 5 * BURST + 1 + BURST, OTHER.id, OTHER.incarnation)
+    request = Prepare(beyond, Version(LOW), (), lease.agreed)
+    assert sent(lease.receive(OTHER, request, STD.grant_s), Promise), "a burst above what this process knows"
+
+
+# --- the gateway's holder of a term --------------------------------------------------------------------------------
+
+
+def test_e12_after_a_fence_the_first_command_of_the_term_says_who_holds_it() -> None:
+    gateway, now = Gateway(1, 9, STD, -10.0), 1.0
+    gateway.agent_up(5, now)
+
+    def command(holder: int, term: Term) -> str | None:
+        header, stamp = Header("robot1", 5, 1, now), GatewayStamp(9, now)
+        return gateway.command(CmdVel(header, Twist(), term, holder, False, stamp, NEVER_STOPPED, STD.grant_s), now)
+
+    assert command(2, NO_TERM) is None, "before any term, nobody holds it"
+    gateway.fence(Fence(LOW, HIGH), now)
+    assert command(2, HIGH) is None
+    assert command(3, HIGH) == "two_holders"
+    assert command(2, HIGH) is None
