@@ -24,6 +24,7 @@ from lfa.agents.orders.stop_listener import StopListener
 from lfa.agents.orders.team_orders import QUESTION, TeamOrders
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
+from lfa.agents.team_messages import TeamMessages
 from lfa.agents.team_state import TeamState
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
@@ -44,7 +45,6 @@ from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import OPERATOR_NAME
 
 HardwareMessage = Sensors | Localization | LaserScan | GroundProfile | SensorReading
-TeamMessage = PoseStamped | TableRow | ObstacleNote | FormationNote
 EASE_PERIODS = 2.0
 """Lease time left, in control periods, beyond which a grant may wait for the next control step: each voter of a round
 would wake the leader."""
@@ -87,6 +87,7 @@ class RobotCore:
         self._stop_listener = StopListener(robot_id, mission.robots, outbox)
         self._commands = CommandPublisher(robot_id, outbox, self._team, self.lease, self._place, self._stop_listener)
         self._formation_commands = FormationCommands(outbox, mission, self.navigator.formation)
+        self._team_messages = TeamMessages(robot_id, self.navigator, self._team, self._formation_commands, self._event)
         self._team_orders = TeamOrders(outbox, mission)
         self._roster_orders = RosterOrders(robot_id, mission, self.lease, outbox)
         self._reports = Reports(outbox, len(mission.robots), timing.deadman_s - mission.control_period_s)
@@ -148,7 +149,7 @@ class RobotCore:
             case PoseStamped() | TableRow() | ObstacleNote() | FormationNote():
                 robot = robot_id_of(message.header.sender)
                 if robot is not None and robot != self._id:
-                    self._hear_robot(robot, message, now)
+                    self._team_messages.hear(robot, message, now)
             case PeerUp() | PeerDown():
                 peer = robot_id_of(message.name)
                 if peer is not None:
@@ -191,30 +192,6 @@ class RobotCore:
                 navigator.update_ground(message, now)
             case SensorReading():
                 navigator.own_readings.update(message, now)
-
-    def _hear_robot(self, robot: int, message: TeamMessage, now: float) -> None:
-        """Update the state from a message of another robot."""
-        navigator = self.navigator
-        ahead = navigator.predecessor
-        if ahead is not None and ahead.robot != robot:
-            ahead = None
-        match message:
-            case PoseStamped():
-                if ahead is not None:
-                    ahead.heard(message, now)
-            case TableRow():
-                self._team.hear_row(robot, message, now)
-                least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
-                if ahead is not None and least_s is not None:
-                    ahead.clock.reported(least_s, now)
-            case ObstacleNote(kind="trap"):
-                navigator.avoid_trap(message, now)
-            case ObstacleNote():
-                self._team.obstacles.update(robot, message, now)
-            case FormationNote():
-                if navigator.formation.request(message):
-                    self._formation_commands.hear(message)
-                    self._event("formation", now, {"number": message.number, "trace": message.trace})
 
     def _obey(self, note: OperatorNote, now: float) -> None:
         """Obey an operator's command. Only the leader changes the formation, or hands the lease to the next in the

@@ -32,9 +32,9 @@ ORDER = (
 
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
-    "agents/leading", "agents/behaviors", "agents/navigator", "agents/stuck_policy", "agents/telemetry",
-    "agents/attendance", "agents/input_watch", "agents/chain_place", "agents/orders", "agents/command_publisher",
-    "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
+    "agents/leading", "agents/behaviors", "agents/navigator", "agents/stuck_policy", "agents/team_messages",
+    "agents/telemetry", "agents/attendance", "agents/input_watch", "agents/chain_place", "agents/orders",
+    "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",
     "world/time_grid", "world/saved_state", "world/world", "world/checkpoint",

@@ -194,6 +194,7 @@ class Estimator:
         self._history.clear()
         self._map_odom = None
         self._pending = None
+        self._backward_in_a_row = 0
 
     def _correct(self, fix: Localization) -> None:
         odometry = _at(self._history, fix.header.stamp)
