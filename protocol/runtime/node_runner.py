@@ -215,7 +215,7 @@ def _joined(node: Node, bus: ZenohBus, inbox: Inbox, options: Options, floor: in
     conditions_key = key(options.fleet, OPERATOR_NAME, "operator") if options.faults else None
     runner = _NodeRunner(node, bus, inbox, Journal(options.journal, heading), conditions_key)
     bus.announce(options.fleet, node.name, node.incarnation)
-    refuse_twin(bus, options.fleet, lease_s, node, dead)
+    refuse_twin(bus, inbox, options.fleet, lease_s, node, dead)
     return runner
 
 

@@ -33,6 +33,8 @@ _PRIORITY = {
 }
 
 
+LIVING_TRIES = 10
+"""Number of times that a router is asked which tokens exist."""
 PULLED_MAX = 1024
 """Number of samples of one subscription that wait for `pull`: 0.1 s of 200 robots. The oldest are dropped."""
 
@@ -78,8 +80,15 @@ class ZenohBus:
             self._token = None
 
     def living(self, fleet: str, owner: str, timeout_s: float = 1.0) -> list[int]:
-        """Return the incarnations of `owner` whose tokens exist at the moment."""
-        replies = self._session.liveliness().get(alive_key(fleet, owner, "*"), timeout=timeout_s)
+        """Return the incarnations of `owner` whose tokens exist at the moment.
+
+        A router that is too busy to answer within `timeout_s` is asked again, `LIVING_TRIES` times in all: that nothing
+        is heard of a token does not mean that there is none, and who joins on that ground takes it for a twin's later.
+        """
+        for _ in range(LIVING_TRIES):
+            replies = list(self._session.liveliness().get(alive_key(fleet, owner, "*"), timeout=timeout_s))
+            if all(reply.err is None for reply in replies):
+                break
         keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
         return sorted(peer.incarnation for key in keys if (peer := _peer(key, PeerUp)) is not None)
 

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -17,10 +18,13 @@ import msgspec
 import pytest
 from msgspec import structs
 
+from lfa.agents.agent import Agent
+from lfa.protocol import clock
 from lfa.protocol.messages.codec import Message, decode
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.team import Status, Tracking
 from lfa.protocol.names import robot_name
+from lfa.protocol.runtime.namesakes import refuse_twin
 from lfa.protocol.topics import TOPIC, address, key
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.transport.zenoh_bus import ZenohBus
@@ -183,6 +187,48 @@ def test_a_stray_token_of_any_number_locks_no_robot_out(terminals: Terminals, nu
     terminals.agent(2)
     terminals.heard()
     eventually(lambda: follows(terminals, "robot2"), f"robot 2 is locked out by a token with the number {number}")
+
+
+def test_a_token_that_nobody_speaks_under_is_no_twins(terminals: Terminals) -> None:
+    """Though it was not seen before the own token was declared, as happens on a busy machine."""
+    terminals.router()
+    terminals.look_on()
+    terminals.token(2, 2**52)
+    inbox = Inbox()
+    bus = ZenohBus(terminals.endpoint, inbox)
+    try:
+        for number in (5, 2**52 + 5):
+            refuse_twin(bus, inbox, FLEET, 0.1, Agent(2, number, FLEET, 0), [])
+    finally:
+        bus.close()
+
+
+def test_of_two_that_start_at_the_same_time_under_one_name_one_runs(terminals: Terminals) -> None:
+    terminals.router()
+    twins = [terminals.agent(2), terminals.agent(2)]
+    eventually(lambda: any(twin.poll() is not None for twin in twins), "both run")
+    ended = next(twin for twin in twins if twin.poll() is not None)
+    _, said = ended.communicate(timeout=5.0)
+    assert (ended.returncode, "robot2 already runs" in said) == (2, True)
+    clock.sleep(2.0)
+    assert [twin.poll() for twin in twins].count(None) == 1, "neither runs"
+
+
+def test_a_router_that_answers_late_hides_no_token(terminals: Terminals) -> None:
+    """Or a robot that starts on a busy machine takes a stray token for a twin that has started with it, and ends."""
+    router = terminals.router()
+    terminals.look_on()
+    terminals.token(2, 2**52)
+    bus = ZenohBus(terminals.endpoint, Inbox())
+    try:
+        router.send_signal(signal.SIGSTOP)
+        late = threading.Timer(0.5, router.send_signal, [signal.SIGCONT])
+        late.start()
+        assert bus.living(FLEET, robot_name(2), timeout_s=0.2) == [2**52]
+        late.join()
+    finally:
+        router.send_signal(signal.SIGCONT)
+        bus.close()
 
 
 def test_a_process_that_slept_while_another_took_its_name_ends_in_one_line(terminals: Terminals) -> None:
