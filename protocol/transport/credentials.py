@@ -7,8 +7,10 @@ certificates itself; a secret is never stored in a value that could be printed.
 from __future__ import annotations
 
 import binascii
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
 
 from msgspec import Struct
 
@@ -23,6 +25,11 @@ CERTIFICATE_BYTES_MAX = 64 * 1024
 PASSWORD_BYTES_MAX = 4096
 _BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
 _UTC_TIME, _CONTEXT_0 = 0x17, 0xA0
+_COMMON_NAME = bytes.fromhex("0603550403")
+"""Object identifier 2.5.4.3, before the common name in a subject (X.520, 6.2.2)."""
+
+
+Part = TypeVar("Part")
 
 
 class Credentials(Struct, frozen=True):
@@ -47,7 +54,8 @@ class Credentials(Struct, frozen=True):
 def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
     """Return the credentials of `name` in `folder` (`ca.pem`, `<name>.pem`, `<name>.key`, optional `<name>.password`).
 
-    Raises Refused if a file is missing, readable by others, or invalid at wall-clock time `wall_ms` [ms].
+    Raises Refused if a file is missing, readable by others, of somebody else, or invalid at wall-clock time `wall_ms`
+    [ms]. A machine's own `operator` and `recorder` are `operator-<machine>` and `recorder-<machine>`.
     """
     certificate, key, password = (folder / f"{name}.{kind}" for kind in ("pem", "key", "password"))
     for path in (folder / CA_FILE, certificate):
@@ -56,9 +64,12 @@ def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
         check_private(path)
     found = Credentials(name, folder / CA_FILE, certificate, key, password if password.exists() else None)
     try:
-        found.user_and_password()
+        user = found.user_and_password()
     except (OSError, DamagedFile) as error:
         raise Refused(f"{password}: {error}, must be a file that `lfa keys` made") from None
+    for path, owner in ((certificate, holder(certificate)), (password, name if user is None else user[0])):
+        if owner != name and not owner.startswith(f"{name}-"):
+            raise Refused(f"{path}: is that of {owner or 'nobody'}, must be that of {name}")
     return found
 
 
@@ -84,9 +95,19 @@ def check_valid(path: Path, wall_ms: int) -> None:
 
 def validity(path: Path) -> tuple[datetime, datetime]:
     """Return start and end of the validity of the certificate at `path`. Raises Refused if it is no certificate."""
+    return _read(path, _validity)
+
+
+def holder(path: Path) -> str:
+    """Return the common name in the certificate at `path`; empty if it has none. Raises Refused for no certificate."""
+    return _read(path, _common_name)
+
+
+def _read(path: Path, part: Callable[[bytes], Part]) -> Part:
+    """Return what `part` finds in the certificate at `path`. Raises Refused if it is no certificate."""
     try:
         text = read_bytes(path, CERTIFICATE_BYTES_MAX)
-        return _validity(binascii.a2b_base64(text.partition(_BEGIN)[2].partition(_END)[0]))
+        return part(binascii.a2b_base64(text.partition(_BEGIN)[2].partition(_END)[0]))
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}, must be a certificate in PEM") from None
     except (ValueError, IndexError):
@@ -94,17 +115,31 @@ def validity(path: Path) -> tuple[datetime, datetime]:
 
 
 def _validity(der: bytes) -> tuple[datetime, datetime]:
-    """Return start and end of validity.
+    begins = _element(der, _validity_at(der))[1]
+    return _time(der, begins), _time(der, _element(der, begins)[2])
 
-    RFC 5280, 4.1: Certificate { TBSCertificate { [0] version, serial, signature, issuer, validity, .. } .. }.
+
+def _common_name(der: bytes) -> str:
+    """Return the common name of the subject, which follows the validity."""
+    _, start, end = _element(der, _element(der, _validity_at(der))[2])
+    at = der.find(_COMMON_NAME, start, end)
+    if at < 0:
+        return ""
+    _, start, end = _element(der, at + len(_COMMON_NAME))
+    return der[start:end].decode()
+
+
+def _validity_at(der: bytes) -> int:
+    """Return the place of the validity.
+
+    RFC 5280, 4.1: Certificate { TBSCertificate { [0] version, serial, signature, issuer, validity, subject, .. } .. }.
     """
     at = _element(der, _element(der, 0)[1])[1]
     if der[at] == _CONTEXT_0:
         at = _element(der, at)[2]
     for _ in ("serial", "signature", "issuer"):
         at = _element(der, at)[2]
-    begins = _element(der, at)[1]
-    return _time(der, begins), _time(der, _element(der, begins)[2])
+    return at
 
 
 def _element(der: bytes, at: int) -> tuple[int, int, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import stat
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -283,6 +284,18 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path) -> None:
     (home / "robot1.key").chmod(0o640)
     with pytest.raises(Refused, match=r"0640.*must be 0600"):
         credentials(home, "robot1", now_ms)
+
+
+@pytest.mark.parametrize("kind", ["pem", "password"])
+def test_files_of_a_robot_under_the_operators_name_are_refused(tmp_path: Path, kind: str) -> None:
+    """Routers drop what it says under a name that is not its own: an order from it would wait for answers in vain."""
+    keys.make(tmp_path / "k", plan(1))
+    home = registry.folder_of(tmp_path / "k", "a")
+    now_ms = int(validity(home / "robot1.pem")[0].timestamp() * 1000.0) + 1
+    assert credentials(home, "operator", now_ms).name == "operator"
+    shutil.copyfile(home / f"robot1.{kind}", home / f"operator.{kind}")
+    with pytest.raises(Refused, match=rf"operator\.{kind}: is that of robot1, must be that of operator"):
+        credentials(home, "operator", now_ms)
 
 
 def test_credentials_that_are_printed_tell_no_secret(tmp_path: Path) -> None:
