@@ -137,26 +137,33 @@ class StopTraffic:
         if running.gateway.twist(running.clock.local(self._team.now)) != STILL:
             self._team.report(Checker.turns, self._team.now, robot, running.gateway.stop.known.word)
 
-    def started(self, robot: int) -> None:
-        """Report that a robot has forgotten what it acknowledged: agent and gateway, before one has told the other.
-
-        More than half of the agents remember for it: it is held to its word as long as none of them starts anew.
-        """
-        word = self._acknowledged.get(robot)
-        process, running = self._team.processes.get(robot), self._team.gateways.get(robot)
-        known_there = process is not None and process.alive and process.stop.known.word >= (word or NO_STOP)
-        known = running.gateway.stop.known if running is not None and running.alive else None
-        if word is not None and not known_there and not (known is not None and known.certain and known.word >= word):
-            if self._most_know(word):
-                self._relying.add(robot)
-            else:
-                self._forgets(robot)
+    def gateway_started(self, robot: int) -> None:
+        """Report that a robot has forgotten what it acknowledged: its agent does not know it either."""
+        if self._has_forgotten(robot):
+            self._forgets(robot)
 
     def agent_started(self, robot: int) -> None:
-        """Report what is forgotten now that the agent of `robot` begins anew."""
+        """Report what is forgotten now that the agent of `robot` begins anew.
+
+        While more than half of the agents remember for it, it is held to its word, as long as none of them starts anew.
+        """
         for other in self._relying - {robot}:
             self._forgets(other)
-        self.started(robot)
+        if not self._has_forgotten(robot):
+            return
+        if self._most_know(self._acknowledged[robot]):
+            self._relying.add(robot)
+        else:
+            self._forgets(robot)
+
+    def _has_forgotten(self, robot: int) -> bool:
+        """Return True if neither agent nor gateway of a robot knows the stop that it has acknowledged."""
+        word = self._acknowledged.get(robot)
+        process, running = self._team.processes.get(robot), self._team.gateways.get(robot)
+        if word is None or (process is not None and process.alive and process.stop.known.word >= word):
+            return False
+        known = running.gateway.stop.known if running is not None and running.alive else None
+        return not (known is not None and known.certain and known.word >= word)
 
     def _forgets(self, robot: int) -> None:
         self._acknowledged.pop(robot, None)
@@ -205,7 +212,7 @@ class _Observer(Checker):
         self._traffic.check_wheels(robot_id)
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
-        self._traffic.started(robot_id)
+        self._traffic.gateway_started(robot_id)
 
     def lives(self, at: float, who: Member) -> None:
         self._traffic.agent_started(who.id)
