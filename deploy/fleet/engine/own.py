@@ -13,6 +13,7 @@ from pathlib import Path
 from lfa.deploy.fleet.engine.engine import ROUTER_FIRST_S, KnownProcess, LogSource, Waitable
 from lfa.deploy.fleet.engine.log_tail import FileTail
 from lfa.deploy.fleet.engine.watchdog import HangDetector, SignSocket
+from lfa.deploy.fleet.plan.files import SIGNS
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup, ProcessSpec
@@ -22,7 +23,6 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.messages.fleet import ProcessReport
 from lfa.protocol.output import write_line
 
-SIGNS = "notify.sock"
 RESUME = "--resume"
 END_S = 1.5
 """Time limit [s] for processes to end. Their final messages take at most 0.7 s; the rest allows for a lost router."""

@@ -18,14 +18,15 @@ from pathlib import Path
 
 import msgspec
 
-from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep, watchers
+from lfa.deploy.fleet.host.end import ANSWER, STOP_S, end, engine_of, refuse_left, wait_gone
+from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.router import LISTENS
 from lfa.deploy.fleet.host.start_check import POLL_S, Found, check, family
 from lfa.deploy.fleet.host.units_host import start_units, stop_units
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.security.private_files import unpack
-from lfa.deploy.process.identity import Identity, identify, send_signal
+from lfa.deploy.process.identity import send_signal
 from lfa.deploy.process.process_group import ROUTER_NAME
 from lfa.deploy.recording.run_folder import LOGS, SCENARIO
 from lfa.protocol import clock
@@ -33,10 +34,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.topics import HOST_PREFIX
 from lfa.protocol.transport.zenoh_config import answers
 
-ANSWER = "lfa-answer:"
-"""Mark before an answer: a shell may print a greeting, to the same output, before it runs a command."""
 READY_S = 15.0
-STOP_S = 8.0
 LISTEN_S = 4.0
 LOG = "supervisor.log"
 SYSTEMD = Path("/run/systemd/system")
@@ -68,56 +66,20 @@ def start(part: HostPlan) -> Found:
 
 def stop(part: HostPlan) -> Found:
     """End this machine's watchers and processes, by SIGKILL after STOP_S. Raises Refused when a process remains."""
-    running = living(part.folder)
-    written = _written(part)
-    if written is not None and written.engine != "own":
-        return _stop_units(written, running)
-    if running is None:
-        end_orphans(part.folder)
-        sweep(part.folder)
-        return Found(version("lfa"), clock.wall_ms())
-    guardians = tuple(watchers(part.folder, GUARDIAN))
-    everybody = (*guardians, running.supervisor, *running.children)
-    send_signal(running.supervisor, signal.SIGTERM)  # first, or it would start a guardian again
-    for guardian in guardians:
-        send_signal(guardian, signal.SIGTERM)
-        send_signal(guardian, signal.SIGCONT)
-    _wait_gone(everybody, STOP_S)
-    for identity in everybody:
-        send_signal(identity, signal.SIGKILL)
-    left = _wait_gone(everybody, 1.0)
-    if left:
-        raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
-    sweep(part.folder)
-    return Found(version("lfa"), clock.wall_ms(), run=running.run, digest=running.digest)
-
-
-def _written(part: HostPlan) -> HostPlan | None:
-    """Return the plan that was started last in this folder, None if there is none."""
-    try:
-        return host_plan.read(part.folder / host_plan.PART)
-    except Refused:
-        return None
+    if engine_of(part.folder) != "own":
+        return _stop_units(part, living(part.folder))
+    ended = end(part.folder)
+    run, digest = ("", "") if ended is None else (ended.run, ended.digest)
+    return Found(version("lfa"), clock.wall_ms(), run=run, digest=digest)
 
 
 def _stop_units(part: HostPlan, running: Ledger | None) -> Found:
     """End a machine's units, and what a systemd that fails left. Raises Refused when a process remains."""
     stop_units(part)
-    left = _wait_gone(() if running is None else (running.supervisor, *running.children), STOP_S)
-    if left:
-        raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
+    refuse_left(wait_gone(() if running is None else (running.supervisor, *running.children), STOP_S))
     sweep(part.folder)
     run, digest = ("", "") if running is None else (running.run, running.digest)
     return Found(version("lfa"), clock.wall_ms(), run=run, digest=digest)
-
-
-def _wait_gone(everybody: tuple[Identity, ...], within_s: float) -> list[Identity]:
-    until = clock.now() + within_s
-    while True:
-        left = [identity for identity in everybody if identify(identity.pid) == identity]
-        if not left or clock.now() > until:
-            return left
-        clock.sleep(POLL_S)
 
 
 def _spawn(part: HostPlan, path: Path, log: Path) -> subprocess.Popen[bytes]:

@@ -10,14 +10,11 @@ from pathlib import Path
 from msgspec import Struct
 
 from lfa.deploy.fleet.engine.engine import KnownProcess
-from lfa.deploy.fleet.engine.own import SIGNS
-from lfa.deploy.fleet.plan.host_plan import PART, SOCKET
+from lfa.deploy.fleet.plan.files import LEDGER, PART, SIGNS, SOCKET
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import Identity
 from lfa.protocol.file_reading import DamagedFile, read_json
 
-LEDGER = "processes.json"
-"""File beside the plan with the supervisor and its processes; read by a later incarnation, `lfa down`, `lfa doctor`."""
 SUPERVISOR, GUARDIAN = "lfa.deploy.fleet.host.supervisor", "lfa.deploy.fleet.host.guardian"
 """Modules of the two processes that start each other again; each is called with the plan's file."""
 

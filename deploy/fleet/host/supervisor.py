@@ -22,9 +22,10 @@ from lfa.deploy.fleet.engine.engine import LogSource, ProcessEngine
 from lfa.deploy.fleet.engine.own import OwnEngine
 from lfa.deploy.fleet.engine.systemd import SystemdEngine
 from lfa.deploy.fleet.host.guardian_watch import GuardianWatch
-from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, ledger, living, sweep
+from lfa.deploy.fleet.host.ledger import Ledger, ledger, living, sweep
 from lfa.deploy.fleet.host.units_host import scope_of
 from lfa.deploy.fleet.plan import host_plan
+from lfa.deploy.fleet.plan.files import LEDGER
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.process import identity
 from lfa.deploy.process.restart_policy import REFUSED_CODE

@@ -9,6 +9,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from lfa.deploy.fleet.plan import files
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.process.restart_policy import Restart
@@ -22,8 +23,7 @@ from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.credentials import Credentials, credentials
 from lfa.world.description.scenario import STATE
 
-PART = "part.json"
-SOCKET = "router.sock"
+PART = files.PART
 KEYS = "keys"
 USUAL_STATE = "~/.local/state/lfa"
 
@@ -91,7 +91,7 @@ class HostPlan(Struct, frozen=True):
 
     @property
     def socket(self) -> str:
-        return f"unixsock-stream/{self.folder / SOCKET}"
+        return f"unixsock-stream/{self.folder / files.SOCKET}"
 
     @property
     def endpoint(self) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
 
-from lfa.deploy.fleet.host.host import ANSWER
+from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import HostPlan
@@ -22,6 +22,8 @@ from lfa.protocol.file_reading import DamagedFile, decode_json
 
 WIRE = f"from lfa.protocol.messages.header import WIRE_VERSION; print('{ANSWER}' + str(WIRE_VERSION))"
 """Program for a machine's Python: print the version of the messages of its `lfa`."""
+END = "lfa.deploy.fleet.host.end"
+"""Program that ends a machine's part, with a quarter of the imports of `host.py`."""
 CLOCK_S_MAX = 60.0
 """Maximum difference [s] of wall clocks; beyond it certificates start or end at the wrong time."""
 
@@ -117,9 +119,11 @@ class FleetHosts:
 
 
 async def ask(shell: Shell, machine: Machine, action: str, part: HostPlan) -> Found:
-    """Run `host.py` on a machine and return its answer. Raises Refused, naming a wrong Python or version of `lfa`."""
-    python = python_of(machine)
-    done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", action), msgspec.json.encode(part))
+    """Run `host.py`, or `end.py`, on a machine and return its answer. Raises Refused for a wrong Python or `lfa`."""
+    python, given = python_of(machine), msgspec.json.encode(part)
+    done = await shell.run((python, "-P", "-m", END), given) if action == "stop" else None
+    if done is None or done.code not in (0, REFUSED_CODE):  # also for an earlier lfa, which has no END
+        done = await shell.run((python, "-P", "-m", "lfa.deploy.fleet.host.host", action), given)
     if done.code == 0:
         with contextlib.suppress(DamagedFile):  # not our program: the probe finds the cause
             return decode_json(done.answer or b"", Found)

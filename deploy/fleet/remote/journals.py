@@ -9,7 +9,7 @@ import tarfile
 from pathlib import Path
 
 from lfa.deploy.client.discovery import option
-from lfa.deploy.fleet.host.host import ANSWER
+from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import HostPlan, parts
 from lfa.deploy.fleet.remote.ssh import Unreachable, python_of, reach

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from msgspec import Struct
 
-from lfa.deploy.fleet.host.host import ANSWER
+from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import Machine
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, decode_json
