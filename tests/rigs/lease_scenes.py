@@ -7,7 +7,7 @@ from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.effects import BecomeLeader, Effect, Send
-from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import (
     Config,
@@ -75,10 +75,10 @@ A, B = Member(1, 7), Member(2, 8)
 LOW, HIGH = Term(5, 1, 7), Term(6, 2, 8)
 
 
-def alone() -> Lease:
+def alone(observer: Observer | None = None) -> Lease:
     """Return the lease of robot 1 of two, with a witness, after a HELLO of both others."""
     mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
-    lease = Lease(Member(1, 7), mission, STD, 0.0, floor=0)
+    lease = Lease(Member(1, 7), mission, STD, 0.0, 0, observer)
     for other in OTHERS:
         lease.receive(other, Hello(None, lease.agreed), 0.0)
     return lease

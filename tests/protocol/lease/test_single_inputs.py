@@ -8,7 +8,8 @@ from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.effects import BecomeLeader, StepDown
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.machine.lease import Lease
-from lfa.protocol.lease.term_window import BURST, FREE
+from lfa.protocol.lease.machine.table import LeaseState
+from lfa.protocol.lease.term_window import BURST, FREE, FRESH, RATE_HZ
 from lfa.protocol.messages.consensus import (
     NO_TERM,
     Config,
@@ -170,13 +171,15 @@ def test_a_leader_begins_with_the_config_that_its_voters_have_granted() -> None:
 
 
 def test_e16_a_term_that_names_this_process_without_its_own_nonce_is_not_taken_over() -> None:
-    """From no time of its own clock could the lease count."""
+    """From no time of its own clock could the lease count: it does not even begin a candidacy."""
     for nonce, leads in ((None, False), (STD.grant_s + 0.29, True)):
-        lease = alone()
+        states: set[LeaseState] = set()
+        lease = alone(lambda observed, states=states: states.add(observed.after))
         config = led_by_other(lease, Term(9, 2, 4), STD.grant_s + 0.2)
         given = Propose(Term(10, 2, 4), config, 1, ME, (), nonce, lease.agreed)
         at = STD.grant_s + 0.3
         effects = lease.receive(OTHER, given, at)
+        assert states - {LeaseState.FOLLOWER} == ({LeaseState.TAKING_OVER} if leads else set())
         for source in OTHERS:
             effects += lease.receive(source, Grant(given.term, 1, config.version, at), at)
         assert any(isinstance(effect, BecomeLeader) for effect in effects) == leads
@@ -194,13 +197,47 @@ def test_e16_grants_that_come_before_their_hand_over_count_when_it_comes() -> No
     assert lease.may_command(at)
 
 
-def test_e26_an_own_term_above_the_free_ones_does_not_use_up_what_is_believed_of_others() -> None:
-    lease = alone()
-    lease.gateway_term(Term(FREE + 5 * BURST, 2, 4), 0.1)
+def test_e26_what_is_believed_of_others_counts_from_the_own_gateways_term_and_from_the_own_one() -> None:
+    """Both may be higher than a process believes of others that knows no term."""
+    seen = FREE + FRESH + 100
+    for ahead, believed in ((0, True), (1, False)):
+        lease, now = alone(), STD.grant_s
+        lease.gateway_term(Term(seen, 2, 4), 0.1)
+        [own] = sent(lease.tick(now), Prepare)
+        assert isinstance(own, Prepare)
+        assert own.term.n == seen + 1
+        beyond = Term(own.term.n + BURST + int(RATE_HZ * now) + ahead, OTHER.id, OTHER.incarnation)
+        later = Version(Term(own.term.n, OTHER.id, OTHER.incarnation))
+        answers = sent(lease.receive(OTHER, Prepare(beyond, later, (), lease.agreed), now), Promise)
+        assert len(answers) == believed
+
+
+def test_e26_a_term_of_the_own_gateway_is_known_to_whoever_only_votes_too() -> None:
+    lease, seen = alone(), FREE + FRESH + 100
+    request = Prepare(Term(seen + 1, OTHER.id, OTHER.incarnation), Version(LOW), (), lease.agreed)
+    assert lease.receive(OTHER, request, STD.grant_s) == [], "too far ahead"
+    lease.gateway_term(Term(seen, 2, 4), STD.grant_s)
+    assert sent(lease.receive(OTHER, request, STD.grant_s), Promise)
+
+
+def test_e20_an_operators_word_is_acted_upon_at_once() -> None:
+    lease, now = alone(), STD.grant_s + 0.1
     lease.tick(STD.grant_s)
-    beyond = Term(FREE + 5 * BURST + 1 + BURST, OTHER.id, OTHER.incarnation)
-    request = Prepare(beyond, Version(LOW), (), lease.agreed)
-    assert sent(lease.receive(OTHER, request, STD.grant_s), Promise), "a burst above what this process knows"
+    lease.request_forget((OTHER,), now)
+    [prepare] = sent(lease.tick(now), Prepare)
+    assert isinstance(prepare, Prepare)
+    assert prepare.forget == (OTHER,)
+
+
+def test_e6_whoever_promised_a_term_stands_when_its_candidate_has_not_led_for_two_heartbeats() -> None:
+    lease = alone()
+    config = led_by_other(lease, Term(9, 2, 4), STD.grant_s)
+    now = 3.0 * STD.grant_s
+    request = Prepare(Term(10, 2, 4), config.version, (), lease.agreed)
+    assert len(sent(lease.receive(OTHER, request, now), Promise)) == 1
+    waits_s = 2.0 * STD.heartbeat_s
+    assert not sent(lease.tick(now + 0.99 * waits_s), Prepare)
+    assert sent(lease.tick(now + waits_s + 2.0 * STD.rank_step_s), Prepare)
 
 
 # --- the gateway's holder of a term --------------------------------------------------------------------------------
