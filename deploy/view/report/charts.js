@@ -13,15 +13,25 @@
       c.font = size + "px system-ui, sans-serif";
       c.setLineDash([4, 4]);
       c.textAlign = "left";
+      const seen = list.map((m) => [u.valToPos(m.t, "x", true), m.text])
+        .filter(([x]) => x >= u.bbox.left && x <= u.bbox.left + u.bbox.width);
+      const texts = [];
       let last = -Infinity, row = 0;
-      for (const m of list) {
-        const x = u.valToPos(m.t, "x", true);
-        if (x < u.bbox.left || x > u.bbox.left + u.bbox.width) continue;
-        c.beginPath(); c.moveTo(x, top); c.lineTo(x, top + u.bbox.height); c.stroke();
+      for (const [x, text] of seen) {
         row = x < last ? row + 1 : 0;
-        const width = c.measureText(m.text).width, right = x + width + 6 > u.bbox.left + u.bbox.width;
-        c.fillText(m.text, right ? x - width - 3 : x + 3, top + size * (1.1 + 1.2 * row));
+        const width = c.measureText(text).width, right = x + width + 6 > u.bbox.left + u.bbox.width;
+        const from = right ? x - width - 3 : x + 3, base = top + size * (1.1 + 1.2 * row);
+        c.fillText(text, from, base);
+        texts.push({ from, to: from + width, over: base - size, under: base + 0.3 * size });
         last = x + width + 12;
+      }
+      for (const [x] of seen) {  // a line stops where a text is
+        const crossed = texts.filter((t) => t.from < x && x < t.to).sort((a, b) => a.over - b.over);
+        c.beginPath();
+        c.moveTo(x, top);
+        for (const t of crossed) { c.lineTo(x, t.over); c.moveTo(x, t.under); }
+        c.lineTo(x, top + u.bbox.height);
+        c.stroke();
       }
       c.restore();
     };
