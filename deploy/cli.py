@@ -152,7 +152,8 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "run": RUNS, "sim": RUNS, "verify": RUNS, "map": RUNS, "record": RECORDINGS, "plot": (*RECORDINGS, "matplotlib"),
     "report": (*RECORDINGS, "matplotlib"), "view": (*RECORDINGS, "rerun"), "bag": (*ROS, "mcap"), "ros": ROS,
     "foxglove": (*ROS, "foxglove"), "up": ("cryptography",), "keys": ("cryptography",), "top": ("rich",),
-    "web": (*RUNS, "websockets"), "import": (*RUNS, "yaml"),
+    "web": (*RUNS, "websockets"), "import": (*RUNS, "yaml"), "why": RECORDINGS, "replay": RUNS, "campaign": RUNS,
+    "bench": RUNS,
 }  # fmt: skip
 """Modules outside the base install without which a command can do nothing."""
 TAKES_NUMBERS = frozenset({"go", "join", "retire", "forget"})

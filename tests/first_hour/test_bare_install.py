@@ -56,6 +56,10 @@ def test_the_doctor_knows_every_extra_that_a_user_may_want() -> None:
         (("up", "fleet.toml"), "deploy"),
         (("watch", "--once"), "deploy"),
         (("bag", "runs/none"), "ros,view"),
+        (("why", "runs/none"), "view"),
+        (("replay", "runs/none"), "world,view"),
+        (("campaign", "plan.toml"), "world,view"),
+        (("bench", "lidar"), "world,view"),
     ],
 )
 def test_a_command_that_needs_an_extra_says_so_before_it_does_anything(
