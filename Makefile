@@ -111,7 +111,8 @@ model: $(STAMP)
 planted: $(STAMP)
 	$(BIN)/python -m tests.protocol.lease.hunt $(PLANTED)
 
-# The same bugs against drawn, systematic and guided schedules, a thousand in all: some twenty minutes of one core.
+# The same bugs against drawn, systematic and guided schedules, a thousand in all: half an hour and more of one core. Shares and
+# --write as for make planted.
 hunt: $(STAMP)
 	nice -n 15 $(BIN)/python -m tests.protocol.lease.hunt --together $(PLANTED)
 

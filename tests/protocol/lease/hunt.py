@@ -120,9 +120,11 @@ def head(table: Table) -> tuple[str, str]:
 
 
 def total(table: Table, results: Sequence[str]) -> str:
-    """Return how many of the bugs were found."""
+    """Return how many of the bugs were found, and how many have not been searched for."""
     hits = sum(not result.startswith(MISSED) for result in results)
-    return f"{hits} of these {len(results)} bugs are found by {table.schedules} schedules."
+    rest = len(PLANTED) - len(results)
+    others = f" The other {rest} have not been searched for since the search changed." if rest else ""
+    return f"{hits} of these {len(results)} bugs are found by {table.schedules} schedules.{others}"
 
 
 def _missed(searches: Sequence[tuple[Kind, int]]) -> str:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.protocol.lease.hunt import DRAWN, Table, begin_of, on_page
+from tests.protocol.lease.hunt import ALL, DRAWN, begin_of, on_page
 from tests.protocol.lease.planted import PLANTED, Bug
 
 PAGE = Path(__file__).parents[3] / "protocol" / "README.md"
 TESTS = "".join(path.read_text() for path in sorted(Path(__file__).parent.glob("test_*.py")))
 USUAL_BUGS, WORDINGS = 15, 10
+ROWS = ("| bug", "| mutant", "| wording", "| rule")
 
 
 @pytest.mark.parametrize("bug", PLANTED, ids=lambda bug: f"{bug.where}: {bug.what}")
@@ -30,11 +31,16 @@ def test_every_usual_bug_and_every_failed_wording_is_planted() -> None:
     assert where.count("wording") == WORDINGS
 
 
-@pytest.mark.parametrize("table", [DRAWN], ids=lambda table: table.mark)
-def test_the_page_has_a_row_for_every_planted_bug_in_their_order(table: Table) -> None:
+def test_the_page_has_a_row_for_every_planted_bug_in_their_order() -> None:
     """Else: make planted PLANTED=--write."""
-    rows = [row for row in on_page(table) if row.startswith(("| bug", "| mutant", "| wording", "| rule"))]
+    rows = [row for row in on_page(DRAWN) if row.startswith(ROWS)]
     assert rows == [begin_of(bug) for bug in PLANTED]
+
+
+def test_the_page_has_what_all_searches_together_find_in_the_same_order() -> None:
+    """Else: make hunt PLANTED=--write."""
+    found = [row for row in on_page(ALL) if row.startswith(ROWS)]
+    assert found == [row for row in map(begin_of, PLANTED) if row in found]
 
 
 def test_every_rule_has_a_directed_test() -> None:
