@@ -17,6 +17,12 @@ class Raises:
 class Nan(Raises):
     def step(self, reference, own_pose, own_twist, dt):
         return Twist(float("nan"), 0.0)
+
+class Arity(Raises):
+    def step(self, reference): pass
+
+class Ends(Raises):
+    def __init__(self, gains, limits): raise SystemExit(0)
 """
 BAD = """title = "Three mistakes"
 time_limit_s = 10.0
@@ -81,6 +87,8 @@ ALONE = (
     Step("lfa replay carrot --robot 2 --controller carrot/carrot.py:Carrot", 0, ("calls return what they returned",)),
     Step("lfa sim straight --controller bad.py:Raises --out bad", 1, ("bad.py:7: ZeroDivisionError", "failed (")),
     Step("lfa sim straight --controller bad.py:Nan --record none", 1, ("bad.py:10: step returned Twist(nan, 0.0)",)),
+    Step("lfa sim straight --controller bad.py:Arity --out arity", 1, ("bad.py:14: TypeError", "run folder: arity")),
+    Step("lfa sim straight --controller bad.py:Ends", 2, ("cannot be made: bad.py:17: SystemExit",)),
     Step("lfa verify bad --controller bad.py:Raises", 0, ("0 violations",)),
     Step("lfa sim straight --controller none.py:X", 2, ("no such file, must be FILE.py:Class",)),
     Step("lfa sim straight --controller swing", 2, ("must be one of headway, kanayama, law",)),
