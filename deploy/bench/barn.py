@@ -26,6 +26,7 @@ from lfa.deploy.bench.harness.rows import Case, CasePart, Quantity, many, select
 from lfa.deploy.bench.harness.way_past import Corridor, way_exists
 from lfa.deploy.campaign.items import name_of
 from lfa.deploy.recording import mcap_reader
+from lfa.deploy.recording.mcap_reader import Array
 from lfa.deploy.recording.run_folder import RUNS
 from lfa.protocol.errors import Refused
 
@@ -146,15 +147,15 @@ def cases(seeds: int | None, worlds: str | None, failed: Path) -> list[Case]:
 
 def case(team: BarnTeam, field: BarnWorlds, worlds: Sequence[BarnWorld], failed: Path) -> Case:
     """Return the case of one team over `worlds`."""
-    good = Quantity(f"good of {len(worlds)}", "runs", float(int(team.good_share * len(worlds))), "at least")
+    named = "good, or no way left, of" if team.faults else "good of"
+    good = Quantity(f"{named} {len(worlds)}", "runs", float(int(team.good_share * len(worlds))), "at least")
     contacts = Quantity("contacts", "runs", 0.0)
     score = (Quantity("score", "", team.score_bar, "at least", over="mean"),) if team.scored else ()
     parts = [
         CasePart([world.index, name_of(to_builtins(world))], partial(result, team, field, world, failed))
         for world in worlds
     ]
-    stopped = (Quantity("failed though there is a way", "runs", 0.0),) if team.faults else ()
-    return many(f"barn/{team.name}", (good, contacts, *score, *stopped), parts)
+    return many(f"barn/{team.name}", (good, contacts, *score), parts)
 
 
 def baseline() -> Case:
@@ -163,12 +164,13 @@ def baseline() -> Case:
 
 
 def result(team: BarnTeam, field: BarnWorlds, world: BarnWorld, failed: Path) -> list[float]:
-    """Return whether the run was good and whether it had a contact (0 or 1), where it is scored the score, and with a
-    fault whether it failed though there was a way past the dead robot.
+    """Return whether the run was good and whether it had a contact (0 or 1), and where it is scored the score.
+
+    After a fault a run is also good where the dead robot leaves no way.
     """
     done = outcome(team, field, world, failed)
-    values = [float(done.wrong is None), float(done.contact)] + ([done.score] if team.scored else [])
-    return values + ([float(done.wrong is not None and done.passable)] if team.faults else [])
+    good = done.wrong is None or (bool(team.faults) and not done.passable)
+    return [float(good), float(done.contact)] + ([done.score] if team.scored else [])
 
 
 class BarnOutcome(NamedTuple):
@@ -184,20 +186,26 @@ class BarnOutcome(NamedTuple):
 def outcome(team: BarnTeam, field: BarnWorlds, world: BarnWorld, failed: Path) -> BarnOutcome:
     """Do one run of the team in the world; where it is not good, its folder stays in `failed`."""
     scenario = loaded(f"barn_{world.index}", scenario_text(field, world), team.sets)
+    first = scenario.mission.robots[0]
     with driven(scenario, world.index, team.faults) as done:
         wrong, truth = complaint(done.summary), mcap_reader.read(done.folder).truth
-        note(f"barn/{team.name}", done, wrong, failed)
-    first, *others = scenario.mission.robots
-    took_s = time_s(truth[first], field)
-    score = 0.0 if wrong is not None else score_of(world.shortest_path_m, took_s)
-    passable = True
-    if others:
-        dead, stood = truth[first][-1], truth[others[0]]
-        at = min(range(len(stood)), key=lambda n: hypot(stood[n][1] - dead[1], stood[n][2] - dead[2]))
-        discs = [(x, y, field.obstacle_radius_m) for x, y in inside(world)] + [(dead[1], dead[2], RADIUS_M)]
-        passable = way_exists((stood[at][1], stood[at][2]), field.goal, discs, CORRIDOR, RADIUS_M)
+        passable = _passable(field, world, [truth[robot] for robot in scenario.mission.robots])
+        note(f"barn/{team.name}", done, wrong if wrong is None or passable else f"no way left: {wrong}", failed)
+    score = 0.0 if wrong is not None else score_of(world.shortest_path_m, time_s(truth[first], field))
     contact = any(robot.contacts for robot in done.summary.robots)
     return BarnOutcome(score, wrong, contact, passable)
+
+
+def _passable(field: BarnWorlds, world: BarnWorld, truth: Sequence[Array]) -> bool:
+    """Return whether a way leads from the second robot past the first one, where that stood at the end, to the goal;
+    True for one robot. `truth` has a robot's rows of t [s], x, y [m] each, in the order of the chain.
+    """
+    if len(truth) < 2:
+        return True
+    dead, stood = truth[0][-1], truth[1]
+    at = min(range(len(stood)), key=lambda n: hypot(stood[n][1] - dead[1], stood[n][2] - dead[2]))
+    discs = [(x, y, field.obstacle_radius_m) for x, y in inside(world)] + [(dead[1], dead[2], RADIUS_M)]
+    return way_exists((stood[at][1], stood[at][2]), field.goal, discs, CORRIDOR, RADIUS_M)
 
 
 def score_of(shortest_path_m: float, took_s: float) -> float:

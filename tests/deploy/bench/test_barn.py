@@ -68,3 +68,15 @@ def test_a_way_past_a_dead_robot_exists_where_a_robot_fits(gap_m: float, way: bo
 
 def test_the_published_baseline_stands_beside_the_teams() -> None:
     assert list(barn.baseline().measure()) == [0.85, 0.159]
+
+
+@pytest.mark.parametrize(("passable", "good"), [(True, 0.0), (False, 1.0)])
+def test_a_run_whose_dead_leader_leaves_no_way_does_not_count_against_the_team(
+    monkeypatch: pytest.MonkeyPatch, passable: bool, good: float
+) -> None:
+    ended = barn.BarnOutcome(0.0, "not at the goal after 100 s", contact=False, passable=passable)
+    monkeypatch.setattr(barn, "outcome", lambda *_: ended)
+    killed = next(team for team in barn.TEAMS if team.faults)
+    assert barn.result(killed, FIELD, FIELD.worlds[0], Path()) == [good, 0.0]
+    whole = next(team for team in barn.TEAMS if not team.faults and not team.scored)
+    assert barn.result(whole, FIELD, FIELD.worlds[0], Path()) == [0.0, 0.0]
