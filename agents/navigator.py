@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
-from lfa.agents.avoidance.moving_obstacle import Crossing, shadow
+from lfa.agents.avoidance.moving_obstacle import Crossing
+from lfa.agents.avoidance.moving_points import shadow
 from lfa.agents.avoidance.safety import safe
 from lfa.agents.behaviors.back_out import BackOut
 from lfa.agents.behaviors.command_limits import CommandLimits
@@ -185,8 +186,7 @@ class Navigator:
     def drive(self, role: Role, chain: tuple[int, ...], pose: Pose2D, twist: Twist, now: float) -> Twist:
         """Return the command for the next control period."""
         period_s = self._mission.control_period_s
-        dt = period_s if self._driven_at is None else now - self._driven_at
-        dt = min(max(dt, DT_MIN_S), 2.0 * period_s)
+        dt = min(max(period_s if self._driven_at is None else now - self._driven_at, DT_MIN_S), 2.0 * period_s)
         self._driven_at = now
         self._stuck_monitor.find_pose()
         if self._placeless_since is not None and self.was_placed:
@@ -207,7 +207,7 @@ class Navigator:
             wanted = STILL
         if role is not Role.WAITING:
             wanted = self._own.step(BehaviorInput(now, role, pose, self._last, wanted, still, moving))
-            wanted = self._crossing.give_way(moving, pose, wanted, now, still)
+            wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving)
             wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now)
         self._back_out.keep(pose)
         self._watch(role, pose, wanted, now)
@@ -244,8 +244,8 @@ class Navigator:
         if role is Role.WAITING or waits or self._lead_route.by_hand or self.arrived(pose, self._last):
             self._stuck_monitor.rest(pose, now)
             return
-        action = None if self.decision is None else self.decision.action
+        action, moving = (None, False) if (said := self.decision) is None else (said.action, said.kind == "moving")
         leads = role is Role.LEADER and self.leading.under_way
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
         planned = self.leading.rounding or self._follow_slot.catches_up
-        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not planned)
+        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not planned, moving=moving)

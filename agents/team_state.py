@@ -94,6 +94,10 @@ class TeamState:
         row, (vx, vy), later = known[0], self._velocity[robot], min(now - known[1], GOES_ON_S)
         return Pose2D(row.x + vx * later, row.y + vy * later, row.theta)
 
+    def velocity_of(self, robot: int) -> tuple[float, float]:
+        """Return the velocity of `robot` in `map` [m/s] between its last two rows; zero where there are none."""
+        return self._velocity.get(robot, (0.0, 0.0))
+
     def near(self, robots: Sequence[int], pose: Pose2D, within_m: float, now: float) -> list[tuple[int, Pose2D]]:
         """Return those of `robots` that may be within `within_m` of `pose`, in their order, each with its pose.
 

@@ -8,12 +8,13 @@ the scan leaves them free.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import cos, hypot, inf, sin
+from collections.abc import Callable, Sequence
+from math import hypot, inf
 
 from msgspec import Struct
 
 from lfa.agents.avoidance.decision import Action, Decision, Situation, decide
+from lfa.agents.avoidance.moving_points import AWAY_M
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
@@ -39,11 +40,9 @@ BODY_M = 0.05
 """Clearance [m] to what stands that an evasion keeps beside the body."""
 ROOM_S = 1.2
 """Time [s] for which an evasion has to be free of what stands."""
-SHADOW_S, SHADOW_STEPS, SHADOW_M_MAX = 8.0, 3, 1.2
-"""Time [s] ahead for which a detour keeps out of the way of what moves slowly, the number of places on it, and the way
-[m] up to which it counts as slow."""
-AWAY_M = 0.08
-"""Clearance [m] that is left when a robot drives towards what moves; nearer, it drives away from it or stands."""
+MATE_M, MATE_S, MATES_WITHIN_M = 0.15, 1.5, 2.0
+"""Room [m] between two bodies, and time [s] ahead, that an evasion keeps from team-mates, which evade as well, and the
+distance [m] of those that are looked at."""
 
 
 class Evasion(Struct, frozen=True):
@@ -57,8 +56,8 @@ class Evasion(Struct, frozen=True):
 
 EVASIONS = (
     Evasion(Action.WAIT, 0.0),
-    Evasion(Action.RIGHT, 0.35, -0.9, 1.0),
-    Evasion(Action.LEFT, 0.35, 0.9, 1.0),
+    Evasion(Action.RIGHT, 0.45, -0.9, 1.0),
+    Evasion(Action.LEFT, 0.45, 0.9, 1.0),
     Evasion(Action.RIGHT, 0.25, -1.2, 1.5),
     Evasion(Action.LEFT, 0.25, 1.2, 1.5),
     Evasion(Action.AHEAD, 0.25),
@@ -67,10 +66,17 @@ EVASIONS = (
 """Of two that keep the same distance the first is taken: to the right first, as two that meet both do."""
 DRIVEN_M = 0.3
 """Clearance [m] that backing off must keep beyond the others: what comes after a robot that backs off drives it on."""
+CLOSE_M, CLOSE_S = 0.35, 1.0
+"""Room [m] to what comes on below which the way that it means to pass by does not count any more, for it may turn, and
+the time [s] within which the robot makes as much room as it can."""
 SLOW = Evasion(Action.SLOW, 0.0)
 CARE = {Action.SLOW: 0, Action.WAIT: 1}
 """How much more an action does than to slow down; the others do most."""
 MOST_CARE = 2
+
+
+Mates = Callable[[Pose2D, float, float], Sequence[Feature]]
+"""Function that returns the team-mates within a distance [m] of a pose, at a time [s], with their radius as 0."""
 
 
 class Crossing:
@@ -92,10 +98,16 @@ class Crossing:
         return not self._impatient
 
     def give_way(
-        self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, now: float, points: Sequence[Point] = ()
+        self,
+        moving: Sequence[Feature],
+        pose: Pose2D,
+        wanted: Twist,
+        now: float,
+        points: Sequence[Point] = (),
+        mates: Mates = lambda _pose, _within_m, _now: (),
     ) -> Twist:
         """Return `wanted`, or a slower or evading twist. `moving` holds as of now, in `map` like `pose`; `points` are
-        what stands, in `base_link`.
+        what stands, in `base_link`; `mates` is asked where room is made.
         """
         near = _closest(moving, pose, wanted)
         if near >= CLEARANCE_M and now >= self._held_until:
@@ -111,7 +123,9 @@ class Crossing:
         if self._impatient:
             self.decision = None
             return wanted
-        evasion = SLOW if near >= CLEARANCE_M else self._less(moving, pose, wanted, points)
+        evasion = (
+            SLOW if near >= CLEARANCE_M else self._less(moving, pose, wanted, points, mates(pose, MATES_WITHIN_M, now))
+        )
         if self.decision is None or _care(evasion.action) >= _care(self.decision.action) or now >= self._held_until:
             row = decide(Situation("moving", near, closest_m=min(near, self._near)))
             named = ("", "") if row is None else (row.name, row.updates)
@@ -131,25 +145,48 @@ class Crossing:
         left_rad = max(0.0, _side(evasion) * wrap(self._heading - pose.theta))
         return Evasion(evasion.action, evasion.v_mps, evasion.omega_radps if left_rad > 0.0 else 0.0, left_rad)
 
-    def _less(self, moving: Sequence[Feature], pose: Pose2D, wanted: Twist, points: Sequence[Point]) -> Evasion:
+    def _comes_close(self, feature: Feature, pose: Pose2D) -> bool:
+        """Return whether an obstacle is so near that it reaches the robot if it turns towards it, and comes nearer."""
+        x, y = feature.x - pose.x, feature.y - pose.y
+        return hypot(x, y) < feature.radius_m + self._radius_m + CLOSE_M and x * feature.vx + y * feature.vy < 0.0
+
+    def _less(
+        self,
+        moving: Sequence[Feature],
+        pose: Pose2D,
+        wanted: Twist,
+        points: Sequence[Point],
+        mates: Sequence[Feature],
+    ) -> Evasion:
         """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
         if _closest(moving, pose, _done(SLOW, wanted)) >= CLEARANCE_M:
             return SLOW
         if _closest(moving, pose, STILL) >= CLEARANCE_M:
             return EVASIONS[0]
         best, most = EVASIONS[0], -inf
+        close = [feature for feature in moving if self._comes_close(feature, pose)]
         under_way = self.decision is not None and self._evasion is not SLOW
         candidates = (self._present(pose), *EVASIONS) if under_way else EVASIONS
         for evasion in candidates:
             twist = _done(evasion, wanted)
             if twist.linear_x and free_along(points, twist, self._radius_m + BODY_M) < abs(twist.linear_x) * ROOM_S:
                 continue
-            kept = _kept(moving, pose, evasion, twist)
+            if twist.linear_x and _closest(mates, pose, twist, MATE_S) < 2.0 * self._radius_m + MATE_M:
+                continue
+            if close:
+                kept = _apart(close, along_arc(pose, twist, CLOSE_S), 0.5 * CLOSE_S)
+            else:
+                kept = _kept(moving, pose, evasion, twist)
+                kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
             kept += WORTH_M if evasion is candidates[0] else 0.0  # the present one, or waiting
-            kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
             if kept > most:
                 best, most = evasion, kept
-        return self._evasion if under_way and best.action is self._evasion.action else best
+        return self._evasion if under_way and best is candidates[0] else best
+
+
+def _apart(moving: Sequence[Feature], place: Pose2D, later_s: float) -> float:
+    """Return the least distance [m] from `place` to the surface of what moves, `later_s` [s] from now."""
+    return min(hypot(x - place.x, y - place.y) - f.radius_m for f in moving for x, y in [f.at(later_s)])
 
 
 def _care(action: Action) -> int:
@@ -197,37 +234,3 @@ def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: fl
             if apart < first and apart - radius_m < least:
                 least = apart - radius_m
     return least
-
-
-def shadow(moving: Sequence[Feature], pose: Pose2D) -> list[Point]:
-    """Return, in `base_link`, points of the places to which what moves slowly comes next: a detour leads behind it."""
-    c, s, points = cos(pose.theta), sin(pose.theta), list[Point]()
-    for feature in moving:
-        speed = hypot(feature.vx, feature.vy)
-        if speed * SHADOW_S > SHADOW_M_MAX:
-            continue
-        for n in range(1, SHADOW_STEPS + 1):
-            x, y = feature.at(SHADOW_S * n / SHADOW_STEPS)
-            reach = feature.radius_m / max(speed, 1e-6)
-            for left in (-1.0, 0.0, 1.0):
-                side = reach * (1.0 - abs(left))
-                dx = x + side * feature.vx - left * reach * feature.vy - pose.x
-                dy = y + side * feature.vy + left * reach * feature.vx - pose.y
-                points.append((c * dx + s * dy, c * dy - s * dx))
-    return points
-
-
-def before(moving: Sequence[Feature], pose: Pose2D, within_s: float) -> list[Point]:
-    """Return, in `base_link`, the points that the surfaces of what moves reach towards the robot within `within_s` [s]:
-    the last function before the wheels brakes for them as for what stands.
-    """
-    c, s = cos(pose.theta), sin(pose.theta)
-    points = []
-    for feature in moving:
-        x, y = feature.at(within_s)
-        dx, dy = x - pose.x, y - pose.y
-        apart = hypot(dx, dy)
-        if feature.radius_m < apart < hypot(feature.x - pose.x, feature.y - pose.y):
-            share = 1.0 - (feature.radius_m + AWAY_M) / apart
-            points.append((share * (c * dx + s * dy), share * (c * dy - s * dx)))
-    return points

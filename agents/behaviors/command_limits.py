@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lfa.agents.avoidance.moving_obstacle import before
+from lfa.agents.avoidance.moving_points import before
 from lfa.agents.avoidance.safety import safe, sharing, sharing_reach_m
 from lfa.agents.behaviors.team_mates import TeamMates
 from lfa.agents.localization.estimator import Estimator
@@ -54,5 +54,6 @@ class CommandLimits:
         self, wanted: Twist, last: Twist, points: list[Point], moving: Sequence[Feature], pose: Pose2D, dt: float
     ) -> Twist:
         """Return `wanted` within the drive's limits, and slow enough to stop before all that is seen or doubtful."""
-        braked_for = points + self._obstacles.ground.doubtful(pose) + before(moving, pose, BEFORE_S)
+        met = before(moving, pose, BEFORE_S, wanted.linear_x)
+        braked_for = points + self._obstacles.ground.doubtful(pose) + met
         return safe(wanted, last, braked_for, self._mission.radius_m, self._mission.limits, dt)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from lfa.agents.following.predecessor import Predecessor
+from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D
@@ -47,6 +48,19 @@ class TeamMates:
                 dx, dy = place.x - pose.x, place.y - pose.y
                 mates.append((c * dx + s * dy, c * dy - s * dx))
         return mates
+
+    def moving(self, pose: Pose2D, within_m: float, now: float) -> list[Feature]:
+        """Return those within `within_m` of `pose` as what moves in `map`; their radius is 0."""
+        found = []
+        for robot, place in self._team.near(self._others(), pose, within_m, now):
+            vx, vy = self._team.velocity_of(robot)
+            if self.predecessor is not None and robot == self.predecessor.robot:
+                sighting = self.predecessor.at(now)
+                if sighting is not None:
+                    place, v = sighting.pose, sighting.twist.linear_x
+                    vx, vy = v * cos(place.theta), v * sin(place.theta)
+            found.append(Feature("moving", place.x, place.y, 0.0, vx, vy))
+        return found
 
     def _others(self) -> tuple[int, ...]:
         """Return the other robots; made anew only when one more has been heard, for each control step asks."""

@@ -11,6 +11,7 @@ from math import hypot
 from typing import TYPE_CHECKING, Any
 
 from lfa.agents.avoidance.decision import Decision
+from lfa.agents.following.factory import heading_filter_of
 from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.free_place import FREE_WITHIN_M, FreePlace
 from lfa.agents.leading.path_follower import PathFollower
@@ -48,7 +49,12 @@ class Leadership:
         self._mission = mission
         self.formation = formation
         self._team = team
-        self.lead = PathFollower(mission.leading, mission.limits, mission.radius_m, mission.control_period_s)
+        swings = (
+            heading_filter_of(mission) == 0.0
+        )  # behind a filter a slot follows what this robot drives, not its turns
+        self.lead = PathFollower(
+            mission.leading, mission.limits, mission.radius_m, mission.control_period_s, slots_swing=swings
+        )
         self._planned: PlannedWay | None = None
         self._round: WayRound | None = None
         """Way round the present trap; None before the first one."""

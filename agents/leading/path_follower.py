@@ -18,7 +18,8 @@ DETOUR_AHEAD_M = 2.0
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
 ALONE_RADPS, TEAM_RADPS = 2.0, 0.2
-"""Turn rates [rad/s] on the spot at most, alone and with slots that swing around the robot."""
+"""Turn rates [rad/s] on the spot at most: alone or with slots that stay meanwhile, and with slots that swing around the
+robot."""
 SLOWEST_SHARE = 0.25
 """Minimum fraction of the cruise speed on a planned route's bends, so that the path is tracked and not cut."""
 CORNER_MPS = 0.1
@@ -29,10 +30,20 @@ class PathFollower(RouteTracker):
     """Twist of one robot along its route when it leads."""
 
     def __init__(
-        self, leading: Leading, limits: Limits, radius_m: float = 0.15, period_s: float = CONTROL_PERIOD_S
+        self,
+        leading: Leading,
+        limits: Limits,
+        radius_m: float = 0.15,
+        period_s: float = CONTROL_PERIOD_S,
+        *,
+        slots_swing: bool = True,
     ) -> None:
-        """Create a path follower whose `step` is called each `period_s`; other arguments as of `RouteTracker`."""
+        """Create a path follower whose `step` is called each `period_s`; other arguments as of `RouteTracker`.
+
+        Without `slots_swing` the slots stay where they are while the robot turns on the spot.
+        """
         super().__init__(leading, radius_m)
+        self.slots_swing = slots_swing
         self._limits = limits
         self._period_s = period_s
         self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
@@ -100,7 +111,8 @@ class PathFollower(RouteTracker):
         return v if ends else max(v, CORNER_MPS)
 
     def _turn(self, bearing: float, slots: Sequence[Slot]) -> Twist:
-        rate = TEAM_RADPS if slots else min(ALONE_RADPS, self._limits.omega_max_radps)
+        swing = slots and self.slots_swing
+        rate = TEAM_RADPS if swing else min(ALONE_RADPS, self._limits.omega_max_radps)
         return Twist(0.0, rate if bearing > 0.0 else -rate)
 
     def _cruise(self, slots: Sequence[Slot]) -> float:

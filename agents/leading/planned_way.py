@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from lfa.agents.avoidance.arc_planner import ArcPlanner
 from lfa.agents.exploration.explorer import Explore
 from lfa.agents.exploration.occupancy_grid import Mapping
+from lfa.agents.following.factory import heading_filter_of
 from lfa.agents.leading.path_follower import ALONE_RADPS, PathFollower
 from lfa.agents.perception.scan import Point
 from lfa.protocol.geometry import STILL, Pose2D, Twist
@@ -29,7 +30,10 @@ class PlannedWay:
         route_m = mission.leading.route_m if goal is None else (goal,)
         leading = replace(mission.leading, motion="explore", route_m=route_m)
         self.explore = Explore(replace(mission, leading=leading), mapping)
-        self.lead = PathFollower(leading, mission.limits, mission.radius_m, mission.control_period_s)
+        swings = heading_filter_of(mission) == 0.0
+        self.lead = PathFollower(
+            leading, mission.limits, mission.radius_m, mission.control_period_s, slots_swing=swings
+        )
         self._radius_m, self._omega_max_radps = mission.radius_m, mission.limits.omega_max_radps
         self._arcs = ArcPlanner(mission.radius_m, mission.limits)
         self._blocked_since: float | None = None
@@ -57,7 +61,8 @@ class PlannedWay:
         """
         if not self.explore.route:
             return STILL
-        turn_radps = min(ALONE_RADPS, self._omega_max_radps) if alone else TEAM_RADPS
+        swing = self.lead.slots_swing and not alone
+        turn_radps = TEAM_RADPS if swing else min(ALONE_RADPS, self._omega_max_radps)
         twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps)
         if not self._arcs.blocked:
             self._blocked_since = None

@@ -61,13 +61,14 @@ class StuckMonitor:
         *,
         leads: bool,
         again: bool = True,
+        moving: bool = False,
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
-        move. Without `again`, coming back (S3) does not count now: a planned way does.
+        move. Without `again`, coming back (S3) does not count now: a planned way does. `moving`: what is avoided moves.
         """
         if self.backing_out:
             return
-        held = self._stuck.watch(pose, wanted, action, lost, now)
+        held = self._stuck.watch(pose, wanted, action, lost, now, moving=moving)
         if held == COMES_BACK and not again:
             held = None
         if not leads:
@@ -139,16 +140,26 @@ class StuckConditions:
         """Position where the cell was entered: noise on a border does not count as a new entry."""
         self._entries: dict[tuple[int, int], deque[float]] = {}
         self._avoided = False
-        """True once something was avoided since the last cell was entered."""
+        """True once something that stands was avoided since the last cell was entered."""
 
     def reset(self) -> None:
         self.__init__(again=self._again)  # type: ignore[misc]
 
-    def watch(self, pose: Pose2D, wanted: Twist, action: Action | None, lost: str | None, now: float) -> str | None:
+    def watch(
+        self,
+        pose: Pose2D,
+        wanted: Twist,
+        action: Action | None,
+        lost: str | None,
+        now: float,
+        *,
+        moving: bool = False,
+    ) -> str | None:
         """Return the reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before
-        limits, `lost` the reason of S5 while an input that it needs is missing.
+        limits, `lost` the reason of S5 while an input that it needs is missing. `moving`: the decision is about what
+        moves; a robot that comes back after it has given way is in no trap.
         """
-        self._note(pose, action, now)
+        self._note(pose, action, moving, now)
         if lost is not None:
             return lost
         if action is Action.WAIT and now - self._since > WAITING_S:
@@ -163,12 +174,12 @@ class StuckConditions:
             return COMES_BACK
         return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
 
-    def _note(self, pose: Pose2D, action: Action | None, now: float) -> None:
+    def _note(self, pose: Pose2D, action: Action | None, moving: bool, now: float) -> None:
         if action != self._action:
             self._action, self._since = action, now
             if action is Action.U_TURN and (not self._turns or now - self._turns[-1] >= TURN_S_MIN):
                 self._turns.append(now)
-        self._avoided = self._avoided or action is not None
+        self._avoided = self._avoided or (action is not None and not moving)
         cell = (floor(pose.x / CELL_M), floor(pose.y / CELL_M))
         far = self._entered is None or hypot(pose.x - self._entered[0], pose.y - self._entered[1]) > 0.5 * CELL_M
         if cell != self._cell and far:

@@ -2,7 +2,8 @@
 
 import pytest
 
-from lfa.agents.avoidance.moving_obstacle import HOLD_S, WAIT_S_MAX, Crossing, shadow
+from lfa.agents.avoidance.moving_obstacle import HOLD_S, WAIT_S_MAX, Crossing
+from lfa.agents.avoidance.moving_points import before, shadow
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
 
@@ -97,3 +98,42 @@ def test_who_stands_before_what_comes_from_behind_goes_ahead_out_of_its_way() ->
         y -= 0.22 * 0.02
         least = min(least, ((0.2 - pose.x) ** 2 + (y - pose.y) ** 2) ** 0.5 - 0.25 - 0.15)
     assert least > 0.2, least
+
+
+def test_who_made_room_to_a_side_and_is_followed_turns_farther_to_that_side() -> None:
+    """What came head-on and turns after the robot: the bend that was chosen first is driven, and another one begins."""
+    crossing, pose, x, y, least = Crossing(), Pose2D(), 2.0, 0.0, 9.0
+    for n in range(400):
+        away = ((pose.x - x) ** 2 + (pose.y - y) ** 2) ** 0.5
+        vx, vy = 0.35 * (pose.x - x) / away, 0.35 * (pose.y - y) / away
+        twist = crossing.give_way(crosser(x, y, vx, vy), pose, STILL, 0.02 * n)
+        pose = along_arc(pose, twist, 0.02)
+        x, y = x + 0.02 * vx, y + 0.02 * vy
+        least = min(least, away - 0.25 - 0.15)
+    assert least > 0.1, least
+
+
+def test_what_comes_from_the_side_does_not_stop_a_robot_in_its_way() -> None:
+    aside, ahead = crosser(0.05, -0.6, 0.0, 0.4), crosser(0.8, 0.1, -0.4, 0.0)
+    assert before(aside, Pose2D(), 0.5, 0.3) == []
+    assert len(before(ahead, Pose2D(), 0.5, 0.3)) == 1
+    assert before(ahead, Pose2D(), 0.5, -0.3) == [], "it drives away from it"
+    assert len(before([*aside, *ahead], Pose2D(), 0.5, 0.0)) == 2
+
+
+def test_room_is_not_made_towards_a_team_mate_that_makes_room_as_well() -> None:
+    """Two of a team before what comes head-on: without the other one it goes to the right."""
+    mate = [Feature("moving", 0.3, -0.8, 0.0, 0.0, 0.2)]
+    alone, beside = Crossing(), Crossing()
+    assert alone.give_way(crosser(1.6, 0.0, -0.4, 0.0), Pose2D(), AHEAD, 0.0).angular_z < 0.0
+    twist = beside.give_way(crosser(1.6, 0.0, -0.4, 0.0), Pose2D(), AHEAD, 0.0, mates=lambda *_: mate)
+    assert twist.angular_z > 0.0
+
+
+@pytest.mark.parametrize(("x", "backs"), [(0.65, True), (-0.65, False)])
+def test_from_what_comes_close_a_robot_drives_away_whatever_way_it_means_to_pass_by(x: float, backs: bool) -> None:
+    """It would pass by at some distance; it may turn, and then a robot that waits is touched."""
+    passes_by = crosser(x, 0.2, -0.4 if backs else 0.4, 0.25)
+    twist = Crossing().give_way(passes_by, Pose2D(), STILL, 0.0)
+    assert (twist.linear_x < 0.0) is backs
+    assert twist.linear_x != 0.0

@@ -175,3 +175,14 @@ def test_a_route_of_kilometres_is_laid_within_a_step_and_bends_as_a_short_one_do
         (x, y), (far_x, far_y) = short.point(corner_s + ahead_m), long.point(corner_l + ahead_m)
         assert hypot(x - far_x, y - far_y) < 0.01
     assert max(long.curvature) == pytest.approx(max(short.curvature), rel=0.02)
+
+
+@pytest.mark.parametrize(("slots_swing", "least_radps", "most_radps"), [(True, 0.1, 0.3), (False, 1.0, 2.0)])
+def test_a_leader_turns_on_the_spot_slowly_only_where_its_turn_swings_its_slots(
+    slots_swing: bool, least_radps: float, most_radps: float
+) -> None:
+    lead = PathFollower(Leading(route_m=((0.0, 0.0), (8.0, 0.0))), LIMITS, slots_swing=slots_swing)
+    lead.begin(Pose2D(0.0, 0.0, 2.5))
+    wanted = lead.step(Pose2D(0.0, 0.0, 2.5), STILL, slots_of(FormationSpec(), [2, 3]), 0.4)
+    assert wanted.linear_x == 0.0
+    assert least_radps <= abs(wanted.angular_z) <= most_radps

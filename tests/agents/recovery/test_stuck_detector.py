@@ -311,13 +311,18 @@ def test_S3_places_are_half_a_metre_wide_along_both_axes(place: Pose2D) -> None:
     assert str(reason).startswith("S3")
 
 
-def come_back(*, again: bool) -> StuckMonitor:
+def come_back(*, again: bool = True, moving: bool = False) -> StuckMonitor:
     """A monitor of a robot that was in one place again and again."""
     monitor = StuckMonitor()
     for n in range(CELL_ENTRIES):
         for x, now in ((1.1, 4.0 * n), (0.1, 4.0 * n + 2.0)):
-            monitor.watch(Pose2D(x, 0.1, 0.0), AHEAD, Action.LEFT, None, now, leads=False, again=again)
+            here = Pose2D(x, 0.1, 0.0)
+            monitor.watch(here, AHEAD, Action.LEFT, None, now, leads=False, again=again, moving=moving)
     return monitor
+
+
+def test_S3_a_robot_that_comes_back_after_it_gave_way_to_what_moves_is_in_no_trap() -> None:
+    assert come_back(moving=True).reason is None
 
 
 def test_S3_on_a_planned_way_coming_back_does_not_count_and_all_else_does() -> None:

@@ -1,0 +1,56 @@
+"""Points that stand for what moves, for the functions that know points only: the detour, and the last brake."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, hypot, sin
+
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.agents.perception.scan import Point
+from lfa.protocol.geometry import Pose2D
+
+SHADOW_S, SHADOW_STEPS, SHADOW_M_MAX = 8.0, 3, 1.2
+"""Time [s] ahead for which a detour keeps out of the way of what moves slowly, the number of places on it, and the way
+[m] up to which it counts as slow."""
+AWAY_M = 0.08
+"""Clearance [m] that is left when a robot drives towards what moves; nearer, it drives away from it or stands."""
+ASIDE_SHARE = 0.5
+"""Cosine of the angle off the robot's motion beyond which what comes towards it comes from the side."""
+
+
+def shadow(moving: Sequence[Feature], pose: Pose2D) -> list[Point]:
+    """Return, in `base_link`, points of the places to which what moves slowly comes next: a detour leads behind it."""
+    c, s, points = cos(pose.theta), sin(pose.theta), list[Point]()
+    for feature in moving:
+        speed = hypot(feature.vx, feature.vy)
+        if speed * SHADOW_S > SHADOW_M_MAX:
+            continue
+        for n in range(1, SHADOW_STEPS + 1):
+            x, y = feature.at(SHADOW_S * n / SHADOW_STEPS)
+            reach = feature.radius_m / max(speed, 1e-6)
+            for left in (-1.0, 0.0, 1.0):
+                side = reach * (1.0 - abs(left))
+                dx = x + side * feature.vx - left * reach * feature.vy - pose.x
+                dy = y + side * feature.vy + left * reach * feature.vx - pose.y
+                points.append((c * dx + s * dy, c * dy - s * dx))
+    return points
+
+
+def before(moving: Sequence[Feature], pose: Pose2D, within_s: float, v_mps: float) -> list[Point]:
+    """Return, in `base_link`, the points that the surfaces of what moves reach towards the robot within `within_s` [s]:
+    the last function before the wheels brakes for them as for what stands.
+
+    The robot wants to drive at `v_mps` [m/s]. For what comes from the side it does not brake: at rest it would be met.
+    """
+    c, s = cos(pose.theta), sin(pose.theta)
+    points = []
+    for feature in moving:
+        x, y = feature.at(within_s)
+        dx, dy = x - pose.x, y - pose.y
+        apart = hypot(dx, dy)
+        if feature.radius_m < apart < hypot(feature.x - pose.x, feature.y - pose.y):
+            share = 1.0 - (feature.radius_m + AWAY_M) / apart
+            px, py = c * dx + s * dy, c * dy - s * dx
+            if v_mps * px >= ASIDE_SHARE * apart * abs(v_mps):
+                points.append((share * px, share * py))
+    return points
