@@ -21,18 +21,23 @@ def version_line(root: Path = ROOT) -> str:
     return f"lfa {version('lfa')}" + (f" (commit {at})" if at else "")
 
 
-@cache
 def code_line(root: Path = ROOT) -> str:
-    """Return name, version and a hash of the code: equal where the same runs would give the same results.
+    """Return name, version and a hash of the code: equal where the same runs would give the same results."""
+    from importlib.metadata import version
+
+    return f"lfa {version('lfa')} (code {code_digits(root)})"
+
+
+@cache
+def code_digits(root: Path = ROOT) -> str:
+    """Return a hash of the code, in hexadecimal digits.
 
     A commit says less: an installation has none, and a checkout may have been changed.
     """
-    from importlib.metadata import version
-
     digest = hashlib.sha256()
     for path in sorted(found for package in PACKAGES for found in (root / package).rglob("*.py")):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return f"lfa {version('lfa')} (code {digest.hexdigest()[:CODE_DIGITS]})"
+    return digest.hexdigest()[:CODE_DIGITS]
 
 
 def commit(root: Path) -> str | None:

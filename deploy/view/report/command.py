@@ -23,6 +23,9 @@ def command(
 ) -> int:
     folders = [folder] if other is None else [folder, other]
     path = out or folder / (REPORT if other is None else f"report-vs-{other.resolve().name}.html")
+    check_finished(folders)
+    if not path.resolve().parent.is_dir():
+        raise Refused(f"--out {path}: must be in a folder that exists")
     write_line("reading the recording and drawing the figures ...", sys.stderr)
     page = html(folders)
     try:
@@ -39,9 +42,15 @@ def html(folders: list[Path]) -> str:
     from lfa.deploy.recording.mcap_reader import look_into
     from lfa.deploy.view.report import page
 
+    check_finished(folders)
+    for folder in folders:
+        look_into(folder)
+    return page.of([Run(folder) for folder in folders])
+
+
+def check_finished(folders: list[Path]) -> None:
+    """Raise Refused, with what is missing, for a folder that is no finished run."""
     for folder in folders:
         for needed in ("summary.json", "recording.mcap", "scenario.toml"):
             if not (folder / needed).is_file():
                 raise Refused(f"{folder}: no finished run, it has no {needed}")
-        look_into(folder)
-    return page.of([Run(folder) for folder in folders])

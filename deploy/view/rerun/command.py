@@ -37,7 +37,8 @@ from lfa.deploy.view.rerun.viewer import (
     serve,
 )
 
-RRD = "recording.rrd"
+RRD = "recording.{}.rrd"
+"""Name of the converted recording, with the hash of the code that converted it: another version converts it anew."""
 PICTURE = "view.png"
 FLUSH_S = 0.33  # the cost of a batch depends little on its size: at 0.1 s the total would be more than twice as high
 PORT, WEB_PORT = 9876, 9090
@@ -101,15 +102,19 @@ def _write_clip(folder: Path | None, html: Path | None, gif: Path | None, mp4: P
 
 
 def converted(folder: Path) -> Path:
-    """Return the path of a run's `recording.rrd`, converted again when older than the recording. Raises Refused."""
+    """Return the path of a run's recording for the viewer, converted when older than the recording or than this code.
+
+    Raises Refused. What an earlier version converted is removed then.
+    """
     import rerun as rr
 
     from lfa.deploy.recording.mcap_reader import look_into, messages
     from lfa.deploy.recording.run_folder import scenario_of
+    from lfa.deploy.version import code_digits
     from lfa.deploy.view.rerun.layout import layout
     from lfa.deploy.view.rerun.scene import APPLICATION, TOPICS, Scene
 
-    rrd = folder / RRD
+    rrd = folder / RRD.format(code_digits())
     look_into(folder)
     if rrd.is_file() and rrd.stat().st_mtime > max(path.stat().st_mtime for path in parts(folder)):
         return rrd
@@ -134,9 +139,17 @@ def converted(folder: Path) -> Path:
         layout(scenario, robots, lasted_s=lasted_s).save(APPLICATION, rrd.with_suffix(LAYOUT_AT_END))
         stream.send_blueprint(layout(scenario, robots, lasted_s=lasted_s, plays=True))
         stream.disconnect()
+        _remove_earlier(rrd)
         return unfinished.rename(rrd)
     finally:
         unfinished.unlink(missing_ok=True)  # left over when the recording was refused midway
+
+
+def _remove_earlier(rrd: Path) -> None:
+    """Remove the recordings and layouts for the viewer that other versions left beside `rrd`."""
+    for path in rrd.parent.glob("recording.*"):
+        if path.suffix in (rrd.suffix, LAYOUT_AT_END) and path.stem != rrd.stem:
+            path.unlink(missing_ok=True)
 
 
 def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: int, web_port: int) -> int:
@@ -153,7 +166,7 @@ def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: i
         from lfa.deploy.view.rerun.screenshot import take
 
         with tempfile.TemporaryDirectory() as place:
-            rrd = Path(place) / RRD
+            rrd = Path(place) / RRD.format("live")
             stream.save(rrd, default_blueprint=plan)
             _draw(fleet, stream, scenario, clock.now() + SHOT_S)
             stream.disconnect()

@@ -119,6 +119,16 @@ def test_what_is_no_finished_run_is_refused(tmp_path: Path) -> None:
         command.html([tmp_path])
 
 
+def test_a_command_that_cannot_be_done_says_so_first(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(Refused, match=r"no finished run, it has no summary\.json"):
+        command.command(folder, other=tmp_path)
+    with pytest.raises(Refused, match="must be in a folder that exists"):
+        command.command(folder, out=tmp_path / "none" / "a.html")
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium here")
 def test_a_browser_shows_it_without_a_complaint(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "report.html"

@@ -58,6 +58,18 @@ def test_each_robot_has_as_many_poses_scans_and_slots_as_were_recorded(
     assert rrd.stat().st_size < 6.0 * RRD_BYTES_A_SECOND_MAX
 
 
+def test_what_another_version_converted_is_converted_anew_and_removed(folder: Path, tmp_path: Path) -> None:
+    copied = shutil.copytree(folder, tmp_path / "copied", ignore=shutil.ignore_patterns("*.rrd", "*.rbl"))
+    stale = [copied / name for name in ("recording.rrd", "recording.rbl", "recording.0123456789ab.rrd")]
+    for path in stale:
+        path.write_bytes(b"of another version")
+    rrd = command.converted(copied)
+    assert rrd.read_bytes().startswith(b"RRF")
+    assert [path for path in stale if path.exists()] == []
+    assert command.converted(copied) == rrd
+    assert sorted(path.suffix for path in copied.glob("recording.*")) == [".mcap", ".rbl", ".rrd"]
+
+
 def test_without_a_screen_the_picture_is_drawn_and_says_so(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
