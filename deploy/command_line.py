@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.output import write_line
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def print_text(name: str, text: str) -> int:
     """Print `text` for the script `name`, without its parser; return the exit code."""
 
     def write() -> int:
-        print(text, flush=True)
+        print_visible(text, flush=True)
         return 0
 
     return _guarded(name, write)
@@ -102,7 +103,7 @@ def print_refusal(name: str, refused: Refused) -> int:
         from lfa.protocol.config_file.mistake import RefusedFile
 
         errors = refused.errors if isinstance(refused, RefusedFile) else [{"text": line} for line in refused.lines]
-        print(msgspec.json.encode({"errors": errors}).decode())
+        print_visible(msgspec.json.encode({"errors": errors}).decode())
     return print_errors(name, *refused.lines)
 
 

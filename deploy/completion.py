@@ -14,6 +14,7 @@ from msgspec import Struct
 from typer.models import OptionInfo
 
 from lfa.deploy.cli import COMMANDS, Command
+from lfa.deploy.terminal_text import print_visible
 from lfa.world.description.load import titled
 
 
@@ -29,7 +30,7 @@ class Words(Struct, frozen=True):
 def command(
     shell: Annotated[Literal["bash", "zsh", "fish"], typer.Argument(help="Shell that the script is for.")],
 ) -> int:
-    print({"bash": _bash, "zsh": _zsh, "fish": _fish}[shell](words()))
+    print_visible({"bash": _bash, "zsh": _zsh, "fish": _fish}[shell](words()))
     return 0
 
 

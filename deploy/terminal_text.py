@@ -1,27 +1,22 @@
 """Foreign text on the terminal: shown as text, never taken for markup, with control characters made visible.
 
-Status texts, names and log lines come from other machines. Every command that prints a text of them uses this module.
+Status texts, names, reasons and paths come from other machines and from files. Every command prints by this module, or
+by `write_line`, which does the same.
 """
 
 from __future__ import annotations
 
-import unicodedata
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
+
+from lfa.protocol.output import visible, visible_lines
 
 if TYPE_CHECKING:
     from rich.text import Text
 
-HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-"""Unicode categories that a terminal obeys or hides: controls, formats (bidirectional overrides), line separators."""
 
-
-def visible(text: str) -> str:
-    r"""Return `text` with each control or format character written as an escape, such as `\x1b`; a tab stays."""
-    if text.isascii() and text.isprintable():
-        return text
-    return "".join(
-        char if char == "\t" or unicodedata.category(char) not in HIDDEN else ascii(char)[1:-1] for char in text
-    )
+def print_visible(text: object, file: TextIO | None = None, end: str = "\n", *, flush: bool = False) -> None:
+    """Print the lines of `text` with their control characters made visible; JSON stays JSON. Raises OSError."""
+    print(visible_lines(str(text)), file=file, end=end, flush=flush)
 
 
 def cell(text: str, style: str = "") -> Text:

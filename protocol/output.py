@@ -17,14 +17,47 @@ LINE_BYTES_MAX = 4000
 """Maximum length [bytes] of a line, below the size that a pipe writes atomically."""
 
 
+HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+"""Unicode categories that a terminal obeys or hides: controls, formats (bidirectional overrides), line separators."""
+
+
+def visible(text: str) -> str:
+    r"""Return `text` with each control or format character written as an escape, such as `\x1b`; a tab stays.
+
+    Those above ASCII have the escapes of JSON (`\u202e`), whose text may hold them; those below are never in it.
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(map(_visible, text))
+
+
+def visible_lines(text: str) -> str:
+    """Return `text` with all but its newlines made visible."""
+    return "\n".join(map(visible, text.split("\n")))
+
+
+def _visible(char: str) -> str:
+    from unicodedata import category  # for rare texts: no agent loads its tables at the start
+
+    if char == "\t" or category(char) not in HIDDEN:
+        return char
+    units = char.encode("utf-16-be", errors="surrogatepass")
+    if ord(char) < 0x7F:
+        return ascii(char)[1:-1]
+    return "".join(f"\\u{units[n : n + 2].hex()}" for n in range(0, len(units), 2))
+
+
 def write_line(text: str, stream: TextIO | None) -> None:
     """Write `text` and a newline to `stream` (`sys.stdout` or `sys.stderr`) at once, or drop it.
+
+    Control characters in it, which may come from other machines, are made visible.
 
     `stream` is None in a process that was started with that descriptor closed; its number may belong to another file
     by now. A line that a full pipe or a stopped terminal does not take at once is dropped.
     """
     if stream is None:
         return
+    text = visible_lines(text)
     with suppress(OSError, ValueError):  # ValueError: the stream was closed
         try:
             out = stream.fileno()

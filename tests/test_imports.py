@@ -40,7 +40,7 @@ ORDER = (
     "world/time_grid", "world/saved_state", "world/world", "world/checkpoint",
     "world/virtual_time", "world/routes", "world/simulator", "world/cli",
 
-    "deploy/version", "deploy/command_line", "deploy/terminal_text", "deploy/robot_colours", "deploy/own_code",
+    "deploy/version", "deploy/terminal_text", "deploy/command_line", "deploy/robot_colours", "deploy/own_code",
     "deploy/recording",
     "deploy/process", "deploy/campaign", "deploy/client", "deploy/client/roster", "deploy/faults",
     "deploy/scenario_loading", "deploy/worlds", "deploy/analysis",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import time
 
-from lfa.deploy.terminal_text import visible
 from lfa.protocol.output import write_line
 
 LINE_EVERY_S = 10.0
@@ -58,7 +57,9 @@ class CampaignProgress:
             write_line(text, sys.stderr)
 
     def _line(self, text: str) -> None:
-        write_line(("\r\033[K" if self._live else "") + visible(text), sys.stderr)
+        if self._live:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
+        write_line(text, sys.stderr)
 
 
 def so_far(done: int, total: int, done_here: int, seconds: float, failed: int, said: str = "runs") -> str:

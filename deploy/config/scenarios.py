@@ -9,6 +9,7 @@ import typer
 
 from lfa.agents.behaviors.own_behavior import BEHAVIORS
 from lfa.agents.following.controller import CONTROLLERS
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.world.description.generator import GENERATORS, title_of
 from lfa.world.description.load import titled
@@ -28,13 +29,13 @@ def command(as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.
     plug_ins += [{"name": name, "kind": "sensor"} for name in SENSORS.names()]
     plug_ins += [{"name": name, "kind": "behavior"} for name in BEHAVIORS.names()]
     if as_json:
-        print(msgspec.json.encode([*rows, *plug_ins]).decode())
+        print_visible(msgspec.json.encode([*rows, *plug_ins]).decode())
         return 0
     for row in rows:
-        print(f"{row['name']:<16}{row['robots']:>3} robots  {row['title']}")
-    print()
+        print_visible(f"{row['name']:<16}{row['robots']:>3} robots  {row['title']}")
+    print_visible("")
     for one in plug_ins:
-        print(f"{one['name']:<16}{one['kind']}{': ' if 'title' in one else ''}{one.get('title', '')}")
+        print_visible(f"{one['name']:<16}{one['kind']}{': ' if 'title' in one else ''}{one.get('title', '')}")
     return 0
 
 

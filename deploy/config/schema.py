@@ -20,6 +20,7 @@ from msgspec.structs import FieldInfo, fields
 
 from lfa.agents.following.controller import CONTROLLERS, find_controller
 from lfa.deploy.fleet.plan.fleet_file import FleetFile
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.plug_in import parameters_of
 from lfa.world.description.load import Scenario
 
@@ -50,7 +51,9 @@ def command(
     ] = False,
 ) -> int:
     kind = FleetFile if fleet else Scenario
-    print(table(kind) if markdown else msgspec.json.format(msgspec.json.encode(schema(kind)), indent=1).decode())
+    print_visible(
+        table(kind) if markdown else msgspec.json.format(msgspec.json.encode(schema(kind)), indent=1).decode()
+    )
     return 0
 
 

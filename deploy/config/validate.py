@@ -11,6 +11,7 @@ import typer
 from lfa.deploy.fleet.plan.fleet_file import is_fleet_file, load
 from lfa.deploy.recording.run_folder import toml
 from lfa.deploy.scenario_loading import load_scenario
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 from lfa.protocol.plug_in import is_file
@@ -39,11 +40,11 @@ def command(
         GENERATORS.add_file(scenario)
     drawn = draw(load_scenario(scenario, overrides or (), robots), seed)
     if as_json:
-        print(msgspec.json.encode(drawn).decode())
+        print_visible(msgspec.json.encode(drawn).decode())
     elif show:
-        print(toml(drawn), end="")
+        print_visible(toml(drawn), end="")
     else:
-        print(f"{scenario}: ok, {len(drawn.mission.robots)} robots, at most {drawn.time_limit_s:g} s")
+        print_visible(f"{scenario}: ok, {len(drawn.mission.robots)} robots, at most {drawn.time_limit_s:g} s")
     return 0
 
 
@@ -51,14 +52,16 @@ def _fleet(path: Path, *, show: bool, as_json: bool) -> int:
     """Print a fleet, or that it is right. Raises RefusedFile with all mistakes."""
     plan = load(path)
     if as_json:
-        print(msgspec.json.encode(plan.file).decode())
+        print_visible(msgspec.json.encode(plan.file).decode())
         return 0
     if not show:
         machines = f"{len(plan.hosts)} machine{'s' if len(plan.hosts) > 1 else ''}"
-        print(f"{path}: ok, fleet {plan.name} of {len(plan.places)} robots on {machines}")
+        print_visible(f"{path}: ok, fleet {plan.name} of {len(plan.places)} robots on {machines}")
         return 0
-    print(f"fleet {plan.name}: {plan.file.scenario}, world on {plan.file.world}, witness on {plan.file.witness}")
+    print_visible(
+        f"fleet {plan.name}: {plan.file.scenario}, world on {plan.file.world}, witness on {plan.file.witness}"
+    )
     for name, machine in plan.hosts.items():
         robots = " ".join(map(robot_name, plan.robots_on(name))) or "no robot"
-        print(f"host {name} ({machine.ssh or machine.address}): {robots}")
+        print_visible(f"host {name} ({machine.ssh or machine.address}): {robots}")
     return 0

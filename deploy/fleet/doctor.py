@@ -17,6 +17,7 @@ from lfa.deploy.fleet import fleet_view
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.ssh import PYTHON_MIN
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import HOST_PREFIX
 from lfa.protocol.transport.zenoh_config import answers, default_endpoint
@@ -53,10 +54,10 @@ def command(
     """Run `lfa doctor`; return 1 when a check fails."""
     found = this_machine() if file is None else _machines(file)
     if as_json:
-        print(msgspec.json.encode({"ok": all(one.ok for one in found), "findings": found}).decode())
+        print_visible(msgspec.json.encode({"ok": all(one.ok for one in found), "findings": found}).decode())
     else:
         for one in found:
-            print(f"{'ok   ' if one.ok else 'WRONG'}  {one.host:<12} {one.check:<12} {one.says}")
+            print_visible(f"{'ok   ' if one.ok else 'WRONG'}  {one.host:<12} {one.check:<12} {one.says}")
     return 0 if all(one.ok for one in found) else 1
 
 

@@ -17,6 +17,7 @@ from lfa.deploy.fleet.plan.host_plan import parts
 from lfa.deploy.fleet.remote import journals
 from lfa.deploy.fleet.remote.hosts import FleetHosts
 from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
@@ -39,11 +40,13 @@ def command(
         wrong += _bring(seen, keep)
     took_s = round(clock.now() - began, 2)
     if as_json:
-        print(msgspec.json.encode({"fleet": seen.name, "ended": ended, "wrong": wrong, "took_s": took_s}).decode())
+        print_visible(
+            msgspec.json.encode({"fleet": seen.name, "ended": ended, "wrong": wrong, "took_s": took_s}).decode()
+        )
     else:
-        print(f"fleet {seen.name}: ended on {', '.join(ended) or 'no host'} after {took_s:.1f} s")
+        print_visible(f"fleet {seen.name}: ended on {', '.join(ended) or 'no host'} after {took_s:.1f} s")
     for line in wrong:
-        print(f"lfa: {line}", file=sys.stderr)
+        print_visible(f"lfa: {line}", file=sys.stderr)
     return 1 if wrong else 0
 
 

@@ -15,6 +15,7 @@ from lfa.deploy.fleet.plan.host_plan import store
 from lfa.deploy.fleet.remote.key_distribution import push
 from lfa.deploy.fleet.security import keys, registry
 from lfa.deploy.fleet.security.access_rules import KeyPlan, host_name
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import fleet_name
@@ -96,7 +97,7 @@ def _change(
     then = "routers opened anew" if plan is not None else "copy hosts/ again, then SIGHUP to the routers, one by one"
     facts: dict[str, object] = {"changed": changed, "hosts": machines, "pushed": plan is not None, "wrong": wrong}
     for line in wrong:
-        print(f"lfa: {line}", file=sys.stderr)
+        print_visible(f"lfa: {line}", file=sys.stderr)
     _say(facts, f"{', '.join(changed)} {text}; {then}: {', '.join(machines)}", as_json)
     return 1 if wrong else 0
 
@@ -129,15 +130,15 @@ def _show(folder: Path, names: list[str], as_json: bool) -> int:
     if not shown:
         raise Refused(f"{' '.join(names)}: no member of this fleet, must be like robot1, world or {host_name('a')}")
     if as_json:
-        print(msgspec.json.encode(shown).decode())
+        print_visible(msgspec.json.encode(shown).decode())
         return 0
     for one in shown:
-        print(f"{one.name:<12} {one.state:<8} {one.until or '-':<17} joins at {', '.join(one.joins_at)}")
+        print_visible(f"{one.name:<12} {one.state:<8} {one.until or '-':<17} joins at {', '.join(one.joins_at)}")
         for key in one.says if names else ():
-            print(f"{'':<12} may say {key}")
+            print_visible(f"{'':<12} may say {key}")
     return 0
 
 
 def _say(facts: dict[str, object], text: str, as_json: bool) -> int:
-    print(msgspec.json.encode(facts).decode() if as_json else text)
+    print_visible(msgspec.json.encode(facts).decode() if as_json else text)
     return 0

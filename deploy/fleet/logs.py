@@ -12,11 +12,12 @@ import typer
 from lfa.deploy.fleet.engine.log_tail import FOLLOW_S
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
 from lfa.deploy.process.signals import Interrupts
-from lfa.deploy.terminal_text import visible
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.fleet import LogLines
+from lfa.protocol.output import visible
 from lfa.protocol.topics import HOST_PREFIX
 
 HEAR_S = 2.0
@@ -82,7 +83,7 @@ def _print(said: LogLines, as_json: bool, *, alone: bool) -> None:
     host = said.header.sender.removeprefix(HOST_PREFIX)
     for line in said.lines:
         if as_json:
-            print(msgspec.json.encode({"host": host, "process": said.name, "line": line}).decode())
+            print_visible(msgspec.json.encode({"host": host, "process": said.name, "line": line}).decode())
         else:
-            print(visible(line if alone else f"{host}/{said.name}: {line}"))
+            print_visible(visible(line if alone else f"{host}/{said.name}: {line}"))
     sys.stdout.flush()

@@ -10,9 +10,10 @@ import msgspec
 import typer
 
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
-from lfa.deploy.terminal_text import cell, visible
+from lfa.deploy.terminal_text import cell, print_visible
 from lfa.protocol import clock
 from lfa.protocol.names import robot_id_of
+from lfa.protocol.output import visible
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -39,14 +40,14 @@ def command(
         now = clock.now()
         facts, silent = rows(view), view.silent(now)
     if as_json:
-        print(msgspec.json.encode({"fleet": seen.name, "silent": silent, "processes": facts}).decode())
+        print_visible(msgspec.json.encode({"fleet": seen.name, "silent": silent, "processes": facts}).decode())
     else:
         from rich.console import Console
 
         console = Console(width=max(WIDTH_MIN, shutil.get_terminal_size().columns))
         console.print(table(facts))
         for name in silent:
-            print(f"host {visible(name)} is silent")
+            print_visible(f"host {visible(name)} is silent")
     return 1 if silent or not facts or any(row["state"] != "running" for row in facts) else 0
 
 

@@ -28,6 +28,7 @@ from lfa.deploy.recording.recorder import Recorder, Recording
 from lfa.deploy.recording.run_folder import RUNS, SCENARIO, About, make, toml
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.run.termination import Termination
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
@@ -79,12 +80,12 @@ def command(
         came += fetched
     summary = followed.summarize(recording)
     for line in (*wrong, *recording.losses()):
-        print(f"lfa: {line}", file=sys.stderr)
+        print_visible(f"lfa: {line}", file=sys.stderr)
     if as_json:
         facts = {"folder": str(followed.folder), "fleet": found.name, "journals": came, "summary": summary}
-        print(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
+        print_visible(msgspec.json.encode({**facts, **msgspec.to_builtins(recording)}).decode())
     else:
-        print("\n".join(_lines(followed.folder, recording, came, summary)))
+        print_visible("\n".join(_lines(followed.folder, recording, came, summary)))
     whole = recording.messages and not recording.dropped and not recording.unwritten
     return 1 if not whole else 0 if as_json or summary is None else summary.exit_code
 

@@ -9,6 +9,7 @@ import msgspec
 import typer
 
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.fleet import ProcessReport
@@ -43,11 +44,13 @@ def command(
         done = view.say_until(order, again, AGAIN_S)
         took_s = round(clock.now() - began, 2)
     if as_json:
-        print(msgspec.json.encode({"process": name, "host": place, "restarted": done, "took_s": took_s}).decode())
+        print_visible(
+            msgspec.json.encode({"process": name, "host": place, "restarted": done, "took_s": took_s}).decode()
+        )
     elif done:
-        print(f"{name} on {place} was started again after {took_s:.1f} s")
+        print_visible(f"{name} on {place} was started again after {took_s:.1f} s")
     else:
-        print(f"{name} on {place} was not started again within {AGAIN_S:g} s: see lfa logs {name}")
+        print_visible(f"{name} on {place} was not started again within {AGAIN_S:g} s: see lfa logs {name}")
     return 0 if done else 1
 
 

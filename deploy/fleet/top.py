@@ -14,7 +14,7 @@ from lfa.deploy.client.team_status import Board
 from lfa.deploy.fleet import ps
 from lfa.deploy.fleet.fleet_view import FleetView, await_first_status, find, open_view
 from lfa.deploy.process.signals import Interrupts
-from lfa.deploy.terminal_text import cell
+from lfa.deploy.terminal_text import cell, print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
@@ -47,7 +47,7 @@ def command(
         await_first_status(view, HEAR_S)
         _hear_for(view, board, FIRST_S)
         if as_json:
-            print(msgspec.json.encode(_facts(view, board)).decode())
+            print_visible(msgspec.json.encode(_facts(view, board)).decode())
         elif once:
             from rich.console import Console
 

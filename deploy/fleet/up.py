@@ -27,6 +27,7 @@ from lfa.deploy.fleet.remote.hosts import FleetHosts
 from lfa.deploy.fleet.remote.key_distribution import Bundle, bundles
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
@@ -70,17 +71,17 @@ def command(
             facts = asyncio.run(bring_up(plan, interrupts, may_install=install, wait_s=wait))
     except NotUp as not_up:
         if as_json:
-            print(msgspec.json.encode({"fleet": plan.name, "healthy": False, "wrong": not_up.lines}).decode())
+            print_visible(msgspec.json.encode({"fleet": plan.name, "healthy": False, "wrong": not_up.lines}).decode())
         for line in not_up.lines:
-            print(f"lfa: {line}", file=sys.stderr)
+            print_visible(f"lfa: {line}", file=sys.stderr)
         return not_up.code
     took_s = round(clock.now() - began, 2)
     if as_json:
-        print(msgspec.json.encode({"fleet": plan.name, "healthy": True, "took_s": took_s, **facts}).decode())
+        print_visible(msgspec.json.encode({"fleet": plan.name, "healthy": True, "took_s": took_s, **facts}).decode())
     else:
         chain = " <- ".join(map(str, facts["chain"]))
-        print(f"fleet {plan.name} is up after {took_s:.1f} s: {chain}")
-        print(f"next: lfa ps {file}, lfa logs -f robot{facts['chain'][0]}, lfa top {file}, lfa down {file}")
+        print_visible(f"fleet {plan.name} is up after {took_s:.1f} s: {chain}")
+        print_visible(f"next: lfa ps {file}, lfa logs -f robot{facts['chain'][0]}, lfa top {file}, lfa down {file}")
     return 0
 
 
@@ -185,7 +186,7 @@ def _progress(missing: list[str], shown: str) -> str:
 
 def tell(text: str) -> None:
     """Print a line of progress."""
-    print(text, file=sys.stderr, flush=True)
+    print_visible(text, file=sys.stderr, flush=True)
 
 
 def digest_of(plan: FleetPlan) -> str:

@@ -24,6 +24,7 @@ from lfa.deploy.fleet.remote.hosts import FleetHosts
 from lfa.deploy.fleet.remote.key_distribution import bundles
 from lfa.deploy.fleet.up import NotUp, await_health, digest_of, tell
 from lfa.deploy.process.signals import Interrupts
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.header import WIRE_VERSION
@@ -47,11 +48,13 @@ def command(
     took_s = round(clock.now() - began, 2)
     if as_json:
         facts = {"fleet": plan.name, "wire": WIRE_VERSION, "upgraded": done, "wrong": lines, "took_s": took_s}
-        print(msgspec.json.encode(facts).decode())
+        print_visible(msgspec.json.encode(facts).decode())
     elif done:
-        print(f"fleet {plan.name}: {', '.join(done)} upgraded after {took_s:.1f} s; messages of version {WIRE_VERSION}")
+        print_visible(
+            f"fleet {plan.name}: {', '.join(done)} upgraded after {took_s:.1f} s; messages of version {WIRE_VERSION}"
+        )
     for line in lines:
-        print(f"lfa: {line}", file=sys.stderr)
+        print_visible(f"lfa: {line}", file=sys.stderr)
     return code
 
 

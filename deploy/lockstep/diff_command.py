@@ -12,6 +12,7 @@ import typer
 from msgspec import Struct
 
 from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import JournalEntry
@@ -50,7 +51,7 @@ def command(
 ) -> int:
     """Compare two runs tick by tick; return 0 if they are the same, 1 if not. Raises Refused."""
     found = compare(a, b)
-    print(msgspec.json.encode(found).decode() if as_json else _text(found, a, b))
+    print_visible(msgspec.json.encode(found).decode() if as_json else _text(found, a, b))
     return 0 if found.tick is None and found.ticks[0] == found.ticks[1] else 1
 
 

@@ -10,6 +10,7 @@ import typer
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.lockstep.stepping import STEP, STEPPED, ticks_of
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.team import Event
 from lfa.protocol.transport.message_bus import send
@@ -34,11 +35,13 @@ def command(
         send(subscriber.bus, operator.command(STEP, clock.now(), ticks=number))
         event = _answer(subscriber, own_number)
     if event is None:
-        print("no lockstep run that stands has answered: start one with lfa run SCENARIO --lockstep --pause")
+        print_visible("no lockstep run that stands has answered: start one with lfa run SCENARIO --lockstep --pause")
         return 1
     facts = {"what": event.data["what"], "tick": event.data["tick"], "time_s": event.header.stamp}
     at = f"tick {facts['tick']} ({event.header.stamp:.3f} s)"
-    print(msgspec.json.encode(facts).decode() if as_json else f"{facts['what']} {'at' if number else 'from'} {at}")
+    print_visible(
+        msgspec.json.encode(facts).decode() if as_json else f"{facts['what']} {'at' if number else 'from'} {at}"
+    )
     return 0
 
 

@@ -21,6 +21,7 @@ from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, GOAL, LEADER, ORDERS
 from lfa.deploy.operate import go
 from lfa.deploy.operate.options import AsJson, FleetName
 from lfa.deploy.process.identity import Identity, own_processes, send_signal
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
@@ -74,7 +75,7 @@ def command(
         raise Refused(f"{name}: its process {identity.pid} has gone in the meantime")
     facts = {"deed": action, "robot": whom, "fleet": team[0].fleet, "pid": identity.pid}
     said = f"{action} {name} of {team[0].fleet} (process {identity.pid}): {FAULT_ACTIONS[action]}"
-    print(msgspec.json.encode(facts).decode() if as_json else said)
+    print_visible(msgspec.json.encode(facts).decode() if as_json else said)
     return 0
 
 
@@ -99,7 +100,7 @@ def _order(action: str, target: str, team: Sequence[Running], bus: ZenohBus, inb
         bus.close()
     facts = {"deed": action, "target": whom, "fleet": fleet}
     line = f"{action} {whom} in {fleet}: {FAULT_ACTIONS[action]}"
-    print(msgspec.json.encode(facts).decode() if as_json else line)
+    print_visible(msgspec.json.encode(facts).decode() if as_json else line)
     return 0
 
 
@@ -127,7 +128,7 @@ def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool
         bus.close()
     facts = {"deed": RESTART, "robot": robot, "fleet": fleet}
     said = f"{RESTART} robot {robot} of {fleet}: {FAULT_ACTIONS[RESTART]}"
-    print(msgspec.json.encode(facts).decode() if as_json else said)
+    print_visible(msgspec.json.encode(facts).decode() if as_json else said)
     return 0
 
 

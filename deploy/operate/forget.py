@@ -10,6 +10,7 @@ import typer
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.consensus import Role
@@ -48,13 +49,13 @@ def command(
             _say(subscriber, robots)
             leader, waits, _ = _listen(subscriber, ANSWER_S_MAX, until_led=True)
     if as_json:
-        print(msgspec.json.encode({"robots": robots, "asked": asked, "leader": leader}).decode())
+        print_visible(msgspec.json.encode({"robots": robots, "asked": asked, "leader": leader}).decode())
     elif not asked:
-        print(f"robot{leader} leads: who is silent leaves its voters without being forgotten")
+        print_visible(f"robot{leader} leads: who is silent leaves its voters without being forgotten")
     elif leader is None:
-        print(f"nobody leads after {ANSWER_S_MAX:g} s{waits}")
+        print_visible(f"nobody leads after {ANSWER_S_MAX:g} s{waits}")
     else:
-        print(f"forgotten: {', '.join(map(robot_name, robots))}; robot{leader} leads")
+        print_visible(f"forgotten: {', '.join(map(robot_name, robots))}; robot{leader} leads")
     return 0 if leader is not None else 1
 
 

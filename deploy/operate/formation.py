@@ -11,6 +11,7 @@ from lfa.agents.formation.formation import named
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.operate.options import Connect, FleetName, Keys
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.team import Event
 from lfa.protocol.mission import FormationSpec
@@ -34,11 +35,15 @@ def command(
         answer = ask(subscriber, side)
     if as_json:
         facts = {"side": side, "acknowledged": answer is not None}
-        print(msgspec.json.encode(facts if answer is None else {**facts, "leader": answer.header.sender}).decode())
+        print_visible(
+            msgspec.json.encode(facts if answer is None else {**facts, "leader": answer.header.sender}).decode()
+        )
     elif answer is None:
-        print(f"formation {side}: no leader answered within {ANSWER_S_MAX:g} s")
+        print_visible(f"formation {side}: no leader answered within {ANSWER_S_MAX:g} s")
     else:
-        print(f"formation {side}: ordered by {answer.header.sender}, request {answer.data.get('number')} of its term")
+        print_visible(
+            f"formation {side}: ordered by {answer.header.sender}, request {answer.data.get('number')} of its term"
+        )
     return 0 if answer is not None else 1
 
 

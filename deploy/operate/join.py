@@ -13,6 +13,7 @@ from lfa.deploy.client.roster.roster_call import RosterOutcome
 from lfa.deploy.client.roster.roster_fleet import TOPICS, change_roster
 from lfa.deploy.client.session import find, listen
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 
@@ -43,7 +44,7 @@ def say(
         outcome = change_roster(ear, what, robot, slot_of)
     if outcome.reason:
         raise Refused(outcome.reason)
-    print(msgspec.json.encode(outcome).decode() if as_json else outcome_text(what, outcome))
+    print_visible(msgspec.json.encode(outcome).decode() if as_json else outcome_text(what, outcome))
     return 0 if outcome.accepted else 1
 
 

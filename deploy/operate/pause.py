@@ -12,6 +12,7 @@ from lfa.deploy.client.order_call import Change
 from lfa.deploy.client.order_fleet import TOPICS, order_fleet
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 
 
@@ -41,10 +42,10 @@ def say(
     if outcome.reason:
         raise Refused(f"{what}: robot{outcome.leader} refuses it: {outcome.reason}")
     if as_json:
-        print(msgspec.json.encode(outcome).decode())
+        print_visible(msgspec.json.encode(outcome).decode())
     elif outcome.leader is None:
-        print(f"{what}: no leader has answered")
+        print_visible(f"{what}: no leader has answered")
     else:
         known = f"{len(outcome.robots)} robots know it"
-        print(f"{what}: order {outcome.version} carried out by robot{outcome.leader}, {known}")
+        print_visible(f"{what}: order {outcome.version} carried out by robot{outcome.leader}, {known}")
     return 0 if outcome.leader is not None else 1

@@ -9,6 +9,7 @@ import msgspec
 from lfa.deploy.client.session import find, listen
 from lfa.deploy.client.stop_fleet import TOPICS, outcome_lines, stop_fleet
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
+from lfa.deploy.terminal_text import print_visible
 
 
 def command(
@@ -26,7 +27,7 @@ def say(fleet: str | None, connect: str | None, keys: Path | None, as_json: bool
     with listen(find(fleet, connect, keys), TOPICS) as subscriber:
         outcome = stop_fleet(subscriber, stand=stand)
     if as_json:
-        print(msgspec.json.encode(outcome).decode())
+        print_visible(msgspec.json.encode(outcome).decode())
     else:
-        print("\n".join(outcome_lines(outcome, stand=stand)))
+        print_visible("\n".join(outcome_lines(outcome, stand=stand)))
     return 0 if outcome.complete else 1

@@ -14,6 +14,7 @@ import typer
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.operate.options import Connect, FleetName, Keys
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.message_bus import send
@@ -40,7 +41,7 @@ def command(
     if not sys.stdin.isatty():
         raise Refused("teleop needs a terminal: its keys are read one by one")
     with listen(find(fleet, connect, keys), frozenset()) as subscriber:
-        print(HELP)
+        print_visible(HELP)
         before = termios.tcgetattr(sys.stdin)
         tty.setcbreak(sys.stdin)
         try:

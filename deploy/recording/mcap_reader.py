@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_chunks import records
 from lfa.deploy.recording.recorder import RECORDING, parts
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER
@@ -120,7 +121,9 @@ def look_into(folder: Path) -> None:
             stream.seek(max(0, size - len(MCAP0_MAGIC)))
             whole = size > len(MCAP0_MAGIC) and stream.read() == MCAP0_MAGIC
         if not whole:
-            print(f"{path}: cut off (its writer was killed, or still writes): shown as far as it goes", file=sys.stderr)
+            print_visible(
+                f"{path}: cut off (its writer was killed, or still writes): shown as far as it goes", file=sys.stderr
+            )
 
 
 def recorded(folder: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, bytes]]:

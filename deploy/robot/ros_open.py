@@ -18,12 +18,11 @@ from lfa.deploy.ros.graph import TWISTS, RosGraph
 from lfa.deploy.ros.session import GraphFeed, RosSpace
 from lfa.deploy.ros.types import to_cdr
 from lfa.deploy.ros.wire import HASHLESS, Distro, RosEndpoint, check_domain, check_name
-from lfa.deploy.terminal_text import visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Pose2D
 from lfa.protocol.mission import Limits
-from lfa.protocol.output import write_line
+from lfa.protocol.output import visible, write_line
 from lfa.protocol.transport.bus import Wake
 from lfa.protocol.transport.zenoh_ros import ros_session
 

@@ -25,6 +25,7 @@ from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.topics import SOURCES, RosTopic, fleet_topics, robot_topics
 from lfa.deploy.ros.types import to_cdr, typestore
 from lfa.deploy.ros.wire import Qos
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.topics import TOPIC
@@ -56,9 +57,9 @@ def command(
     look_into(run)
     facts = write(run, out or run / FOLDER, tf_per_robot=tf_per_robot)
     if as_json:
-        print(json.dumps(msgspec.to_builtins(facts)))
+        print_visible(json.dumps(msgspec.to_builtins(facts)))
     else:
-        print(f"{facts.folder}: {facts.messages} messages on {facts.topics} topics, {facts.duration_s:.1f} s")
+        print_visible(f"{facts.folder}: {facts.messages} messages on {facts.topics} topics, {facts.duration_s:.1f} s")
     return 0
 
 

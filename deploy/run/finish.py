@@ -21,6 +21,7 @@ from lfa.deploy.process.signals import Interrupts
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.recorder import Recording, parts
 from lfa.deploy.recording.run_folder import JOURNALS, About
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime.state_hashes import HASHES
 
@@ -101,9 +102,9 @@ def report(
         draw(ended.folder)
     if as_json:
         facts = {"folder": None if kept is None else str(kept), **msgspec.to_builtins(ended.summary)}
-        print(msgspec.json.format(msgspec.json.encode(facts), indent=1).decode())
+        print_visible(msgspec.json.format(msgspec.json.encode(facts), indent=1).decode())
     else:
-        print(text(ended.summary, kept, verbose=verbose))
+        print_visible(text(ended.summary, kept, verbose=verbose))
     if junit is not None:
         assertions.junit(junit, ended.summary)
     return ended.exit_code

@@ -7,8 +7,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from lfa.deploy.run.progress_rows import ProgressRows
-from lfa.deploy.terminal_text import cell, visible
-from lfa.protocol.output import write_line
+from lfa.deploy.terminal_text import cell
+from lfa.protocol.output import visible, write_line
 
 if TYPE_CHECKING:
     from rich.live import Live

@@ -18,6 +18,7 @@ from lfa.deploy.client.session import find
 from lfa.deploy.fleet.host.router import host_credentials
 from lfa.deploy.run.machine_size import FEW_BEAMS, SLOW_HZ
 from lfa.deploy.scenario_loading import load_scenario
+from lfa.deploy.terminal_text import print_visible
 from lfa.deploy.view.picture.clip import clip_of
 from lfa.deploy.web.engine import Engine, RecordingEngine
 from lfa.deploy.web.fleet import FleetEngine
@@ -76,8 +77,8 @@ def serve_engine(engine: Engine, listen: str, port: int, secure: ssl.SSLContext 
 
     def ready() -> None:
         base = f"http{'s' if secure else ''}://{f'[{listen}]' if ':' in listen else listen}:{server.port}/"
-        print(f"to operate: {base}?token={tokens.operator}")
-        print(f"to look:    {base}?token={tokens.viewer}", flush=True)
+        print_visible(f"to operate: {base}?token={tokens.operator}")
+        print_visible(f"to look:    {base}?token={tokens.viewer}", flush=True)
 
     server = PageServer(engine, tokens, clip)
     try:

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from lfa.deploy.scenario_loading import load_scenario
+from lfa.deploy.terminal_text import print_visible
 from lfa.deploy.worlds.drawing import WorldDrawing, numbers, text_of
 from lfa.deploy.worlds.fitting import scenario_text
 from lfa.deploy.worlds.irsim import loaded, read_irsim
@@ -61,13 +62,13 @@ def command(
     _write(path, text, file)
     counts = {"walls": len(drawing.walls), "obstacles": len(drawing.obstacles)}
     if as_json:
-        print(json.dumps({"scenario": str(path), **counts, "skipped": drawing.skipped}))
+        print_visible(json.dumps({"scenario": str(path), **counts, "skipped": drawing.skipped}))
         return 0
-    print(f"{path}: {counts['walls']} walls, {counts['obstacles']} obstacles; next: lfa sim {path}")
+    print_visible(f"{path}: {counts['walls']} walls, {counts['obstacles']} obstacles; next: lfa sim {path}")
     for skipped in drawing.skipped[:SHOWN_MAX]:
-        print(f"left out: {skipped}")
+        print_visible(f"left out: {skipped}")
     if len(drawing.skipped) > SHOWN_MAX:
-        print(f"left out: {len(drawing.skipped) - SHOWN_MAX} more, see --json")
+        print_visible(f"left out: {len(drawing.skipped) - SHOWN_MAX} more, see --json")
     return 0
 
 

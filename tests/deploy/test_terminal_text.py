@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import ast
 import io
+import json
+from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from rich.console import Console
 
 from lfa.deploy.client.team_status import RobotStatus
+from lfa.deploy.command_line import print_errors
 from lfa.deploy.fleet import ps
-from lfa.deploy.terminal_text import visible
+from lfa.deploy.terminal_text import print_visible
 from lfa.deploy.view.terminal import watch
+from lfa.protocol.output import visible
+
+DEPLOY = Path(__file__).parents[2] / "deploy"
 
 HOSTILE = (
     "ok [/red] x",
@@ -63,3 +71,35 @@ def test_what_is_printable_stays(text: str) -> None:
 
 def test_a_control_character_is_written_out() -> None:
     assert visible("\x1b[2J") == r"\x1b[2J"
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_command_shows_hostile_words_of_its_command_line_as_text(
+    text: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    print_errors("lfa", f"{text}: no finished run")
+    print_visible(f"run folder: {text}")
+    out, err = capfd.readouterr()
+    assert not set((out + err).replace("\n", "")) & set("\x1b\x07\x9b\u202e\r")
+
+
+@pytest.mark.parametrize("text", [*HOSTILE, "\x7f", "\U000e0001", "\u2028"])
+def test_json_whose_hostile_texts_are_made_visible_still_holds_them(text: str) -> None:
+    printed = visible(msgspec.json.encode({"reason": text}).decode())
+    assert json.loads(printed) == {"reason": text}
+    assert printed.isprintable()
+
+
+SHOWN_OTHERWISE = ("bench", "examples", "terminal_text.py", "campaign/progress.py")
+"""Parts of `deploy` with a plain print: what they print is their own, no text of others."""
+
+
+def test_no_command_prints_without_making_its_text_visible() -> None:
+    plain = [
+        f"deploy/{path.relative_to(DEPLOY)}:{node.lineno}"
+        for path in sorted(DEPLOY.rglob("*.py"))
+        if not str(path.relative_to(DEPLOY)).startswith(SHOWN_OTHERWISE)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("print", "typer.echo")
+    ]
+    assert not plain, f"print_visible (deploy/terminal_text.py) is what these need: {plain}"

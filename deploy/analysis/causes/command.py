@@ -16,6 +16,7 @@ from lfa.deploy.analysis.causes.rules import CauseChain, explain
 from lfa.deploy.analysis.causes.run_trace import read
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.run_folder import scenario_of
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 
 NEAR_S = 5.0
@@ -41,9 +42,9 @@ def command(
         raise Refused(f"--of {of}: must be one of {', '.join(EFFECTS)}")
     found = _chosen(why(folder), kind, at)
     if as_json:
-        print(msgspec.json.encode(found).decode())
+        print_visible(msgspec.json.encode(found).decode())
     else:
-        print("\n".join(lines(found)))
+        print_visible("\n".join(lines(found)))
     return 0
 
 

@@ -27,6 +27,7 @@ from lfa.deploy.own_code import OwnFile, RunBehavior, RunController, RunSensor, 
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.scenario_loading import load_code_of_run
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.output import write_line
 
@@ -83,7 +84,7 @@ def command(
                 _print(one)
     except KeyboardInterrupt:
         if as_json:
-            print(msgspec.json.encode({"runs": checked, "interrupted": True}).decode())
+            print_visible(msgspec.json.encode({"runs": checked, "interrupted": True}).decode())
         write_line(f"interrupted: {len(checked)} of {len(folders)} runs are checked", sys.stderr)
         raise
     return _end(checked, kept, as_json)
@@ -115,9 +116,9 @@ def _end(checked: list[Checked], kept: list[Kept], as_json: bool) -> int:
     compared = tuple(across_seeds.across(kept)) if kept else ()
     verdict = VerifyReport(not any(map(_faulty, checked)) and not _fails(compared), tuple(checked), compared)
     if as_json:
-        print(msgspec.json.encode(verdict).decode())
+        print_visible(msgspec.json.encode(verdict).decode())
     elif compared:
-        print(f"across {len(kept)} of the paper's paths\n" + "\n".join(map(criteria.line, compared)))
+        print_visible(f"across {len(kept)} of the paper's paths\n" + "\n".join(map(criteria.line, compared)))
     return 0 if verdict.ok else 1
 
 
@@ -155,22 +156,22 @@ def _fails(findings: Sequence[Finding]) -> bool:
 
 def _print(one: Checked) -> None:
     for violation in one.broken:
-        print(f"{violation.name} broken at {violation.at:.3f} s: {violation.text}")
+        print_visible(f"{violation.name} broken at {violation.at:.3f} s: {violation.text}")
     names = ", ".join(checker.name for checker in SAFETY)
     if not one.journals:
-        print(
+        print_visible(
             f"{one.folder}: {one.scenario}, seed {one.seed}\n"
             f"{one.happenings} events, I2: {len(one.broken)} violations; "
             "the other invariants need the journals of all processes, which their option --journal DIR keeps"
         )
         return
-    print(
+    print_visible(
         f"{one.folder}: {one.scenario}, seed {one.seed}\n"
         f"{one.journals} journals, {one.happenings} happenings, {names}: {len(one.broken)} violations"
     )
     if not one.shapes:
-        print(f"no scenario of the paper ({', '.join(PAPER)}): the shapes of its figures do not apply")
+        print_visible(f"no scenario of the paper ({', '.join(PAPER)}): the shapes of its figures do not apply")
         return
     failed = [finding.name for finding in one.shapes if finding.status == "fails"]
-    print("\n".join(map(criteria.line, one.shapes)))
-    print(f"{len(one.shapes)} properties of figures 7, 8, 9 and 11: {len(failed)} fail")
+    print_visible("\n".join(map(criteria.line, one.shapes)))
+    print_visible(f"{len(one.shapes)} properties of figures 7, 8, 9 and 11: {len(failed)} fail")

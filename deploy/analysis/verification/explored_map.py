@@ -17,6 +17,7 @@ from lfa.agents.exploration.occupancy_grid import CELL_M, OCCUPIED, Grid
 from lfa.deploy.analysis.verification import reexecution
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 from lfa.protocol.runtime import journal
@@ -45,7 +46,9 @@ def command(
     rows, columns = drawn.cells.shape
     facts = {"map": str(path), "columns": columns, "rows": rows, "resolution_m": drawn.resolution_m,
              "known_cells": int((drawn.cells >= 0).sum()), "occupied_cells": int(drawn.occupied.sum())}  # fmt: skip
-    print(json.dumps(facts) if as_json else f"{path}: {columns} x {rows} cells, {facts['occupied_cells']} occupied")
+    print_visible(
+        json.dumps(facts) if as_json else f"{path}: {columns} x {rows} cells, {facts['occupied_cells']} occupied"
+    )
     return 0
 
 

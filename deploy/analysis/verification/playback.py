@@ -10,6 +10,7 @@ from msgspec import DecodeError
 
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_reader import look_into, recorded
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import encode
@@ -33,7 +34,7 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
     look_into(folder)
     fleet_name(fleet)
     with _bus(endpoint or default_endpoint(), may_open=endpoint is None) as bus:
-        print(f"plays {folder} as fleet {fleet}; look at it with: lfa watch --fleet {fleet}", flush=True)
+        print_visible(f"plays {folder} as fleet {fleet}; look at it with: lfa watch --fleet {fleet}", flush=True)
         begun, count, t = clock.now(), 0, 0.0
         for channel, t, body in recorded(folder, frozenset(TOPIC)):
             ahead_s = t / speed - (clock.now() - begun)
@@ -45,7 +46,7 @@ def play(folder: Path, speed: float, fleet: str, endpoint: str | None) -> int:
                 raise Refused(f"{folder}: recorded by another program or version, {channel}: {error}") from None
             bus.publish(f"lfa/{fleet}{channel}", encode(message))
             count += 1
-    print(f"{count} messages, {t:.1f} s in {clock.now() - begun:.1f} s")
+    print_visible(f"{count} messages, {t:.1f} s in {clock.now() - begun:.1f} s")
     return 0
 
 

@@ -10,6 +10,7 @@ import typer
 
 from lfa.deploy.own_code import RunBehavior, RunController, RunSensor, given_files
 from lfa.deploy.scenario_loading import load_code_of_run
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name, whole_number
 
@@ -58,9 +59,9 @@ def _compare(folder: Path, robot: str, as_json: bool) -> int:
 
     found = [compare(path) for path in journals(folder, robot)]
     if as_json:
-        print(msgspec.json.encode(found).decode())
+        print_visible(msgspec.json.encode(found).decode())
     else:
-        print("\n".join(_text(comparison) for comparison in found))
+        print_visible("\n".join(_text(comparison) for comparison in found))
     return 0 if all(comparison.equal for comparison in found) else 1
 
 

@@ -14,6 +14,7 @@ from lfa.deploy.campaign.engines.kubernetes import manifest
 from lfa.deploy.campaign.shard import SHARDS_MAX, WHOLE, parse_shard
 from lfa.deploy.campaign.sweep.plan import RUNS_MAX, read_plan
 from lfa.deploy.own_code import PLUG_INS
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 
 MERGE = "merge"
@@ -74,7 +75,7 @@ def command(
     if on == LOCAL:
         return carry_out(plan, out, share, jobs, as_json)
     if on == "kubernetes":
-        print(manifest(path, shards, jobs), end="")
+        print_visible(manifest(path, shards, jobs), end="")
         return 0
     more = [word for kind, text in own_code for word in (f"--{kind}", str(Path(text).absolute()))]
     remote = Remote(on, shards, jobs, minutes, _pairs(slurm or ()), [*more, "--max-runs", str(max_runs)])

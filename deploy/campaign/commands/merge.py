@@ -11,9 +11,9 @@ import msgspec
 
 from lfa.deploy.campaign.combine import Combined, combine
 from lfa.deploy.campaign.merge.report import MergeReport, written
-from lfa.deploy.terminal_text import visible
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
-from lfa.protocol.output import write_line
+from lfa.protocol.output import visible, write_line
 
 MERGED = "merged"
 WORST = "worst"
@@ -44,10 +44,12 @@ def merge(folders: Sequence[Path], out: Path | None, as_json: bool) -> int:
     done, of = len(combined.results), len(combined.campaign.names)
     if as_json:
         facts = {"items": of, "done": done, "failed": report.failed, "missing": combined.missing}
-        print(msgspec.json.encode({**facts, **{kind: str(path) for kind, path in paths.items()}}).decode())
+        print_visible(msgspec.json.encode({**facts, **{kind: str(path) for kind, path in paths.items()}}).decode())
     else:
-        print("\n".join(map(visible, report.lines)))
-        print(f"{done} of {of} done, {report.failed} not good; {', '.join(str(path) for path in paths.values())}")
+        print_visible("\n".join(map(visible, report.lines)))
+        print_visible(
+            f"{done} of {of} done, {report.failed} not good; {', '.join(str(path) for path in paths.values())}"
+        )
     if combined.missing:
         write_line(f"{combined.missing} of {of} are missing: start the campaign again to do them", sys.stderr)
     return 1 if report.failed or combined.missing else 0

@@ -11,9 +11,8 @@ from pathlib import Path
 from lfa.deploy.campaign.engines.executors import DASK, Handle, on_dask, on_submitit
 from lfa.deploy.campaign.folder import CampaignFolder
 from lfa.deploy.campaign.progress import CampaignProgress
-from lfa.deploy.terminal_text import visible
 from lfa.protocol.errors import Refused
-from lfa.protocol.output import write_line
+from lfa.protocol.output import visible, write_line
 
 ENGINES = ("local", "slurm", f"{DASK}HOST:PORT", "kubernetes")
 LOOK_EVERY_S = 1.0

@@ -22,6 +22,7 @@ from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
 from lfa.deploy.fleet.plan.host_plan import parts
 from lfa.deploy.fleet.remote.key_distribution import bundles
 from lfa.deploy.fleet.security.private_files import private_folder, write_private
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 
 WORLDS = ("sdf", "map")
@@ -53,9 +54,9 @@ def command(
     _write(folder, files)
     then = NEXT[engine].format(folder=folder)
     if as_json:
-        print(msgspec.json.encode({"folder": str(folder), "files": sorted(files), "next": then}).decode())
+        print_visible(msgspec.json.encode({"folder": str(folder), "files": sorted(files), "next": then}).decode())
     else:
-        print(f"{len(files)} files in {folder}, private keys among them\nnext: {then}")
+        print_visible(f"{len(files)} files in {folder}, private keys among them\nnext: {then}")
     return 0
 
 
@@ -65,7 +66,7 @@ def _world(kind: str, scenario: str, out: Path | None, as_json: bool) -> int:
 
     folder, files = export_world(kind, scenario, out)
     facts = {"folder": str(folder), "files": files}
-    print(msgspec.json.encode(facts).decode() if as_json else f"{' and '.join(files)} in {folder}")
+    print_visible(msgspec.json.encode(facts).decode() if as_json else f"{' and '.join(files)} in {folder}")
     return 0
 
 

@@ -16,6 +16,7 @@ from msgspec import Struct
 from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep, watchers
 from lfa.deploy.fleet.plan.files import PART
 from lfa.deploy.process.identity import Identity, identify, send_signal
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, decode_json, read_json
@@ -108,12 +109,12 @@ def main() -> None:
         ended = end(folder)
         run, digest = ("", "") if ended is None else (ended.run, ended.digest)
         answer = _Ended(asked.version, clock.wall_ms(), run, digest)
-        print(f"{ANSWER}{msgspec.json.encode(answer).decode()}")
+        print_visible(f"{ANSWER}{msgspec.json.encode(answer).decode()}")
     except (Refused, DamagedFile) as refused:
-        print(refused, file=sys.stderr)
+        print_visible(refused, file=sys.stderr)
         sys.exit(2)
     except OSError as error:
-        print(f"{error.filename or 'lfa'}: {error.strerror}", file=sys.stderr)
+        print_visible(f"{error.filename or 'lfa'}: {error.strerror}", file=sys.stderr)
         sys.exit(1)
 
 

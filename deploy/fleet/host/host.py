@@ -29,6 +29,7 @@ from lfa.deploy.fleet.security.private_files import unpack
 from lfa.deploy.process.identity import send_signal
 from lfa.deploy.process.process_group import ROUTER_NAME
 from lfa.deploy.recording.run_folder import LOGS, SCENARIO
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import HOST_PREFIX
@@ -163,12 +164,12 @@ ANSWERS_TO = {"check": check, "start": start, "stop": stop, "listen": listen, "r
 def main() -> None:
     try:
         part = msgspec.json.decode(sys.stdin.buffer.read(), type=HostPlan)
-        print(f"{ANSWER}{msgspec.json.encode(ANSWERS_TO[sys.argv[1]](part)).decode()}")
+        print_visible(f"{ANSWER}{msgspec.json.encode(ANSWERS_TO[sys.argv[1]](part)).decode()}")
     except Refused as refused:
-        print(refused, file=sys.stderr)
+        print_visible(refused, file=sys.stderr)
         sys.exit(2)
     except OSError as error:
-        print(f"{error.filename or 'lfa'}: {error.strerror}", file=sys.stderr)
+        print_visible(f"{error.filename or 'lfa'}: {error.strerror}", file=sys.stderr)
         sys.exit(1)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +31,7 @@ from lfa.deploy.fuzz.search.searches import (
 from lfa.deploy.fuzz.search.shares import do_fuzz
 from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 from lfa.deploy.process.worker_pool import workers
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import whole_number
 
@@ -107,16 +109,16 @@ def _one(seed: int, verbose: bool, search: Search = DRAWN, as_json: bool = False
     if as_json:
         facts = {"seed": seed, "schedule": describe(played.schedule), "elections": played.elections}
         violations = [said(violation) for violation in played.violations]
-        typer.echo(json.dumps({**facts, "faults": dict(played.counts), "violations": violations}))
+        print_visible(json.dumps({**facts, "faults": dict(played.counts), "violations": violations}))
         return 1 if violations else 0
-    typer.echo(describe(played.schedule))
+    print_visible(describe(played.schedule))
     for line in lines:
-        typer.echo(line)
+        print_visible(line)
     for violation in played.violations:
-        typer.echo(said(violation))
+        print_visible(said(violation))
     for line in [] if played.broken is None else chain_lines(played.broken):
-        typer.echo(line)
-    typer.echo(f"seed {seed}: {len(played.violations)} violations, {played.elections} elections")
+        print_visible(line)
+    print_visible(f"seed {seed}: {len(played.violations)} violations, {played.elections} elections")
     return 1 if played.violations else 0
 
 
@@ -136,14 +138,14 @@ def _hunt(seeds: range, jobs: int, as_json: bool, search: Search) -> int:
             tally.add(part)
             if time.perf_counter() > shown_at + TELL_EVERY_S:
                 shown_at = time.perf_counter()
-                typer.echo(so_far(tally, len(seeds), shown_at - began), err=True)
+                print_visible(so_far(tally, len(seeds), shown_at - began), file=sys.stderr)
     except KeyboardInterrupt:
         return _interrupted(tally, seeds, time.perf_counter() - began, as_json)
     seconds = time.perf_counter() - began
     for seed in sorted(tally.failed)[:FAILURES_SHOWN_MAX]:
-        typer.echo(f"seed {seed}: {tally.failed[seed][0]}  reproduce: {again(seed, search)}", err=True)
+        print_visible(f"seed {seed}: {tally.failed[seed][0]}  reproduce: {again(seed, search)}", file=sys.stderr)
         path = write_explanation(seed, explain(seed, search), TRACES, search)
-        typer.echo(f"  shrunk trace: {path}", err=True)
+        print_visible(f"  shrunk trace: {path}", file=sys.stderr)
     return _tell(tally, seeds, seconds, jobs, as_json, search)
 
 
@@ -153,32 +155,32 @@ def _tell(tally: Tally, seeds: range, seconds: float, jobs: int, as_json: bool, 
     missing = [kind for kind in KINDS if kind not in tally.faults] if claimed else []
     covered = systematic.covered(seeds) if search.kind == "systematic" else []
     if missing:
-        typer.echo(f"faults that never took effect: {', '.join(missing)}", err=True)
+        print_visible(f"faults that never took effect: {', '.join(missing)}", file=sys.stderr)
     rate = round(60.0 * tally.seeds / seconds)
     if as_json:
         facts = {"seeds": tally.seeds, "elections": tally.elections, "faults": tally.faults}
         failed = {str(s): what for s, what in tally.failed.items()}
-        typer.echo(
+        print_visible(
             json.dumps(
                 {**facts, "per_minute": rate, "jobs": jobs, "failed": failed, "missing": missing, "covered": covered}
             )
         )
     else:
-        typer.echo(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in KINDS))
+        print_visible(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in KINDS))
         for line in covered:
-            typer.echo(line)
+            print_visible(line)
         rate_text = f"{rate} a minute with {jobs} jobs"
-        typer.echo(f"{tally.seeds} schedules ({rate_text}), {tally.elections} elections, {len(tally.failed)} failed")
+        print_visible(f"{tally.seeds} schedules ({rate_text}), {tally.elections} elections, {len(tally.failed)} failed")
     return 1 if tally.failed or missing else 0
 
 
 def _interrupted(tally: Tally, seeds: range, seconds: float, as_json: bool) -> int:
     """Print what a search that Ctrl-C ended has found; the failed seeds are not shrunk."""
-    typer.echo(f"interrupted: {so_far(tally, len(seeds), seconds)}", err=as_json)
+    print_visible(f"interrupted: {so_far(tally, len(seeds), seconds)}", file=sys.stderr if as_json else None)
     if as_json:
         failed = {str(seed): what for seed, what in tally.failed.items()}
         facts = {"seeds": tally.seeds, "elections": tally.elections, "faults": tally.faults, "failed": failed}
-        typer.echo(json.dumps({**facts, "interrupted": True}))
+        print_visible(json.dumps({**facts, "interrupted": True}))
     return 130
 
 

@@ -21,7 +21,7 @@ from lfa.deploy.ros.bridge.stop_calls import StopCalls
 from lfa.deploy.ros.mapping import FleetMapping, RosMessage
 from lfa.deploy.ros.session import ServiceCall
 from lfa.deploy.ros.topics import ON_DEMAND, SOURCES, WORLD_TIME, sources_heard
-from lfa.deploy.terminal_text import visible
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.orders import OrderNote
@@ -29,6 +29,7 @@ from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.stop import StopState
 from lfa.protocol.messages.team import Event, MissionNote
 from lfa.protocol.names import robot_id_of
+from lfa.protocol.output import visible
 from lfa.protocol.topics import address
 from lfa.protocol.transport.message_bus import send
 
@@ -179,7 +180,7 @@ class Bridge:
 
     def warn(self, words: str) -> None:
         """Print a warning, and publish it on /rosout."""
-        print(visible(f"lfa: {words}"), file=sys.stderr, flush=True)
+        print_visible(visible(f"lfa: {words}"), file=sys.stderr, flush=True)
         stamp_ns = self._clocks.now_ns(clock.now())
         self._output.publish([RosMessage("/rosout", stamp_ns, messages.log(stamp_ns, "warn", BRIDGE_NODE, words))])
 

@@ -20,9 +20,10 @@ from lfa.deploy.ros.bridge.inward import OperatorInput
 from lfa.deploy.ros.bridge.outward import BRIDGE_NODE, RosOutput
 from lfa.deploy.ros.session import GraphFeed, RosSpace
 from lfa.deploy.ros.wire import Distro, check_domain
-from lfa.deploy.terminal_text import visible
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import visible
 from lfa.protocol.runtime.vital_signs import keep_one_heap, settle
 from lfa.protocol.transport.bus import Wake
 from lfa.protocol.transport.zenoh_ros import ros_session
@@ -70,7 +71,9 @@ def command(
             orders = OperatorInput(output.node, bridge)
             foreign = ForeignNodes(graph, distro)
             how = "router at" if serve else "through"
-            print(f"fleet {found.name} is on ROS domain {domain}, {how} {endpoint}", file=sys.stderr, flush=True)
+            print_visible(
+                f"fleet {found.name} is on ROS domain {domain}, {how} {endpoint}", file=sys.stderr, flush=True
+            )
             settle()
             while interrupts.signal is None:
                 wake.wait(bridge.period_s())
@@ -81,7 +84,9 @@ def command(
     finally:
         session.close()
     facts = {**msgspec.to_builtins(space.counters), "fleet_dropped": subscriber.dropped}
-    print(msgspec.json.encode(facts).decode() if as_json else ", ".join(f"{n} {name}" for name, n in facts.items()))
+    print_visible(
+        msgspec.json.encode(facts).decode() if as_json else ", ".join(f"{n} {name}" for name, n in facts.items())
+    )
     return 0
 
 

@@ -15,6 +15,7 @@ from lfa.deploy.ros.bridge.answers import answer
 from lfa.deploy.ros.bridge.bridge import EAGER, Bridge
 from lfa.deploy.ros.bridge.foxglove_output import FoxgloveOutput
 from lfa.deploy.ros.bridge.inward import SERVICES, TRIGGER, ServiceInput
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.bus import Wake
@@ -48,8 +49,8 @@ def command(
         try:
             bridge = Bridge(subscriber, output, sim_time=False, tf_per_robot=tf_per_robot)
             services = ServiceInput(bridge)
-            print(f"fleet {found.name}: open ws://{host}:{output.port} in Foxglove or Lichtblick", flush=True)
-            print(f"layout: {LAYOUT}", flush=True)
+            print_visible(f"fleet {found.name}: open ws://{host}:{output.port} in Foxglove or Lichtblick", flush=True)
+            print_visible(f"layout: {LAYOUT}", flush=True)
             while interrupts.signal is None:
                 wake.wait(bridge.period_s())
                 now = clock.now()
@@ -78,5 +79,5 @@ def _write_layout(path: Path) -> int:
         path.write_bytes(LAYOUT.read_bytes())
     except OSError as error:
         raise Refused(f"--layout {path}: cannot be written ({error.strerror}), give a place to write to") from None
-    print(path, file=sys.stdout)
+    print_visible(path, file=sys.stdout)
     return 0

@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 import msgspec
 import typer
 
+from lfa.deploy.terminal_text import print_visible
+
 FIGURES = "figures"
 
 
@@ -22,7 +24,7 @@ def command(
 
     look_into(folder)
     drawn = [str(path) for path in draw(folder, kind, column=column)]
-    print(msgspec.json.encode({"figures": drawn}).decode() if as_json else "\n".join(drawn))
+    print_visible(msgspec.json.encode({"figures": drawn}).decode() if as_json else "\n".join(drawn))
     return 0
 
 

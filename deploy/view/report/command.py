@@ -9,6 +9,7 @@ from typing import Annotated
 import msgspec
 import typer
 
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.output import write_line
 
@@ -32,7 +33,7 @@ def command(
         path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise Refused(f"--out {path}: cannot be written ({error.strerror})") from None
-    print(msgspec.json.encode({"report": str(path)}).decode() if as_json else path)
+    print_visible(msgspec.json.encode({"report": str(path)}).decode() if as_json else path)
     return 0
 
 

@@ -14,6 +14,7 @@ from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import FleetAddress, find, listen, scenario_of_fleet
 from lfa.deploy.recording.recorder import parts
 from lfa.deploy.recording.simulation_time import WorldTime
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
@@ -69,14 +70,16 @@ def command(
         return _live(find(fleet, connect, keys), serve_web, screenshot, port, web_port)
     rrd = converted(folder)
     if screenshot is None and not serve_web and not has_display():
-        print("no display here: a picture instead (--serve-web shows it in a browser)", file=sys.stderr, flush=True)
+        print_visible(
+            "no display here: a picture instead (--serve-web shows it in a browser)", file=sys.stderr, flush=True
+        )
         screenshot = folder / PICTURE
     if screenshot is not None:
         from lfa.deploy.view.rerun.screenshot import take
 
-        print(take(rrd, screenshot, folder))
+        print_visible(take(rrd, screenshot, folder))
         return 0
-    print(rrd, flush=True)
+    print_visible(rrd, flush=True)
     if serve_web:
         return await_end(serve(web_port, port, str(rrd)))
     return run_viewer(str(rrd))
@@ -97,7 +100,7 @@ def _write_clip(folder: Path | None, html: Path | None, gif: Path | None, mp4: P
     for path, write in ((html, lambda c, p: p.write_text(html_of(c), "utf-8")), (gif, write_gif), (mp4, write_mp4)):
         if path is not None:
             write(clip, path)
-            print(path)
+            print_visible(path)
     return 0
 
 
@@ -170,7 +173,7 @@ def _live(fleet: FleetAddress, serve_web: bool, screenshot: Path | None, port: i
             stream.save(rrd, default_blueprint=plan)
             _draw(fleet, stream, scenario, clock.now() + SHOT_S)
             stream.disconnect()
-            print(take(rrd, screenshot, None))
+            print_visible(take(rrd, screenshot, None))
         return 0
     if serve_web:
         child = serve(web_port, port)
@@ -208,4 +211,6 @@ def _draw(fleet: FleetAddress, stream: rerun.RecordingStream, scenario: Scenario
             scene.flush()
             if subscriber.dropped > lost:
                 lost = subscriber.dropped
-                print(f"{lost} messages lost: this machine is too busy to draw them", file=sys.stderr, flush=True)
+                print_visible(
+                    f"{lost} messages lost: this machine is too busy to draw them", file=sys.stderr, flush=True
+                )

@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from lfa.deploy.process import parent_death
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
@@ -42,8 +43,8 @@ def serve(web_port: int, port: int, *files: str) -> subprocess.Popen[bytes]:
     until = clock.now() + START_S_MAX
     while child.poll() is None and clock.now() < until and not _answers(web_port):
         clock.sleep(0.05)
-    print(f"http://127.0.0.1:{web_port}?url={quote(data_address(port), safe='')}", flush=True)
-    print("open this address in a browser of this machine; Ctrl-C ends it", file=sys.stderr, flush=True)
+    print_visible(f"http://127.0.0.1:{web_port}?url={quote(data_address(port), safe='')}", flush=True)
+    print_visible("open this address in a browser of this machine; Ctrl-C ends it", file=sys.stderr, flush=True)
     return child
 
 

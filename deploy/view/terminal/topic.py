@@ -14,6 +14,7 @@ from msgspec import Struct
 
 from lfa.deploy.client.session import FleetAddress, find, listen
 from lfa.deploy.recording import mcap_channels
+from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import WITNESS_NAME, robot_id_of
@@ -60,9 +61,9 @@ def command(
         return _echo(found, wanted, count, topic or "anything")
     rates = _rates(found, wanted, seconds)
     if as_json:
-        print(msgspec.json.encode(rates).decode())
+        print_visible(msgspec.json.encode(rates).decode())
     else:
-        print("\n".join(_lines(rates, with_rates=action == "hz")))
+        print_visible("\n".join(_lines(rates, with_rates=action == "hz")))
     return 0 if rates else 1
 
 
@@ -85,11 +86,11 @@ def _echo(fleet: FleetAddress, wanted: frozenset[str], count: int, what: str) ->
         while True:
             subscriber.wait(POLL_S)
             if left == count and clock.now() > silent_at:
-                print(f"nothing is heard of {what} yet (lfa topic list)", file=sys.stderr, flush=True)
+                print_visible(f"nothing is heard of {what} yet (lfa topic list)", file=sys.stderr, flush=True)
                 silent_at = inf
             for arrival, message in subscriber.take():
                 channel = msgspec.json.encode(arrival.key.split("/", 2)[2]).decode()
-                print(f'{{"channel":{channel},"message":{mcap_channels.encode(message).decode()}}}', flush=True)
+                print_visible(f'{{"channel":{channel},"message":{mcap_channels.encode(message).decode()}}}', flush=True)
                 left -= 1
                 if left == 0:
                     return 0

@@ -23,9 +23,10 @@ from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.client.team_status import Board, RobotStatus
 from lfa.deploy.operate import fault, formation
-from lfa.deploy.terminal_text import cell, visible
+from lfa.deploy.terminal_text import cell, print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
+from lfa.protocol.output import visible
 from lfa.protocol.transport.message_bus import send
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def command(
         _hear_for(subscriber, board, FIRST_S)
         rows = board.rows(clock.now())
     if as_json:
-        print(msgspec.json.encode({"fleet": found.name, "robots": rows}).decode())
+        print_visible(msgspec.json.encode({"fleet": found.name, "robots": rows}).decode())
     else:
         from rich.console import Console
 
