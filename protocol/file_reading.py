@@ -30,10 +30,12 @@ def read_bytes(path: Path, bytes_max: int = FILE_BYTES_MAX) -> bytes:
     except ValueError as error:  # a null byte in the path
         raise DamagedFile(str(error)) from None
     with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
+        found = os.fstat(handle)
+        if not stat.S_ISREG(found.st_mode):
             raise DamagedFile("no regular file")
-        data = file.read(bytes_max + 1)
-    if len(data) > bytes_max:
+        # Said by its size before a byte of it is read; /proc has files of size 0 with content, and a file may grow.
+        data = b"" if found.st_size > bytes_max else file.read(bytes_max + 1)
+    if max(found.st_size, len(data)) > bytes_max:
         raise DamagedFile(f"longer than {bytes_max} bytes")
     return data
 

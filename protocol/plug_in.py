@@ -17,6 +17,7 @@ from msgspec import Struct
 
 from lfa.protocol.config_file.mistake import Mistake, RefusedValue
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import FILE_BYTES_MAX
 
 _TERMINATED = 143
 """Exit code of a process that SIGTERM ends, also while a plug-in is at work."""
@@ -135,6 +136,8 @@ def _module(path: Path, where: str) -> Any:
 
     if not path.is_file():
         raise Refused(f"{where}: no such file, must be FILE.py:Class")
+    if path.stat().st_size > FILE_BYTES_MAX:  # a compiler would take it all into memory
+        raise Refused(f"{where}: longer than {FILE_BYTES_MAX} bytes, must be a file of Python code")
     # Under a name that no other module has: the types of its classes are looked up there.
     spec = spec_from_file_location(f"own code in {path}", path)
     assert spec is not None and spec.loader is not None

@@ -18,11 +18,15 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from lfa.agents.cli import read_mission
+from lfa.agents.following.controller import CONTROLLERS
 from lfa.deploy.analysis import summary as summaries
+from lfa.deploy.bench import barn
 from lfa.deploy.fleet.engine.engine import KnownProcess
 from lfa.deploy.fleet.host.ledger import LEDGER, Ledger, end_orphans, ledger
 from lfa.deploy.fleet.plan import fleet_file, host_plan
 from lfa.deploy.fleet.security import authority, keys, registry
+from lfa.deploy.lockstep import diff_command
+from lfa.deploy.operate import go
 from lfa.deploy.process.identity import Identity
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.recorder import EVENTS, RECORDING, Recorder
@@ -33,6 +37,7 @@ from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import TrueRobot, Truth
 from lfa.protocol.messages.team import Event
 from lfa.protocol.runtime import journal
+from lfa.protocol.runtime.state_hashes import HASHES
 from lfa.protocol.transport.credentials import credentials
 from lfa.world import checkpoint
 from lfa.world.description import load, maps
@@ -231,6 +236,31 @@ def _registry(folder: Path) -> Path:
     return _keys(folder) / registry.REGISTRY
 
 
+@_format("route of lfa go (text)", go.points_in)
+def _route(folder: Path) -> Path:
+    path = folder / "route.txt"
+    path.write_text("0 1.5  # the door\n-2, 3\n", encoding="utf-8")
+    return path
+
+
+@_format("BARN worlds (JSON)", barn.read)
+def _barn(folder: Path) -> Path:
+    path = folder / "worlds.json"
+    path.write_text(
+        '{"start": [0, 0, 0], "goal": [1, 1], "goal_tolerance_m": 1, "time_limit_s": 9, "obstacle_radius_m": 1, '
+        '"worlds": []}',
+        encoding="utf-8",
+    )
+    return path
+
+
+@_format("state hashes (text)", lambda path: diff_command.compare(path.parent, path.parent))
+def _hashes(folder: Path) -> Path:
+    path = folder / HASHES
+    path.write_text("tick time_s robot1 world\n0 0.0 ab/cd ef/01\n1 0.02 ab/ce ef/02\n", encoding="ascii")
+    return path
+
+
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_damaged_file_is_a_value_or_one_line(name: str, tmp_path: Path) -> None:
     make, read = FORMATS[name]
@@ -263,13 +293,35 @@ def test_what_is_no_file_in_a_files_place_is_a_value_or_one_line(
     path = make(tmp_path)
     path.unlink()
     put(path)
+    said = _outcome_in_time(read, path)
+    assert "\n" not in said, said
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_file_of_5_gb_is_a_value_or_one_line(name: str, tmp_path: Path) -> None:
+    make, read = FORMATS[name]
+    path = make(tmp_path)
+    os.truncate(path, 5 << 30)
+    said = _outcome_in_time(read, path)
+    assert "\n" not in said, said
+
+
+def test_own_code_of_5_gb_is_refused(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.touch()
+    os.truncate(own, 5 << 30)
+    with pytest.raises(Refused, match="longer than"):
+        CONTROLLERS.add_file(f"{own}:Controller")
+
+
+def _outcome_in_time(read: Callable[[Path], object], path: Path) -> str:
+    """Return `_outcome`; raise KeyboardInterrupt where a file holds its reader up."""
     signal.signal(signal.SIGALRM, signal.default_int_handler)
     signal.alarm(BLOCKED_S)
     try:
-        said = _outcome(read, path)
+        return _outcome(read, path)
     finally:
         signal.alarm(0)
-    assert "\n" not in said, said
 
 
 def _outcome(read: Callable[[Path], object], path: Path) -> str:

@@ -17,7 +17,6 @@ from pathlib import Path
 from time import strftime
 from typing import NamedTuple
 
-import msgspec
 from msgspec import Struct, to_builtins
 
 from lfa.deploy.bench.driving.one_run import complaint, driven, loaded, note, show_failures
@@ -29,6 +28,7 @@ from lfa.deploy.recording import mcap_reader
 from lfa.deploy.recording.mcap_reader import Array
 from lfa.deploy.recording.run_folder import RUNS
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_json
 
 FOUND_IN = Path("shared") / "data" / "barn" / "worlds.json"
 LEFT_M, RIGHT_M, BOTTOM_M, TOP_M = -4.35, -0.15, 0.15, 9.6
@@ -242,10 +242,10 @@ def inside(world: BarnWorld) -> list[tuple[float, float]]:
 def read(path: Path) -> BarnWorlds:
     """Read a file of worlds. Raises `Refused` with one line if that is impossible."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=BarnWorlds)
+        return read_json(path, BarnWorlds)
     except OSError as error:
         raise Refused(f"{path}: {error.strerror}: must be a file of BARN worlds (--worlds FILE)") from error
-    except msgspec.DecodeError as error:
+    except DamagedFile as error:
         raise Refused(f"{path}: {error}: must be BARN worlds in JSON") from error
 
 

@@ -14,9 +14,13 @@ from msgspec import Struct
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import read_text
 from lfa.protocol.runtime import journal
 from lfa.protocol.runtime.journal import JournalEntry
 from lfa.protocol.runtime.state_hashes import ENDED, HASHES
+
+HASHES_BYTES_MAX = 512 * 1024 * 1024
+"""Length [bytes] above which a file of state hashes is refused: that of a day with a hundred processes is below it."""
 
 RunFolder = Annotated[Path, typer.Argument(help="Folder of a run by lfa sim or lfa run --lockstep.")]
 
@@ -82,7 +86,7 @@ def _caused(one: str, two: str) -> bool:
 def _read(folder: Path) -> _Hashes:
     path = folder / HASHES
     try:
-        lines = path.read_text(encoding="ascii").splitlines()
+        lines = read_text(path, HASHES_BYTES_MAX).splitlines()
         rows = [line.split() for line in lines]
         names = tuple(rows[0][2:])
         whole = [row for row in rows[1:] if len(row) == len(names) + 2]

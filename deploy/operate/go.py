@@ -12,6 +12,7 @@ from lfa.deploy.client.order_fleet import walls_of
 from lfa.deploy.operate import pause
 from lfa.deploy.operate.options import AsJson, Connect, FleetName, Keys
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_text
 
 ROUTE_POINTS_MAX = 1000
 
@@ -40,7 +41,7 @@ def _points(x: float | None, y: float | None, theta: float | None, route: Path |
     if route is not None:
         if x is not None:
             raise Refused("go: must be a goal or --route, not both")
-        return _read(route)
+        return points_in(route)
     if x is None:
         return None
     if y is None:
@@ -48,12 +49,12 @@ def _points(x: float | None, y: float | None, theta: float | None, route: Path |
     return to_goal(x, y, theta)
 
 
-def _read(path: Path) -> Points:
+def points_in(path: Path) -> Points:
     """Return the way-points in a file. Raises Refused that names the line."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise Refused(f"--route {path}: cannot be read ({getattr(error, 'strerror', None) or 'no text'})") from None
+        lines = read_text(path).splitlines()
+    except (OSError, DamagedFile) as error:
+        raise Refused(f"--route {path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     points: Points = ()
     for number, line in enumerate(lines, start=1):
         words = line.partition("#")[0].replace(",", " ").split()

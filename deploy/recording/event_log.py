@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Struct
 
 from lfa.deploy.recording.recorder import EVENTS
+from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, decode_json
 
 DIED = "died"
@@ -19,6 +20,8 @@ DIED = "died"
 ENDING_FAULTS = ("kill", "terminate", "stop", "cut", DIED)
 LINE_BYTES_MAX = 1024 * 1024
 """Longest line [bytes]: what a message of 64 KiB becomes at most; a longer one is damage."""
+EVENTS_BYTES_MAX = 256 * 1024 * 1024
+"""Length [bytes] above which an event log is refused: all of it is held in memory."""
 Line = dict[str, Any]
 
 
@@ -70,11 +73,14 @@ class TermViolation(Struct):
 def lines(folder: Path) -> list[Line]:
     """Return the events of a run ordered by time; a last line truncated by a kill, and damaged lines, are skipped.
 
-    An event is skipped too if it lacks what its kind has in every run: a member can publish any event.
+    An event is skipped too if it lacks what its kind has in every run: a member can publish any event. Raises Refused
+    for a file that is far too long.
     """
     path = folder / EVENTS
     if not path.is_file():
         return []
+    if path.stat().st_size > EVENTS_BYTES_MAX:
+        raise Refused(f"{path}: longer than {EVENTS_BYTES_MAX} bytes, must be the events of one run")
     with path.open("rb") as file:
         return in_order(iter(lambda: file.readline(LINE_BYTES_MAX), b""))
 

@@ -16,6 +16,7 @@ from lfa.deploy.campaign.items import Item, ItemResult, name_of
 from lfa.deploy.campaign.shard import Shard
 from lfa.deploy.campaign.work import campaign_of, do_share
 from lfa.protocol.errors import Refused
+from lfa.protocol.file_reading import DamagedFile, read_bytes
 
 KIND = "verify"
 
@@ -38,8 +39,8 @@ def check_share(folders: Sequence[Path], check: Check, out: Path, shard: Shard, 
 def _summary_hash(folder: Path) -> str:
     """Return the hash of a run's summary, which names the run wherever its folder lies."""
     try:
-        return hashlib.sha256((folder / SUMMARY).read_bytes()).hexdigest()
-    except OSError:
+        return hashlib.sha256(read_bytes(folder / SUMMARY)).hexdigest()
+    except (OSError, DamagedFile):
         raise Refused(f"{folder}: no {SUMMARY}, must be the folder of a run that came to its end") from None
 
 
