@@ -99,9 +99,30 @@ def _order(action: str, target: str, team: Sequence[Running], bus: ZenohBus, inb
     finally:
         bus.close()
     facts = {"deed": action, "target": whom, "fleet": fleet}
-    line = f"{action} {whom} in {fleet}: {FAULT_ACTIONS[action]}"
+    line = f"{f'{action} {whom}'.strip()} in fleet {fleet}: {effect(action, whom)}"
     print_visible(msgspec.json.encode(facts).decode() if as_json else line)
     return 0
+
+
+def effect(action: str, target: str) -> str:
+    """Return in words what an order, found valid, does to its target, and what ends it."""
+    match action:
+        case "cut" if ">" in target:
+            return "no radio from {} to {}, until lfa fault heal".format(*target.split(">"))
+        case "cut":
+            one, other = [*target.split("-"), "all others"][:2]
+            return f"no radio between {one} and {other}, until lfa fault heal"
+        case "heal":
+            return f"the cut {target} is ended" if target else "all cuts and all loss are ended"
+        case "loss" if target:
+            return f"every receiver loses {100.0 * float(target):g} % of its messages, until lfa fault heal"
+        case "loss":
+            return "every receiver loses as many messages as at the start"
+        case "range":
+            reach_m = float(target)
+            return f"messages reach robots {f'up to {reach_m:g} m away' if reach_m else 'at any distance'}"
+        case _:
+            return FAULT_ACTIONS[action]
 
 
 def _restart(target: str, fleet: str, bus: ZenohBus, inbox: Inbox, as_json: bool) -> int:

@@ -42,7 +42,9 @@ class Checked(Struct, frozen=True):
     happenings: int
     broken: tuple[Violation, ...]
     shapes: tuple[Finding, ...]
-    """Findings of the paper checks; empty when the scenario is not one of the paper's."""
+    """Findings of the paper checks; empty when the scenario is not one of the paper's, or only a part was recorded."""
+    part: bool = False
+    """True for the recording of a fleet that neither ended nor was seen to its end."""
 
 
 class VerifyReport(Struct, frozen=True):
@@ -79,7 +81,7 @@ def command(
             load_code_of_run(folder, own_code)
             one, of_it = check(folder)
             checked.append(one)
-            kept += [of_it] if of_it.scenario in PATHS else []
+            kept += [of_it] if one.shapes and of_it.scenario in PATHS else []
             if not as_json:
                 _print(one)
     except KeyboardInterrupt:
@@ -96,7 +98,7 @@ def _kept(folders: list[Path], own_code: list[OwnFile], out: Path, shard: Shard,
         load_code_of_run(folder, own_code)
     done = check_share(folders, partial(_checked, own_code), out, shard, jobs)
     checked = [msgspec.convert(one, Checked) for one in done]
-    kept = [keep for one in done if (keep := msgspec.convert(one["kept"], Kept)).scenario in PATHS]
+    kept = [keep for one in done if one["shapes"] and (keep := msgspec.convert(one["kept"], Kept)).scenario in PATHS]
     if not as_json:
         for one in checked:
             _print(one)
@@ -133,8 +135,10 @@ def check(folder: Path) -> tuple[Checked, Kept]:
         raise Refused(f"{folder}: no {SUMMARY}, must be the folder of a run that came to its end")
     run = Run(folder)
     summary = run.summary
+    part = summary.outcome == "recorded"
+    shapes = () if part else tuple(of_run(run))
     known = Checked(
-        str(folder), summary.scenario, summary.seed, lease.journals, lease.happenings, lease.broken, tuple(of_run(run))
+        str(folder), summary.scenario, summary.seed, lease.journals, lease.happenings, lease.broken, shapes, part
     )
     return known, across_seeds.keep(run)
 
@@ -164,11 +168,16 @@ def _print(one: Checked) -> None:
             f"{one.happenings} events, I2: {len(one.broken)} violations; "
             "the other invariants need the journals of all processes, which their option --journal DIR keeps"
         )
+    else:
+        print_visible(
+            f"{one.folder}: {one.scenario}, seed {one.seed}\n"
+            f"{one.journals} journals, {one.happenings} happenings, {names}: {len(one.broken)} violations"
+        )
+    if one.part and one.scenario in PAPER:
+        print_visible(
+            "recorded in part: the shapes of the paper's figures are those of a whole run, and are not checked"
+        )
         return
-    print_visible(
-        f"{one.folder}: {one.scenario}, seed {one.seed}\n"
-        f"{one.journals} journals, {one.happenings} happenings, {names}: {len(one.broken)} violations"
-    )
     if not one.shapes:
         print_visible(f"no scenario of the paper ({', '.join(PAPER)}): the shapes of its figures do not apply")
         return

@@ -9,6 +9,7 @@ import numpy as np
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.recording.mcap_reader import messages
+from lfa.deploy.recording.recorder import Recording
 from lfa.deploy.view.report.html import NONE, in_ms, table
 
 
@@ -40,11 +41,18 @@ def processes(run: Run, s: Summary) -> str:
         "longest gap",
     )
     kept = s.recording
-    lost = "" if kept is None else (
-        f"<p class='soft'>Recorded: {kept.messages} messages in {kept.bytes / 1e6:.1f} MB; {kept.missing} missing, "
-        f"{kept.dropped} dropped, {kept.undecodable} undecodable.</p>"
-    )  # fmt: skip
-    return table(heads, rows, text=(0,)) + lost
+    return table(heads, rows, text=(0,)) + ("" if kept is None else f"<p class='soft'>{_recorded(kept)}</p>")
+
+
+def _recorded(kept: Recording) -> str:
+    """Return what was recorded and what was lost, with the numbers of `Recording.losses`."""
+    lost = sum(hole.missing for hole in kept.holes)
+    short = kept.missing - lost
+    replaced = f" (besides {short} single values that newer ones replaced)" if short else ""
+    return (
+        f"Recorded: {kept.messages} messages in {kept.bytes / 1e6:.1f} MB; {lost} never arrived{replaced}, "
+        f"{kept.dropped} dropped, {kept.undecodable} undecodable."
+    )
 
 
 def radio(run: Run, _s: Summary) -> str:
@@ -56,7 +64,7 @@ def radio(run: Run, _s: Summary) -> str:
         ("loss", f"{100.0 * radio.loss:g} %"),
         ("mean losses in a row", f"{radio.loss_burst:g}"),
         ("duplication", f"{100.0 * radio.duplication:g} %"),
-        ("held back", f"{100.0 * radio.tail:g} % (mean {in_ms(1000.0 * radio.tail_mean_s)} ms)"),
+        ("held back", f"{100.0 * radio.tail:g} % (mean {in_ms(1000.0 * radio.tail_mean_s)})"),
         ("overtaken", f"{100.0 * radio.reorder:g} %"),
     ]
     heard: dict[str, list[float]] = {}

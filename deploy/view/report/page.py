@@ -160,12 +160,17 @@ def _leaders(run: Run, s: Summary) -> str:
 def _faults(run: Run, s: Summary) -> str:
     if not s.faults:
         return "<p>None.</p>"
-    rows = [(in_s(f.at_s), f.kind, f.target, *_recovery(run, f)) for f in s.faults]
-    return table(("at", "what", "robot", "chain without it after", "back in the chain after"), rows, text=(1,))
+    rows = [(in_s(f.at_s), f.kind, f.target, *recovery(run, f)) for f in s.faults]
+    return table(("at", "what", "target", "chain without it after", "back in the chain after"), rows, text=(1,))
 
 
-def _recovery(run: Run, fault: event_log.FaultDone) -> tuple[str, str]:
-    """Return the times from the fault to the first chain without the victim, and to the next chain with it."""
+def recovery(run: Run, fault: event_log.FaultDone) -> tuple[str, str]:
+    """Return the times from the fault to the first chain without the victim, and to the next chain with it.
+
+    A fault of links between several, or of the radio, has no victim.
+    """
+    if fault.target not in run.robots or fault.kind in ("heal", "loss", "range"):
+        return NONE, NONE
     without: float | None = None
     for line in event_log.of_kind([e for e in run.events if e["t"] >= fault.at_s], "chain"):
         member = fault.target in line.get("chain", [])

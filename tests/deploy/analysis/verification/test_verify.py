@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from lfa.deploy.analysis.verification import journals
+from lfa.deploy.analysis.verification import command, journals
 from lfa.deploy.faults.script import parse_all
 from lfa.deploy.run.simulate import run
 from lfa.protocol.errors import Refused
@@ -75,6 +75,17 @@ def _come_again(world: Path) -> None:
     body = msgspec.msgpack.encode(replace(first, at=known[-1].at + 0.01))
     with world.open("ab") as file:
         file.write(len(body).to_bytes(4, "little") + body)
+
+
+def test_a_part_of_a_run_of_the_paper_is_not_measured_by_its_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ran = run(load("paper_path1", ["time_limit_s=2.0"]), 1, tmp_path / "part", ()).folder
+    shutil.rmtree(ran / "journal")  # as `lfa record` leaves it
+    kept = ran / "summary.json"
+    kept.write_text(kept.read_text().replace('"time_limit"', '"recorded"', 1))
+    assert command.command([ran]) == 0
+    assert "the paper's figures are those of a whole run, and are not checked" in capsys.readouterr().out
 
 
 def test_a_folder_without_journals_is_refused(tmp_path: Path) -> None:

@@ -14,11 +14,12 @@ import pytest
 
 from lfa.deploy.analysis.run_data import Run
 from lfa.deploy.faults.script import parse_all
+from lfa.deploy.recording.event_log import FaultDone
 from lfa.deploy.run.simulate import run
 from lfa.deploy.view.figures.catalogue import FIGURES, drawn
 from lfa.deploy.view.figures.style import label
 from lfa.deploy.view.report import command, page
-from lfa.deploy.view.report.html import in_mm
+from lfa.deploy.view.report.html import NONE, in_mm
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import load
 
@@ -105,6 +106,15 @@ def test_two_runs_stand_side_by_side_and_are_subtracted(folder: Path, tmp_path: 
     html = command.html([folder, _ran(tmp_path / "two", 2)])
     assert "second − first" in html
     assert len(_images(html)) == 2 * len(FIGURES)
+
+
+def test_only_a_fault_with_a_victim_has_a_time_of_recovery(folder: Path) -> None:
+    killed = Run(folder)
+    victim = killed.summary.faults[0].target
+    without, _ = page.recovery(killed, FaultDone(3.0, "kill", victim))
+    assert without.endswith(" ms")
+    for kind, target in (("cut", "1-2"), ("loss", "0.1"), ("loss", 1), ("heal", "")):
+        assert page.recovery(killed, FaultDone(3.0, kind, target)) == (NONE, NONE)
 
 
 def test_a_large_team_stays_small_on_the_page(tmp_path: Path) -> None:
