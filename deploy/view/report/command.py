@@ -11,7 +11,7 @@ import typer
 
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
-from lfa.protocol.output import write_line
+from lfa.protocol.output import replace_file, write_line
 
 REPORT = "report.html"
 
@@ -29,12 +29,22 @@ def command(
         raise Refused(f"--out {path}: must be in a folder that exists")
     write_line("reading the recording and drawing the figures ...", sys.stderr)
     page = html(folders)
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise Refused(f"--out {path}: cannot be written ({error.strerror})") from None
+    reason = _written(path, page.encode())
+    if reason:
+        raise Refused(f"--out {path}: cannot be written ({reason})")
     print_visible(msgspec.json.encode({"report": str(path)}).decode() if as_json else path)
     return 0
+
+
+def _written(path: Path, page: bytes) -> str:
+    """Write the page, in one step where a file is or will be; return the reason of a failure, else ""."""
+    if path.is_file() or not path.exists():
+        return replace_file(path, page)
+    try:
+        path.write_bytes(page)  # a device or a pipe
+    except OSError as error:  # a folder, too
+        return error.strerror or str(error)
+    return ""
 
 
 def html(folders: list[Path]) -> str:

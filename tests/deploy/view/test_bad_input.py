@@ -141,3 +141,13 @@ def test_without_a_display_a_picture_is_made_beside_the_recording(
     assert str(copied / "view.png") in said.out
     assert "\nno display here" in said.err
     assert (copied / "view.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_report_that_the_disk_takes_in_part_leaves_no_half_page(copied: Path, tmp_path: Path) -> None:
+    out = tmp_path / "page.html"
+    words = ["report", str(copied), "--out", str(out)]
+    small = f"import resource, sys; sys.argv = ['lfa', *{words!r}]; from lfa.deploy.view.report import page; "
+    limit = "resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384)); "
+    done = subprocess.run([sys.executable, "-c", small + limit + LFA], capture_output=True, text=True, check=False)
+    assert (done.returncode, out.exists()) == (2, False), done.stderr
+    assert done.stderr.splitlines()[-1] == f"lfa: --out {out}: cannot be written (File too large)"
