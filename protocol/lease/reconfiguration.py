@@ -41,7 +41,8 @@ class Calm:
 
     def __init__(self) -> None:
         self._of: tuple[Config, Holder] | None = None
-        self._members: frozenset[Member] = frozenset()
+        self._taken_in: frozenset[Member] = frozenset()
+        """Whose HELLO changes nothing: a robot of the chain, a witness that votes; not a voter outside of the chain."""
         self._oldest = 0.0
         """Time [s] at which the member heard longest ago was heard, or before; none but the leader is left out."""
         self._changes = (0, 0)
@@ -50,12 +51,13 @@ class Calm:
         self, config: Config, holder: Holder, me: Member, peers: FailureDetector, left_out: frozenset[int]
     ) -> None:
         """Note that `reshaped` keeps `config`, if only silence, a token, an incarnation or a newcomer changes that."""
-        self._of, members = None, frozenset((*config.chain, *config.voters))
+        self._of = None
         if config.previous is not None or left_out or config.roster.retired or not holder.committed(config):
             return
-        others = members - {me}
-        if members.issuperset(holder.said_hello) and not any(map(peers.has_ended, others)):
-            self._of, self._members = (config, holder), members
+        others = {*config.chain, *config.voters} - {me}
+        taken_in = frozenset((*config.chain, *(m for m in config.voters if m.id == WITNESS_ID)))
+        if taken_in.issuperset(holder.said_hello) and not any(map(peers.has_ended, others)):
+            self._of, self._taken_in = (config, holder), taken_in
             self._oldest = min((holder.heard_at.get(m, holder.began_at) for m in others), default=inf)
             self._changes = peers.vanishings, peers.renewals
 
@@ -68,7 +70,7 @@ class Calm:
             return False
         heard = now - self._oldest <= min(timing.chain_silence_s, timing.remove_silence_s)
         same = self._changes == (peers.vanishings, peers.renewals)
-        return heard and same and self._members.issuperset(holder.said_hello)
+        return heard and same and self._taken_in.issuperset(holder.said_hello)
 
 
 def reshaped(

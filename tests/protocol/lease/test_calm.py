@@ -6,7 +6,9 @@ from random import Random
 
 import pytest
 
+from lfa.deploy.fuzz.fault_injector import play
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
+from lfa.deploy.fuzz.schedules import draw
 from lfa.protocol.lease.machine import leadership
 from lfa.protocol.lease.machine.deadlines import WAKES
 from lfa.protocol.lease.machine.lease import SOONEST, Lease
@@ -54,6 +56,12 @@ def test_a_leader_that_does_not_look_at_its_chain_would_have_kept_it(
     monkeypatch.setattr(leadership, "change_roster", checked)
     disturbed(seed).run(12.0)
     assert looked[False] > looked[True] > 0
+
+
+@pytest.mark.parametrize("seed", [25, 104, 120])
+def test_a_voter_outside_of_the_chain_is_taken_in_at_its_hello(seed: int) -> None:
+    """A robot over which the chain was closed may still vote when it says HELLO; the chain was kept without it."""
+    assert play(draw(seed)).violations == [], f"reproduce: lfa fuzz --seed {seed} -v"
 
 
 @pytest.mark.parametrize("seed", range(3))
