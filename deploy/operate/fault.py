@@ -87,7 +87,8 @@ def _order(action: str, target: str, team: Sequence[Running], bus: ZenohBus, inb
             without = ", ".join(str(agent.robot) for agent in team if "--faults" not in agent.identity.arguments)
             raise Refused(
                 f"{action}: the links of a fleet are changed only where its processes allow it: start lfa-world "
-                f"and each lfa-agent with --faults (robots without: {without})"
+                "and each lfa-agent by hand with --faults, or use lfa run; lfa up starts none so "
+                f"(robots without: {without})"
             )
         whom = str(_victim(target, team, bus, inbox).robot) if target == LEADER else target
         operator = Operator(fleet, incarnations.drawn())

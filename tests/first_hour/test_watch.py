@@ -48,3 +48,4 @@ def test_a_kill_is_asked_for(monkeypatch: pytest.MonkeyPatch, answer: str, kille
     assert (done, hand.said) == ([], "kill the process of robot 1? y: yes, any other key: no")
     hand.press(answer)
     assert done == killed
+    assert (hand.said == "robot 1 is not killed") is (answer in "nq")

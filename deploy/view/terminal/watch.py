@@ -146,10 +146,12 @@ class KeyHandler:
         return pressed
 
     def press(self, key: str) -> None:
-        confirmed, self._asked = self._asked and key == "y", False
-        if confirmed:
+        asked, self._asked = self._asked, False
+        if asked and key == "y":
             self._do("kill")
             return
+        if asked:
+            self.said = f"robot {self.chosen} is not killed"
         if key == "?":
             self.help = not self.help
             return
