@@ -9,8 +9,9 @@ way that they leave free.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import atan2, cos, hypot, inf, pi, sin
+from math import atan2, cos, hypot, inf, pi, sin, sqrt
 
+from lfa.agents.avoidance.safety import BRAKING_SHARE, turn_on_spot
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import Twist, wrap
 from lfa.protocol.mission import Limits
@@ -29,8 +30,6 @@ HEADING_M = 0.25
 SHORT, CLOSE, CHANGE_M = 0.9, 0.35, 0.05
 """Cost of each metre that an arc is short of `LOOK_M`, of each metre without `ROOM_M`, and of another curvature than
 the last one's."""
-CLOSE_MPS = 0.45
-"""Speed [m/s] beside what is nearer than `ROOM_M`."""
 ALIGNED_RAD = 0.15
 BACK_MPS = 0.15
 BACK_FREE_M = 0.06
@@ -50,7 +49,7 @@ class ArcPlanner:
         self, points: Sequence[Point], route: Callable[[float], Point], wanted: Twist, turn_radps: float
     ) -> Twist:
         """Return `wanted` or the twist of a better arc. `points` are in `base_link`, and so is `route(s)`, the point
-        `s` [m] ahead on the route; `turn_radps` is the rate of a turn on the spot.
+        `s` [m] ahead on the route; `turn_radps` is the largest rate of a turn on the spot.
         """
         self.blocked = False
         if wanted.linear_x <= 0.0:
@@ -64,16 +63,18 @@ class ArcPlanner:
         best = self._best(near, route, wanted, look_m)
         if best is None:
             return self._turn(near, route, turn_radps)
-        self._curvature, close = best
-        v = min(wanted.linear_x, CLOSE_MPS) if close else wanted.linear_x
+        self._curvature, roomy_m = best
+        v = min(wanted.linear_x, self._close_mps(roomy_m))
         omega_max = self._limits.omega_max_radps
         v = min(v, omega_max / max(abs(self._curvature), 1e-9))
         return Twist(v, v * self._curvature)
 
     def _best(
         self, points: Sequence[Point], route: Callable[[float], Point], wanted: Twist, look_m: float
-    ) -> tuple[float, bool] | None:
-        """Return the curvature [1/m] of the best arc, and whether something is close beside it; None without an arc."""
+    ) -> tuple[float, float] | None:
+        """Return the curvature [1/m] of the best arc, and its length [m] before something is nearer beside it than
+        `ROOM_M`, which is inf where nothing is; None without an arc.
+        """
         least, best = inf, None
         own = wanted.angular_z / wanted.linear_x
         for curvature in (own, *CURVATURES_PER_M, *(-c for c in CURVATURES_PER_M[1:])):
@@ -86,8 +87,14 @@ class ArcPlanner:
             if self._curvature is not None and curvature != self._curvature:
                 cost += CHANGE_M
             if cost < least:
-                least, best = cost, (curvature, roomy_m < free_m)
+                least, best = cost, (curvature, roomy_m if roomy_m < free_m else inf)
         return best
+
+    def _close_mps(self, roomy_m: float) -> float:
+        """Return the speed [m/s] from which the drive slows down, over `roomy_m` [m], to one from which it stops within
+        `ROOM_M`.
+        """
+        return sqrt(2.0 * BRAKING_SHARE * self._limits.a_max_mps2 * (roomy_m + ROOM_M))
 
     def _turn(self, points: Sequence[Point], route: Callable[[float], Point], turn_radps: float) -> Twist:
         """Return a turn on the spot towards the route, which a round body can always make; back off when it faces
@@ -96,7 +103,7 @@ class ArcPlanner:
         x, y = route(self._radius_m + ROOM_M)
         bearing = atan2(y, x)
         if abs(bearing) > ALIGNED_RAD:
-            return Twist(0.0, turn_radps if bearing > 0.0 else -turn_radps)
+            return turn_on_spot(bearing, turn_radps, self._limits)
         self.blocked = True
         free_m = free_along(points, Twist(-1.0, 0.0), self._radius_m + SKIN_M)
         return Twist(-BACK_MPS if free_m > BACK_FREE_M else 0.0, 0.0)

@@ -5,7 +5,7 @@ before the obstacles of the scan.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, hypot, isfinite, pi
+from math import atan2, copysign, hypot, isfinite, pi, sqrt
 
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Twist
@@ -83,6 +83,12 @@ def within(twist: Twist, limits: Limits) -> tuple[float, float]:
     v_max = limits.v_max_mps if v >= 0.0 else limits.v_reverse_max_mps
     scale = max(abs(v) / max(v_max, 1e-9), abs(omega) / limits.omega_max_radps, 1.0)
     return v / scale, omega / scale
+
+
+def turn_on_spot(bearing: float, radps_max: float, limits: Limits) -> Twist:
+    """Return the turn towards `bearing` [rad] at `radps_max` [rad/s] at most, from which the drive can stop there."""
+    rate = min(radps_max, limits.omega_max_radps, sqrt(2.0 * limits.alpha_max_radps2 * abs(bearing)))
+    return Twist(0.0, copysign(rate, bearing))
 
 
 def _near(value: float, last: float, step: float) -> float:

@@ -16,8 +16,10 @@ from lfa.protocol.mission import Mission
 MARGIN_M = 15.0
 """Margin [m] around start and goal: ground farther out is not mapped, and no route leads through it."""
 MAP_CELLS = 400
-PLAN_CELLS = 160
-"""Budgets [cells] of one control step."""
+PLAN_CELLS, STANDING_PLAN_CELLS = 160, 480
+"""Budgets [cells] of one control step; planning has more while the robot stands for want of a route, and so computes no
+motion.
+"""
 TURNING_RADPS = 1.0
 """Turn rate [rad/s] above which a scan is not mapped: its beams do not share one pose."""
 GIVE_UP_SEARCHES = 3
@@ -84,7 +86,7 @@ class Explore:
         if not leading:
             return False
         searches = self.planner.searches
-        found = self.planner.work(PLAN_CELLS, (pose.x, pose.y), mates, now)
+        found = self.planner.work(PLAN_CELLS if self.route else STANDING_PLAN_CELLS, (pose.x, pose.y), mates, now)
         if self.planner.searches != searches:
             self._failures = self._failures + 1 if self.planner.unreachable is not None else 0
         return found

@@ -150,10 +150,10 @@ def speed_factors(slots: Iterable[Slot], curvature: float) -> list[float]:
 def leader_speed_cap(slots: Sequence[Slot], curvature: float, limits: Limits, margin: float = SPEED_MARGIN) -> float:
     """Return the maximum leader speed [m/s] in a bend at which f v stays within `margin` of the limits for all robots.
 
-    Followers on a trace have f = 1: pass no slots then.
+    Followers on a trace have f = 1: pass no slots then. A leader without slots needs no margin of speed, for nobody has
+    to catch up with a slot of its own.
     """
-    fastest = max([1.0, *speed_factors(slots, curvature)])
-    cap = margin * limits.v_max_mps / fastest
+    cap = margin * limits.v_max_mps / max([1.0, *speed_factors(slots, curvature)]) if slots else limits.v_max_mps
     if curvature != 0.0:
         cap = min(cap, margin * limits.omega_max_radps / abs(curvature))
     return cap

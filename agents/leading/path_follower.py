@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, hypot, pi
+from math import atan2, hypot, inf, pi
 
+from lfa.agents.avoidance.safety import turn_on_spot
 from lfa.agents.config import CONTROL_PERIOD_S
 from lfa.agents.formation.formation import COLUMN_BELOW_MPS, PLANNED_MARGIN, leader_speed_cap
 from lfa.agents.leading.route_tracker import RouteTracker
@@ -17,9 +18,8 @@ PLANNED_LOOK_AHEAD_M = 0.35
 DETOUR_AHEAD_M = 2.0
 BRAKING_SHARE = 0.6
 IN_PLACE_RAD = 1.0
-ALONE_RADPS, TEAM_RADPS = 2.0, 0.2
-"""Turn rates [rad/s] on the spot at most: alone or with slots that stay meanwhile, and with slots that swing around the
-robot."""
+TEAM_RADPS = 0.2
+"""Turn rate [rad/s] on the spot with slots that swing around the robot; else the drive's, from which it can stop."""
 SLOWEST_SHARE = 0.25
 """Minimum fraction of the cruise speed on a planned route's bends, so that the path is tracked and not cut."""
 CORNER_MPS = 0.1
@@ -112,8 +112,7 @@ class PathFollower(RouteTracker):
 
     def _turn(self, bearing: float, slots: Sequence[Slot]) -> Twist:
         swing = slots and self.slots_swing
-        rate = TEAM_RADPS if swing else min(ALONE_RADPS, self._limits.omega_max_radps)
-        return Twist(0.0, rate if bearing > 0.0 else -rate)
+        return turn_on_spot(bearing, TEAM_RADPS if swing else inf, self._limits)
 
     def _cruise(self, slots: Sequence[Slot]) -> float:
         """Return the maximum speed [m/s] from which the robot can brake to the outermost robot's speed limit of each

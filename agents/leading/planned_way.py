@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from math import inf
 
 from msgspec.structs import replace
 
@@ -11,15 +12,17 @@ from lfa.agents.avoidance.arc_planner import ArcPlanner
 from lfa.agents.exploration.explorer import Explore
 from lfa.agents.exploration.occupancy_grid import Mapping
 from lfa.agents.following.factory import heading_filter_of
-from lfa.agents.leading.path_follower import ALONE_RADPS, PathFollower
+from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.perception.scan import Point
-from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.geometry import STILL, Pose2D, Twist, distance
 from lfa.protocol.mission import Mission
 
 TEAM_RADPS = 0.5
 """Turn rate [rad/s] before what blocks the way, with slots that swing around the robot."""
-BLOCKED_S = 1.0
-"""Time [s] before a gap that no arc leads through, after which its place is barred and another way is searched."""
+BLOCKED_S = 1.5
+"""Time [s] before a gap that no arc leads through, after which its place is barred and another way is searched. It runs
+on until the robot is its own radius away: an arc that the next scan shows closed again leads nowhere.
+"""
 
 
 class PlannedWay:
@@ -34,9 +37,10 @@ class PlannedWay:
         self.lead = PathFollower(
             leading, mission.limits, mission.radius_m, mission.control_period_s, slots_swing=swings
         )
-        self._radius_m, self._omega_max_radps = mission.radius_m, mission.limits.omega_max_radps
+        self._radius_m = mission.radius_m
         self._arcs = ArcPlanner(mission.radius_m, mission.limits)
-        self._blocked_since: float | None = None
+        self._blocked: tuple[float, Pose2D] | None = None
+        """Time [s] and place at which no arc led on first; None since the robot has left it."""
 
     def work(self, leads: bool, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> None:
         """Do one step's share of mapping and, if leading, of planning."""
@@ -62,13 +66,14 @@ class PlannedWay:
         if not self.explore.route:
             return STILL
         swing = self.lead.slots_swing and not alone
-        turn_radps = TEAM_RADPS if swing else min(ALONE_RADPS, self._omega_max_radps)
+        turn_radps = TEAM_RADPS if swing else inf
         twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps)
-        if not self._arcs.blocked:
-            self._blocked_since = None
-        elif self._blocked_since is None:
-            self._blocked_since = now
-        elif now - self._blocked_since >= BLOCKED_S:
-            self._blocked_since = None
-            self.explore.bar(self.lead.point(self._radius_m), now)
+        if self._blocked is not None and distance(self._blocked[1], pose) > self._radius_m:
+            self._blocked = None
+        if self._arcs.blocked:
+            if self._blocked is None:
+                self._blocked = now, pose
+            elif now - self._blocked[0] >= BLOCKED_S:
+                self._blocked = None
+                self.explore.bar(self.lead.point(self._radius_m), now)
         return twist

@@ -48,6 +48,11 @@ HIDDEN_RAD = 0.09
 """Angle [rad] within which a nearer obstacle may hide an end; neighbouring beams of a scan of 180 are less than half of
 this apart."""
 TRACKS_MAX = 64
+BEHIND_M, BESIDE_RAD = 0.1, 0.02
+"""Distance [m] behind a place, and angle [rad] beside it (half the beams' of a scan of 180), in which a scan must show
+nothing nearer for the place to count as seen free."""
+PROOFS_MIN = 2
+"""Number of ends, of the two now and the two before, that must be in places seen free: one may be a grazing beam."""
 
 
 class Feature(Struct, frozen=True, gc=False):
@@ -67,6 +72,25 @@ class Feature(Struct, frozen=True, gc=False):
         return self.x + self.vx * later_s, self.y + self.vy * later_s
 
 
+class _View(Struct, frozen=True, gc=False):
+    """Scan in `map`: where it was seen from, and what it showed."""
+
+    eye: Point
+    points: Sequence[Point]
+
+    def shows_free(self, place: Point) -> bool:
+        """Return whether the scan looked through `place`: at what is behind it, or at nothing in its direction."""
+        px, py = place[0] - self.eye[0], place[1] - self.eye[1]
+        far_m = hypot(px, py)
+        for x, y in self.points:
+            qx, qy = x - self.eye[0], y - self.eye[1]
+            if (q_m := hypot(qx, qy)) > far_m + BEHIND_M:
+                continue
+            if px * qx + py * qy > 0.0 and abs(px * qy - py * qx) < BESIDE_RAD * far_m * q_m:
+                return False
+        return True
+
+
 class _Track(Struct):
     x: float
     y: float
@@ -74,8 +98,8 @@ class _Track(Struct):
     seen_at: float
     ends: tuple[Point, Point]
     """First and last point."""
-    anchors: list[tuple[float, tuple[Point, ...]]]
-    """Time, centre and ends at intervals, the newest last."""
+    anchors: list[tuple[float, tuple[Point, ...], _View]]
+    """Time, centre and ends at intervals, and the scan that showed them, the newest last."""
     vx: float = 0.0
     vy: float = 0.0
     moves: bool = False
@@ -85,21 +109,33 @@ class _Track(Struct):
     def places(self) -> tuple[Point, ...]:
         return ((self.x, self.y), *self.ends)
 
-    def has_moved(self) -> bool:
-        """Return whether all of it has moved; an end stays when it comes out from behind an obstacle or seems to join
-        one.
+    def has_moved(self, view: _View) -> bool:
+        """Return whether all of it has moved, as `view` shows it now; an end stays when it comes out from behind an
+        obstacle or seems to join one.
 
         A moving obstacle that passes another one can lose an end to it as well: for a moving one the centre is enough.
         """
-        at, before = self.anchors[-2] if len(self.anchors) > 1 else self.anchors[0]
+        at, before, seen = self.anchors[-2] if len(self.anchors) > 1 else self.anchors[0]
         lasted = self.seen_at - at
         far = [hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)]
         far_m = far[0] if self.moves else min(far)
-        return lasted >= ANCHOR_S and far_m > MOVING_MPS * lasted and hypot(self.vx, self.vy) > MOVING_MPS
+        if lasted < ANCHOR_S or far_m <= MOVING_MPS * lasted or hypot(self.vx, self.vy) <= MOVING_MPS:
+            return False
+        return self.moves or self._has_left(before, seen, view)
 
-    def slow_velocity(self) -> Point | None:
-        """Return the mean velocity of all of it over the anchors, when it creeps in one direction; None otherwise."""
-        at, before = self.anchors[0]
+    def _has_left(self, before: tuple[Point, ...], seen: _View, view: _View) -> bool:
+        """Return whether two ends prove that it has left `before`, of what `seen` showed then and `view` shows now.
+
+        What stands seems to move as well when a robot that passes by sees other parts of it. But only what moves has
+        ends where a scan looked through before, or had them where one looks through now.
+        """
+        return sum(map(seen.shows_free, self.ends)) + sum(map(view.shows_free, before[1:])) >= PROOFS_MIN
+
+    def slow_velocity(self, view: _View) -> Point | None:
+        """Return the mean velocity of all of it over the anchors, when it creeps in one direction; None otherwise.
+        `view` is the newest scan.
+        """
+        at, before, seen = self.anchors[0]
         lasted = self.seen_at - at
         if lasted < SLOW_S:
             return None
@@ -108,10 +144,10 @@ class _Track(Struct):
             return None
         vx, vy = (self.x - before[0][0]) / lasted, (self.y - before[0][1]) / lasted
         least = STEADY_SHARE * (vx * vx + vy * vy)
-        for (at, (a, *_)), (until, (b, *_)) in pairwise(self.anchors):
+        for (at, (a, *_), _), (until, (b, *_), _) in pairwise(self.anchors):
             if (b[0] - a[0]) * vx + (b[1] - a[1]) * vy < least * (until - at):
                 return None
-        return vx, vy
+        return (vx, vy) if self.moves or self._has_left(before, seen, view) else None
 
 
 class Tracker:
@@ -130,7 +166,7 @@ class Tracker:
         """
         self._seen = []
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
-        clusters = _clusters(points_map)
+        clusters, view = _clusters(points_map), _View(eye, points_map)
         for n, cluster in enumerate(clusters):
             x, y, radius_m = _circle(cluster, eye)
             ends = (cluster[0], clusters[n - 1][-1]), (cluster[-1], clusters[(n + 1) % len(clusters)][0])
@@ -145,7 +181,7 @@ class Tracker:
                 # An obstacle partly behind another one, and a wall seen end on, would seem to move.
                 self._seen.append((cluster, Feature("stationary", x, y, radius_m, whole=whole)))
             else:
-                track = self._follow((x, y, radius_m), (cluster[0], cluster[-1]), now)
+                track = self._follow((x, y, radius_m), (cluster[0], cluster[-1]), view, now)
                 if track is not None:
                     self._seen.append((cluster, track))
 
@@ -177,7 +213,9 @@ class Tracker:
     def moving(self, now: float) -> list[Feature]:
         return [_feature(t, now) for t in self._tracks if t.moves and now - t.seen_at <= FORGET_S]
 
-    def _follow(self, circle: tuple[float, float, float], ends: tuple[Point, Point], now: float) -> _Track | None:
+    def _follow(
+        self, circle: tuple[float, float, float], ends: tuple[Point, Point], view: _View, now: float
+    ) -> _Track | None:
         x, y, radius_m = circle
         best, best_m = None, inf
         for track in self._tracks:
@@ -188,7 +226,7 @@ class Tracker:
         if best is None:
             if len(self._tracks) >= TRACKS_MAX:
                 return None
-            self._tracks.append(_Track(x, y, radius_m, now, ends, [(now, ((x, y), *ends))]))
+            self._tracks.append(_Track(x, y, radius_m, now, ends, [(now, ((x, y), *ends), view)]))
             return self._tracks[-1]
         dt = now - best.seen_at
         rx, ry = x - best.x - best.vx * dt, y - best.y - best.vy * dt
@@ -197,9 +235,9 @@ class Tracker:
         best.radius_m = 0.7 * best.radius_m + 0.3 * radius_m
         best.seen_at, best.ends = now, ends
         if now - best.anchors[-1][0] >= ANCHOR_S:
-            best.anchors = [*best.anchors[1 - ANCHORS_MAX :], (now, best.places())]
-        moved = best.has_moved()
-        best.slow = None if moved else best.slow_velocity()
+            best.anchors = [*best.anchors[1 - ANCHORS_MAX :], (now, best.places(), view)]
+        moved = best.has_moved(view)
+        best.slow = None if moved else best.slow_velocity(view)
         best.moves = moved or best.slow is not None
         return best
 

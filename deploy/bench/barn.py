@@ -141,7 +141,7 @@ def cases(seeds: int | None, worlds: str | None, failed: Path) -> list[Case]:
 
     Failing runs leave their folders in `failed`. Raises Refused without a file of worlds.
     """
-    field = read(_file() if worlds is None else Path(worlds))
+    field = read(found() if worlds is None else Path(worlds))
     return [case(team, field, field.worlds[: seeds or len(field.worlds)], failed) for team in TEAMS]
 
 
@@ -249,12 +249,13 @@ def read(path: Path) -> BarnWorlds:
         raise Refused(f"{path}: {error}: must be BARN worlds in JSON") from error
 
 
-def _file() -> Path:
+def found() -> Path:
+    """Return the usual file of worlds. Raises Refused if there is none."""
     above = (*Path.cwd().parents, *Path(__file__).resolve().parents)
-    found = next((path for up in above if (path := up / FOUND_IN).is_file()), None)
-    if found is None:
+    file = next((path for up in above if (path := up / FOUND_IN).is_file()), None)
+    if file is None:
         raise Refused(f"no {FOUND_IN} beside the checkout or above it: name the worlds with --worlds FILE")
-    return found
+    return file
 
 
 def time_s(truth: Iterable[Sequence[float]], field: BarnWorlds) -> float:

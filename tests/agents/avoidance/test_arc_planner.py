@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import cos, hypot, pi, sin, sqrt
 
 import pytest
 
@@ -67,3 +67,12 @@ def test_facing_a_wall_it_turns_on_the_spot_towards_its_route() -> None:
     aside = lambda s: (s * cos(0.5 * pi), s * sin(0.5 * pi))  # noqa: E731
     twist = ArcPlanner(RADIUS_M, Limits()).steer(wall, aside, WANTED, TURN_RADPS)
     assert twist == Twist(0.0, TURN_RADPS)
+
+
+@pytest.mark.parametrize("a_max_mps2", [1.0, 4.0])
+def test_beside_what_is_close_a_robot_drives_as_fast_as_its_drive_can_brake(a_max_mps2: float) -> None:
+    limits = Limits(v_max_mps=2.0, a_max_mps2=a_max_mps2)
+    posts = [(0.1, side * (RADIUS_M + 0.06)) for side in (1.0, -1.0)]
+    twist = ArcPlanner(RADIUS_M, limits).steer(posts, route_along_x(Pose2D()), Twist(2.0, 0.0), TURN_RADPS)  # type: ignore[arg-type]
+    stops_within_room = sqrt(2.0 * 0.8 * a_max_mps2 * 0.12)
+    assert stops_within_room <= twist.linear_x <= 1.2 * stops_within_room

@@ -1,6 +1,6 @@
 """The last function before cmd_vel: finite, within the limits, and able to stop in time, whatever comes in."""
 
-from math import cos, inf, isfinite, nan, sin
+from math import cos, inf, isfinite, nan, sin, sqrt
 
 import pytest
 from hypothesis import given
@@ -15,6 +15,7 @@ from lfa.agents.avoidance.safety import (
     obeyed,
     safe,
     sharing,
+    turn_on_spot,
     within,
 )
 from lfa.protocol.geometry import STILL, Twist
@@ -174,3 +175,15 @@ def test_towards_a_team_mate_the_path_keeps_its_shape() -> None:
     out = sharing(Twist(0.6, 0.3), [(0.5, 0.0)], 0.15, LIMITS)
     assert out.linear_x < 0.5
     assert out.angular_z == pytest.approx(0.5 * out.linear_x)
+
+
+@pytest.mark.parametrize(
+    ("bearing", "radps"),
+    [(3.0, 2.0), (-3.0, -2.0), (0.1, sqrt(0.8)), (-0.1, -sqrt(0.8))],
+)
+def test_a_turn_on_the_spot_is_at_the_drives_rate_from_which_it_stops_at_the_bearing(
+    bearing: float, radps: float
+) -> None:
+    limits = Limits(omega_max_radps=2.0, alpha_max_radps2=4.0)
+    assert turn_on_spot(bearing, inf, limits) == Twist(0.0, pytest.approx(radps))
+    assert abs(turn_on_spot(bearing, 0.2, limits).angular_z) == pytest.approx(0.2)

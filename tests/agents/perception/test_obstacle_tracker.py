@@ -1,6 +1,7 @@
 """What the points of a scan belong to, and what moves."""
 
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, pi, sin, sqrt
+from random import Random
 
 import pytest
 
@@ -32,6 +33,32 @@ def test_a_thing_that_stands_is_stationary_where_it_stands() -> None:
 def test_a_thing_that_the_robot_drives_past_does_not_move() -> None:
     eyes = [(0.05 * n, 0.0) for n in range(40)]
     assert seen([(1.0, 0.6)] * 40, eyes).moving(3.9) == []
+
+
+def scan_among(posts: list[tuple[float, float, float]], eye: Point) -> list[Point]:
+    """The points that 180 beams from `eye` show of round posts (x, y, radius), in beam order."""
+    points = []
+    for n in range(180):
+        c, s = cos(-pi + n * pi / 90), sin(-pi + n * pi / 90)
+        ranges = [
+            along - sqrt(r * r - off * off)
+            for x, y, r in posts
+            if (along := (x - eye[0]) * c + (y - eye[1]) * s) > 0.0
+            and abs(off := (x - eye[0]) * s - (y - eye[1]) * c) < r
+        ]
+        if ranges and min(ranges) < SIGHT_M:
+            points.append((eye[0] + min(ranges) * c, eye[1] + min(ranges) * s))
+    return points
+
+
+@pytest.mark.parametrize("seed", range(2, 7))
+def test_among_posts_that_hide_each_other_nothing_moves(seed: int) -> None:
+    chance, tracker = Random(seed), Tracker()
+    posts = [(chance.uniform(0.0, 8.0), chance.choice([-1, 1]) * chance.uniform(0.5, 2.2), 0.1) for _ in range(30)]
+    for n in range(80):
+        eye = 0.1 * n, 0.1 * sin(n / 6.0)
+        tracker.update(scan_among(posts, eye), eye, [], 0.5, 0.1 * n)
+        assert tracker.moving(0.1 * n) == [], f"after {0.1 * n:.1f} s"
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.4])

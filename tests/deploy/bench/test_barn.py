@@ -80,3 +80,17 @@ def test_a_run_whose_dead_leader_leaves_no_way_does_not_count_against_the_team(
     assert barn.result(killed, FIELD, FIELD.worlds[0], Path()) == [good, 0.0]
     whole = next(team for team in barn.TEAMS if not team.faults and not team.scored)
     assert barn.result(whole, FIELD, FIELD.worlds[0], Path()) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(("index", "score"), [(237, 0.45), (243, 0.4)])
+def test_a_robot_comes_fast_through_a_world_of_gaps_that_are_closed_when_it_sees_them(
+    index: int, score: float, tmp_path: Path
+) -> None:
+    try:
+        field = barn.read(barn.found())
+    except Refused:
+        pytest.skip("no shared/data/barn beside the checkout or above it")
+    [world] = [world for world in field.worlds if world.index == index]
+    done = barn.outcome(barn.TEAMS[0], field, world, tmp_path)
+    assert (done.wrong, done.contact) == (None, False), f"reproduce: lfa bench barn --rows 'barn/one/*', world {index}"
+    assert done.score >= score
