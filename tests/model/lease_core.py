@@ -134,7 +134,9 @@ class LeaseCore(LeaseTime):
         bond_term = s[w + BOND_TERM]
         holder = s[self.at[bond_term] + HOLDER] if bond_term else None
         hint = self.gateways and holder != v
-        if not self._agree(v, i) or not may_promise(k, i, promised=s[w], bond_holder=holder, holder_gone=hint):
+        if not self._agree(v, i) or not may_promise(
+            k, i, promised=s[w], released=s[w + RELEASED], bond_holder=holder, holder_gone=hint
+        ):
             return False
         b[w + PROMISED] = k
         if self.mutant == "hint_is_proof" and bond_term and holder != i:

@@ -111,7 +111,12 @@ def _prepare(
     body = Prepare(TERMS[k - 1], VERSIONS[version])
     answer = voter.prepare(MEMBERS[asker], body, config_of(state.version), now, gone)
     may = state.version <= version and may_promise(
-        k, asker, promised=state.promised, bond_holder=state.bond_holder, holder_gone=gone
+        k,
+        asker,
+        promised=state.promised,
+        released=state.released,
+        bond_holder=state.bond_holder,
+        holder_gone=gone,
     )
     assert isinstance(answer, Promise) == may, (state, body, gone, answer)
     if isinstance(answer, Promise):

@@ -1,4 +1,4 @@
-"""What a voter may promise and grant (E3, E15, E16), as pure functions of small numbers.
+"""What a voter may promise and grant (E3, E4, E15, E16), as pure functions of small numbers.
 
 The timed model decides with these; `refinement.py` shows that `lfa.protocol.lease.acceptor.Acceptor` decides the same
 in every state that it can reach. Terms and ids are small integers; 0 is "no term", holder None is "not bound".
@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Container
 
 
-def may_promise(term: int, asker: int, *, promised: int, bond_holder: int | None, holder_gone: bool) -> bool:
-    return term >= promised and (bond_holder is None or bond_holder == asker or holder_gone)
+def may_promise(
+    term: int, asker: int, *, promised: int, released: int, bond_holder: int | None, holder_gone: bool
+) -> bool:
+    return term >= promised and term > released and (bond_holder is None or bond_holder == asker or holder_gone)
 
 
 def may_grant(
