@@ -16,7 +16,7 @@ from lfa.protocol.lease.effects import StepDown
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.holder import Holder
 from lfa.protocol.lease.machine import lease, resigning
-from lfa.protocol.lease.machine.deadlines import DEADLINES, wakes_by_state
+from lfa.protocol.lease.machine.deadlines import DEADLINES, dues_by_state, wakes_by_state
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.machine.table import LeaseEvent
@@ -144,6 +144,7 @@ def deaf_leader_goes_on_asking(patch: pytest.MonkeyPatch) -> None:
     others = tuple(deadline for deadline in DEADLINES if deadline.event is not LeaseEvent.LEASE_EXPIRED)
     patch.setattr(lease, "DEADLINES", others)
     patch.setattr(lease, "WAKES", wakes_by_state(others))
+    patch.setattr(lease, "DUES", dues_by_state(others))
     patch.setattr(Lease, "_expire", lambda self, now: None)
 
 
