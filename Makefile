@@ -93,7 +93,7 @@ soak: $(STAMP)
 
 # A thousand drawn schedules of faults on leases and gateways, systematic and guided ones, and some on whole robots.
 fuzz: $(STAMP)
-	$(BIN)/lfa fuzz --seeds 1000 --jobs 2
+	$(BIN)/lfa fuzz --seeds $(or $(SEEDS),1000) --jobs 2
 	$(BIN)/lfa fuzz --systematic --seeds 300 --jobs 2
 	$(BIN)/lfa fuzz --guided --seeds 100
 	$(BIN)/lfa fuzz --whole --seeds 60 --jobs 2
