@@ -19,6 +19,7 @@ import pytest
 from msgspec import structs
 
 from lfa.agents.agent import Agent
+from lfa.deploy.bench.agents.footprint import footprint
 from lfa.protocol import clock
 from lfa.protocol.messages.codec import Message, decode
 from lfa.protocol.messages.consensus import Role
@@ -42,7 +43,8 @@ from lfa.agents.cli import main
 main()
 """
 """`lfa-agent` on a machine whose wall clock is an hour behind."""
-RSS_MB_MAX = 35.0
+UNIQUE_MIB_MAX = 15.0
+RSS_MB_MAX = 36.0
 
 
 class Terminals:
@@ -271,21 +273,26 @@ def test_a_second_router_at_the_same_place_is_refused_in_one_line(terminals: Ter
 
 
 def test_an_agent_is_small(terminals: Terminals) -> None:
-    """Under 35 MB resident while it leads."""
+    """At most 15 MiB of its own while it leads, and 36 MB resident with the pages that it shares.
+
+    20 MB of an agent are pages of Python's and Zenoh's libraries, which all processes of a machine share; how many of
+    them count as resident differs from machine to machine by more than a module of ours takes.
+    """
     terminals.router()
     terminals.look_on()
     terminals.world()
-    terminals.agent(1, "leader")
+    leader = terminals.agent(1, "leader")
     terminals.agent(2)  # the first election of a fleet waits for everybody
-    sizes_mb: list[float] = []
+    resident_mb: list[float] = []
 
     def told() -> bool:
         said = [m for m in terminals.heard() if isinstance(m, Status) and m.header.sender == "robot1"]
-        sizes_mb.extend(m.counters["rss_mib"] * 2**20 / 1e6 for m in said if m.role is Role.LEADER)
-        return len(sizes_mb) >= 2
+        resident_mb.extend(m.counters["rss_mib"] * 2**20 / 1e6 for m in said if m.role is Role.LEADER)
+        return len(resident_mb) >= 2
 
     eventually(told, "robot 1 does not lead")
-    assert max(sizes_mb) < RSS_MB_MAX
+    assert footprint(leader.pid).unique_mib < UNIQUE_MIB_MAX
+    assert max(resident_mb) < RSS_MB_MAX
 
 
 def test_a_fleet_goes_on_without_robots_that_the_operator_declares_lost(terminals: Terminals) -> None:
