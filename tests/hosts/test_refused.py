@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lfa.deploy.fleet.host.host import ANSWER
+from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.host.ledger import living
 from lfa.deploy.process.identity import send_signal
 from tests.rigs.machines import Machines, machines, why_not

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -99,17 +100,10 @@ def refuse_left(left: list[Identity]) -> None:
         raise Refused(f"process {left[0].pid} does not end: {' '.join(left[0].arguments)}")
 
 
-def main() -> None:
-    given = sys.stdin.buffer.read()
+def print_answer(answer: Callable[[bytes], Struct]) -> None:
+    """Print what `answer` makes of standard input; or an error in one line, with exit code 2 for what is refused."""
     try:
-        asked = decode_json(given, _Asked)
-        folder = Path(asked.state).expanduser()
-        if engine_of(folder) != "own":
-            sys.exit(OTHER_ENGINE)
-        ended = end(folder)
-        run, digest = ("", "") if ended is None else (ended.run, ended.digest)
-        answer = _Ended(asked.version, clock.wall_ms(), run, digest)
-        print_visible(f"{ANSWER}{msgspec.json.encode(answer).decode()}")
+        print_visible(f"{ANSWER}{msgspec.json.encode(answer(sys.stdin.buffer.read())).decode()}")
     except (Refused, DamagedFile) as refused:
         print_visible(refused, file=sys.stderr)
         sys.exit(2)
@@ -118,5 +112,15 @@ def main() -> None:
         sys.exit(1)
 
 
+def _answer(given: bytes) -> _Ended:
+    asked = decode_json(given, _Asked)
+    folder = Path(asked.state).expanduser()
+    if engine_of(folder) != "own":
+        sys.exit(OTHER_ENGINE)
+    ended = end(folder)
+    run, digest = ("", "") if ended is None else (ended.run, ended.digest)
+    return _Ended(asked.version, clock.wall_ms(), run, digest)
+
+
 if __name__ == "__main__":
-    main()
+    print_answer(_answer)

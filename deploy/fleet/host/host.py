@@ -17,8 +17,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
+from msgspec import Struct
 
-from lfa.deploy.fleet.host.end import ANSWER, STOP_S, end, engine_of, refuse_left, wait_gone
+from lfa.deploy.fleet.host.end import STOP_S, end, engine_of, print_answer, refuse_left, wait_gone
 from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.router import LISTENS
 from lfa.deploy.fleet.host.start_check import POLL_S, Found, check, family
@@ -29,7 +30,6 @@ from lfa.deploy.fleet.security.private_files import unpack
 from lfa.deploy.process.identity import send_signal
 from lfa.deploy.process.process_group import ROUTER_NAME
 from lfa.deploy.recording.run_folder import LOGS, SCENARIO
-from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import HOST_PREFIX
@@ -161,17 +161,9 @@ def rekey(part: HostPlan) -> Found:
 ANSWERS_TO = {"check": check, "start": start, "stop": stop, "listen": listen, "rekey": rekey}
 
 
-def main() -> None:
-    try:
-        part = msgspec.json.decode(sys.stdin.buffer.read(), type=HostPlan)
-        print_visible(f"{ANSWER}{msgspec.json.encode(ANSWERS_TO[sys.argv[1]](part)).decode()}")
-    except Refused as refused:
-        print_visible(refused, file=sys.stderr)
-        sys.exit(2)
-    except OSError as error:
-        print_visible(f"{error.filename or 'lfa'}: {error.strerror}", file=sys.stderr)
-        sys.exit(1)
+def _answer(given: bytes) -> Struct:
+    return ANSWERS_TO[sys.argv[1]](msgspec.json.decode(given, type=HostPlan))
 
 
 if __name__ == "__main__":
-    main()
+    print_answer(_answer)

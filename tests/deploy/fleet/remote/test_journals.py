@@ -8,7 +8,7 @@ import sys
 import tarfile
 from pathlib import Path
 
-from lfa.deploy.fleet.host.host import ANSWER
+from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.remote import journals
 
