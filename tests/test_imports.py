@@ -37,7 +37,7 @@ ORDER = (
     "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",
-    "world/time_grid", "world/saved_state", "world/world", "world/checkpoint",
+    "world/time_grid", "world/saved_state", "world/simulated_sensors", "world/world", "world/checkpoint",
     "world/virtual_time", "world/routes", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/terminal_text", "deploy/command_line", "deploy/robot_colours", "deploy/own_code",

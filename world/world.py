@@ -7,10 +7,10 @@ the tick comes. A delay too long to catch up with slows the world down instead, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 
 import msgspec
-from msgspec.structs import replace
 
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.lease.gateway import Gateway
@@ -24,22 +24,17 @@ from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, 
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
 from lfa.world.added_obstacles import AddedObstacles
-from lfa.world.description.own_sensor import TrueState
 from lfa.world.description.placement import with_spares
 from lfa.world.description.scenario import Scenario
 from lfa.world.physics.kinematics import Kinematic, Touch
 from lfa.world.physics.rigid_bodies import Physics
 from lfa.world.robot_hardware import PARTS, RobotHardware
 from lfa.world.saved_state import Memory, Remembered
-from lfa.world.sensors.ground_sensor import Profiler
-from lfa.world.sensors.lidar import Scanner
-from lfa.world.sensors.own_sensors import OwnSensors
+from lfa.world.simulated_sensors import SimulatedSensors
 from lfa.world.time_grid import TimeGrid
 
-FIX_HZ, GROUND_HZ, TRUTH_HZ, CLOCK_HZ = (
-    TOPIC[topic].rate_hz or 0.0 for topic in ("localization", "ground", "truth", "clock")
-)
-"""Rates [Hz] of what the world says besides sensors and scans."""
+TRUTH_HZ, CLOCK_HZ = (TOPIC[topic].rate_hz or 0.0 for topic in ("truth", "clock"))
+"""Rates [Hz] of what the world says besides what sensors measure."""
 
 
 class World:
@@ -64,28 +59,16 @@ class World:
         self.finished = False
         self.refusal: str | None = None
         self.defer_hellos = self.defer_grants = False
-        self.started_with = {
-            "kind": "world",
-            "scenario": msgspec.to_builtins(scenario),
-            "seed": seed,
-            "start_at": start_at,
-            "bodies": bodies.__name__,
-            "memory": msgspec.to_builtins(memory),
-        }
+        self.started_with = _started_with(scenario, seed, start_at, bodies, memory)
         self._fleet = fleet
         self._announced = scenario.mission
         self._scenario = scenario = with_spares(scenario)
         self._seed = seed
         self._bodies = bodies(scenario)
-        self._scanner = Scanner(scenario)
-        self._profiler = Profiler(scenario)
-        self._own_sensors = OwnSensors(scenario, seed, scenario.mission.robots)
         self._robots: list[RobotHardware] = []
-        self._names = [robot_name(robot_id) for robot_id in scenario.mission.robots]
-        self._place = {name: n for n, name in enumerate(self._names)}
+        self._place = {robot_name(robot_id): n for n, robot_id in enumerate(scenario.mission.robots)}
         self._real = {robot_name(robot): self._place[robot_name(robot)] for robot in scenario.world.real_robots}
         """Names of robots with a driver of their own, and their indices."""
-        simulated = [robot for robot in scenario.mission.robots if robot_name(robot) not in self._real]
         self._simulated: list[tuple[int, RobotHardware]] = []
         """Simulated robots with their indices."""
         self._driven: dict[int, Twist] = {}
@@ -97,15 +80,11 @@ class World:
         self._bodies.advance(self._time.step)
         self._outbox = Outbox(fleet, WORLD_NAME, incarnation, first=1)
         self._truths = Outbox(fleet, WORLD_NAME, incarnation, TRUTH_OWNER, first=1)
+        self._sensors = SimulatedSensors(scenario, seed, self._added, self._outbox)
         self._led: tuple[int, Term] | None = None
         """Robot and term of the leader command obeyed last, over all gateways; shows a return to an older term (I2)."""
-        self.interests = frozenset(
-            {key(fleet, "*", topic) for topic in ("ask", "operator", "stop")}
-            | {key(fleet, robot_name(robot_id), "cmd_vel") for robot_id in simulated}
-            | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in simulated}
-            | {alive_key(fleet, robot_name(robot_id), "*") for robot_id in simulated}
-            | {key(fleet, name, topic) for name in self._real for topic in ("sensors", "localization")}
-        )
+        simulated = [robot for robot in scenario.mission.robots if robot_name(robot) not in self._real]
+        self.interests = _interests(fleet, simulated, self._real)
 
     @property
     def slowed_s(self) -> float:
@@ -232,7 +211,7 @@ class World:
         data, obstacle = taken
         if obstacle is not None:
             self._bodies.set_down(data["index"], obstacle)
-            self._scanner.set_down(obstacle)
+            self._sensors.set_down(obstacle)
         return [self._event("obstacle", None, data | {"t": self._time.time_of(now)}, now)]
 
     def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None) -> None:
@@ -258,7 +237,6 @@ class World:
         """Return the messages that are due at this point of the time grid."""
         sent: list[Envelope] = []
         poses, samples = self._bodies.poses, self._time.samples
-        simulated = self._simulated
         for touch in touches:
             robot = self._robots[touch.robot]
             if robot.name in self._real:
@@ -267,48 +245,12 @@ class World:
                 sent.append(robot.contact(stamp, poses[touch.robot], touch.x, touch.y))
             data: dict[str, object] = {"robot": robot.id, "other": touch.other, "x": touch.x, "y": touch.y}
             sent.append(self._event("contact", None, data | {"t": self._time.elapsed_s}, stamp))
-        if samples(self._scenario.mission.control_hz):
-            driven = [robot for _, robot in simulated if not robot.hangs("driver")]
-            sent += [robot.sensors(stamp, now) for robot in driven]
-            sent += [rests for robot in driven if (rests := robot.come_to_rest(now)) is not None]
-        if samples(FIX_HZ):
-            fixes = (robot.localization(stamp, poses[n]) for n, robot in simulated if not robot.hangs("localization"))
-            sent += [fix for fix in fixes if fix is not None]
-        if samples(self._scenario.world.lidar.rate_hz):
-            ranges = self._scanner.scan(poses, self._bodies.moved())
-            sent += [robot.scan(stamp, ranges[n]) for n, robot in simulated if not robot.hangs("scanner")]
-        if not self._profiler.flat and samples(GROUND_HZ):
-            heights = self._profiler.profile(poses, self._bodies.standing_m())
-            seeing = [(n, robot) for n, robot in simulated if not robot.hangs("driver")]
-            sent += [robot.ground(stamp, self._profiler.offsets_m, heights[n]) for n, robot in seeing]
-        for name, rate_hz in self._own_sensors.rates_hz.items():
-            if samples(rate_hz):
-                sent += self._readings(name, stamp)
+        sent += self._sensors.measure(stamp, now, self._time, self._bodies, self._simulated)
         if samples(TRUTH_HZ):
             sent.append(self._truth(stamp))
         if samples(CLOCK_HZ):
             clock = Clock(self._truths.header("clock", stamp), self._time.elapsed_s)
             sent.append(self._truths.envelope("clock", clock))
-        return sent
-
-    def _readings(self, name: str, stamp: float) -> list[Envelope]:
-        """Return what the sensor `name` of each robot measures, and an event for the first that fails."""
-        poses, moved = self._bodies.poses, self._bodies.moved()
-        robots = {robot.id: pose for robot, pose in zip(self._robots, poses, strict=True)}
-        known = dict(enumerate((*self._scenario.world.obstacles, *self._added.new)))
-        places = {n: (pose.x, pose.y) for n, pose in moved.items()}
-        obstacles = tuple(replace(one, center_m=places.get(n, one.center_m)) for n, one in known.items())
-        sent: list[Envelope] = []
-        for n, robot in self._simulated:
-            if robot.hangs("driver"):
-                continue
-            twist, way_m = self._bodies.twists[n], robot.odometry.odometer_m
-            state = TrueState(robot.id, self._time.elapsed_s, poses[n], twist, way_m, robots, obstacles)
-            measured = self._own_sensors.measure(name, state)
-            if isinstance(measured, str):
-                sent.append(self._event("failed", None, {"robot": robot.id, "reason": measured}, stamp))
-            elif measured is not None:
-                sent.append(robot.reading(stamp, name, measured))
         return sent
 
     def _truth(self, stamp: float) -> Envelope:
@@ -326,6 +268,35 @@ class World:
 
     def _event(self, kind: str, term: Term | None, data: dict[str, object], stamp: float) -> Envelope:
         return self._outbox.event_envelope(kind, stamp, term, data)
+
+
+def _started_with(
+    scenario: Scenario,
+    seed: int,
+    start_at: float | None,
+    bodies: type[Physics] | type[Kinematic],
+    memory: Memory | None,
+) -> dict[str, object]:
+    """Return the arguments of a World as its journal keeps them."""
+    return {
+        "kind": "world",
+        "scenario": msgspec.to_builtins(scenario),
+        "seed": seed,
+        "start_at": start_at,
+        "bodies": bodies.__name__,
+        "memory": msgspec.to_builtins(memory),
+    }
+
+
+def _interests(fleet: str, simulated: Iterable[int], real: Iterable[str]) -> frozenset[str]:
+    """Return the keys that a world hears: of operators, of `simulated` robots' agents, of `real` robots' drivers."""
+    return frozenset(
+        {key(fleet, "*", topic) for topic in ("ask", "operator", "stop")}
+        | {key(fleet, robot_name(robot_id), "cmd_vel") for robot_id in simulated}
+        | {key(fleet, "*", "lease", _gateway_name(robot_id)) for robot_id in simulated}
+        | {alive_key(fleet, robot_name(robot_id), "*") for robot_id in simulated}
+        | {key(fleet, name, topic) for name in real for topic in ("sensors", "localization")}
+    )
 
 
 def _gateway_name(robot_id: int) -> str:
