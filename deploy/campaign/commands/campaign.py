@@ -60,16 +60,10 @@ def command(
         raise Refused(f"lfa campaign {' '.join(words)}: must be one plan, or merge DIR...")
     if on != LOCAL and shard is not None:
         raise Refused(f"--on {on} with --shard {shard}: must be one of the two")
-    if not 1 <= shards <= SHARDS_MAX or jobs < 1 or minutes < 1:
-        raise Refused(f"--shards {shards} --jobs {jobs} --minutes {minutes}: each must be at least 1")
-    if max_runs < 1:
-        raise Refused(f"--max-runs {max_runs}: must be at least 1")
+    _refuse_numbers(shards, jobs, minutes, max_runs)
     check_engine(on)
     share = WHOLE if shard is None else parse_shard(shard)
-    given = {"controller": controller, "behavior": behavior, "sensor": sensor, "generator": generator}
-    own_code = [(kind, text) for kind, texts in given.items() for text in texts or ()]
-    for kind, text in own_code:
-        PLUG_INS[kind].add_file(text)
+    own_code = _load_all({"controller": controller, "behavior": behavior, "sensor": sensor, "generator": generator})
     path = Path(words[0])
     plan = read_plan(path, max_runs)
     if on == LOCAL:
@@ -88,3 +82,19 @@ def _pairs(texts: list[str] | tuple[()]) -> dict[str, str]:
         if not text.partition("=")[2]:
             raise Refused(f"--slurm {text}: must be like partition=short")
     return {key: value for key, _, value in (text.partition("=") for text in texts)}
+
+
+def _refuse_numbers(shards: int, jobs: int, minutes: int, max_runs: int) -> None:
+    """Raise Refused for a number of shares, processes, minutes or runs that is too small or too large."""
+    if not 1 <= shards <= SHARDS_MAX or jobs < 1 or minutes < 1:
+        raise Refused(f"--shards {shards} --jobs {jobs} --minutes {minutes}: each must be at least 1")
+    if max_runs < 1:
+        raise Refused(f"--max-runs {max_runs}: must be at least 1")
+
+
+def _load_all(given: dict[str, list[str] | None]) -> list[tuple[str, str]]:
+    """Load the classes that the options name, FILE.py:Class by kind; return each with its kind, as it was given."""
+    own_code = [(kind, text) for kind, texts in given.items() for text in texts or ()]
+    for kind, text in own_code:
+        PLUG_INS[kind].add_file(text)
+    return own_code
