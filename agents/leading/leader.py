@@ -83,6 +83,7 @@ class Leadership:
         """True when the leader has waited for its team for the longest time allowed."""
         self._speed_mps = 0.0
         self._slots: list[Slot] = []
+        self._alone = False
 
     @property
     def explore(self) -> Explore | None:
@@ -133,7 +134,7 @@ class Leadership:
     def step(self, chain: tuple[int, ...], pose: Pose2D, last: Twist, now: float) -> tuple[Twist, float]:
         """Return the wanted twist, and the maximum speed [m/s] of a detour."""
         slots = [] if self.formation.trace else [self.formation.slot_of(robot) for robot in chain[1:]]
-        self._slots = slots
+        self._slots, self._alone = slots, len(chain) == 1
         speed = self._mission.leading.cruise_mps
         if self._timetable is not None:
             speed = self._timetable.speed(self.lead.place_m, now)
@@ -211,7 +212,7 @@ class Leadership:
             from lfa.agents.leading.way_round import WayRound
 
             self._round = WayRound(self._mission, self.lead)
-        self._round.watch(local, now)
+        self._round.watch(local, now, alone=self._alone)
         return self._round.steer(points, pose, last, self._slots, self._speed_mps, now)
 
     def _swing(self, slots: Sequence[Slot], now: float) -> float:

@@ -23,7 +23,7 @@ from lfa.protocol.mission import Mission
 PATIENCE_S, WON_M = 6.0, 0.8
 """Time [s] of a detour that wins less than this progress [m], after which a way round is planned."""
 BACK_S = 1.0
-"""Time [s] for which a detour backs off before a way round is planned."""
+"""Time [s] for which a detour backs off, or is blocked on all sides, before a way round is planned."""
 AHEAD_M, AHEAD_M_MAX = 1.5, 24.0
 """Distance [m] ahead on the route of the first place to return to; doubled where the return was into the next trap."""
 FREE_M, STEP_M = 0.8, 0.4
@@ -45,6 +45,7 @@ class WayRound:
         self._detour: tuple[float, float] | None = None
         """Time [s] and progress [m] since which the present detour has won nothing."""
         self._backs_since: float | None = None
+        """Time [s] since which it backs off or is blocked."""
         self._ahead_m = AHEAD_M
         self._returned_m: float | None = None
         self._begun_at = 0.0
@@ -56,8 +57,10 @@ class WayRound:
         """Forget the trap: the robot leads no more, or anew."""
         self.way, self._detour, self._backs_since = None, None, None
 
-    def watch(self, decision: Decision | None, now: float) -> None:
-        """Begin a way round when the present detour leads nowhere."""
+    def watch(self, decision: Decision | None, now: float, *, alone: bool = False) -> None:
+        """Begin a way round when the present detour leads nowhere; blocked on all sides, only `alone`: in a chain a
+        leader that is blocked by its own followers hands over.
+        """
         if self.way is not None:
             return
         if decision is None or decision.kind not in ON_THE_MAP:
@@ -66,7 +69,7 @@ class WayRound:
         progress_m = self._lead.progress_m
         if self._detour is None or progress_m - self._detour[1] >= WON_M:
             self._detour = now, progress_m
-        if decision.action is not Action.BACK:
+        if decision.action is not Action.BACK and not (alone and decision.action is Action.BLOCKED):
             self._backs_since = None
         elif self._backs_since is None:
             self._backs_since = now
@@ -83,8 +86,14 @@ class WayRound:
         way = self.way
         if way is None:
             return None
-        if self._back_m is None and now - self._begun_at >= MAPPED_S:
-            self._aim(way)
+        if self._back_m is None:
+            if now - self._begun_at >= MAPPED_S:
+                self._aim(way, self._lead.place_m + self._ahead_m)
+        elif way.explore.failure is not None:
+            self._ahead_m = min(2.0 * self._ahead_m, AHEAD_M_MAX)
+            self._aim(way, self._back_m + self._ahead_m)
+        elif not self._goes_on(way, self._back_m):
+            self._aim(way, self._back_m + STEP_M)
         ended = self._ended(pose)
         if ended or way.explore.failure is not None:
             if ended and self._back_m is not None:
@@ -94,23 +103,31 @@ class WayRound:
             return None
         return way.follow(points, pose, way.lead.step(pose, last, slots, speed_mps), now, alone=not slots)
 
-    def _aim(self, way: PlannedWay) -> None:
-        """Choose the first place ahead from which the route is free for a while, but not behind a way-point that can be
-        passed; the goal when there is none.
+    def _aim(self, way: PlannedWay, from_m: float) -> None:
+        """Choose the first place from arc length `from_m` on at which the route goes on, but not behind a way-point
+        that can be passed; the goal when there is none. What was not seen yet counts as free, so that a place may have
+        to be chosen anew when it is.
         """
         route = self._lead.route
         if route is None:
             return
-        at_m, end_m = self._lead.place_m + self._ahead_m, route.length_m
+        end_m = route.length_m
         if self._lead.waypoints_m and way.explore.free(self._lead.waypoint):
             end_m = max(self._lead.waypoints_m[self._lead.waypoint_number], self._lead.place_m)
-        while at_m < end_m:
-            ahead = [route.point(at_m + n * STEP_M) for n in range(round(FREE_M / STEP_M) + 1)]
-            if all(way.explore.free(point) for point in ahead):
-                break
+        at_m = from_m
+        while at_m < end_m and not self._goes_on(way, at_m):
             at_m += STEP_M
-        self._back_m = min(at_m, end_m)
-        way.aim(route.point(self._back_m))
+        at_m = min(at_m, end_m)
+        if at_m != self._back_m:
+            self._back_m = at_m
+            way.aim(route.point(at_m))
+
+    def _goes_on(self, way: PlannedWay, at_m: float) -> bool:
+        """Return whether the map shows the route free for `FREE_M` from arc length `at_m`."""
+        route = self._lead.route
+        if route is None:
+            return True
+        return all(way.explore.free(route.point(at_m + n * STEP_M)) for n in range(round(FREE_M / STEP_M) + 1))
 
     def _ended(self, pose: Pose2D) -> bool:
         """Return whether the robot is back on its route, or as near to the goal as makes no difference."""

@@ -30,7 +30,8 @@ def detour(action: Action, kind: Class = "wall") -> Decision:
 
 
 @pytest.mark.parametrize(
-    ("action", "after_s"), [(Action.LEFT, PATIENCE_S), (Action.U_TURN, PATIENCE_S), (Action.BACK, BACK_S)]
+    ("action", "after_s"),
+    [(Action.LEFT, PATIENCE_S), (Action.U_TURN, PATIENCE_S), (Action.BACK, BACK_S)],
 )
 def test_a_detour_that_wins_nothing_begins_a_way_round(action: Action, after_s: float) -> None:
     rounding, _ = started()
@@ -39,6 +40,14 @@ def test_a_detour_that_wins_nothing_begins_a_way_round(action: Action, after_s: 
     assert rounding.way is None
     rounding.watch(detour(action), after_s + 0.1)
     assert rounding.way is not None
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_blocked_on_all_sides_a_robot_alone_plans_and_one_with_followers_hands_over(alone: bool) -> None:
+    rounding, _ = started()
+    rounding.watch(detour(Action.BLOCKED), 0.0, alone=alone)
+    rounding.watch(detour(Action.BLOCKED), BACK_S + 0.1, alone=alone)
+    assert (rounding.way is not None) == alone
 
 
 def test_a_detour_that_wins_its_way_goes_on_alone() -> None:
@@ -82,6 +91,26 @@ def test_a_way_point_that_can_be_passed_is_not_passed_over() -> None:
     rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0)
     assert rounding.steer([], Pose2D(1.0, 0.0, 0.0), STILL, [], 0.5, BACK_S + 1.1) is None
     assert lead.place_m == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_place_to_return_to_that_turns_out_occupied_is_given_up_for_one_farther_on() -> None:
+    """It was chosen on ground that nobody had seen: back there, the robot would stand before the next thing."""
+    rounding, _ = started()
+    rounding.watch(detour(Action.BACK), 0.0)
+    rounding.watch(detour(Action.BACK), BACK_S)
+    way = rounding.way
+    assert way is not None
+    rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.0)
+    chosen = way.lead.place
+    assert chosen is not None
+    ranges = tuple(1.8 if abs(n - 90) < 10 else 10.0 for n in range(180))
+    scan = LaserScan(Header("robot1", 1, 1, 0.0), -pi, 2.0 * pi / 180, 0.05, 10.0, ranges)
+    for n in range(20):
+        way.explore.see(scan, Pose2D(), STILL, [])
+        way.work(True, Pose2D(), [], BACK_S + 1.0 + 0.02 * n)
+    assert rounding.steer([], Pose2D(), STILL, [], 0.5, BACK_S + 1.5) is not None
+    assert way.lead.place is not None
+    assert way.lead.place[0] > chosen[0] + 0.5
 
 
 def test_a_way_round_that_is_not_found_wins_no_progress() -> None:
