@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -17,6 +16,7 @@ from lfa.deploy.fleet import fleet_view
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.plan.host_plan import HostPlan
 from lfa.deploy.fleet.remote.ssh import PYTHON_MIN
+from lfa.deploy.process.coroutines import run_to_end
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import HOST_PREFIX
@@ -64,7 +64,7 @@ def command(
 def _machines(file: Path) -> list[Diagnosis]:
     from lfa.deploy.fleet.host_checks import examine  # needs cryptography, which is not in the base install
 
-    return asyncio.run(examine(load(file)))
+    return run_to_end(examine(load(file)))
 
 
 # --- this machine -----------------------------------------------------------------------------------------------------

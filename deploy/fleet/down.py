@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -16,6 +15,7 @@ from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import parts
 from lfa.deploy.fleet.remote import journals
 from lfa.deploy.fleet.remote.hosts import FleetHosts
+from lfa.deploy.process.coroutines import run_to_end
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
@@ -35,7 +35,7 @@ def command(
 ) -> int:
     began = clock.now()
     seen = find(file, fleet, connect)
-    ended, wrong = asyncio.run(_by_shell(seen.plan)) if seen.plan is not None else _by_word(seen)
+    ended, wrong = run_to_end(_by_shell(seen.plan)) if seen.plan is not None else _by_word(seen)
     if keep is not None:
         wrong += _bring(seen, keep)
     took_s = round(clock.now() - began, 2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,6 +14,7 @@ from lfa.deploy.fleet.plan.host_plan import store
 from lfa.deploy.fleet.remote.key_distribution import push
 from lfa.deploy.fleet.security import keys, registry
 from lfa.deploy.fleet.security.access_rules import KeyPlan, host_name
+from lfa.deploy.process.coroutines import run_to_end
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -93,7 +93,7 @@ def _change(
         keys.revoke(folder, chosen)
         changed, text = chosen, "revoked"
     machines = [name for name in registry.load(folder).plan.hosts if name != lost]
-    wrong = [] if plan is None else asyncio.run(push(plan, lost))
+    wrong = [] if plan is None else run_to_end(push(plan, lost))
     then = "routers opened anew" if plan is not None else "copy hosts/ again, then SIGHUP to the routers, one by one"
     facts: dict[str, object] = {"changed": changed, "hosts": machines, "pushed": plan is not None, "wrong": wrong}
     for line in wrong:

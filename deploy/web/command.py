@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import secrets
 import ssl
 import sys
@@ -16,6 +15,7 @@ from msgspec.structs import replace
 
 from lfa.deploy.client.session import find
 from lfa.deploy.fleet.host.router import host_credentials
+from lfa.deploy.process.coroutines import run_to_end
 from lfa.deploy.run.machine_size import FEW_BEAMS, SLOW_HZ
 from lfa.deploy.scenario_loading import load_scenario
 from lfa.deploy.terminal_text import print_visible
@@ -82,8 +82,8 @@ def serve_engine(engine: Engine, listen: str, port: int, secure: ssl.SSLContext 
 
     server = PageServer(engine, tokens, clip)
     try:
-        with suppress(KeyboardInterrupt, asyncio.CancelledError):
-            asyncio.run(server.run(listen, port, secure, ready))
+        with suppress(KeyboardInterrupt):
+            run_to_end(server.run(listen, port, secure, ready))
     finally:
         engine.close()
     return 0

@@ -47,7 +47,7 @@ def served(*arguments: str) -> Iterator[Served]:
         yield server
     finally:
         code, errors = server.end()
-    assert (code, errors) == (143, "")
+    assert (code, errors) == (143, ""), f"`lfa web` ended with {code}: {errors}"
 
 
 def place(browser: Browser, robot: int) -> tuple[float, float]:

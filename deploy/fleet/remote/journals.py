@@ -13,6 +13,7 @@ from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan
 from lfa.deploy.fleet.plan.host_plan import HostPlan, parts
 from lfa.deploy.fleet.remote.ssh import Unreachable, python_of, reach
+from lfa.deploy.process.coroutines import run_to_end
 from lfa.deploy.process.identity import own_processes
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.protocol.errors import Refused
@@ -48,7 +49,7 @@ def copy(folders: set[Path], run: Path) -> int:
 
 def fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
     """Fetch the newest run's journals of all machines of `plan` to `run`; return their number, and the failures."""
-    return asyncio.run(_fetch(plan, run))
+    return run_to_end(_fetch(plan, run))
 
 
 async def _fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
