@@ -40,8 +40,8 @@ ORDER = (
     "world/time_grid", "world/saved_state", "world/simulated_sensors", "world/world", "world/checkpoint",
     "world/virtual_time", "world/routes", "world/simulator", "world/cli",
 
-    "deploy/version", "deploy/terminal_text", "deploy/command_line", "deploy/robot_colours", "deploy/own_code",
-    "deploy/recording",
+    "deploy/version", "deploy/whole_output", "deploy/terminal_text", "deploy/command_line", "deploy/robot_colours",
+    "deploy/own_code", "deploy/recording",
     "deploy/process", "deploy/campaign", "deploy/client", "deploy/client/roster", "deploy/faults",
     "deploy/scenario_loading", "deploy/worlds", "deploy/analysis",
     "deploy/analysis/paper", "deploy/analysis/verification",

@@ -21,6 +21,7 @@ import numpy as np
 from lfa.deploy.analysis.tracking_errors import TrackingErrors
 from lfa.deploy.recording.event_log import FaultDone
 from lfa.deploy.recording.mcap_reader import RecordedRun
+from lfa.deploy.whole_output import whole_file
 from lfa.protocol.errors import Refused
 from lfa.world.description.scenario import Assert
 
@@ -108,7 +109,8 @@ def junit(path: Path, summary: Summary) -> None:
     about = f'<properties><property name="seed" value="{summary.seed}"/></properties>'
     text = f'<?xml version="1.0" encoding="utf-8"?>\n<testsuite name={suite} {head}>{about}{cases}</testsuite>\n'
     try:
-        path.write_text(text, encoding="utf-8")
+        with whole_file(path) as fresh:
+            fresh.write_text(text, encoding="utf-8")
     except OSError as error:
         raise Refused(f"--junit {path}: cannot be written ({error.strerror})") from None
 

@@ -35,6 +35,8 @@ def command(
 ) -> int:
     began = clock.now()
     seen = find(file, fleet, connect)
+    if keep is not None:
+        _make(keep)
     ended, wrong = run_to_end(_by_shell(seen.plan)) if seen.plan is not None else _by_word(seen)
     if keep is not None:
         wrong += _bring(seen, keep)
@@ -52,11 +54,21 @@ def command(
 
 def _bring(seen: Seen, keep: Path) -> list[str]:
     """Copy the journals of all machines (without a fleet file: of this one) to `keep`; return a line per failure."""
-    keep.mkdir(parents=True, exist_ok=True)
     if seen.plan is not None:
         return journals.fetch(seen.plan, keep)[1]
-    journals.copy({seen.part.run_folder / JOURNALS} if seen.part is not None else set(), keep)
+    try:
+        journals.copy({seen.part.run_folder / JOURNALS} if seen.part is not None else set(), keep)
+    except OSError as error:
+        return [f"--keep {keep}: {error.strerror}: the journals are not kept there"]
     return []
+
+
+def _make(keep: Path) -> None:
+    """Create the folder for journals, before anything is ended. Raises Refused."""
+    try:
+        keep.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Refused(f"--keep {keep}: {error.strerror}: must be a folder to write to") from None
 
 
 async def _by_shell(plan: FleetPlan) -> tuple[list[str], list[str]]:

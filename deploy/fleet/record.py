@@ -73,11 +73,14 @@ def command(
         kept = journals.of_processes(found.name)
         write_line(f"records fleet {found.name} into {followed.folder}", sys.stderr if as_json else sys.stdout)
         recording = followed.record(subscriber, interrupts, seconds)
-    came = journals.copy(kept | journals.of_processes(found.name), followed.folder)
-    wrong: list[str] = []
+    came, wrong = 0, list[str]()
+    try:
+        came = journals.copy(kept | journals.of_processes(found.name), followed.folder)
+    except OSError as error:
+        wrong.append(f"{error.filename}: {error.strerror}: the journals are not kept there")
     if plan is not None:
-        fetched, wrong = journals.fetch(plan, followed.folder)
-        came += fetched
+        fetched, failed = journals.fetch(plan, followed.folder)
+        came, wrong = came + fetched, wrong + failed
     summary = followed.summarize(recording)
     for line in (*wrong, *recording.losses()):
         print_visible(f"lfa: {line}", file=sys.stderr)

@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from lfa.deploy.own_code import chosen_files
 from lfa.deploy.recording.provenance import Provenance
+from lfa.deploy.whole_output import whole_folder
 from lfa.protocol.errors import Refused
 from lfa.world.description.load import Scenario, load
 
@@ -44,10 +45,10 @@ def make(out: Path | None, scenario: Scenario) -> Path:
     path = out or RUNS / f"{scenario.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     try:
         path = _free(path)
-        path.mkdir(parents=True, exist_ok=True)
-        (path / SCENARIO).write_text(toml(scenario), encoding="utf-8")
-        for own_path in {file.path for file in chosen_files(scenario)}:
-            shutil.copy(own_path, path)
+        with whole_folder(path) as fresh:
+            (fresh / SCENARIO).write_text(toml(scenario), encoding="utf-8")
+            for own_path in {file.path for file in chosen_files(scenario)}:
+                shutil.copy(own_path, fresh)
     except OSError as error:
         raise Refused(f"--out {path}: cannot be made ({error.strerror}), give a place to write to") from None
     return path

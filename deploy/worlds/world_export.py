@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from lfa.deploy.scenario_loading import load_scenario
+from lfa.deploy.whole_output import whole_folder
 from lfa.deploy.worlds.grid import grid_of
 from lfa.deploy.worlds.sdf import sdf_of
 from lfa.protocol.errors import Refused
@@ -27,12 +28,12 @@ def export_world(kind: str, name: str, folder: Path | None) -> tuple[Path, list[
     if place.exists() and (not place.is_dir() or any(place.iterdir())):
         raise Refused(f"--out {place}: must be a new or empty folder")
     try:
-        place.mkdir(parents=True, exist_ok=True)
-        if kind == "sdf":
-            (place / "world.sdf").write_text(sdf_of(drawn), encoding="utf-8")
-            return place, ["world.sdf"]
-        maps.write(place / "map.yaml", map_of(drawn))
-        return place, ["map.pgm", "map.yaml"]
+        with whole_folder(place) as fresh:
+            if kind == "sdf":
+                (fresh / "world.sdf").write_text(sdf_of(drawn), encoding="utf-8")
+                return place, ["world.sdf"]
+            maps.write(fresh / "map.yaml", map_of(drawn))
+            return place, ["map.pgm", "map.yaml"]
     except OSError as error:
         raise Refused(f"--out {place}: cannot be written ({error.strerror})") from None
 

@@ -46,7 +46,7 @@ class TomlFile(NamedTuple):
 
 
 def read_toml(path: Path, kind: str) -> TomlFile:
-    """Read the file as TOML. Raises RefusedFile, naming `kind`, if it cannot be read, is too long or is not TOML."""
+    """Read the file as TOML. Raises RefusedFile, naming `kind`, if it cannot be read, is too long, empty or no TOML."""
     right = f"must be {kind} in TOML"
     try:
         with open_binary(path) as file:
@@ -57,9 +57,12 @@ def read_toml(path: Path, kind: str) -> TomlFile:
         raise refuse_file(path, f"longer than {FILE_BYTES_MAX} bytes: {right}")
     try:
         text = data.decode().replace("\r\n", "\n")
-        return TomlFile(path, tomllib.loads(text), lines_of(text))
+        read = TomlFile(path, tomllib.loads(text), lines_of(text))
     except (ValueError, RecursionError) as error:  # ValueError: also a number of thousands of digits
         said = " ".join(str(error).split())
         place = _PLACE.search(said)
         wrong = f"no TOML ({_PLACE.sub('', said)}): {right}"
         raise refuse_file(path, wrong, int(place[1]) if place else 0) from None
+    if not read.document:  # also a pipe that nobody writes to
+        raise refuse_file(path, f"holds no key: {right}")
+    return read

@@ -18,6 +18,7 @@ from lfa.deploy.analysis.verification import reexecution
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.terminal_text import print_visible
+from lfa.deploy.whole_output import whole_folder
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_name
 from lfa.protocol.runtime import journal
@@ -39,8 +40,8 @@ def command(
     drawn = map_of(run, robot)
     path = (out or run) / "map.yaml"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        maps.write(path, drawn)
+        with whole_folder(path.parent) as fresh:
+            maps.write(fresh / path.name, drawn)
     except OSError as error:
         raise Refused(f"--out {path.parent}: cannot be written ({error.strerror}), give a place to write to") from None
     rows, columns = drawn.cells.shape

@@ -36,10 +36,9 @@ def merge(folders: Sequence[Path], out: Path | None, as_json: bool) -> int:
     report = report_of(combined)
     place = out or folders[0] / MERGED
     try:
-        place.mkdir(parents=True, exist_ok=True)
+        paths = written(combined, report, place)
     except OSError as error:
         raise Refused(f"--out {place}: {error.strerror}: must be a folder to write to") from None
-    paths = written(combined, report, place)
     _record_worst(combined, report, place)
     done, of = len(combined.results), len(combined.campaign.names)
     if as_json:

@@ -10,9 +10,6 @@ from typing import Any
 
 from msgspec import Struct
 
-from lfa.protocol.errors import Refused
-from lfa.protocol.output import replace_file
-
 TABLE = "results"
 Value = str | int | float | bool | None
 
@@ -27,25 +24,18 @@ class ResultTable(Struct, frozen=True):
         return len(next(iter(self.columns.values()), []))
 
 
-def write_table(folder: Path, table: ResultTable) -> list[Path]:
-    """Write the table as `results.csv` and `results.parquet`; return the paths. Raises Refused."""
+def write_table(folder: Path, table: ResultTable) -> tuple[str, str]:
+    """Write the table into `folder` as CSV and Parquet; return the names of the files. Raises OSError."""
     import pyarrow
     from pyarrow import parquet
 
     arrays = {name: pyarrow.array(values, type=_arrow_type(values)) for name, values in table.columns.items()}
     buffer = io.BytesIO()
     parquet.write_table(pyarrow.table(arrays), buffer, compression="zstd")
-    written = [(folder / f"{TABLE}.csv", csv_text(table).encode()), (folder / f"{TABLE}.parquet", buffer.getvalue())]
-    for path, data in written:
-        write_file(path, data)
-    return [path for path, _ in written]
-
-
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file in one step. Raises Refused when the place does not take it."""
-    reason = replace_file(path, data)
-    if reason:
-        raise Refused(f"{path}: {reason}: must be a place that has room, and that this user may use")
+    csv, parquet_name = f"{TABLE}.csv", f"{TABLE}.parquet"
+    (folder / csv).write_bytes(csv_text(table).encode())
+    (folder / parquet_name).write_bytes(buffer.getvalue())
+    return csv, parquet_name
 
 
 def csv_text(table: ResultTable) -> str:

@@ -8,8 +8,9 @@ from pathlib import Path
 from msgspec import Struct
 
 from lfa.deploy.campaign.combine import Combined
-from lfa.deploy.campaign.merge.files import ResultTable, write_file, write_table
+from lfa.deploy.campaign.merge.files import ResultTable, write_table
 from lfa.deploy.campaign.merge.page import Section, page
+from lfa.deploy.whole_output import whole_folder
 
 PAGE = "index.html"
 
@@ -31,10 +32,11 @@ Report = Callable[[Combined], MergeReport]
 
 
 def written(combined: Combined, report: MergeReport, out: Path) -> Mapping[str, Path]:
-    """Write page, CSV and Parquet into the folder `out`; return their paths by kind. Raises Refused."""
-    table = write_table(out, report.table)
+    """Write page, CSV and Parquet into the folder `out`, all or none; return their paths by kind. Raises OSError."""
     campaign = combined.campaign
     missing = f"{combined.missing} of {len(campaign.names)} items are missing" if combined.missing else ""
     text = page(campaign.title, f"{campaign.kind}, {campaign.lfa}, plan {campaign.plan}", missing, report.sections)
-    write_file(out / PAGE, text.encode())
-    return {"csv": table[0], "parquet": table[1], "page": out / PAGE}
+    with whole_folder(out) as fresh:
+        csv, parquet = write_table(fresh, report.table)
+        (fresh / PAGE).write_bytes(text.encode())
+    return {"csv": out / csv, "parquet": out / parquet, "page": out / PAGE}

@@ -23,6 +23,7 @@ from lfa.deploy.fleet.plan.host_plan import parts
 from lfa.deploy.fleet.remote.key_distribution import bundles
 from lfa.deploy.fleet.security.private_files import private_folder, write_private
 from lfa.deploy.terminal_text import print_visible
+from lfa.deploy.whole_output import whole_folder
 from lfa.protocol.errors import Refused
 
 WORLDS = ("sdf", "map")
@@ -96,12 +97,14 @@ def _check_empty(folder: Path) -> None:
 def _write(folder: Path, files: dict[str, str]) -> None:
     """Write the files, which only their owner can read; as root, keys for containers get the containers' user."""
     try:
-        for path, text in files.items():
-            place = folder / path
-            private_folder(place.parent)
-            write_private(place, text.encode())
-            if os.geteuid() == 0 and path.startswith("keys/"):
-                os.chown(place, USER, USER)
-        folder.chmod(0o700)
+        with whole_folder(folder) as fresh:
+            for path, text in files.items():
+                place = fresh / path
+                private_folder(place.parent)
+                write_private(place, text.encode())
+                if os.geteuid() == 0 and path.startswith("keys/"):
+                    os.chown(place, USER, USER)
+            private_folder(fresh)
+        private_folder(folder)
     except OSError as error:
         raise Refused(f"--out {folder}: {error.strerror}: must be a place to write to") from None

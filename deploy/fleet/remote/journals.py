@@ -16,6 +16,7 @@ from lfa.deploy.fleet.remote.ssh import Unreachable, python_of, reach
 from lfa.deploy.process.coroutines import run_to_end
 from lfa.deploy.process.identity import own_processes
 from lfa.deploy.recording.run_folder import JOURNALS
+from lfa.deploy.whole_output import whole_folder
 from lfa.protocol.errors import Refused
 
 PACK = (
@@ -38,12 +39,15 @@ def of_processes(fleet: str) -> set[Path]:
 
 
 def copy(folders: set[Path], run: Path) -> int:
-    """Copy the journals in `folders` to `run`; return their number. An open one may lack its last entries."""
+    """Copy the journals in `folders` to `run`; return their number. An open one may lack its last entries.
+
+    Raises OSError, and leaves none then.
+    """
     journals = [path for folder in sorted(folders) for path in sorted(folder.glob("*.bin"))]
     if journals:
-        (run / JOURNALS).mkdir(exist_ok=True)
-    for path in journals:
-        shutil.copyfile(path, run / JOURNALS / path.name)
+        with whole_folder(run / JOURNALS) as fresh:
+            for path in journals:
+                shutil.copyfile(path, fresh / path.name)
     return len(journals)
 
 
@@ -76,16 +80,20 @@ async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> 
         return unpack(done.answer, run)
     except tarfile.TarError as error:
         return f"gives no journals that can be read: {error}"
+    except OSError as error:
+        return f"its journals are not kept: {error.filename}: {error.strerror}"
 
 
 def unpack(packed: bytes, run: Path) -> int:
-    """Unpack the regular files `*.bin` of a tar file into the folder itself, skip the rest; return their number."""
-    (run / JOURNALS).mkdir(parents=True, exist_ok=True)
+    """Unpack the regular files `*.bin` of a tar file into the folder itself, skip the rest; return their number.
+
+    Raises OSError and TarError, and leaves none then.
+    """
     count = 0
-    with tarfile.open(fileobj=io.BytesIO(packed), mode="r|") as files:
+    with whole_folder(run / JOURNALS) as fresh, tarfile.open(fileobj=io.BytesIO(packed), mode="r|") as files:
         for member in files:
             content = files.extractfile(member) if member.isreg() else None
             if content is not None and Path(member.name).suffix == ".bin":
-                (run / JOURNALS / Path(member.name).name).write_bytes(content.read())
+                (fresh / Path(member.name).name).write_bytes(content.read())
                 count += 1
     return count

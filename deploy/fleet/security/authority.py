@@ -5,9 +5,7 @@ Only routers have server certificates: a robot's certificate cannot impersonate 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
@@ -21,6 +19,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption,
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from msgspec import Struct
 
+from lfa.deploy.fleet.security.private_files import write_private
+from lfa.deploy.whole_output import whole_file
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import read_bytes
 
@@ -164,16 +164,14 @@ def _pair(key: Path, certificate: Path) -> tuple[Any, Any, x509.Certificate]:
 
 
 def write_key(path: Path, key: EllipticCurvePrivateKey) -> None:
-    """Write `key` in PKCS8; the file is created with mode 0600."""
+    """Write `key` in PKCS8, for its owner only."""
     text = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    with suppress(FileNotFoundError):
-        path.unlink()
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        file.write(text)
+    write_private(path, text)
 
 
 def _write_certificate(path: Path, certificate: x509.Certificate) -> None:
-    path.write_bytes(certificate.public_bytes(Encoding.PEM))
+    with whole_file(path) as fresh:
+        fresh.write_bytes(certificate.public_bytes(Encoding.PEM))
 
 
 def _begun(subject: x509.Name, issuer: x509.Name, key: EllipticCurvePrivateKey, days: float) -> x509.CertificateBuilder:

@@ -25,15 +25,17 @@ A process with `--keys /etc/lfa/keys` uses the certificate of its name (`protoco
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 from msgspec import Struct, structs
 
 from lfa.deploy.fleet.security import authority
 from lfa.deploy.fleet.security.access_rules import PERSONS, KeyPlan, driver_of, host_name, sayable, stationed
-from lfa.deploy.fleet.security.layout import addresses_of, lay_out, write_requests
+from lfa.deploy.fleet.security.layout import Unsigned, addresses_of, lay_out, write_requests
 from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
 from lfa.deploy.fleet.security.registry import CA_KEY, REGISTRY, Registry, check_names, load
+from lfa.deploy.whole_output import whole_folder
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import WORLD_NAME
@@ -98,26 +100,36 @@ def _turn(names: list[str], n: int) -> tuple[str, ...]:
 def make(folder: Path, plan: KeyPlan, days: float = DAYS, ca_cert: Path | None = None) -> list[str]:
     """Create all files of `plan` in `folder`; return the members with a new certificate. Raises Refused.
 
-    With the certificate `ca_cert` of an outside authority, requests are written for it (`requested`), and nobody gets
-    keys before all are signed.
+    A new folder appears whole, or not at all. With the certificate `ca_cert` of an outside authority, requests are
+    written for it (`requested`), and nobody gets keys before all are signed.
     """
     outside = None if ca_cert is None else authority.certificate_of(ca_cert)
     authority.check_names(plan.fleet, {name: addresses_of(name, plan) for name in plan.places})
+    known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
+    if known.plan.fleet != plan.fleet:
+        raise Refused(f"{folder}: holds the keys of fleet {known.plan.fleet!r}, give another folder")
+    if outside is not None and (folder / CA_KEY).exists():
+        raise Refused(f"{folder}: has an authority of its own, give another folder with --ca-cert")
+    registry = structs.replace(known, plan=plan, outside=known.outside or outside is not None)
+    unsigned: Sequence[str] = ()
     try:
+        used = folder.exists() and any(folder.iterdir())
+        with nullcontext(folder) if used else whole_folder(folder) as place:
+            private_folder(place)
+            if ca_cert is not None:
+                write_private(place / CA_FILE, ca_cert.read_bytes())
+            elif not known.outside and not (place / CA_KEY).exists():
+                authority.found(place / CA_FILE, place / CA_KEY, plan.fleet)
+            try:
+                made = lay_out(place, registry, days, renew=())
+            except Unsigned as waiting:  # whose requests stay
+                made, unsigned = [], waiting.names
         private_folder(folder)
-        known = load(folder) if (folder / REGISTRY).exists() else Registry(plan)
-        if known.plan.fleet != plan.fleet:
-            raise Refused(f"{folder}: holds the keys of fleet {known.plan.fleet!r}, give another folder")
-        if outside is not None and (folder / CA_KEY).exists():
-            raise Refused(f"{folder}: has an authority of its own, give another folder with --ca-cert")
-        if ca_cert is not None:
-            write_private(folder / CA_FILE, ca_cert.read_bytes())
-        elif not known.outside and not (folder / CA_KEY).exists():
-            authority.found(folder / CA_FILE, folder / CA_KEY, plan.fleet)
-        registry = structs.replace(known, plan=plan, outside=known.outside or outside is not None)
-        return lay_out(folder, registry, days, renew=())
     except OSError as error:
         raise _unwritable(folder, error) from None
+    if unsigned:
+        raise Unsigned(folder, unsigned)
+    return made
 
 
 def rotate(folder: Path, names: Sequence[str] = (), days: float = DAYS) -> list[str]:

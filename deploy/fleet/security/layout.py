@@ -20,8 +20,20 @@ from lfa.protocol.transport.credentials import ACCESS_FILE, CA_FILE, PASSWORD_BY
 KINDS = ("pem", "key", "password")
 
 
+class Unsigned(Refused):
+    """Members of the keys in `folder` whose certificates an outside authority has yet to sign."""
+
+    def __init__(self, folder: Path, names: Sequence[str]) -> None:
+        where = f"have {folder / REQUESTS}/*.csr signed, put the certificates into {folder / ISSUED}/NAME.pem"
+        super().__init__(f"{len(names)} certificates are not signed yet ({names[0]}, ...): {where}, and repeat")
+        self.names = names
+
+
 def lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str]) -> list[str]:
-    """Issue missing certificates, then rewrite every machine's folder; return the members with a new certificate."""
+    """Issue missing certificates, then rewrite every machine's folder; return the members with a new certificate.
+
+    Raises OSError, and Unsigned after writing the requests for an outside authority.
+    """
     issued = folder / ISSUED
     for inner in (issued, folder / HOSTS):
         private_folder(inner)
@@ -50,12 +62,11 @@ def lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str])
 
 
 def _await_signatures(folder: Path, registry: Registry, renew: Sequence[str]) -> None:
-    """Write the requests that are open, and the registry. Raises Refused while there are some."""
+    """Write the requests that are open, and the registry. Raises Unsigned while there are some."""
     write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))
     waiting = write_requests(folder, registry, renew)
     if waiting:
-        where = f"have {folder / REQUESTS}/*.csr signed, put the certificates into {folder / ISSUED}/NAME.pem"
-        raise Refused(f"{len(waiting)} certificates are not signed yet ({waiting[0].stem}, ...): {where}, and repeat")
+        raise Unsigned(folder, [path.stem for path in waiting])
 
 
 def write_requests(folder: Path, registry: Registry, renew: Sequence[str]) -> list[Path]:

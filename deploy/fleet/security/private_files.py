@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from lfa.deploy.whole_output import whole_file
+
 ISSUED = "issued"
 """Subfolder of a fleet's keys with those of every member: the operator's `--keys`."""
 
@@ -18,11 +20,10 @@ def private_folder(path: Path) -> None:
 
 def write_private(path: Path, data: bytes) -> None:
     """Write a file atomically, with mode 0600 from its creation on. Raises OSError."""
-    beside = path.with_name(f".{path.name}.new")
-    beside.unlink(missing_ok=True)
-    with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        file.write(data)
-    beside.replace(path)
+    with whole_file(path) as fresh:
+        handle = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
 
 
 def unpack(folder: Path, files: Mapping[str, str]) -> None:

@@ -9,6 +9,7 @@ import msgspec
 import typer
 
 from lfa.deploy.terminal_text import print_visible
+from lfa.deploy.whole_output import whole_folder
 
 FIGURES = "figures"
 
@@ -34,9 +35,8 @@ def draw(folder: Path, kind: str = "png", *, column: bool = False) -> list[Path]
     from lfa.deploy.view.figures import catalogue
 
     run = Run(folder)
-    (folder / FIGURES).mkdir(exist_ok=True)
-    paths = []
-    for name, *_ in catalogue.FIGURES:
-        paths.append(folder / FIGURES / f"{name}.{kind}")
-        paths[-1].write_bytes(catalogue.saved_as(catalogue.drawn(name, run, column=column), kind))
-    return paths
+    names = [f"{name}.{kind}" for name, *_ in catalogue.FIGURES]
+    with whole_folder(folder / FIGURES) as fresh:
+        for name, (figure, *_) in zip(names, catalogue.FIGURES, strict=True):
+            (fresh / name).write_bytes(catalogue.saved_as(catalogue.drawn(figure, run, column=column), kind))
+    return [folder / FIGURES / name for name in names]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator
+from contextlib import suppress
 from math import cos, sin
 from pathlib import Path
 from typing import Any
@@ -53,8 +54,9 @@ def write_mp4(clip: dict[str, Any], path: Path) -> None:
     command = [program, "-y", "-loglevel", "error", *form, "-pix_fmt", "yuv420p", str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
-        for image in (first, *images):
-            encoder.stdin.write(image.tobytes())
+        with suppress(BrokenPipeError):  # ffmpeg has ended, and says why
+            for image in (first, *images):
+                encoder.stdin.write(image.tobytes())
     if encoder.returncode != 0:
         raise Refused(f"--mp4 {path}: ffmpeg ended with {encoder.returncode}")
 

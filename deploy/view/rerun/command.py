@@ -15,6 +15,7 @@ from lfa.deploy.client.session import FleetAddress, find, listen, scenario_of_fl
 from lfa.deploy.recording.recorder import parts
 from lfa.deploy.recording.simulation_time import WorldTime
 from lfa.deploy.terminal_text import print_visible
+from lfa.deploy.whole_output import whole_file
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.simulation import Truth
@@ -99,7 +100,8 @@ def _write_clip(folder: Path | None, html: Path | None, gif: Path | None, mp4: P
     write_line("drawing the recording ...", sys.stderr)
     for path, write in ((html, lambda c, p: p.write_text(html_of(c), "utf-8")), (gif, write_gif), (mp4, write_mp4)):
         if path is not None:
-            write(clip, path)
+            with whole_file(path) as fresh:
+                write(clip, fresh)
             print_visible(path)
     return 0
 

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lfa.deploy.view.rerun.viewer import quiet, viewer_path
+from lfa.deploy.whole_output import whole_file
 from lfa.protocol.errors import Refused
 
 SIZE, SCALE = "1600x1000", "2"
@@ -37,7 +38,8 @@ def take(rrd: Path, picture: Path, folder: Path | None) -> str:
     from lfa.deploy.analysis.run_data import Run
     from lfa.deploy.view.figures import catalogue
 
-    picture.write_bytes(catalogue.png(catalogue.overview(Run(folder))))
+    with whole_file(picture) as fresh:
+        fresh.write_bytes(catalogue.png(catalogue.overview(Run(folder))))
     return f"{picture} (drawn without the viewer: {complaint})"
 
 

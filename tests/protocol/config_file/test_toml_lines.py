@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lfa.protocol.config_file.mistake import RefusedFile
+from lfa.protocol.config_file.toml_file import read_toml
 from lfa.protocol.config_file.toml_lines import lines_of, member
 from lfa.world.description.load import SCENARIOS
 
@@ -83,3 +86,13 @@ def test_any_text_has_a_line_for_each_of_its_keys(values: dict[str, str]) -> Non
     lines = lines_of(text)
     assert names(tomllib.loads(text)) == lines.keys()
     assert all(text.splitlines()[lines[key] - 1].startswith(f"{key} = ") for key in values)
+
+
+@pytest.mark.parametrize("text", ["", "\n \n", "# a comment", None])
+def test_a_file_without_a_key_is_one_mistake(text: str | None, tmp_path: Path) -> None:
+    """None: a named pipe that nobody writes to."""
+    path = tmp_path / "scenario.toml"
+    os.mkfifo(path) if text is None else path.write_text(text)
+    with pytest.raises(RefusedFile) as refused:
+        read_toml(path, "a scenario file")
+    assert refused.value.lines == (f"{path}: holds no key: must be a scenario file in TOML",)
