@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Union
 
 from msgspec import Struct, structs
 
-from lfa.deploy.analysis.causes.broken_rules import BrokenRule, RuleWatch
+from lfa.deploy.analysis.causes.broken_rules import RuleWatch
+from lfa.deploy.analysis.causes.fact_log import BrokenRule
 from lfa.deploy.analysis.verification.checker import Checker, Violation
 from lfa.deploy.analysis.verification.fleet_stop import LatchKept
 from lfa.deploy.analysis.verification.leadership import NextInChain, Steady, StopsWithoutQuorum
@@ -235,7 +236,7 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
     simulation = simulate(schedule)
     simulation.trace = trace
     watch = RuleWatch(simulation.timing)
-    checkers = [watch, *(checker(simulation.timing) for checker in _checkers(schedule))]
+    checkers = [watch.log, watch, *(checker(simulation.timing) for checker in _checkers(schedule))]
     for checker in checkers:
         checker.told = watch.note
     simulation.listen(checkers)

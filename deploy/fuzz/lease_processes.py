@@ -29,6 +29,7 @@ from lfa.protocol.messages.consensus import (
     Propose,
     Release,
     Role,
+    Superseded,
     Term,
 )
 from lfa.protocol.messages.header import Header
@@ -238,7 +239,7 @@ class Hosts(GatewaySimulation):
                 self._tell_grant(process, Grant(body.term, body.round, body.config.version, 0.0))
         elif isinstance(body, Release):
             self._report(Checker.releases, self.now, body.term)
-        elif isinstance(body, Promise | Nack | Prepare):
+        elif isinstance(body, Promise | Nack | Prepare | Superseded):
             self._report(Checker.says, self.now, process.member, body)
 
     def _tell_grant(self, process: Process, grant: Grant) -> None:

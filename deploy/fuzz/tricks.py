@@ -80,6 +80,7 @@ class Tricks:
         team.foreign.add(member)
         agreed = digest(agreement_of(team.mission, team.timing))
         team.report(Checker.holds, team.now, member, agreed + 1)
+        team.report(Checker.speaks, team.now, member)
         team.at(lasts, self._right_version, target, member)
 
     def _right_version(self, target: int, foreign: Member) -> None:

@@ -11,25 +11,12 @@ from itertools import pairwise
 
 from msgspec import Struct
 
-from lfa.deploy.analysis.verification.checker import LONG_AGO, Checker, Violation
+from lfa.deploy.analysis.causes import liveness_rules
+from lfa.deploy.analysis.causes.fact_log import BrokenRule, CauseStep, FactLog, called, chain
+from lfa.deploy.analysis.verification.checker import EARLY_S, LONG_AGO, Checker, Violation, shown
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR, Timing
 from lfa.protocol.messages.consensus import Grant, Member, Promise, Propose, Term
 from lfa.protocol.messages.stop import NO_STOP, StopWord
-
-
-class CauseStep(Struct, frozen=True):
-    """One step of the chain, at true time `at_s` [s]."""
-
-    at_s: float
-    text: str
-
-
-class BrokenRule(Struct, frozen=True):
-    """The rules that a violation shows to be broken, and the steps that lead there, the violation last."""
-
-    rules: tuple[str, ...]
-    """Numbers in protocol/README.md, the root first; of two, the second is what the first was to keep."""
-    steps: tuple[CauseStep, ...]
 
 
 class TwoGrants(Struct, frozen=True):
@@ -42,7 +29,7 @@ class TwoGrants(Struct, frozen=True):
     later: Term
 
     def steps(self) -> tuple[CauseStep, CauseStep]:
-        who = _shown(self.voter)
+        who = called(self.voter)
         return (
             CauseStep(
                 self.earlier_s, f"{who} granted term {self.earlier.n} of {self.earlier.issuer}, and was bound by it"
@@ -58,6 +45,8 @@ class RuleWatch(Checker):
 
     def __init__(self, timing: Timing) -> None:
         super().__init__(timing)
+        self.log = FactLog(timing)
+        """Facts of the leases; a checker of the schedule too. For what falls long after a rule was broken."""
         self._bond_s = (timing.act_s + timing.deadman_s) * (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
         """T_grant by E2, from the mission's durations alone."""
         self._granted: dict[Member, list[tuple[float, Term]]] = {}
@@ -69,12 +58,16 @@ class RuleWatch(Checker):
         self._acknowledged: dict[int, tuple[float, StopWord]] = {}
         self._turned: tuple[int, StopWord] = (0, NO_STOP)
         """Robot whose wheels turned last, and what its gateway knew."""
+        self.foreign: set[Member] = set()
         self.broken_rules: list[tuple[Violation, BrokenRule | None]] = []
 
     # --- facts -------------------------------------------------------------------------------------------------
 
     def lives(self, at: float, who: Member) -> None:
         self._began[who] = at
+
+    def speaks(self, at: float, who: Member) -> None:
+        self.foreign.add(who)
 
     def hinted(self, at: float, who: Member, about: Member) -> None:
         self._hinted[who, about] = at
@@ -102,15 +95,8 @@ class RuleWatch(Checker):
     def note(self, violation: Violation) -> None:
         """Look the rule of a violation up, at the moment at which the violation is found."""
         explain = _BY_INVARIANT.get(violation.name)
-        found = None if explain is None else explain(self, violation)
+        found = liveness_rules.found(self.log, violation) if explain is None else explain(self, violation)
         self.broken_rules.append((violation, found))
-
-    def chain(self, violation: Violation, rules: str, *steps: CauseStep) -> BrokenRule:
-        """Return the chain of a violation of `rules`, such as `E15 E3`: its steps by time, then the violation."""
-        by_time = sorted(steps, key=lambda step: step.at_s)
-        return BrokenRule(
-            tuple(rules.split()), (*by_time, CauseStep(violation.at, f"{violation.name}: {violation.text}"))
-        )
 
     def last_grants(self, before_s: float) -> TwoGrants | None:
         """Return the last two grants of different terms of the voter of the newest grant up to a time."""
@@ -145,13 +131,9 @@ class RuleWatch(Checker):
         return None
 
 
-def _shown(member: Member) -> str:
-    return "the witness" if member.id == 0 else f"robot {member.id}"
-
-
 def _always(rule: str, text: str) -> Callable[[RuleWatch, Violation], BrokenRule | None]:
     """Return the rule of an invariant that only one rule keeps, with what it demands."""
-    return lambda watch, violation: watch.chain(violation, rule, CauseStep(violation.at, text))
+    return lambda watch, violation: chain(violation, rule, CauseStep(violation.at, text))
 
 
 def _exclusive(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
@@ -160,7 +142,7 @@ def _exclusive(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     if two is None:
         return None
     text = f"a bond outlives its lease: it lasts {watch._bond_s:.3f} s"
-    return watch.chain(violation, "E2", *two.steps(), CauseStep(two.later_s, text))
+    return chain(violation, "E2", *two.steps(), CauseStep(two.later_s, text))
 
 
 def _bond(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
@@ -170,12 +152,12 @@ def _bond(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
         return None
     steps = two.steps()
     if two.earlier in watch._proposed[two.later][2].fenced:
-        return watch.chain(violation, "E15", *steps, CauseStep(two.later_s, "its holder's gateway had not been fenced"))
+        return chain(violation, "E15", *steps, CauseStep(two.later_s, "its holder's gateway had not been fenced"))
     hinted_s = watch._hinted.get((two.voter, watch._proposed[two.earlier][2].holder), LONG_AGO)
     if hinted_s >= two.earlier_s:
-        text = f"{_shown(two.voter)} saw the token of the lease's holder vanish, which proves nothing"
-        return watch.chain(violation, "E15 E3", *steps, CauseStep(hinted_s, text))
-    return watch.chain(violation, "E3", *steps)
+        text = f"{called(two.voter)} saw the token of the lease's holder vanish, which proves nothing"
+        return chain(violation, "E15 E3", *steps, CauseStep(hinted_s, text))
+    return chain(violation, "E3", *steps)
 
 
 def _amnesiac(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
@@ -183,29 +165,38 @@ def _amnesiac(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     term = max(watch._proposed, key=lambda one: watch._proposed[one][0])
     at, who, propose = watch._proposed[term]
     if (who.id, who.incarnation) != (term.issuer, term.incarnation) or propose.holder != who:
-        text = f"{_shown(who)} proposed term {term.n} of {term.issuer}, which was handed over, as a new one"
-        return watch.chain(violation, "E16", CauseStep(at, text))
+        text = f"{called(who)} proposed term {term.n} of {term.issuer}, which was handed over, as a new one"
+        return chain(violation, "E16", CauseStep(at, text))
     promises = watch._promised.get(term, [])
     if not promises:
         others = [(t, one) for one, some in watch._promised.items() if one.issuer == who.id for t, _ in some[-1:]]
         if not others or max(others)[0] < at - watch._bond_s:
-            text = f"{_shown(who)} proposed term {term.n} without having asked for promises"
-            return watch.chain(violation, "E16", CauseStep(at, text))
-        text = f"{_shown(who)} proposed term {term.n} on promises for term {max(others)[1].n}"
-        return watch.chain(violation, "E6", CauseStep(max(others)[0], "promises came"), CauseStep(at, text))
+            text = f"{called(who)} proposed term {term.n} without having asked for promises"
+            return chain(violation, "E16", CauseStep(at, text))
+        text = f"{called(who)} proposed term {term.n} on promises for term {max(others)[1].n}"
+        return chain(violation, "E6", CauseStep(max(others)[0], "promises came"), CauseStep(at, text))
     newcomer = watch.promise_of_a_newcomer(term)
     joint = propose.config.previous is not None
     if newcomer is not None and (joint or at > 2.0 * watch._bond_s):
-        text = f"{_shown(newcomer[1])} promised, which had just started"
-        return watch.chain(violation, "E1", CauseStep(newcomer[0], text))
+        text = f"{called(newcomer[1])} promised, which had just started"
+        return chain(violation, "E1", CauseStep(newcomer[0], text))
     dropped = watch.asked_before(term)
     if dropped is not None:
-        text = f"{_shown(who)} had promises for term {dropped.n}, and asked for term {term.n}"
-        return watch.chain(violation, "E6", CauseStep(at, text))
+        text = f"{called(who)} had promises for term {dropped.n}, and asked for term {term.n}"
+        return chain(violation, "E6", CauseStep(at, text))
     if not joint:
-        text = f"{_shown(who)} proposed a config that is not joint with all that promised"
-        return watch.chain(violation, "E18", CauseStep(at, text))
-    return watch.chain(violation, "E18", CauseStep(at, f"{_shown(who)} proposed without a quorum that remembers"))
+        text = f"{called(who)} proposed a config that is not joint with all that promised"
+        return chain(violation, "E18", CauseStep(at, text))
+    return chain(violation, "E18", CauseStep(at, f"{called(who)} proposed without a quorum that remembers"))
+
+
+def _agreement(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    """I9: whether one of the two speaks another version of the messages, or holds another mission."""
+    foreign = [member for member in watch.foreign if shown(member) in violation.text]
+    if foreign:
+        text = f"{called(foreign[0])} speaks a version of the messages that the others cannot read"
+        return chain(violation, "E35", CauseStep(violation.at, text))
+    return chain(violation, "E25", CauseStep(violation.at, "one acted on a message of another agreement"))
 
 
 def _stop(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
@@ -215,18 +206,18 @@ def _stop(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     step = CauseStep(at, f"the gateway of robot {robot} acknowledged stop {acknowledged.epoch}")
     if word.stand:
         text = f"it knew stop {word.epoch}, and let the wheels turn"
-        return watch.chain(violation, "E28", step, CauseStep(violation.at, text))
+        return chain(violation, "E28", step, CauseStep(violation.at, text))
     began_s = watch._gateway_began.get(robot, LONG_AGO)
     if began_s > at:
         text = f"the gateway of robot {robot} started again, and did not stand until it knew"
-        return watch.chain(violation, "E30", step, CauseStep(began_s, text))
+        return chain(violation, "E30", step, CauseStep(began_s, text))
     text = f"it took the older resume {word.epoch} for the newest word"
-    return watch.chain(violation, "E29", step, CauseStep(violation.at, text))
+    return chain(violation, "E29", step, CauseStep(violation.at, text))
 
 
-def _roster(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+def _roster(_: RuleWatch, violation: Violation) -> BrokenRule | None:
     rule = "E34" if violation.text.startswith("retired") else "E33"
-    return watch.chain(violation, rule)
+    return chain(violation, rule)
 
 
 _OF_WORDS: tuple[tuple[str, str], ...] = (
@@ -250,8 +241,13 @@ _OF_WORDS: tuple[tuple[str, str], ...] = (
 
 
 def _word(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
+    """I12 to I16: the rule of what was said, and E7 if a lease had ended before its RELEASE."""
+    own = [lease for lease in watch.log.leases if violation.text.startswith(f"{shown(lease.who)} released")]
+    if own and own[-1].until_s <= violation.at + EARLY_S:
+        text = f"the lease of {called(own[-1].who)} ended, and it did not say so"
+        return chain(violation, "E7 E4", CauseStep(own[-1].until_s, text))
     rule = next((rule for part, rule in _OF_WORDS if part in violation.text), None)
-    return None if rule is None else watch.chain(violation, rule)
+    return None if rule is None else chain(violation, rule)
 
 
 _BY_INVARIANT: dict[str, Callable[[RuleWatch, Violation], BrokenRule | None]] = {
@@ -260,7 +256,7 @@ _BY_INVARIANT: dict[str, Callable[[RuleWatch, Violation], BrokenRule | None]] = 
     "I4": _bond,
     "I6": _always("E17", "voters changed without the quorums of both sets"),
     "I7": _amnesiac,
-    "I9": _always("E25", "one acted on a message of another agreement"),
+    "I9": _agreement,
     "I10": _stop,
     "I11": _roster,
     "I12": _word,

@@ -74,7 +74,7 @@ class Checker:
         """Record that a RELEASE of `term` reached the voter `who` (simulations only)."""
 
     def says(self, at: float, who: Member, body: LeaseBody) -> None:
-        """Record that `who` sends this PREPARE, promise or refusal (simulations only)."""
+        """Record that `who` sends this PREPARE, promise, refusal or SUPERSEDED (simulations only)."""
 
     def hears_order(self, at: float, robot_id: int, incarnation: int, order: StopOrder) -> None:
         """Record that an order of the fleet stop reached that incarnation of a gateway (simulations only)."""
@@ -92,6 +92,9 @@ class Checker:
 
     def holds(self, at: float, who: Member, agreed: int) -> None:
         """Record the digest of what `who` holds to be agreed (E25)."""
+
+    def speaks(self, at: float, who: Member) -> None:
+        """Record that `who` speaks a version of the messages that its team cannot read (E35)."""
 
     def ends(self, at: float, who: Member) -> None:
         """Record that the process of incarnation `who` ended."""

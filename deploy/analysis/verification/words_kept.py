@@ -189,7 +189,9 @@ class ChainOrder(Checker):
         self._own: dict[Member, Config] = {}
 
     def adopts(self, at: float, who: Member, config: Config) -> None:
-        self._own[who] = config
+        written_now = config.version.seq == 0 and config.chain[:1] == (who,)  # and proposed next
+        if not written_now:
+            self._own[who] = config
 
     def promises(self, at: float, who: Member, promise: Promise) -> None:
         known = self._told.get(promise.term)

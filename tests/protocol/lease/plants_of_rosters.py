@@ -30,7 +30,12 @@ def strangers_are_taken_in(patch: pytest.MonkeyPatch) -> None:
 
 
 def retired_robots_stand(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Election, "may_lead", lambda self, config, robot_id: robot_id != 0)
+    honest = Election.may_lead
+    patch.setattr(
+        Election,
+        "may_lead",
+        lambda self, config, robot_id: robot_id in config.roster.retired or honest(self, config, robot_id),
+    )
 
 
 def retired_candidates_go_on(patch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 import lfa.protocol.lease.failure_detector
 import lfa.protocol.lease.holder
@@ -78,7 +79,7 @@ def chain_forgets_its_order(patch: pytest.MonkeyPatch) -> None:
     def led_by(*arguments: Any, **named: Any) -> Config:
         config = honest(*arguments, **named)
         head, *rest = config.chain
-        return Config(config.version, config.voters, config.tie, config.previous, (head, *reversed(rest)))
+        return structs.replace(config, chain=(head, *reversed(rest)))
 
     patch.setattr(lfa.protocol.lease.machine.candidacy, "led_by", led_by)
 
