@@ -32,7 +32,7 @@ from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.own_readings import OwnReadings
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
 from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, StuckMonitor
-from lfa.agents.team_state import TeamState
+from lfa.agents.team_state import TeamState, sensors_s_max
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
@@ -53,7 +53,7 @@ class Navigator:
         self._id = robot_id
         self._mission = mission
         self._team = team
-        self.estimator = Estimator()
+        self.estimator = Estimator(odometry_s_max=sensors_s_max(mission))
         self.formation = Formation.of(mission)
         self.follower = follower_of(mission)
         self.leading = Leadership(mission, self.formation, team)

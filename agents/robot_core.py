@@ -25,7 +25,7 @@ from lfa.agents.orders.team_orders import QUESTION, TeamOrders
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
 from lfa.agents.team_messages import TeamMessages
-from lfa.agents.team_state import TeamState
+from lfa.agents.team_state import TeamState, sensors_s_max
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL
@@ -78,7 +78,7 @@ class RobotCore:
         """True once an exit was requested, or others know a later incarnation (E23)."""
         self._id = robot_id
         self._outbox = outbox
-        self._team = TeamState()
+        self._team = TeamState(sensors_s_max(mission))
         self.navigator = Navigator(robot_id, mission, self._team)
         me = Member(robot_id, outbox.incarnation)
         timing = timing_for(mission)

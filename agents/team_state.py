@@ -13,9 +13,12 @@ from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import Sensors
 from lfa.protocol.messages.team import Delay, RouteProgress, TableRow
+from lfa.protocol.mission import Mission
 from lfa.protocol.topics import TOPIC
 
-ROBOTS_MAX = 512
+ROBOTS_MAX = 1024
+SENSORS_PERIODS_MIN = 3
+"""Least number of control periods after which the own odometry counts as lost: as many as the deadman's."""
 ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
@@ -23,9 +26,10 @@ GOES_ON_S = 0.6
 
 
 class TeamState:
-    """Latest values, each fresh or stale by the topic table."""
+    """Latest values, each fresh or stale by the topic table; the own sensors are fresh for `sensors_s_max` [s]."""
 
-    def __init__(self) -> None:
+    def __init__(self, sensors_s_max: float = SENSORS_S_MAX) -> None:
+        self._sensors_s_max = sensors_s_max
         self.sensors: Sensors | None = None
         self.sensors_at = -1.0
         self.rows_heard = self.rows_lost = 0
@@ -82,7 +86,7 @@ class TeamState:
         self._clocks[robot].heard(row.header.stamp, at)
 
     def fresh_sensors(self, now: float) -> Sensors | None:
-        return self.sensors if now - self.sensors_at <= SENSORS_S_MAX else None
+        return self.sensors if now - self.sensors_at <= self._sensors_s_max else None
 
     def pose_of(self, robot: int, now: float) -> Pose2D | None:
         """Return the pose of `robot` in `map`, extrapolated for `GOES_ON_S` at most; None when its row is stale, or
@@ -140,6 +144,11 @@ class TeamState:
         """Return the least (receive - send) of these robots' rows, for their half of a round trip (control.md 3.3)."""
         clocks = [(robot, self._clocks.get(robot)) for robot in robots]
         return tuple(Delay(robot, clock.least(now)) for robot, clock in clocks if clock is not None and clock.known)
+
+
+def sensors_s_max(mission: Mission) -> float:
+    """Return the age [s] beyond which the odometry of a robot with the control rate of `mission` is stale."""
+    return max(SENSORS_S_MAX, SENSORS_PERIODS_MIN * mission.control_period_s)
 
 
 def _overtaken(row: Header, known: Header, age_s: float) -> bool:

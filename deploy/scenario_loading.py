@@ -10,7 +10,7 @@ from lfa.agents.behaviors.own_behavior import OwnBehaviors
 from lfa.agents.config import Gains
 from lfa.agents.following.factory import gains_of
 from lfa.agents.following.plugin import make_controller
-from lfa.deploy.faults.goals import check_goals
+from lfa.deploy.faults.feasible import check_faults
 from lfa.deploy.faults.script import parse
 from lfa.deploy.own_code import OwnFile, load_files, refuse_missing
 from lfa.deploy.recording.run_folder import SCENARIO, scenario_of
@@ -71,10 +71,10 @@ def _faults(scenario: Scenario) -> Iterator[Mistake]:
             yield Mistake(f"faults[{n}]", f" = {str(refused).strip()}")
 
 
-def _goals(scenario: Scenario) -> Iterator[Mistake]:
+def _feasible(scenario: Scenario) -> Iterator[Mistake]:
     for n, text in enumerate(scenario.faults):
         try:
-            check_goals(scenario, [parse(text, scenario.mission, "")])
+            check_faults(scenario, [parse(text, scenario.mission, "")])
         except Refused as refused:
             yield Mistake(f"faults[{n}]", f" = {text!r}: {refused}")
 
@@ -85,5 +85,5 @@ RULES: tuple[Rule[Scenario], ...] = (
     INSTALLED_RULE,
     Rule(_behaviors),
     Rule(_faults, ("mission.robots",)),
-    Rule(_goals, ("faults", *PLACES)),
+    Rule(_feasible, ("faults", "world.lidar.beams", *PLACES)),
 )

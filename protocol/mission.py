@@ -16,7 +16,7 @@ KNOWN_MAX = 64
 ROUTE_M_MAX = 10_000.0
 """Maximum route length [m]: a leader stores one point per 0.1 m, so that a longer route would exhaust the memory."""
 
-CONTROL_HZ, CONTROL_HZ_MIN = 50.0, 20.0
+CONTROL_HZ, CONTROL_HZ_MIN = 50.0, 10.0
 """Usual and least rate [Hz] of the robots' control steps."""
 
 Side = Literal["left", "right", "column", "zigzag"]
@@ -122,7 +122,8 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     profile: Profile = "std"
     control_hz: float = CONTROL_HZ
     """Rate [Hz] of each robot's control steps, with its commands and poses, and of a simulated robot's odometry. A
-    lower rate lets a machine run more robots; the deadman D is never shorter than three control periods."""
+    lower rate lets a machine run more robots; the deadman D, and the age at which odometry is too old to drive by, are
+    never shorter than three control periods (300 ms at 10 Hz)."""
     tiebreak: TieBreak = "witness"
     """Tie-breaker between two halves of the voters: the witness, the head of the chain, or none."""
     shrink: Shrink = "dynamic"

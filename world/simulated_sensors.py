@@ -35,6 +35,7 @@ class SimulatedSensors:
         self._added = added
         self._outbox = outbox
         self._scanner = Scanner(scenario)
+        self._sees = scenario.world.lidar.fitted
         self._profiler = Profiler(scenario)
         self._own_sensors = OwnSensors(scenario, seed, scenario.mission.robots)
 
@@ -63,7 +64,7 @@ class SimulatedSensors:
         if samples(FIX_HZ):
             fixes = (robot.localization(stamp, poses[n]) for n, robot in robots if not robot.hangs("localization"))
             sent += [fix for fix in fixes if fix is not None]
-        if samples(self._scenario.world.lidar.rate_hz):
+        if self._sees and samples(self._scenario.world.lidar.rate_hz):
             ranges = self._scanner.scan(poses, bodies.moved())
             sent += [robot.scan(stamp, ranges[n]) for n, robot in robots if not robot.hangs("scanner")]
         if not self._profiler.flat and samples(GROUND_HZ):

@@ -26,7 +26,7 @@ GATE_SIGMA = 5.0
 OUTLIERS_TO_RELOCATE = 5
 """Number of successive fixes that contradict the odometry after which the robot counts as carried or slipped."""
 ODOMETRY_S_MAX = TOPIC["sensors"].timeout_s or 0.2
-"""Age [s] of the newest odometry beyond which there is no pose: nobody knows where the wheels went since."""
+"""Least age [s] of the newest odometry beyond which there is no pose: nobody knows where the wheels went since."""
 UNFIXED_SLOW_M, UNFIXED_M_MAX = 0.75, 1.5
 """Way [m] driven since the last accepted fix, from which a robot slows, and beyond which it has no pose: slip or a worn
 wheel leads it astray by some centimetres a metre, which no noise model knows of."""
@@ -69,8 +69,10 @@ class Estimator:
     here.
     """
 
-    def __init__(self, noise: EstimatorNoise = NOISE) -> None:
+    def __init__(self, noise: EstimatorNoise = NOISE, odometry_s_max: float = ODOMETRY_S_MAX) -> None:
+        """`odometry_s_max`: age [s] of the newest odometry beyond which there is no pose."""
         self._noise = noise
+        self._odometry_s_max = odometry_s_max
         self._clock = ClockOffset()
         self._wheels = FrozenOdometry()
         self._incarnation: int | None = None
@@ -134,7 +136,7 @@ class Estimator:
         There is one from the first fix on that could be joined to the odometry, while the odometry is fresh and the
         robot has not driven far since the last fix.
         """
-        if self._wheels.frozen or self.age_s(now) > ODOMETRY_S_MAX:
+        if self._wheels.frozen or self.age_s(now) > self._odometry_s_max:
             return "odometry"
         unsure = self._covariance.position_m > SIGMA_M_MAX or self._covariance.heading_rad > SIGMA_RAD_MAX
         lost = self._map_odom is None or self._unfixed_m > UNFIXED_M_MAX or unsure
@@ -161,7 +163,7 @@ class Estimator:
             return None
         newest = self._history[-1]
         age = now - newest.stamp - self._clock.offset(now)
-        age = min(ODOMETRY_S_MAX, max(0.0, age))
+        age = min(self._odometry_s_max, max(0.0, age))
         here = compose(self._map_odom, newest.pose_odom)
         return along_arc(here, newest.twist, age), newest.twist
 

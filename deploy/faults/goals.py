@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from lfa.deploy.client.mission_changes import along
-from lfa.deploy.faults.link_faults import goal_of
-from lfa.deploy.faults.script import GOAL, Fault
 from lfa.protocol.errors import Refused
 from lfa.world.description.placement import gap_to
 from lfa.world.description.scenario import Point, Scenario
-
-
-def check_goals(scenario: Scenario, faults: Iterable[Fault]) -> None:
-    """Raise Refused for a goal that lies in or behind a wall, or on an obstacle that does not move."""
-    for fault in faults:
-        if fault.action == GOAL:
-            check_goal(scenario, goal_of(str(fault.target)))
 
 
 def check_goal(scenario: Scenario, goal: Point) -> None:

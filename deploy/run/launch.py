@@ -16,7 +16,7 @@ import msgspec
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.goals import check_goals
+from lfa.deploy.faults.feasible import check_faults
 from lfa.deploy.faults.script import Fault
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessGroup
 from lfa.deploy.process.signals import Interrupts
@@ -59,7 +59,7 @@ def run(scenario: Scenario, seed: int, out: Path | None, faults: Sequence[Fault]
     if scenario.radio.range_m > 0.0:
         raise Refused("radio.range_m: only in lfa sim, say the fault 'range 5 at 0 s' where robots are processes")
     drawn = draw(scenario, seed)
-    check_goals(drawn, faults)
+    check_faults(drawn, faults)
     folder = make(out, drawn)
     about = About(scenario.name, "processes", seed, f"{scenario.name}-{os.getpid()}", provenance())
     sockets = socket_folder()

@@ -85,5 +85,5 @@ def slower(scenario: Scenario, kept: frozenset[str] = frozenset()) -> Scenario:
 
 def _rates(scenario: Scenario) -> str:
     mission = scenario.mission
-    beams = scenario.world.lidar.beams
+    beams = scenario.world.lidar.beams or "no"
     return f"control at {mission.control_hz:g} Hz, profile {mission.profile} and {beams} lidar beams"

@@ -15,7 +15,7 @@ from lfa.deploy.analysis.summary import Summary
 from lfa.deploy.client.mission_changes import along
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.order_calls import OrderCalls
-from lfa.deploy.faults.goals import check_goals
+from lfa.deploy.faults.feasible import check_faults
 from lfa.deploy.faults.link_faults import goal_of, note
 from lfa.deploy.faults.script import COMMON, GOAL, ORDERS, Fault, FaultAction, FaultSchedule
 from lfa.deploy.process.signals import Interrupts
@@ -102,11 +102,11 @@ def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Unre
 
 
 def refuse_faults(drawn: Scenario, faults: Sequence[Fault]) -> None:
-    """Raise Refused for a fault of a process that a simulation does not have, and for a goal that cannot be reached."""
+    """Raise Refused for a fault of a process that a simulation lacks, and for one that the scenario cannot have."""
     common = next((fault for fault in faults if fault.target in COMMON), None)
     if common is not None:
         raise Refused(f"fault '{common}': only in lfa run, here {common.target} is no process")
-    check_goals(drawn, faults)
+    check_faults(drawn, faults)
 
 
 class UnrecordedRun(NamedTuple):

@@ -109,7 +109,8 @@ def lighter(setting: Setting) -> Setting:
     """
     scenario = load_scenario(setting.scenario, setting.overrides, setting.robots)
     kept = {override.partition("=")[0].strip() for override in setting.overrides}
-    rates = tuple(f"{key}={value:g}" for key, value in LIGHT.items() if key not in kept)
+    usual = {"mission.control_hz": scenario.mission.control_hz, "world.lidar.beams": scenario.world.lidar.beams}
+    rates = tuple(f"{key}={value:g}" for key, value in LIGHT.items() if key not in kept and value < usual[key])
     robots = len(scenario.mission.robots)
     if robots <= ROBOTS_USUAL or not rates:
         return setting

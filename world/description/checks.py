@@ -13,10 +13,14 @@ from lfa.protocol.names import robot_name
 from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Scenario
 from lfa.world.description.terrain import feature_mistakes, features
 
-ROBOTS_MAX = 500
+ROBOTS_MAX = 1000
 LENGTH_M_MIN = 0.001
 REACH_M = 1e-3
 """Rounding [m] of a radius that a corner may lie outside of."""
+BEAMS_MIN, BEAMS_MAX = 4, 4096
+"""Bounds of the number of beams of a scanner; a robot without one has 0."""
+SEEING_MOTIONS = ("reactive", "explore")
+"""Motions of a leader that finds its way by what its scanner shows."""
 PHYSICS_HZ_MIN, PHYSICS_HZ_MAX = 100.0, 1000.0
 
 
@@ -90,6 +94,26 @@ def _mount(scenario: Scenario) -> Iterator[Mistake]:
         yield wrong("world.lidar.mount", list(mount), right, "mission.radius_m")
 
 
+def _beams(scenario: Scenario) -> Iterator[Mistake]:
+    """Require a scanner of enough beams, or none and a course on which nobody needs one."""
+    world, motion, beams = scenario.world, scenario.mission.leading.motion, "world.lidar.beams"
+    if world.lidar.fitted:
+        if not BEAMS_MIN <= world.lidar.beams <= BEAMS_MAX:
+            right = f"a number from {BEAMS_MIN} to {BEAMS_MAX}, or 0 for robots without a scanner"
+            yield wrong(beams, world.lidar.beams, right)
+        return
+    blind = f"robots without a scanner ({beams} = 0)"
+    if motion in SEEING_MOTIONS:
+        yield wrong(
+            "mission.leading.motion", motion, f"path_following, point_to_point or trajectory for {blind}", beams
+        )
+    if world.map is not None:
+        yield wrong("world.map", world.map, f"left out for {blind}: they would drive into its walls", beams)
+    for key, count in (("world.obstacles", len(world.obstacles)), ("world.walls_m", len(world.walls_m))):
+        if count:
+            yield wrong(key, f"{count} of them", f"left out for {blind}: they would drive into them", beams)
+
+
 def _terrain(scenario: Scenario) -> Iterator[Mistake]:
     for key, feature in features(scenario.world):
         yield from feature_mistakes(f"world.{key}", feature)
@@ -104,7 +128,6 @@ def _ranges(scenario: Scenario) -> Iterator[Mistake]:
         Range("world.body.mass_kg", world.body.mass_kg, 0.1, 1e4),
         Range("world.body.push_n", world.body.push_n, 0.1, 1e6),
         Range("world.body.wheel_radius_m", world.body.wheel_radius_m, 0.005, 1.0),
-        Range("world.lidar.beams", lidar.beams, 4, 4096),
         Range("world.lidar.range_min_m", lidar.range_min_m, 0.0, lidar.range_max_m, "world.lidar.range_max_m"),
         Range("world.lidar.range_max_m", lidar.range_max_m, 0.1, 1e3),
         Range("world.lidar.fov_rad", lidar.fov_rad, 0.1, TAU),
@@ -191,6 +214,7 @@ SCENARIO_RULES: tuple[Rule[Scenario], ...] = tuple(
     for check in (
         _saved_from,
         _robots,
+        _beams,
         _ranges,
         _obstacles,
         _footprint,

@@ -67,6 +67,8 @@ class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
     """Laser scanner of each robot. Its scans are published as seen from `base_link`, wherever it is mounted."""
 
     beams: int = 180
+    """Number of beams, at least 4. 0: robots have no scanner. They see no obstacle and no wall, so that none may be
+    there, and drive on open ground, along a route or to a goal; of each other they know what they say."""
     range_min_m: float = 0.05
     range_max_m: float = 8.0
     rate_hz: float = 10.0
@@ -74,6 +76,11 @@ class Lidar(Struct, frozen=True, forbid_unknown_fields=True):
     """Field of view [rad], centred on the scanner's own x axis; what lies outside of it is not seen."""
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Mounting pose x, y [m], theta [rad] in `base_link`."""
+
+    @property
+    def fitted(self) -> bool:
+        """False for robots without a scanner."""
+        return self.beams != 0
 
     @property
     def beams_a_turn(self) -> int:

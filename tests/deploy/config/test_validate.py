@@ -96,7 +96,8 @@ def test_a_value_from_the_command_line_has_no_line(
 ) -> None:
     assert _validate(monkeypatch, "straight", "--set", "radio.loss=2", "--set", "world.lidar.beams=1") == 2
     assert capsys.readouterr().err.splitlines() == [
-        "lfa: straight.toml with --set: world.lidar.beams = 1: must be a number from 4 to 4096",
+        "lfa: straight.toml with --set: world.lidar.beams = 1: must be a number from 4 to 4096, or 0 for robots "
+        "without a scanner",
         "lfa: straight.toml with --set: radio.loss = 2.0: must be a number from 0 to 1",
     ]
 

@@ -166,3 +166,5 @@ def test_many_robots_are_computed_at_lower_rates_that_are_part_of_the_link(capfd
     assert "50 robots: computed with mission.control_hz=20" in capfd.readouterr().err
     assert setting_of(fragment_of(many)) == many
     assert lighter(many) == many
+    lower = ("mission.control_hz=10", "world.lidar.beams=0")
+    assert lighter(Setting("straight", robots=50, overrides=lower)).overrides == lower

@@ -88,7 +88,8 @@ def test_a_scanner_at_the_nose_sees_a_mate_right_before_it() -> None:
 @pytest.mark.parametrize(
     ("override", "says"),
     [
-        ("world.lidar.beams=0", "world.lidar.beams = 0"),
+        ("world.lidar.beams=3", "world.lidar.beams = 3"),
+        ("world.lidar.beams=-1", "world.lidar.beams = -1"),
         ("world.lidar.fov_rad=7", "world.lidar.fov_rad = 7"),
         ("world.lidar.mount=[0.5,0,0]", "world.lidar.mount = [0.5, 0.0, 0.0]"),
         ("world.lidar.mount=[nan,0,0]", "world.lidar.mount"),
