@@ -42,3 +42,14 @@ def test_a_share_is_chosen_by_name_and_an_unknown_name_is_refused() -> None:
     assert {name for name, _, _ in tasks(None, ["straight", LEASES])} == {"straight", LEASES}
     with pytest.raises(ValueError, match=r"--only strait: must be one of .*straight"):
         tasks(None, ["strait"])
+
+
+def test_a_replay_that_returns_otherwise_than_recorded_fails_without_any_table(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["same", "--only", LEASES])
+    for answer, exit_code in ((ROW.hash, 0), (same.OTHERWISE, 1)):
+        replay = Row("replay", "killed", "-", "robot1-1.bin", answer)
+        monkeypatch.setattr(same, "rows", lambda *_, replay=replay: [ROW, replay])
+        assert same.main() == exit_code
+        assert f"{1 - exit_code} of 1 journals return what was recorded" in capsys.readouterr().err
