@@ -24,6 +24,7 @@ import hypothesis  # noqa: F401  loaded once, before the forks
 import numpy  # noqa: F401
 import pytest
 
+from tests.mutation import warm_session
 from tests.mutation.mutate import Mutant, mutants, planted
 from tests.mutation.warm_session import Fault, WarmSession
 
@@ -114,7 +115,7 @@ def _replace(path: str, tree: ast.Module) -> None:
     importlib.machinery.SourceFileLoader.get_code = get_code  # type: ignore[assignment,method-assign]
 
 
-def verdicts_of(faults: list[Fault], tests: list[str]) -> Iterator[tuple[int, bool, bool]]:
+def verdicts_of(faults: list[Fault], tests: list[str], longest_s: float) -> Iterator[tuple[int, bool, bool]]:
     """Yield each fault's number, whether a test noticed it, and whether its lines also run at import.
 
     All happens in a fork, so that this process has not imported the files. Raises ValueError if the tests fail without
@@ -125,7 +126,9 @@ def verdicts_of(faults: list[Fault], tests: list[str]) -> Iterator[tuple[int, bo
     if child == 0:
         os.close(reading)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        session = WarmSession(faults, lambda *verdict: os.write(writing, "{} {:d} {:d}\n".format(*verdict).encode()))
+        session = WarmSession(
+            faults, lambda *verdict: os.write(writing, "{} {:d} {:d}\n".format(*verdict).encode()), longest_s
+        )
         exit_code = pytest.main([*OPTIONS, *tests], plugins=[session])
         if session.failed:
             print(*session.failed, sep="\n", file=sys.stderr, flush=True)
@@ -148,6 +151,13 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--lines", type=int, nargs="+", help="try the faults in these lines, once more")
     parser.add_argument("--seed", type=int, default=1, help="of the draw (1)")
     parser.add_argument("--tests", nargs="+", help="tests to run (those of the file's room)")
+    parser.add_argument(
+        "--longest",
+        type=float,
+        default=warm_session.LONGEST_S,
+        metavar="SECONDS",
+        help=f"leave out tests that take longer while they are traced ({warm_session.LONGEST_S:g} s)",
+    )
     return parser.parse_args()
 
 
@@ -164,7 +174,7 @@ def try_files(files: list[Path], tests: list[str], given: argparse.Namespace) ->
     """Try the faults of `files`, whose tests are the same; return whether these see enough in each."""
     began, verdicts = time.perf_counter(), {os.path.realpath(ROOT / file): Verdicts(file) for file in files}
     faults, again = [fault for file in files for fault in drawn(file, given)], []
-    for number, noticed, at_import in verdicts_of(faults, tests):
+    for number, noticed, at_import in verdicts_of(faults, tests, given.longest):
         if at_import and not noticed:
             again.append(faults[number])
         else:

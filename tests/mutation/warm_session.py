@@ -75,8 +75,10 @@ class WarmSession:
     `judge` hears each mutant's number, whether a test noticed it, and whether it runs at import.
     """
 
-    def __init__(self, faults: list[Fault], judge: Callable[[int, bool, bool], object]) -> None:
-        self.faults, self.judge = faults, judge
+    def __init__(
+        self, faults: list[Fault], judge: Callable[[int, bool, bool], object], longest_s: float = LONGEST_S
+    ) -> None:
+        self.faults, self.judge, self.longest_s = faults, judge, longest_s
         self.paths = {fault.path for fault in faults}
         self.at_import: set[Line] = set()
         self.failed: list[str] = []
@@ -96,12 +98,12 @@ class WarmSession:
         sys.settrace(None)
         if session.testsfailed:
             return True
-        seen: Seen = self._in_fork(lambda told: _write(told, _run_traced(session, self.paths)))[1]
+        seen: Seen = self._in_fork(lambda told: _write(told, _run_traced(session, self.paths, self.longest_s)))[1]
         if seen.failed:
             self.failed = seen.failed
             session.testsfailed = len(seen.failed)
             return True
-        quick = [item for item in session.items if seen.seconds[item.nodeid] < LONGEST_S]
+        quick = [item for item in session.items if seen.seconds[item.nodeid] < self.longest_s]
         for number, fault in enumerate(self.faults):
             items = self._in_order([item for item in quick if seen.lines[item.nodeid] & fault.lines], seen)
             self.judge(number, self._noticed(session, items, seen, fault), bool(fault.lines & self.at_import))
@@ -183,7 +185,7 @@ def _tracer(paths: set[str], lines: set[Line]) -> Callable[[FrameType, str, Any]
     return called
 
 
-def _run_traced(session: pytest.Session, paths: set[str]) -> Seen:
+def _run_traced(session: pytest.Session, paths: set[str], longest_s: float) -> Seen:
     seen = Seen({}, {}, [])
     signal.signal(signal.SIGPROF, lambda *_: pytest.skip("takes too long"))
     for item, following in zip(session.items, [*session.items[1:], None], strict=True):
@@ -191,7 +193,7 @@ def _run_traced(session: pytest.Session, paths: set[str]) -> Seen:
         failed, began = session.testsfailed, time.process_time()
         threading.settrace(_tracer(paths, lines))
         sys.settrace(_tracer(paths, lines))
-        signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
+        signal.setitimer(signal.ITIMER_PROF, longest_s)
         item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         sys.settrace(None)
