@@ -6,7 +6,7 @@ A key is `lfa/<fleet>/<owner>/<topic>`; `lease` and `alive` carry one more part:
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from msgspec import Struct
 
@@ -153,30 +153,34 @@ def address(key: str) -> Address | None:
 
 def message_in(key: str, payload: bytes) -> Message | None:
     """Return the message of the topic of `key` in `payload`; None for a foreign key and bytes that do not decode."""
-    expected = _type_on(key)
+    expected = expected_on(key)
     try:
-        return None if expected is None else decode(payload, expected)
+        return None if expected is None else decode(payload, expected.kind)
     except BadMessage:
         return None
 
 
+class Expected(NamedTuple):
+    """What messages on one key are: their type, and the senders that their headers may name."""
+
+    kind: type
+    signers: frozenset[str]
+
+
 @lru_cache(maxsize=4096)
-def _type_on(key: str) -> type | None:
-    """Return the type of the messages on `key`; None for a foreign key."""
-    where = address(key)
-    return None if where is None or where.topic not in TOPIC else TOPIC[where.topic].type
-
-
-def may_sign(where: Address, topic: Topic, sender: str) -> bool:
-    """Return True if `sender` may be the header's sender of a message on the key `where`.
+def expected_on(key: str) -> Expected | None:
+    """Return what belongs on `key`; None for a foreign key.
 
     Routers check the key, cores the header: both must name the same process; otherwise a process could publish on
     its own key in another's name. Only hardware topics and ground truth may come from the driver or the world instead.
     """
-    if sender == where.owner:
-        return True
+    where = address(key)
+    topic = None if where is None else TOPIC.get(where.topic)
+    if where is None or topic is None:
+        return None
     plays = "driver" in topic.publishers or "world" in topic.publishers
-    return plays and (sender == WORLD_NAME or sender == where.owner.replace("robot", DRIVER_PREFIX, 1))
+    players = (WORLD_NAME, where.owner.replace("robot", DRIVER_PREFIX, 1)) if plays else ()
+    return Expected(topic.type, frozenset((where.owner, *players)))
 
 
 def matches(expression: str, key: str) -> bool:

@@ -48,6 +48,8 @@ class JournalEntry(Struct, frozen=True, array_like=True, gc=False):
     digest: int
 
 
+Call = tuple[str, float, str, bytes, Sequence[tuple[str, bytes]]]
+"""A call of a node: kind, time [s], key and payload as in a `JournalEntry`, and the messages that it sent."""
 _encode = msgspec.msgpack.Encoder().encode
 _entry_decoder = msgspec.msgpack.Decoder(JournalEntry)
 _heading_decoder = msgspec.msgpack.Decoder(Heading)
@@ -70,6 +72,8 @@ class Journal:
         Raises Refused where no file can be written, whatever room there is.
         """
         self._file: AppendedFile | None = None
+        self._calls: list[Call] = []
+        """Calls that are not encoded yet: many of them one after the other take less time than each by itself."""
         self._pending = bytearray()
         if directory is None:
             return
@@ -87,13 +91,27 @@ class Journal:
         self.flush()
 
     def add(self, kind: str, at: float, key: str, payload: bytes, sent: Sequence[tuple[str, bytes]]) -> None:
+        """Add a call of the node, which sent the messages `sent`."""
         if self._file is not None:
-            body = _encode((kind, at, key, payload, digest(sent) if sent else 0))  # as a `JournalEntry`
-            self._pending += len(body).to_bytes(4, "little")
-            self._pending += body
+            self._calls.append((kind, at, key, payload, sent))
+
+    def _take_in(self, calls: Sequence[Call]) -> None:
+        """Encode added calls."""
+        if self._file is not None:
+            pending = self._pending
+            for kind, at, key, payload, sent in calls:
+                body = _encode((kind, at, key, payload, digest(sent) if sent else 0))  # as a `JournalEntry`
+                pending += len(body).to_bytes(4, "little")
+                pending += body
+
+    def _take_in_all(self) -> None:
+        if self._calls:
+            calls, self._calls = self._calls, []
+            self._take_in(calls)
 
     def flush(self) -> None:
         """Write all added entries to the file. On a full disk the journal ends and the robot continues."""
+        self._take_in_all()
         if self._file is None or not self._pending:
             return
         if not self._file.append(self._pending):

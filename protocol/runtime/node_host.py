@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import msgspec
 
-from lfa.protocol.messages.codec import Message, encode
+from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
 from lfa.protocol.node import Envelope, Local, Node, NodeObserver, Received
 from lfa.protocol.runtime.journal import Journal
-from lfa.protocol.topics import TOPIC, address, may_sign, message_in
+from lfa.protocol.topics import expected_on
 
 Sent = list[tuple[str, bytes]]
 
@@ -31,13 +31,15 @@ class NodeHost:
 
     def decoded(self, key: str, payload: bytes) -> Message | None:
         """Return the message in `payload`; if foreign, malformed or in another's name, count it and return None."""
-        message = message_in(key, payload)
-        if message is not None:
-            where, sender = address(key), message.header.sender
-            if where is not None and (sender == where.owner or may_sign(where, TOPIC[where.topic], sender)):
-                return message
-        self.undecodable += 1
-        return None
+        expected = expected_on(key)
+        try:
+            message = None if expected is None else decode(payload, expected.kind)
+        except BadMessage:
+            message = None
+        if expected is None or message is None or message.header.sender not in expected.signers:
+            self.undecodable += 1
+            return None
+        return message
 
     def message(self, at: float, key: str, payload: bytes) -> Sent:
         """Decode and deliver `payload`, received on `key` at `at` [s]; return the messages to publish."""

@@ -12,14 +12,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from lfa.protocol.output import AppendedFile
-from lfa.protocol.runtime.journal import Heading, Journal
+from lfa.protocol.runtime.journal import Call, Heading, Journal
 
 HASHES = "state_hashes.txt"
 ENDED = "-"
 """Hash of a process that does not run."""
 FLUSH_ROWS = 50
 _time = struct.Struct("<d").pack
-_crc32 = zlib.crc32
 
 
 class HashedJournal(Journal):
@@ -27,14 +26,26 @@ class HashedJournal(Journal):
 
     def __init__(self, directory: Path, heading: Heading) -> None:
         super().__init__(directory, heading)
-        self.inputs = 0
-        self.outputs = 0
+        self._inputs = self._outputs = 0
 
     def add(self, kind: str, at: float, key: str, payload: bytes, sent: Sequence[tuple[str, bytes]]) -> None:
-        super().add(kind, at, key, payload, sent)
-        self.inputs = _crc32(payload, _crc32(_time(at) + key.encode(), self.inputs))
-        for to, said in sent:
-            self.outputs = _crc32(said, _crc32(to.encode(), self.outputs))
+        self._calls.append((kind, at, key, payload, sent))  # also where a full disk has ended the file
+
+    def hashes(self) -> tuple[int, int]:
+        """Return the CRC-32 of all inputs added so far, and that of all outputs."""
+        self._take_in_all()
+        return self._inputs, self._outputs
+
+    def _take_in(self, calls: Sequence[Call]) -> None:
+        super()._take_in(calls)
+        heard: list[bytes] = []
+        said: list[bytes] = []
+        for _, at, key, payload, sent in calls:
+            heard += _time(at), key.encode(), payload
+            for to, message in sent:
+                said += to.encode(), message
+        self._inputs = zlib.crc32(b"".join(heard), self._inputs)
+        self._outputs = zlib.crc32(b"".join(said), self._outputs)
 
 
 class StateHashes:
@@ -63,4 +74,4 @@ class StateHashes:
 
 
 def _column(journal: Journal | None) -> str:
-    return f"{journal.inputs:08x}/{journal.outputs:08x}" if isinstance(journal, HashedJournal) else ENDED
+    return "{:08x}/{:08x}".format(*journal.hashes()) if isinstance(journal, HashedJournal) else ENDED
