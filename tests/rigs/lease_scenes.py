@@ -110,3 +110,30 @@ def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
     grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
     effects = [e for other in OTHERS for e in lease.receive(other, grant, at)]
     return lease, asked_at, at, effects
+
+
+ME, (WITNESS, OTHER) = Member(1, 7), OTHERS
+TRIO = (ME, OTHER, WITNESS)
+TWO = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
+"""Robot 1, robot 2 and the witness of `alone`, and their mission."""
+
+
+def led_by_other(lease: Lease, term: Term, now: float) -> Config:
+    """Let the other robot lead under `term`, by a PROPOSE that this process grants; return its config."""
+    config = Config(Version(term), TRIO, WITNESS, None, (OTHER, ME))
+    effects = lease.receive(OTHER, Propose(term, config, 0, OTHER, agreed=lease.agreed), now)
+    assert len(sent(effects, Grant)) == 1
+    return config
+
+
+def committed() -> tuple[Lease, float]:
+    """A lease whose config is joint with none any more and has been accepted by all, and when that was."""
+    lease, _, at, effects = elected(slow_s=0.001)
+    assert not lease.is_committed, "joint with the unanimous start"
+    while not lease.is_committed:
+        at = max(at, lease.next_deadline())
+        newest = sent([*effects, *lease.tick(at)], Propose)[-1]
+        assert isinstance(newest, Propose)
+        grant = Grant(newest.term, newest.round, newest.config.version, at)
+        effects = [effect for other in OTHERS for effect in lease.receive(other, grant, at)]
+    return lease, at

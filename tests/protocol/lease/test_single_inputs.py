@@ -30,34 +30,28 @@ from lfa.protocol.messages.consensus import (
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.messages.stop import NEVER_STOPPED
-from lfa.protocol.mission import Leading, Mission
-from tests.rigs.lease_scenes import HIGH, LOW, OTHERS, STD, A, B, alone, ask, config_of, elected, proposed, sent, voter
-
-ME, (WITNESS, OTHER) = Member(1, 7), OTHERS
-TRIO = (ME, OTHER, WITNESS)
-TWO = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
-
-
-def led_by_other(lease: Lease, term: Term, now: float) -> Config:
-    """Let the other robot lead under `term`, by a PROPOSE that this process grants; return its config."""
-    config = Config(Version(term), TRIO, WITNESS, None, (OTHER, ME))
-    effects = lease.receive(OTHER, Propose(term, config, 0, OTHER, agreed=lease.agreed), now)
-    assert len(sent(effects, Grant)) == 1
-    return config
-
-
-def committed() -> tuple[Lease, float]:
-    """A lease whose config is joint with none any more and has been accepted by all, and when that was."""
-    lease, _, at, effects = elected(slow_s=0.001)
-    assert not lease.is_committed, "joint with the unanimous start"
-    while not lease.is_committed:
-        at = max(at, lease.next_deadline())
-        newest = sent([*effects, *lease.tick(at)], Propose)[-1]
-        assert isinstance(newest, Propose)
-        grant = Grant(newest.term, newest.round, newest.config.version, at)
-        effects = [effect for other in OTHERS for effect in lease.receive(other, grant, at)]
-    return lease, at
-
+from tests.rigs.lease_scenes import (
+    HIGH,
+    LOW,
+    ME,
+    OTHER,
+    OTHERS,
+    STD,
+    TRIO,
+    TWO,
+    WITNESS,
+    A,
+    B,
+    alone,
+    ask,
+    committed,
+    config_of,
+    elected,
+    led_by_other,
+    proposed,
+    sent,
+    voter,
+)
 
 # --- what an agent reads -----------------------------------------------------------------------------------------
 
