@@ -6,6 +6,10 @@ resident memory.
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # isort: skip  # before any other module
+import lfa.protocol.program_start.lean_msgspec  # isort: skip  # noqa: F401
+
+# isort: split
 import argparse
 import os
 import signal

@@ -6,6 +6,9 @@ stderr and exit code 2.
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import signal
 import sys
 from collections.abc import Sequence

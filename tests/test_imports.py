@@ -23,8 +23,8 @@ MAY: dict[str, set[str]] = {
 }  # fmt: skip
 
 ORDER = (
-    "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file", "protocol/plug_in",
-    "protocol/clock",
+    "protocol/program_start", "protocol/errors", "protocol/output", "protocol/file_reading", "protocol/config_file",
+    "protocol/plug_in", "protocol/clock",
     "protocol/incarnations",
     "protocol/names", "protocol/geometry", "protocol/mission", "protocol/mission_checks", "protocol/messages",
     "protocol/node", "protocol/topics", "protocol/outbox", "protocol/fleet_stop", "protocol/lease",

@@ -5,6 +5,9 @@ Like an agent it needs the base install only.
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import argparse
 import os
 import shlex

@@ -6,6 +6,9 @@ late: some robots keep their last velocity for ever. Start: `python -m lfa.deplo
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import signal
 import struct
 import sys

@@ -10,6 +10,9 @@ Start: `python -m lfa.deploy.robot.watchdog SILENT_S COMMAND...`.
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import os
 import select
 import signal

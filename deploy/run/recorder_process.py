@@ -7,6 +7,9 @@ that the launcher died: the run is then aborted, and this process cleans up in i
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import shutil
 import signal
 import sys

@@ -6,6 +6,9 @@ small computer on a robot, spends more time on imports than on the end of the pr
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import signal
 import sys
 from collections.abc import Callable

@@ -6,6 +6,9 @@ guardian again in the same way (`supervisor.py`). Neither is the parent that the
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import os
 import select
 import signal

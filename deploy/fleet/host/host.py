@@ -6,6 +6,9 @@ error, with exit code 2 if the request is refused.
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import contextlib
 import os
 import shutil

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import os
 import signal
 import socket

@@ -8,6 +8,9 @@ router. The processes outlive a supervisor that dies: its guardian (`guardian.py
 
 from __future__ import annotations
 
+import lfa.protocol.program_start.installed_first  # noqa: F401 (before any other module)
+
+# isort: split
 import os
 import select
 import signal
