@@ -35,7 +35,7 @@ from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import LeaseNote, Member, Role, Term
 from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.robot import GroundProfile, LaserScan, Localization, SensorReading, Sensors
-from lfa.protocol.messages.stop import StopOrder, StopReport
+from lfa.protocol.messages.stop import StopKnowledge, StopOrder, StopReport
 from lfa.protocol.messages.team import Ask, FormationNote, ObstacleNote, OperatorNote, PoseStamped, TableRow
 from lfa.protocol.mission import Mission
 from lfa.protocol.mission_checks import check_mission
@@ -108,6 +108,11 @@ class RobotCore:
     def finished(self) -> bool:
         """True when a requested exit is complete: the final messages are out."""
         return self._pending_release and self.lease.released
+
+    @property
+    def stop_known(self) -> StopKnowledge:
+        """What this robot knows of the fleet stop."""
+        return self._stop_listener.known
 
     @property
     def lacks_messages(self) -> bool:

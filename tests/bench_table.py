@@ -1,7 +1,8 @@
 """The performance table of deploy/docs/performance.md, from the JSON of the benches: `make bench-table`.
 
 `python -m tests.bench_table [BENCH[/GLOB]]...` runs these benches, all of `BENCHES` by default, keeps their rows in
-`runs/bench`, and writes the table of all rows kept so far. What falls short is named with its next bottleneck.
+`runs/bench`, and puts them into the table, in the place of rows of the same names. What falls short is named with its
+next bottleneck.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "deploy" / "docs" / "performance.md"
 KEPT = ROOT / "runs" / "bench"
 BEGIN, END = "<!-- begin: make bench-table -->\n", "<!-- end -->"
-BENCHES = ("lidar", "world", "sim", "agent", "agents", "lockstep", "latency", "router", "failover", "soak")
+BENCHES = ("lidar", "world", "sim", "agent", "agents", "lockstep", "latency", "router", "failover", "operate", "soak")
 """Benches of the table; those of driving and of campaigns have pages of their own."""
 BOTTLENECKS = {
     "sim/1000*": "the agents' own steps, then the rows of the team's table, each heard by all",
@@ -44,7 +45,7 @@ def main(chosen: Sequence[str]) -> None:
         bench, _, glob = name.partition("/")
         keep(bench, rows_of(bench, glob))
     whole = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(with_table(whole, text(kept())), encoding="utf-8")
+    PAGE.write_text(with_table(whole, text(kept(on_page(whole)))), encoding="utf-8")
 
 
 def rows_of(bench: str, glob: str) -> list[dict[str, Any]]:
@@ -67,10 +68,30 @@ def keep(bench: str, rows: Sequence[Mapping[str, Any]]) -> None:
     file.write_text(json.dumps(list(known.values()), indent=1))
 
 
-def kept() -> dict[str, list[dict[str, Any]]]:
-    """Return the rows kept so far, by bench, in the order of `BENCHES`."""
-    files = {name: KEPT / f"{name}.json" for name in BENCHES}
-    return {name: json.loads(file.read_text()) for name, file in files.items() if file.is_file()}
+def kept(before: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows kept so far, by bench, in the order of `BENCHES`, and those of `before` that no run replaces."""
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for name in BENCHES:
+        file = KEPT / f"{name}.json"
+        newer = json.loads(file.read_text()) if file.is_file() else []
+        known = {row["name"]: dict(row) for row in [*before.get(name, ()), *newer]}
+        if known:
+            rows[name] = list(known.values())
+    return rows
+
+
+def on_page(page: str) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of the table on the page, by bench."""
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for line in page.partition(BEGIN)[2].partition(END)[0].splitlines()[2:]:
+        if not line.startswith("| "):
+            break
+        bench, name, measured, bar, ratio, mark = (cell.strip() for cell in line.strip("|").split("|"))
+        value, _, unit = measured.partition(" ")
+        row = {"name": name, "value": float(value), "unit": unit or "1", "ok": mark != "short"}
+        row |= {"bar": float(bar) if bar else None, "ratio": float(ratio) if ratio else None}
+        rows.setdefault(bench, []).append(row)
+    return rows
 
 
 def text(benches: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:

@@ -30,7 +30,19 @@ def test_new_rows_take_the_place_of_old_ones_of_the_same_name(tmp_path: Path, mo
     monkeypatch.setattr(bench_table, "KEPT", tmp_path)
     bench_table.keep("lidar", [GOOD, FREE])
     bench_table.keep("lidar", [GOOD | {"value": 1.0}])
-    assert [row["value"] for row in bench_table.kept()["lidar"]] == [1.0, 12.0]
+    assert [row["value"] for row in bench_table.kept({})["lidar"]] == [1.0, 12.0]
+
+
+def test_rows_of_the_page_stay_where_their_bench_was_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench_table, "KEPT", tmp_path)
+    page = bench_table.PAGE.read_text()
+    before = bench_table.on_page(page)
+    assert {"lidar", "sim", "agent"} <= before.keys()
+    assert bench_table.with_table(page, bench_table.text(bench_table.kept(before))) == page
+    bench_table.keep("lidar", [before["lidar"][0] | {"value": 7.0}])
+    after = bench_table.kept(before)
+    assert [row["value"] for row in after["lidar"]] == [7.0, *(row["value"] for row in before["lidar"][1:])]
+    assert after["sim"] == before["sim"]
 
 
 def test_the_page_has_marks_for_the_table() -> None:

@@ -121,6 +121,11 @@ class Simulator(VirtualTime):
         for process in [self._processes[name] for name in observers if name in self._processes]:
             self._give(process, "", event, b"")
 
+    def deliver(self, name: str, key: str, payload: bytes) -> None:
+        """Deliver a message from outside the simulation to the process `name` alone, now, if it runs."""
+        if name in self._processes:
+            self._give(self._processes[name], key, decode(payload, TOPIC[key.split("/")[3]].type), payload)
+
     def pause(self, name: str) -> None:
         """Simulate SIGSTOP: the process does nothing, and its messages are queued."""
         self._processes[name].paused = True

@@ -12,10 +12,11 @@ from random import Random
 from typing import Any
 
 from lfa.agents.agent import Agent
-from lfa.deploy.analysis.verification.checker import Checker, CheckerGroup
+from lfa.deploy.analysis.verification.checker import Arguments, Checker, CheckerGroup
 from lfa.deploy.analysis.verification.lease_observer import report_effect
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.fuzz.agent_processes import AgentProcess, WorldProcess, unread
+from lfa.deploy.fuzz.gateways import RunningGateway
 from lfa.deploy.fuzz.network import Trace, effect_text
 from lfa.deploy.fuzz.observers import GatewayObserver
 from lfa.deploy.fuzz.partition import Partitioned
@@ -25,15 +26,16 @@ from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.lease.effects import BecomeLeader, Effect, StandAside
 from lfa.protocol.lease.machine.lease import Lease, Observed
 from lfa.protocol.lease.machine.table import LeaseEvent
-from lfa.protocol.lease.timing import CONTROL_PERIOD_S, timing_for, timing_of
-from lfa.protocol.messages.codec import Message
+from lfa.protocol.lease.timing import CONTROL_PERIOD_S, Timing, timing_for, timing_of
+from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import StopKnowledge, StopOrder
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.names import WITNESS_ID, robot_id_of, robot_name
 from lfa.protocol.node import Node, NodeObserver, PeerDown, PeerUp
 from lfa.protocol.runtime.journal import Journal
-from lfa.protocol.topics import WORLD_NAME
+from lfa.protocol.topics import OPERATOR_NAME, WORLD_NAME, key
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
 from lfa.world.checkpoint import resumed
@@ -58,7 +60,7 @@ class AgentSimulation(Partitioned):
         leading = Leading(route_m=((road_m, 0.0),))
         robots = tuple(range(1, schedule.robots + 1))
         self.mission = Mission(robots, witness=schedule.witness, profile=schedule.profile, leading=leading)
-        self.timing = timing_of(schedule.profile)
+        self.timing: Timing = timing_of(schedule.profile)
         self.trace: Trace | None = None
         self.wall_ms: dict[int, int] = {}
         """Error [ms] of each host's wall clock, which terms and numbers of incarnations that begin there follow."""
@@ -212,6 +214,33 @@ class AgentSimulation(Partitioned):
     def latch(self, robot_id: int, incarnation: int) -> None:
         """Deliver the liveliness event of the agent's vanished token to the robot's gateway, true or false."""
         self.simulator.hint(PeerDown(robot_name(robot_id), incarnation), [WORLD_NAME])
+
+    # --- the fleet stop ----------------------------------------------------------------------------------------
+
+    def report(self, fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None:
+        """Notify the checkers of a fact that another part of the simulation has observed."""
+        self._report(fact, *arguments)
+
+    def host_of_gateway(self, robot_id: int) -> int:
+        """Return the id of the host of a robot's gateway, its own: operators reach it as they reach its agent."""
+        return robot_id
+
+    def gateway_now(self, robot_id: int) -> RunningGateway | None:
+        """Return a robot's gateway with its own time [s]; None while the world is down or has not begun."""
+        process = self.gateways.get(robot_id)
+        if process is None or not process.alive or robot_id not in process.world.gateways:
+            return None
+        return RunningGateway(process.world.gateways[robot_id], process.clock.local(self.now))
+
+    def stop_known(self, robot_id: int) -> StopKnowledge | None:
+        """Return what a robot's agent knows of the fleet stop; None while it does not run."""
+        process = self.processes.get(robot_id)
+        core = process.node.core if process is not None and isinstance(process.node, Agent) else None
+        return core.stop_known if process is not None and process.alive and core is not None else None
+
+    def tell_stop(self, robot_id: int, order: StopOrder) -> None:
+        """Deliver an order of the fleet stop to a robot's agent."""
+        self.simulator.deliver(robot_name(robot_id), key(FLEET, OPERATOR_NAME, "stop"), encode(order))
 
     # --- the network -------------------------------------------------------------------------------------------
 

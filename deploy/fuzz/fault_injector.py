@@ -16,12 +16,13 @@ from lfa.deploy.analysis.verification.leadership import NextInChain, Steady, Sto
 from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.analysis.verification.words_kept import WORDS_KEPT
+from lfa.deploy.client.stop_call import StopOutcome
 from lfa.deploy.fuzz.held_messages import MessageHolder
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.roster_calls import RosterCalls
 from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
-from lfa.deploy.fuzz.stops import StopTraffic
+from lfa.deploy.fuzz.stops import StopQuestions, StopTraffic
 from lfa.deploy.fuzz.tricks import Tricks
 from lfa.protocol.lease.membership import team_of
 from lfa.protocol.lease.quorum import is_quorum
@@ -50,6 +51,8 @@ class Played(Struct):
     """Number of faults that took effect, by kind."""
     elections: int
     simulation: Simulation
+    stops: list[tuple[float, float, StopOutcome]]
+    """Results of the operators' calls that have ended, with the times [s] of their begin and end."""
     broken: BrokenRule | None = None
     """Rule that the first violation to show one shows to be broken, with its chain of causes; None: none does."""
 
@@ -241,11 +244,13 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
         checker.told = watch.note
     simulation.listen(checkers)
     faults = Faults(simulation, schedule)
+    traffic = StopTraffic(simulation, simulation.robots, schedule.seed)
     if isinstance(simulation, LeaseSimulation):
         simulation.filter = MessageHolder(simulation, schedule) if schedule.held else None
-        traffic = StopTraffic(simulation, simulation.robots, schedule.seed)
-        traffic.begin(schedule.stops)
-        simulation.listen([*checkers, traffic.observer])
+        StopQuestions(simulation, simulation.robots, traffic.links)
+    traffic.begin(schedule.stops)
+    simulation.listen([*checkers, traffic.observer])
+    if isinstance(simulation, LeaseSimulation):
         rosters = RosterCalls(simulation)
         rosters.begin(schedule.rosters)
         Tricks(simulation).begin(schedule.tricks)
@@ -256,7 +261,7 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
     violations = [v for checker in checkers for v in checker.violations]
     elections = sum(1 for _, _, effect in simulation.log if type(effect).__name__ == "BecomeLeader")
     broken = next((rule for _, rule in watch.broken_rules if rule is not None), None)
-    return Played(schedule, violations, faults.counts, elections, simulation, broken)
+    return Played(schedule, violations, faults.counts, elections, simulation, traffic.outcomes, broken)
 
 
 def _checkers(schedule: Schedule) -> list[type[Checker]]:

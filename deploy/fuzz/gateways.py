@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from msgspec import Struct
 
 from lfa.deploy.analysis.verification.checker import Checker
@@ -12,6 +14,13 @@ from lfa.protocol.messages.consensus import Fence, Fenced, GatewayStamp, LeaseBo
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.transport.link_model import Radio
 from lfa.world.virtual_time import LocalClock
+
+
+class RunningGateway(NamedTuple):
+    """Gateway of a robot, and the time [s] by its own clock."""
+
+    gateway: Gateway
+    local_s: float
 
 
 class GatewayHost(Struct):
@@ -58,6 +67,13 @@ class GatewaySimulation(Network):
 
     def kill_gateway(self, robot_id: int) -> None:
         self.gateways[robot_id].alive = False
+
+    def gateway_now(self, robot_id: int) -> RunningGateway | None:
+        """Return a robot's gateway with its own time [s]; None while it is down."""
+        host = self.gateways.get(robot_id)
+        if host is None or not host.alive:
+            return None
+        return RunningGateway(host.gateway, host.clock.local(self.now))
 
     def latch(self, robot_id: int, incarnation: int) -> None:
         """Deliver the liveliness event of the agent's vanished token to the robot's gateway, true or false."""

@@ -34,6 +34,7 @@ from lfa.protocol.messages.consensus import (
 )
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
+from lfa.protocol.messages.stop import StopKnowledge, StopOrder
 from lfa.protocol.names import robot_name
 from lfa.world.simulator import HINT_DELAY_S
 from lfa.world.virtual_time import LocalClock
@@ -89,6 +90,19 @@ class Hosts(GatewaySimulation):
         """`BecomeLeader`, `StepDown` and `StandAside` effects, each with its true time [s] and the id."""
         self._addresses = {name: to for i in self.ids for name, to in ((robot_name(i), i), (f"gateway{i}", -i))}
         self._others = {i: tuple(other for other in self.ids if other != i) for i in self.ids}
+
+    # --- the fleet stop ----------------------------------------------------------------------------------------
+
+    def stop_known(self, robot_id: int) -> StopKnowledge | None:
+        """Return what a robot's process knows of the fleet stop; None while it does not run."""
+        process = self.processes.get(robot_id)
+        return process.stop.known if process is not None and process.alive else None
+
+    def tell_stop(self, robot_id: int, order: StopOrder) -> None:
+        """Deliver an order of the fleet stop to a robot's process; a paused one misses it."""
+        process = self.processes.get(robot_id)
+        if process is not None and process.alive and not process.paused:
+            process.stop.order(order)
 
     # --- inputs ------------------------------------------------------------------------------------------------
 

@@ -46,6 +46,9 @@ LEADER_SHARE = 0.4
 MIXED_AT_S = 0.05
 """Time [s] of a fault before the first election."""
 
+LOST_SHARE, LOSSES = 0.3, ("restart", "cut", "pause")
+"""Share of the stops of complete agents at whose moment the leader is lost, and how."""
+
 LEADER = -1
 FIRST_AT_S = 1.5
 """Time [s] of the first fault of a systematic schedule: a leader has long led."""
@@ -160,6 +163,19 @@ def draw(seed: int) -> Schedule:
         revive_all=random.random() < 0.5,
     )
     return _calm(schedule) if share < CALM_SHARE else schedule
+
+
+def draw_whole(seed: int) -> Schedule:
+    """Draw the schedule of a seed for complete agents: some leaders are lost as an operator stops the fleet."""
+    schedule, random = draw(seed), Random(f"whole-{seed}")
+    if not schedule.faults or schedule.is_single:
+        return schedule
+    lost = [
+        ScheduledFault(call.at - random.uniform(0.0, 0.02), random.choice(LOSSES), (LEADER,), random.uniform(0.1, 1.0))
+        for call in schedule.stops
+        if call.kind == "stop" and random.random() < LOST_SHARE
+    ]
+    return structs.replace(schedule, faults=tuple(sorted([*schedule.faults, *lost], key=_when)))
 
 
 def _calm(schedule: Schedule) -> Schedule:

@@ -1,4 +1,4 @@
-"""Operators who stop and resume the team of a fuzz schedule, and the words of the fleet stop between its processes.
+"""Operators who stop and resume the team of a fuzz schedule, of leases alone or of complete agents.
 
 Its messages have a random generator of their own: a schedule of the leases is the same with and without stops. Words
 come late, twice, or again long after; operators sit at a host, and share its cuts.
@@ -6,10 +6,13 @@ come late, twice, or again long after; operators sit at a host, and share its cu
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from random import Random
+from typing import Any, Protocol
 
-from lfa.deploy.analysis.verification.checker import Checker
+from lfa.deploy.analysis.verification.checker import Arguments, Checker
 from lfa.deploy.client.stop_call import StopCall, StopOutcome
+from lfa.deploy.fuzz.gateways import RunningGateway
 from lfa.deploy.fuzz.lease_processes import Hosts, Process
 from lfa.deploy.fuzz.partition import place
 from lfa.deploy.fuzz.schedules import ScheduledFault
@@ -28,14 +31,54 @@ STEP_S = 0.01
 LOCAL_S = 0.0003
 
 
+class StoppedTeam(Protocol):
+    """Simulation whose team operators stop: its time, its links, and the two that keep a robot's word."""
+
+    timing: Timing
+    link_model: LinkModel
+
+    @property
+    def now(self) -> float: ...
+
+    def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None: ...
+
+    def report(self, fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None: ...
+
+    def host_of_gateway(self, robot_id: int) -> int: ...
+
+    def gateway_now(self, robot_id: int) -> RunningGateway | None:
+        """Return the gateway of a robot; None while it is down."""
+
+    def stop_known(self, robot_id: int) -> StopKnowledge | None:
+        """Return what the agent of a robot knows of the fleet stop; None while it does not run."""
+
+    def tell_stop(self, robot_id: int, order: StopOrder) -> None:
+        """Deliver an order to the agent of a robot, if it runs."""
+
+
+class StopLinks:
+    """Links of the simulation as the words of the fleet stop cross them, by a random generator of their own."""
+
+    def __init__(self, team: StoppedTeam, random: Random) -> None:
+        self._team = team
+        self._link_model = LinkModel(team.link_model.radio, random)
+
+    def delays(self, here: int, there: int) -> list[float]:
+        """Return the delay [s] of each copy of a word from host to host."""
+        if here == there:
+            return [LOCAL_S]
+        self._link_model.radio, self._link_model.cuts = self._team.link_model.radio, self._team.link_model.cuts
+        return self._link_model.delays(place(here), place(there))
+
+
 class StopTraffic:
     """Stops of one simulation; `begin` schedules them."""
 
-    def __init__(self, team: Hosts, robots: tuple[int, ...], seed: int) -> None:
+    def __init__(self, team: StoppedTeam, robots: tuple[int, ...], seed: int) -> None:
         self._team = team
         self._robots = robots
         self._random = Random(f"stops-{seed}")
-        self._link_model = LinkModel(team.link_model.radio, self._random)
+        self.links = StopLinks(team, self._random)
         self._said: list[StopOrder] = []
         self._acknowledged: dict[int, StopWord] = {}
         """Greatest stop that each robot's gateway has acknowledged, as kept by its agent too."""
@@ -51,8 +94,7 @@ class StopTraffic:
         return _Observer(self._team.timing, self)
 
     def begin(self, calls: tuple[ScheduledFault, ...]) -> None:
-        """Schedule the calls of operators, the replays of their words, and the questions of agents."""
-        self._team.at(0.0, self._ask_all)
+        """Schedule the calls of operators, and the replays of their words."""
         for number, call in enumerate(calls, start=1):
             if call.kind == "replay":
                 self._team.at(call.at, self._replay, call.targets[0])
@@ -86,10 +128,10 @@ class StopTraffic:
             self.outcomes.append((begun, now, outcome))
 
     def _send(self, order: StopOrder, robot: int, host: int, call: StopCall | None) -> None:
-        for delay_s in self._delays(host, self._team.host_of_gateway(robot)):
+        for delay_s in self.links.delays(host, self._team.host_of_gateway(robot)):
             self._team.at(self._team.now + delay_s, self._at_gateway, order, robot, host, call)
-        for delay_s in self._delays(host, robot):
-            self._team.at(self._team.now + delay_s, self._at_process, order, robot)
+        for delay_s in self.links.delays(host, robot):
+            self._team.at(self._team.now + delay_s, self._team.tell_stop, robot, order)
 
     def _replay(self, robot: int) -> None:
         """Deliver each word of before once more to one robot, in any order."""
@@ -97,19 +139,13 @@ class StopTraffic:
         for order in self._random.sample(list(words.values()), len(words)):
             self._send(order, robot, robot, None)
 
-    def _delays(self, here: int, there: int) -> list[float]:
-        if here == there:
-            return [LOCAL_S]
-        self._link_model.radio, self._link_model.cuts = self._team.link_model.radio, self._team.link_model.cuts
-        return self._link_model.delays(place(here), place(there))
-
     # --- gateways and processes --------------------------------------------------------------------------------
 
     def _at_gateway(self, order: StopOrder, robot: int, host: int, call: StopCall | None) -> None:
-        running = self._team.gateways.get(robot)
-        if running is None or not running.alive:
+        running = self._team.gateway_now(robot)
+        if running is None:
             return
-        gateway, local = running.gateway, running.clock.local(self._team.now)
+        gateway, local = running
         gateway.stop.order(order, local)
         self._team.report(Checker.hears_order, self._team.now, robot, gateway.incarnation, order)
         self._answers += 1
@@ -119,22 +155,17 @@ class StopTraffic:
             self._acknowledged[robot] = max(self._acknowledged.get(robot, NO_STOP), state.known.word)
             self._team.report(Checker.stop_acknowledged, self._team.now, robot, state.known.word)
         if call is not None:
-            for delay_s in self._delays(self._team.host_of_gateway(robot), host):
+            for delay_s in self.links.delays(self._team.host_of_gateway(robot), host):
                 self._team.at(self._team.now + delay_s, self._answered, call, robot, state)
         self.check_wheels(robot)
 
     def _answered(self, call: StopCall, robot: int, state: StopState) -> None:
         call.hear(robot, state, self._team.now)
 
-    def _at_process(self, order: StopOrder, robot: int) -> None:
-        process = self._team.processes.get(robot)
-        if process is not None and process.alive and not process.paused:
-            process.stop.order(order)
-
     def check_wheels(self, robot: int) -> None:
         """Report it if the wheels of a robot turn, after its gateway has obeyed a command or an order."""
-        running = self._team.gateways[robot]
-        if running.gateway.twist(running.clock.local(self._team.now)) != STILL:
+        running = self._team.gateway_now(robot)
+        if running is not None and running.gateway.twist(running.local_s) != STILL:
             self._team.report(Checker.turns, self._team.now, robot, running.gateway.stop.known.word)
 
     def gateway_started(self, robot: int) -> None:
@@ -159,10 +190,10 @@ class StopTraffic:
     def _has_forgotten(self, robot: int) -> bool:
         """Return True if neither agent nor gateway of a robot knows the stop that it has acknowledged."""
         word = self._acknowledged.get(robot)
-        process, running = self._team.processes.get(robot), self._team.gateways.get(robot)
-        if word is None or (process is not None and process.alive and process.stop.known.word >= word):
+        agent, running = self._team.stop_known(robot), self._team.gateway_now(robot)
+        if word is None or (agent is not None and agent.word >= word):
             return False
-        known = running.gateway.stop.known if running is not None and running.alive else None
+        known = None if running is None else running.gateway.stop.known
         return not (known is not None and known.certain and known.word >= word)
 
     def _forgets(self, robot: int) -> None:
@@ -171,34 +202,9 @@ class StopTraffic:
         self._team.report(Checker.stop_forgotten, self._team.now, robot)
 
     def _most_know(self, word: StopWord) -> bool:
-        agents = (self._team.processes.get(robot) for robot in self._robots)
-        knowing = sum(one is not None and one.alive and one.stop.known.word >= word for one in agents)
+        agents = (self._team.stop_known(robot) for robot in self._robots)
+        knowing = sum(one is not None and one.word >= word for one in agents)
         return 2 * knowing > len(self._robots)
-
-    def _ask_all(self) -> None:
-        self._team.at(self._team.now + ASK_S / 2.0, self._ask_all)
-        for process in list(self._team.processes.values()):
-            if process.id in self._robots and process.alive and not process.paused:
-                self._ask(process)
-
-    def _ask(self, process: Process) -> None:
-        """Let the agent of `process` ask the others, if it is due (E30)."""
-        if not process.stop.ask_due(process.clock.local(self._team.now)):
-            return
-        for other in self._robots:
-            for delay_s in self._delays(process.id, other) if other != process.id else ():
-                self._team.at(self._team.now + delay_s, self._asked, process.member, other)
-
-    def _asked(self, asker: Member, robot: int) -> None:
-        process = self._team.processes.get(robot)
-        if process is not None and process.alive and not process.paused:
-            for delay_s in self._delays(robot, asker.id):
-                self._team.at(self._team.now + delay_s, self._learn, asker, robot, process.stop.known)
-
-    def _learn(self, asker: Member, robot: int, known: StopKnowledge) -> None:
-        process = self._team.processes[asker.id]
-        if process.member == asker and process.alive and not process.paused:
-            process.stop.hear_agent(robot, known)
 
 
 class _Observer(Checker):
@@ -216,3 +222,38 @@ class _Observer(Checker):
 
     def lives(self, at: float, who: Member) -> None:
         self._traffic.agent_started(who.id)
+
+
+class StopQuestions:
+    """Questions of processes that do not know enough of the fleet stop (E30); complete agents ask by themselves."""
+
+    def __init__(self, team: Hosts, robots: tuple[int, ...], links: StopLinks) -> None:
+        self._team = team
+        self._robots = robots
+        self._links = links
+        team.at(0.0, self._ask_all)
+
+    def _ask_all(self) -> None:
+        self._team.at(self._team.now + ASK_S / 2.0, self._ask_all)
+        for process in list(self._team.processes.values()):
+            if process.id in self._robots and process.alive and not process.paused:
+                self._ask(process)
+
+    def _ask(self, process: Process) -> None:
+        """Let the agent of `process` ask the others, if it is due (E30)."""
+        if not process.stop.ask_due(process.clock.local(self._team.now)):
+            return
+        for other in self._robots:
+            for delay_s in self._links.delays(process.id, other) if other != process.id else ():
+                self._team.at(self._team.now + delay_s, self._asked, process.member, other)
+
+    def _asked(self, asker: Member, robot: int) -> None:
+        process = self._team.processes.get(robot)
+        if process is not None and process.alive and not process.paused:
+            for delay_s in self._links.delays(robot, asker.id):
+                self._team.at(self._team.now + delay_s, self._learn, asker, robot, process.stop.known)
+
+    def _learn(self, asker: Member, robot: int, known: StopKnowledge) -> None:
+        process = self._team.processes[asker.id]
+        if process.member == asker and process.alive and not process.paused:
+            process.stop.hear_agent(robot, known)

@@ -16,7 +16,7 @@ from lfa.deploy.client.mission_changes import along
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import FAIR
 from lfa.deploy.fuzz.schedules import ScheduledFault
-from lfa.deploy.fuzz.stops import StopTraffic
+from lfa.deploy.fuzz.stops import StopQuestions, StopTraffic
 
 SEEDS = 50
 DRIVING_S = 4.0
@@ -74,6 +74,7 @@ def _result(loss: float, seed: int) -> tuple[float, int]:
     """Return how long [s] a stop took whose messages are lost in `loss` of all cases, and how many robots it named."""
     team = LeaseSimulation(ROBOTS, seed=seed, radio=structs.replace(FAIR, loss=loss)).start_all()
     traffic = StopTraffic(team, team.mission.robots, seed)
+    StopQuestions(team, team.mission.robots, traffic.links)
     traffic.begin((ScheduledFault(1.0, "stop", (0,)),))
     team.run(3.0)
     ((said_at, ended_at, outcome),) = traffic.outcomes

@@ -12,7 +12,7 @@ from msgspec import Struct, structs
 from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.fuzz.fault_injector import Played, play, play_whole
 from lfa.deploy.fuzz.network import Trace
-from lfa.deploy.fuzz.schedules import Schedule, draw, without
+from lfa.deploy.fuzz.schedules import Schedule, draw, draw_whole, without
 from lfa.deploy.fuzz.search import guided, systematic
 from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 
@@ -45,7 +45,9 @@ class Search(Struct, frozen=True):
         """Return the schedule of a seed; of a guided search by playing its island up to it."""
         if self.kind == "guided":
             return next(played.schedule for _, played in guided.evolve(range(seed, seed + 1), self.player))
-        return systematic.schedule(seed) if self.kind == "systematic" else draw(seed)
+        if self.kind == "systematic":
+            return systematic.schedule(seed)
+        return draw_whole(seed) if self.whole else draw(seed)
 
     def played(self, seeds: range) -> Iterator[tuple[int, Played]]:
         """Play the schedules of `seeds` and yield each seed with its result."""

@@ -10,9 +10,10 @@ import pytest
 from msgspec.structs import replace
 
 from lfa.deploy.fuzz.fault_injector import play_whole
-from lfa.deploy.fuzz.schedules import KINDS, LEADER, ScheduledFault, draw
+from lfa.deploy.fuzz.schedules import KINDS, LEADER, ScheduledFault, draw, draw_whole
 from lfa.deploy.fuzz.search.searches import shrink
 from lfa.protocol.lease.gateway import Gateway
+from tests.protocol.lease import plants_of_stops as stops
 
 SEEDS = (2, 3, 4, 7, 8, 14, 15, 18, 19)
 """Small teams, which are quick; between them every kind of fault."""
@@ -35,6 +36,25 @@ def test_one_seed_is_one_run_under_any_hash_seed() -> None:
     ]
     assert told[0] == told[1]
     assert len(told[0].splitlines()) > 50
+
+
+@pytest.mark.parametrize("seed", [2, 7])
+def test_i10_holds_for_whole_agents_that_operators_stop_also_when_the_leader_is_lost_at_that_moment(seed: int) -> None:
+    schedule = draw_whole(seed)
+    said = [call.at for call in schedule.stops if call.kind == "stop"]
+    lost = [fault for fault in schedule.faults if fault not in draw(seed).faults]
+    assert all(fault.targets == (LEADER,) and any(0.0 <= at - fault.at <= 0.02 for at in said) for fault in lost)
+    played = play_whole(schedule)
+    assert played.violations == [], f"reproduce: lfa fuzz --whole --seed {seed} -v"
+    assert any(outcome.complete for _, _, outcome in played.stops)
+
+
+def test_i10_a_whole_agent_that_drives_after_it_has_acknowledged_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    stops.stop_is_not_held(monkeypatch)
+    played = play_whole(draw_whole(7))
+    assert {"I10", "I16"} <= {violation.name for violation in played.violations}
+    assert played.broken is not None
+    assert played.broken.rules == ("E28",)
 
 
 @pytest.mark.usefixtures("forgetful_voter")
