@@ -72,7 +72,8 @@ test-campaign: $(STAMP)
 
 # Every situation of shared/cases in which a team has to come through, in virtual time: some five minutes.
 test-driving: $(STAMP)
-	$(BIN)/pytest -m 'campaign or not campaign' -rs tests/deploy/scenarios/test_driving_cases.py
+	$(BIN)/pytest -m 'campaign or not campaign' -rs tests/deploy/scenarios/test_driving_cases.py \
+		tests/deploy/scenarios/test_make_room.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

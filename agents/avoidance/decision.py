@@ -29,6 +29,8 @@ class Action(StrEnum):
     RIGHT = "right"
     U_TURN = "u_turn"
     BACK = "back"
+    MAKE_ROOM = "make_room"
+    """Back along the own trail, for a team-mate that has to pass."""
     CREEP = "creep"
     BLOCKED = "blocked"
     PLAN_ROUND = "plan_round"

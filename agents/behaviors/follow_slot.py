@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.avoidance.detour import Detour
+from lfa.agents.behaviors.make_room import ROOM, MakeRoom
 from lfa.agents.behaviors.team_mates import TeamMates
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.predecessor import Sighting
@@ -61,11 +62,13 @@ class FollowSlot:
         self._leading = leading
         self._own_readings = own_readings
         self._free_slot = FreeSlot(mission.radius_m)
+        self._make_room = MakeRoom(mission.radius_m)
         self._way_back: WayBack | None = None
         """Way back to the slot; None before this follower has lost it for the first time."""
 
     def end(self) -> None:
-        """Give up a planned way: the robot has another role."""
+        """Give up a planned way and the room that it makes: the robot has another role."""
+        self._make_room.end()
         if self._way_back is not None:
             self._way_back.end()
 
@@ -91,6 +94,13 @@ class FollowSlot:
         wanted = self._follower.step(sighting, slot, pose, twist, dt, on_trace=trace)
         if sighting is None or sighting.age_s > FRESH_S:
             return wanted
+        room = self._make_room.step(sighting, points, pose, now)
+        if room is not None:
+            self._detour.decision = ROOM
+            return room
+        if self._detour.decision is ROOM:
+            self._detour.decision = None
+            self._follower.rejoin(pose, last)
         if trace and self._follower.readout.error_m < ON_TRACE_M:
             return wanted
         place = self._follower.readout.slot_map

@@ -34,6 +34,9 @@ ROOMY = 60
 """Cost of a step up to which a robot has room to spare."""
 BARRED_M, BARRED_S = 0.15, 60.0
 """Radius [m] around a place where the body did not fit, and time [s] for which no route leads through it."""
+BARRED_AGAIN = 2
+"""Number of times that such places are tried once more, where no way is left without them, until the goal counts as
+walled in: noise may have barred a gap that the body passes."""
 MOVED_M = 0.4
 """Distance [m] of the goal from the end of the route above which a new one is searched."""
 CHECK_S = 0.2
@@ -57,6 +60,7 @@ class Planner:
         self._checked_at = -inf
         self._pose: Point = goal
         self._barred: list[tuple[Point, float]] = []
+        self._again = BARRED_AGAIN
         self.route: tuple[Point, ...] = ()
         self.number = 0
         """Number of the route; grows with each new one."""
@@ -143,6 +147,11 @@ class Planner:
         toward = bytearray(len(costmap.near))
         reached = yield from search(costmap, start, goal, toward)
         if not reached and mates:
+            yield from self._plan((), needed)
+            return
+        if not reached and self._barred and self._again > 0:
+            self._again -= 1
+            self._barred.clear()
             yield from self._plan((), needed)
             return
         if not reached:

@@ -18,6 +18,8 @@ from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, pa
 SAMPLES_MAX = 64
 SPACING_M = 0.02
 SAME_PLACE_M = 0.15
+BEYOND_M = 0.1
+"""Distance [m] driven back beyond the kept path after which it begins anew: more than noise adds up to in a turn."""
 
 
 class Sample(Struct, frozen=True, gc=False):
@@ -147,6 +149,8 @@ class PoseHistory:
         while len(self._s) > 1 and self._s[-1] > self.travelled_m:
             self._s.pop()
             self._poses.pop()
+        if self._s[-1] - self.travelled_m > BEYOND_M:  # back beyond what is kept
+            self._s[-1], self._poses[-1] = self.travelled_m, pose
         if self.travelled_m - self._s[-1] >= SPACING_M:
             self._push(pose)
         return self.travelled_m

@@ -13,8 +13,8 @@ from lfa.agents.exploration.explorer import Explore
 from lfa.agents.exploration.occupancy_grid import Mapping
 from lfa.agents.following.factory import heading_filter_of
 from lfa.agents.leading.path_follower import PathFollower
-from lfa.agents.perception.scan import Point
-from lfa.protocol.geometry import STILL, Pose2D, Twist, distance
+from lfa.agents.perception.scan import Point, without
+from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, in_base
 from lfa.protocol.mission import Mission
 
 TEAM_RADPS = 0.5
@@ -23,6 +23,10 @@ BLOCKED_S = 1.5
 """Time [s] before a gap that no arc leads through, after which its place is barred and another way is searched. It runs
 on until the robot is its own radius away: an arc that the next scan shows closed again leads nowhere.
 """
+ROOM_S = 8.0
+"""The same time [s] where a team-mate stands there, which makes room (`behaviors/make_room.py`)."""
+MATE_M = 0.15
+"""Distance [m] beyond the body of a team-mate up to which a point of the scan is that team-mate."""
 
 
 class PlannedWay:
@@ -41,9 +45,11 @@ class PlannedWay:
         self._arcs = ArcPlanner(mission.radius_m, mission.limits)
         self._blocked: tuple[float, Pose2D] | None = None
         """Time [s] and place at which no arc led on first; None since the robot has left it."""
+        self._mates: Sequence[Pose2D] = ()
 
     def work(self, leads: bool, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> None:
         """Do one step's share of mapping and, if leading, of planning."""
+        self._mates = mates
         if self.explore.work(leads, pose, mates, now):
             self.lead.take(self.explore.route, pose)
 
@@ -73,7 +79,20 @@ class PlannedWay:
         if self._arcs.blocked:
             if self._blocked is None:
                 self._blocked = now, pose
-            elif now - self._blocked[0] >= BLOCKED_S:
+            waits = self._mate_blocks(points, pose, wanted, turn_radps)
+            if now - self._blocked[0] >= (ROOM_S if waits else BLOCKED_S):
                 self._blocked = None
                 self.explore.bar(self.lead.point(self._radius_m), now)
+            elif waits:
+                return STILL
         return twist
+
+    def _mate_blocks(self, points: list[Point], pose: Pose2D, wanted: Twist, turn_radps: float) -> bool:
+        """Return whether an arc leads on but for the team-mates."""
+        others = points
+        for mate in self._mates:
+            others = without(others, in_base(pose, (mate.x, mate.y)), self._radius_m + MATE_M)
+        if len(others) == len(points):
+            return False
+        self._arcs.steer(others, partial(self.lead.ahead, pose), wanted, turn_radps)
+        return not self._arcs.blocked

@@ -42,6 +42,10 @@ class BackUp:
         self._left_m, self._at = OUT_M, (pose.x, pose.y)
         self.trap = self._at
 
+    def end(self) -> None:
+        """Give the back-up up: the robot drives on from where it is."""
+        self._left_m = None
+
     def step(self, points: Sequence[Point], pose: Pose2D, radius_m: float) -> Twist | None:
         """Return the twist backwards along the trail; still while it is blocked; None when the robot is out."""
         if self._left_m is None or self._at is None:

@@ -9,7 +9,7 @@ import pytest
 
 from lfa.agents.exploration.costmap import FREE, TIGHT_M, prices_of
 from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, OCCUPIED, REACH, Grid, Point
-from lfa.agents.exploration.path_planner import Planner
+from lfa.agents.exploration.path_planner import BARRED_AGAIN, Planner
 from lfa.protocol.geometry import Pose2D, wrap
 
 RADIUS_M = 0.15
@@ -174,3 +174,17 @@ def test_no_gap_five_centimetres_wider_than_the_body_on_either_side_is_barred(mi
     planner = Planner(ground((5.0, 0.0, 5.2, low), (5.0, high, 5.2, 6.0)), (8.0, 3.0), RADIUS_M)
     plan(planner, (2.0, 3.0))
     assert planner.unreachable is None
+
+
+def test_a_gap_in_which_the_body_did_not_fit_is_tried_again_where_it_is_the_only_way() -> None:
+    gap = (5.05, 3.05)
+    planner = Planner(ground((4.9, -2.0, 5.1, 2.9), (4.9, 3.2, 5.1, 9.0)), (8.0, 3.0), RADIUS_M)
+    plan(planner, (2.0, 3.0))
+    for n in range(1, BARRED_AGAIN + 1):
+        planner.bar(gap, float(n))
+        plan(planner, (2.0, 3.0), at=float(n))
+        assert planner.route
+    planner.bar(gap, 9.0)
+    plan(planner, (2.0, 3.0), at=9.0)
+    assert planner.route == ()
+    assert planner.unreachable is not None

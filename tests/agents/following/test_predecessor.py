@@ -139,6 +139,19 @@ def test_reversing_takes_the_path_back() -> None:
     assert hypot(point.x - true.x, point.y - true.y) < 1e-6
 
 
+def test_reversing_beyond_the_kept_path_begins_it_anew() -> None:
+    trace, pose = _traced(Twist(0.5, 0.0), 60.0)
+    for n in range(1, 1401):
+        trace.add(along_arc(pose, Twist(-0.5, 0.0), n * DT))
+    point = trace.at(trace.travelled_m - 0.8)
+    assert (point.x, point.y) == pytest.approx((30.0 - 14.0 - 0.8, 0.0), abs=0.2)
+    turned = Pose2D(16.0, 0.0, 2.0)
+    for n in range(1, 101):
+        trace.add(along_arc(turned, Twist(0.5, 0.0), n * DT))
+    point, true = trace.at(trace.travelled_m - 0.8), along_arc(turned, Twist(0.2, 0.0), 1.0)
+    assert hypot(point.x - true.x, point.y - true.y) < 0.05, "the path that it has driven since"
+
+
 def test_a_trace_keeps_a_bounded_number_of_points() -> None:
     trace, _ = _traced(Twist(1.0, 0.1), 200.0)
     assert len(trace._s) <= 2.0 * 4.0 / SPACING_M + 2

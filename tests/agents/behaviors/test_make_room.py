@@ -1,0 +1,107 @@
+"""A follower makes room for a predecessor that comes back, where it cannot pass, and for no other."""
+
+from __future__ import annotations
+
+from math import pi
+
+import pytest
+
+from lfa.agents.behaviors.make_room import CLEAR_M, COMES_S, GONE_S, NEAR_M, ROOM_S, MakeRoom
+from lfa.agents.following.predecessor import Sighting
+from lfa.agents.formation.pose_history import PoseHistory
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+
+RADIUS_M = 0.25
+AT = Pose2D(2.0, 0.0, 0.0)
+COMES = Twist(0.2, 0.0)
+
+
+def walls(left_m: float, right_m: float) -> list[tuple[float, float]]:
+    """Points of two walls beside the robot, in `base_link`."""
+    return [(0.1 * n, y) for n in range(-20, 21) for y in (left_m, -right_m)]
+
+
+def seen(x: float = 2.9, heading: float = pi, twist: Twist = COMES) -> Sighting:
+    """The predecessor at (`x`, 0) in `map`."""
+    return Sighting(1, 0, Pose2D(x, 0.0, heading), twist, 0.0, 0.0, 0.0, PoseHistory(1.0))
+
+
+class Place:
+    """A follower that came 2 m straight on, between walls, to where it stands."""
+
+    def __init__(self, points: list[tuple[float, float]], came_m: float = 2.0) -> None:
+        self.points, self.room = points, MakeRoom(RADIUS_M)
+        for n in range(round(came_m / 0.1) + 1):
+            assert self.room.step(seen(9.0, 0.0), points, Pose2D(2.0 - came_m + 0.1 * n, 0.0, 0.0), 0.0) is None
+
+    def does(self, sighting: Sighting, since: float = 1.0) -> Twist | None:
+        """What it does about `sighting` after it has seen it for a while."""
+        assert self.room.step(sighting, self.points, AT, since) is None, "at the first sight"
+        return self.room.step(sighting, self.points, AT, since + COMES_S)
+
+
+def test_in_a_corridor_it_backs_along_its_trail() -> None:
+    twist = Place(walls(0.5, 0.5)).does(seen())
+    assert twist is not None
+    assert twist.linear_x < 0.0
+    assert abs(twist.angular_z) < 1e-9
+
+
+def test_where_its_trail_ends_it_backs_straight() -> None:
+    twist = Place(walls(0.5, 0.5), came_m=0.2).does(seen())
+    assert twist is not None
+    assert twist.linear_x < 0.0
+
+
+def test_the_next_one_makes_room_for_a_predecessor_that_reverses() -> None:
+    twist = Place(walls(0.5, 0.5)).does(seen(heading=0.0, twist=Twist(-0.2, 0.0)))
+    assert twist is not None
+    assert twist.linear_x < 0.0
+
+
+def test_one_that_touches_it_needs_room_although_it_faces_aside() -> None:
+    twist = Place(walls(0.5, 0.5)).does(seen(x=2.55, heading=pi - 1.4, twist=STILL))
+    assert twist is not None
+    assert twist.linear_x < 0.0
+
+
+def test_where_a_body_passes_beside_it_nobody_goes_back() -> None:
+    assert Place(walls(0.5, 1.0)).does(seen()) is None
+
+
+@pytest.mark.parametrize(
+    "sighting",
+    [
+        pytest.param(seen(heading=0.0), id="it leads on"),
+        pytest.param(seen(heading=pi / 2), id="it turns off"),
+        pytest.param(seen(twist=Twist(-0.2, 0.0)), id="it reverses away"),
+        pytest.param(seen(x=1.1, heading=0.0), id="it comes from behind"),
+        pytest.param(seen(x=2.0 + 2.0 * RADIUS_M + NEAR_M + 0.01), id="it is far away"),
+    ],
+)
+def test_others_need_no_room(sighting: Sighting) -> None:
+    assert Place(walls(0.5, 0.5)).does(sighting) is None
+
+
+def test_it_stands_where_something_is_behind_it_and_once_there_is_room() -> None:
+    place = Place([*walls(0.5, 0.5), (-0.28, 0.0)])
+    assert place.does(seen()) == STILL
+    place = Place(walls(0.5, 0.5))
+    assert place.does(seen()) != STILL
+    far = seen(x=2.0 + 2.0 * RADIUS_M + NEAR_M + CLEAR_M + 0.01)
+    assert place.room.step(far, place.points, AT, 2.0) == STILL
+
+
+def test_once_the_predecessor_has_turned_away_for_a_while_it_follows_again() -> None:
+    place = Place(walls(0.5, 0.5))
+    assert place.does(seen()) is not None
+    away = seen(heading=0.0)
+    assert place.room.step(away, place.points, AT, 1.7) is not None, "a turn that goes on"
+    assert place.room.step(away, place.points, AT, 1.0 + COMES_S + GONE_S) is None
+
+
+def test_it_makes_room_for_a_bounded_time() -> None:
+    place = Place(walls(0.5, 0.5))
+    assert place.does(seen()) is not None
+    assert place.room.step(seen(), place.points, AT, 0.9 + ROOM_S) is not None
+    assert place.room.step(seen(), place.points, AT, 1.1 + ROOM_S) is None
