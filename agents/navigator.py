@@ -63,7 +63,6 @@ class Navigator:
         self.scan_age = ScanAge()
         self.own_readings = OwnReadings()
         self._detour = Detour(mission.radius_m, mission.limits, mission.control_period_s)
-        self._crossing = Crossing(mission.radius_m)
         self.hand_driving = HandDriving()
         self._begin_roles(mission)
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
@@ -81,6 +80,7 @@ class Navigator:
         )
         self._lead_route = LeadRoute(self.leading, self._detour, self._obstacles, mission, self.hand_driving)
         self._own = OwnBehaviors(mission)
+        self._crossing = Crossing(mission.radius_m, mission.leading.cruise_mps)
 
     @property
     def predecessor(self) -> Predecessor | None:

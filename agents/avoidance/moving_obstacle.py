@@ -17,7 +17,7 @@ from lfa.agents.avoidance.decision import Action, Decision, Situation, decide
 from lfa.agents.avoidance.moving_points import AWAY_M
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, free_along
-from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, wrap
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, slowed, wrap
 
 CLEARANCE_M = 0.6
 """Least distance [m] from the robot's centre to the surface of a moving obstacle; less within the horizon is a
@@ -27,7 +27,10 @@ LOOK_S = 6.0
 """Prediction time [s] for choosing the action with the largest clearance when no action keeps `CLEARANCE_M` within the
 horizon: an obstacle that comes slowly from behind has not reached a waiting robot at the end of the horizon."""
 STEP_S = 0.25
-SLOW_SHARE = 0.4
+SLOW_SHARE, CRUISE_MPS = 0.4, 0.5
+"""Share of the cruise speed [m/s] that a slowed robot drives at most. A share of what it wants would be taken again in
+each step, since that grows from its last speed: it would crawl.
+"""
 WAIT_S_MAX = 5.0
 """Maximum waiting time [s]; afterwards a moving obstacle is driven around like a stationary one."""
 SOON_S = 2.0
@@ -82,8 +85,9 @@ Mates = Callable[[Pose2D, float, float], Sequence[Feature]]
 class Crossing:
     """Give-way behaviour of one robot towards moving obstacles, for a bounded time."""
 
-    def __init__(self, radius_m: float = 0.15) -> None:
+    def __init__(self, radius_m: float = 0.15, cruise_mps: float = CRUISE_MPS) -> None:
         self._radius_m = radius_m
+        self._slow_mps = SLOW_SHARE * cruise_mps
         self._evasion, self._heading = SLOW, 0.0
         self.decision: Decision | None = None
         self._waiting_since: float | None = None
@@ -135,7 +139,7 @@ class Crossing:
                 self._evasion, self._heading = evasion, wrap(pose.theta + evasion.turn_rad * _side(evasion))
         if self._evasion.action not in (Action.WAIT, Action.BACK):
             self._waiting_since = now  # a robot that drives on or makes room does not wait
-        return _done(self._present(pose), wanted)
+        return self._done(self._present(pose), wanted)
 
     def _present(self, pose: Pose2D) -> Evasion:
         """Return what is left of the present evasion: its bend ends at the heading that it was chosen for."""
@@ -159,7 +163,7 @@ class Crossing:
         mates: Sequence[Feature],
     ) -> Evasion:
         """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
-        if _closest(moving, pose, _done(SLOW, wanted)) >= CLEARANCE_M:
+        if _closest(moving, pose, self._done(SLOW, wanted)) >= CLEARANCE_M:
             return SLOW
         if _closest(moving, pose, STILL) >= CLEARANCE_M:
             return EVASIONS[0]
@@ -168,7 +172,7 @@ class Crossing:
         under_way = self.decision is not None and self._evasion is not SLOW
         candidates = (self._present(pose), *EVASIONS) if under_way else EVASIONS
         for evasion in candidates:
-            twist = _done(evasion, wanted)
+            twist = self._done(evasion, wanted)
             if twist.linear_x and free_along(points, twist, self._radius_m + BODY_M) < abs(twist.linear_x) * ROOM_S:
                 continue
             if twist.linear_x and _closest(mates, pose, twist, MATE_S) < 2.0 * self._radius_m + MATE_M:
@@ -183,6 +187,13 @@ class Crossing:
                 best, most = evasion, kept
         return self._evasion if under_way and best is candidates[0] else best
 
+    def _done(self, evasion: Evasion, wanted: Twist) -> Twist:
+        """Return the twist of an evasion where `wanted` is the motion without it."""
+        if evasion is SLOW:
+            return slowed(wanted, self._slow_mps)
+        v = max(wanted.linear_x, evasion.v_mps) if evasion.action is Action.AHEAD else evasion.v_mps
+        return Twist(v, evasion.omega_radps)
+
 
 def _apart(moving: Sequence[Feature], place: Pose2D, later_s: float) -> float:
     """Return the least distance [m] from `place` to the surface of what moves, `later_s` [s] from now."""
@@ -195,13 +206,6 @@ def _care(action: Action) -> int:
 
 def _side(evasion: Evasion) -> float:
     return 1.0 if evasion.omega_radps > 0.0 else -1.0
-
-
-def _done(evasion: Evasion, wanted: Twist) -> Twist:
-    if evasion is SLOW:
-        return Twist(SLOW_SHARE * wanted.linear_x, SLOW_SHARE * wanted.angular_z)
-    v = max(wanted.linear_x, evasion.v_mps) if evasion.action is Action.AHEAD else evasion.v_mps
-    return Twist(v, evasion.omega_radps)
 
 
 def _kept(moving: Sequence[Feature], pose: Pose2D, evasion: Evasion, twist: Twist) -> float:

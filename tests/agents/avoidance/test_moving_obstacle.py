@@ -2,7 +2,8 @@
 
 import pytest
 
-from lfa.agents.avoidance.moving_obstacle import HOLD_S, WAIT_S_MAX, Crossing
+from lfa.agents.avoidance.decision import Action
+from lfa.agents.avoidance.moving_obstacle import HOLD_S, SLOW_SHARE, WAIT_S_MAX, Crossing
 from lfa.agents.avoidance.moving_points import before, shadow
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
@@ -37,6 +38,17 @@ def test_the_robot_stays_slow_for_a_while_after_the_conflict() -> None:
     crossing.give_way(crosser(1.2, -0.8, 0.0, 0.3), Pose2D(), AHEAD, 0.0)
     assert crossing.give_way([], Pose2D(), AHEAD, 0.5 * HOLD_S).linear_x < AHEAD.linear_x
     assert crossing.give_way([], Pose2D(), AHEAD, 1.1 * HOLD_S) == AHEAD
+
+
+def test_a_slowed_robot_drives_a_share_of_the_cruise_speed_and_does_not_crawl() -> None:
+    """What it wants grows from its last speed by its acceleration: a share of that would be taken again and again."""
+    crossing, last = Crossing(cruise_mps=0.5), AHEAD
+    for n in range(100):
+        wanted = Twist(min(0.5, last.linear_x + 0.5 * 0.02), 0.0)
+        last = crossing.give_way(crosser(2.0, -1.3, 0.0, 0.25), Pose2D(), wanted, 0.02 * n)
+    assert crossing.decision is not None
+    assert crossing.decision.action is Action.SLOW
+    assert last.linear_x == pytest.approx(SLOW_SHARE * 0.5)
 
 
 def test_what_comes_straight_at_a_robot_is_not_met() -> None:
