@@ -107,7 +107,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; without it, received over Zenoh")
     add("--spare", action="store_true", help="a robot that the mission does not name: it waits for lfa join")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")
-    add("--controller", metavar="FILE.py:Class", help="a controller of your own, for a mission that chooses it")
+    add("--controller", metavar="FILE",
+        help="a controller of your own, FILE.py:Class or FILE.onnx, for a mission that chooses it")
     add("--behavior", metavar="FILE.py:Class", action="append", default=[],
         help="a behaviour of your own, for a mission that names it; repeatable")
     add("--faults", action="store_true", help="obey an operator's link conditions (lfa fault cut, loss): for tests")

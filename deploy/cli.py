@@ -166,7 +166,7 @@ EXTRAS = {
     "rerun": "view", "zstandard": "view", "rich": "deploy", "asyncssh": "deploy", "cryptography": "deploy",
     "pyarrow": "campaign", "submitit": "slurm", "distributed": "dask",
     "rosbags": "ros", "xxhash": "ros", "foxglove": "foxglove", "websockets": "web",
-    "gymnasium": "learn", "pettingzoo": "learn",
+    "gymnasium": "learn", "pettingzoo": "learn", "onnxruntime": "onnx",
 }  # fmt: skip
 """Modules outside the base install, each with the extra that installs it."""
 

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from lfa.agents.behaviors.own_behavior import BEHAVIORS
 from lfa.agents.following.controller import CONTROLLERS, find_controller
-from lfa.agents.following.plugin import add_controller_file
+from lfa.agents.following.plugin import add_controller_file, is_model
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Mission
 from lfa.protocol.plug_in import PlugIns, is_file
@@ -29,7 +29,8 @@ SENSOR_HZ = 10.0
 """Rate [Hz] of a sensor that a command line names, where neither scenario nor `--set` gives one."""
 
 Controller = Annotated[
-    str | None, typer.Option(help="Controller of the followers: an installed one by name, or yours: FILE.py:Class.")
+    str | None,
+    typer.Option(help="Controller of the followers: an installed one, FILE.py:Class, or a learned one: FILE.onnx."),
 ]
 Behavior = Annotated[
     list[str] | None, typer.Option(help="A behaviour of all robots: an installed one, or FILE.py:Class. Repeatable.")
@@ -40,7 +41,7 @@ Sensor = Annotated[
 ]
 
 RunController = Annotated[
-    str | None, typer.Option(help="FILE.py:Class of the runs' controller, if it is not installed.")
+    str | None, typer.Option(help="FILE.py:Class or FILE.onnx of the runs' controller, if it is not installed.")
 ]
 RunBehavior = Annotated[
     list[str] | None, typer.Option(help="FILE.py:Class of a behaviour of the runs that is not installed. Repeatable.")
@@ -51,14 +52,14 @@ RunSensor = Annotated[
 
 
 class OwnFile(Struct, frozen=True):
-    """A plug-in that is not installed: its kind, a key of `PLUG_INS`, and its absolute `FILE.py:Class`."""
+    """A plug-in that is not installed: its kind, a key of `PLUG_INS`, and its absolute `FILE.py:Class` or model."""
 
     kind: str
     place: str
 
     @property
     def path(self) -> Path:
-        return Path(self.place.rpartition(":")[0])
+        return Path(self.place.rpartition(":")[0] if is_file(self.place) else self.place)
 
 
 def chosen_files(scenario: Scenario) -> tuple[OwnFile, ...]:
@@ -74,7 +75,12 @@ def files_of_robots(mission: Mission) -> tuple[OwnFile, ...]:
 def load_files(files: Iterable[OwnFile]) -> None:
     """Load plug-ins into this process. Raises Refused for one that cannot be loaded."""
     for file in files:
-        PLUG_INS[file.kind].add_file(file.place)
+        load_file(file.kind, file.place)
+
+
+def load_file(kind: str, text: str) -> str:
+    """Load a plug-in from its file, and return the name by which a scenario chooses it. Raises Refused."""
+    return add_controller_file(text) if kind == "controller" else PLUG_INS[kind].add_file(text)
 
 
 def given_files(
@@ -122,7 +128,7 @@ def refuse_missing(scenario: Scenario, folder: Path) -> None:
         try:
             find_controller(name) if kind == "controller" else PLUG_INS[kind].find(name)
         except Refused:
-            copy = folder / (name if is_file(name) else f"FILE.py:{name}")
+            copy = folder / (name if is_file(name) or is_model(name) else f"FILE.py:{name}")
             raise Refused(f"{folder}: its {kind} {name} is not loaded: add --{kind} {copy}") from None
 
 

@@ -41,9 +41,14 @@ class PlugIns:
         self._added: dict[str, Any] = {}
         self._files: dict[str, str] = {}
 
-    def add(self, name: str, make: Any) -> None:
-        """Make `make` the plug-in called `name` in this process: for a script or a notebook that simulates."""
+    def add(self, name: str, make: Any, place: str | None = None) -> None:
+        """Make `make` the plug-in called `name` in this process: for a script or a notebook that simulates.
+
+        `place` is the absolute path of a file that it was made from, and that other processes load.
+        """
         self._added[name] = make
+        if place is not None:
+            self._files[name] = place
 
     def add_file(self, text: str) -> str:
         """Load the class that `FILE.py:Class` names, and return the name by which a scenario chooses it.
@@ -60,12 +65,11 @@ class PlugIns:
         if not callable(make):
             raise Refused(f"{self.option}{text}: {file} has no class {name!r}, must be FILE.py:Class")
         known_as = name if self._by_class else f"{path.name}:{name}"
-        self.add(known_as, make)
-        self._files[known_as] = f"{path}:{name}"
+        self.add(known_as, make, f"{path}:{name}")
         return known_as
 
     def file_of(self, name: str) -> str | None:
-        """Return the absolute `FILE.py:Class` of a plug-in that was added from a file, else None."""
+        """Return the absolute `FILE.py:Class`, or model file, of a plug-in that was added from a file, else None."""
         return self._files.get(name)
 
     def names(self) -> list[str]:

@@ -27,11 +27,13 @@ EXTRAS = {
     "deploy": ("asyncssh", "cryptography", "rich"), "ros": ("rosbags", "xxhash"), "foxglove": ("foxglove",),
     "web": ("websockets",), "campaign": ("pyarrow",), "slurm": ("submitit",), "dask": ("distributed",),
     "learn": ("gymnasium", "pettingzoo"),
+    "onnx": ("onnxruntime",),
 }  # fmt: skip
 PURPOSES = {
     "world": "simulated worlds", "view": "recordings, figures and views", "deploy": "lfa up over ssh, watch and top",
     "ros": "ROS 2", "foxglove": "Foxglove", "web": "the page of lfa web", "campaign": "Parquet files of campaigns",
     "slurm": "campaigns on Slurm", "dask": "campaigns on Dask", "learn": "environments for learners",
+    "onnx": "learned controllers",
 }  # fmt: skip
 """What each extra is installed for."""
 

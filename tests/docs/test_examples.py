@@ -31,6 +31,7 @@ SHOWN: dict[str, tuple[str, ...]] = {
     "10_own_sensor":       (r"law +goal_reached, last reading .*: \(12\.\d+, {'lux': \S+}\)", r"careful +goal"),
     "11_learn":            (r"gains 0\.00, 0\.00: -9\.", r"best: .* with -0\.9"),
     "12_own_behavior":     (r"\[\] +goal_reached after 1\d s", r"\['cautious'\] +goal_reached after [23]\d s"),
+    "13_learned_controller": (r"imitates its teacher to 0\.\d\d", r"goal_reached, distance error .* [1-6]\d mm"),
 }  # fmt: skip
 
 

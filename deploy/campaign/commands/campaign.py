@@ -13,7 +13,7 @@ from lfa.deploy.campaign.engines.dispatch import check_engine
 from lfa.deploy.campaign.engines.kubernetes import manifest
 from lfa.deploy.campaign.shard import SHARDS_MAX, WHOLE, parse_shard
 from lfa.deploy.campaign.sweep.plan import RUNS_MAX, read_plan
-from lfa.deploy.own_code import PLUG_INS
+from lfa.deploy.own_code import load_file
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 
@@ -96,5 +96,5 @@ def _load_all(given: dict[str, list[str] | None]) -> list[tuple[str, str]]:
     """Load the classes that the options name, FILE.py:Class by kind; return each with its kind, as it was given."""
     own_code = [(kind, text) for kind, texts in given.items() for text in texts or ()]
     for kind, text in own_code:
-        PLUG_INS[kind].add_file(text)
+        load_file(kind, text)
     return own_code
