@@ -23,6 +23,9 @@ ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
 GOES_ON_S = 0.6
 """Time [s] after its last row for which a robot's motion is extrapolated."""
+ROUNDING_M = 1e-6
+AROUND_M = 2.0
+"""Way [m] along x or y after which a robot looks anew which of its team are around it."""
 
 
 class TeamState:
@@ -41,6 +44,8 @@ class TeamState:
         """Velocity in `map`, from one row to the next."""
         self._reach: dict[int, tuple[float, float, float, float]] = {}
         """Place [m] of each robot's last row, and how far [m] along x and y its extrapolation may take it."""
+        self._around: _Vicinity | None = None
+        """Robots around this one; None while that has to be found anew."""
         self._clocks: dict[int, ClockOffset] = {}
         self.obstacles = SharedObstacles(self.poses)
         """Moving obstacles that other robots reported."""
@@ -82,7 +87,9 @@ class TeamState:
             self.progress = reported
         self._table[robot] = (row, at)
         vx, vy = self._velocity[robot]
-        self._reach[robot] = row.x, row.y, GOES_ON_S * abs(vx), GOES_ON_S * abs(vy)
+        reach = self._reach[robot] = row.x, row.y, GOES_ON_S * abs(vx), GOES_ON_S * abs(vy)
+        if self._around is not None and robot not in self._around.robots and self._around.may_hold(reach):
+            self._around = None
         self._clocks[robot].heard(row.header.stamp, at)
 
     def fresh_sensors(self, now: float) -> Sensors | None:
@@ -107,15 +114,22 @@ class TeamState:
 
         Called at each control step: in a team of a hundred nearly all are passed over by the place in their last row.
         """
-        x, y, reach = pose.x, pose.y, self._reach
+        x, y, reach, around = pose.x, pose.y, self._reach, self._around
+        if around is None or around.of is not robots or not around.covers(x, y, within_m):
+            around = self._around = self._look_around(robots, x, y, within_m)
         nearby = [
             robot
-            for robot in robots
-            if (last := reach.get(robot)) is not None
-            and abs(last[0] - x) <= within_m + last[2]
-            and abs(last[1] - y) <= within_m + last[3]
+            for robot in around.robots
+            if abs((last := reach[robot])[0] - x) <= within_m + last[2] and abs(last[1] - y) <= within_m + last[3]
         ]
         return [(robot, place) for robot in nearby if (place := self.pose_of(robot, now)) is not None]
+
+    def _look_around(self, robots: Sequence[int], x: float, y: float, within_m: float) -> _Vicinity:
+        """Return those of `robots` that are around (x, y) [m], for as long as the robot stays there."""
+        wide_m = max(within_m, 0.0 if self._around is None else self._around.within_m - AROUND_M) + AROUND_M
+        around = _Vicinity(robots, x, y, wide_m)
+        around.robots = [one for one in robots if one in self._reach and around.may_hold(self._reach[one])]
+        return around
 
     def poses(self, now: float) -> list[Pose2D | None]:
         """Return the poses in `map` of all robots in the table; None for a stale one."""
@@ -149,6 +163,25 @@ class TeamState:
 def sensors_s_max(mission: Mission) -> float:
     """Return the age [s] beyond which the odometry of a robot with the control rate of `mission` is stale."""
     return max(SENSORS_S_MAX, SENSORS_PERIODS_MIN * mission.control_period_s)
+
+
+class _Vicinity:
+    """Those of the robots `of` that may be within `within_m` of a place, in their order: a few of a large team."""
+
+    def __init__(self, of: Sequence[int], x: float, y: float, within_m: float) -> None:
+        self.of = of
+        self.within_m = within_m
+        self._x, self._y = x, y
+        self.robots: list[int] = []
+
+    def may_hold(self, reach: tuple[float, float, float, float]) -> bool:
+        """Return True if a robot with this place and extrapolation [m] belongs to them."""
+        x, y, along_x, along_y = reach
+        return abs(x - self._x) <= self.within_m + along_x and abs(y - self._y) <= self.within_m + along_y
+
+    def covers(self, x: float, y: float, within_m: float) -> bool:
+        """Return True if each robot that may be within `within_m` of (x, y) [m] is among them, rounding included."""
+        return abs(x - self._x) + within_m < self.within_m - ROUNDING_M > abs(y - self._y) + within_m
 
 
 def _overtaken(row: Header, known: Header, age_s: float) -> bool:

@@ -153,10 +153,12 @@ def leader_speed_cap(slots: Sequence[Slot], curvature: float, limits: Limits, ma
     Followers on a trace have f = 1: pass no slots then. A leader without slots needs no margin of speed, for nobody has
     to catch up with a slot of its own.
     """
-    cap = margin * limits.v_max_mps / max([1.0, *speed_factors(slots, curvature)]) if slots else limits.v_max_mps
-    if curvature != 0.0:
-        cap = min(cap, margin * limits.omega_max_radps / abs(curvature))
-    return cap
+    cap = margin * limits.v_max_mps if slots else limits.v_max_mps
+    if curvature == 0.0:
+        return cap  # all factors are 1
+    if slots:
+        cap /= max([1.0, *speed_factors(slots, curvature)])
+    return min(cap, margin * limits.omega_max_radps / abs(curvature))
 
 
 def leader_speed_floor(slots: Sequence[Slot], curvature: float) -> float:

@@ -97,8 +97,9 @@ class FailureDetector:
         return self.is_superseded(member) or self.is_gone(member)
 
     def _is_one_too_many(self, id: int) -> bool:
-        known = (self._newest, self._tokens, self._gone)
-        return not any(id in of for of in known) and any(len(of) >= IDS_MAX for of in known)
+        if id in self._newest or id in self._tokens or id in self._gone:
+            return False
+        return max(len(self._newest), len(self._tokens), len(self._gone)) >= IDS_MAX
 
     def _return(self, id: int) -> None:
         del self._gone[id]

@@ -20,6 +20,8 @@ BURST = 1000
 FRESH = 2**40
 """Distance above `FREE` up to which a process believes that knows nothing there yet: 35 years at `RATE_HZ`."""
 
+_BINDING = (Prepare, Release)
+
 
 def highest(body: LeaseBody) -> int:
     """Return the greatest term number by which a receiver of `body` would be bound; 0 if by none."""
@@ -27,7 +29,7 @@ def highest(body: LeaseBody) -> int:
         return max(body.term.n, body.config.version.term.n)
     if isinstance(body, Nack):
         return max(body.promised.n, body.config.version.term.n)
-    return body.term.n if isinstance(body, Prepare | Release) else 0
+    return body.term.n if isinstance(body, _BINDING) else 0
 
 
 class TermWindow:

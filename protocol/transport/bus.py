@@ -150,7 +150,7 @@ class Inbox:
 
     def _admits(self, arrival: Arrival, where: Address | None) -> bool:
         """Return whether the caps of its owner admit an arrival; count it otherwise."""
-        token = arrival.payload if isinstance(arrival.payload, PeerUp | PeerDown) else None
+        token = arrival.payload if isinstance(arrival.payload, (PeerUp, PeerDown)) else None
         admits = token is None or self._tokens.admits(token)  # first: which tokens are there must stay known
         admits = admits and (self._every or self._allows(where, arrival.at))
         if not admits and where is not None and (where.owner in self._refused or len(self._refused) < OWNERS_MAX):

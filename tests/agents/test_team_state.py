@@ -109,3 +109,21 @@ def test_nobody_near_is_passed_over_wherever_its_extrapolation_has_come() -> Non
             inside = [robot for robot, at in places.items() if at is not None and hypot(at.x, at.y) <= within_m]
             assert [robot for robot in inside if found.get(robot) != places[robot]] == []
             assert list(found) == sorted(found)
+
+
+def test_who_is_near_does_not_depend_on_where_the_robot_has_looked_before() -> None:
+    """It drives about among others that drive too; a state that heard the same rows and never looked says the same."""
+    random, team, robots = Random(5), TeamState(), tuple(range(2, 14))
+    heard: list[tuple[int, TableRow, float]] = []
+    place = Pose2D()
+    for step in range(300):
+        now = 0.1 * step
+        row_of = replace(row(step, random.uniform(-9.0, 9.0)), y=random.uniform(-9.0, 9.0))
+        heard.append((robots[step % len(robots)], row_of, now))
+        team.hear_row(*heard[-1])
+        place = Pose2D(place.x + random.uniform(-0.6, 0.6), place.y + random.uniform(-0.6, 0.6))
+        within_m = random.choice((0.8, 3.0))
+        fresh = TeamState()
+        for each in heard:
+            fresh.hear_row(*each)
+        assert team.near(robots, place, within_m, now) == fresh.near(robots, place, within_m, now)

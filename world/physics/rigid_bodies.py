@@ -95,7 +95,7 @@ class Physics:
         """Advance one step of 1/physics_hz with the commanded twists, one per robot; return the touches that began."""
         dt_s = self._dt_s
         self._steps += 1
-        near = [self._floor.near(n, pose) for n, pose in enumerate(self.poses)]
+        near = self._floor.all_near(self.poses)
         for n, drive in enumerate(self._drives):
             self.wheels[n] = self._rolls[n] = drive.step(wanted[n], dt_s)
             held_hard = near[n] and self._touching[n] == 0 and self._roll(n, drive)

@@ -21,6 +21,7 @@ contact from straight below, cos(theta) = (r - h) / r for a step of height h:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import acos, atan, cos, inf, sin, sqrt
 
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
@@ -105,6 +106,10 @@ class Floor:
             within_m = AROUND_M + self._robot_radius_m + STEP_M_MAX
             self._obstacles[n] = [patch for patch in self._patches if patch.gap_m(pose.x, pose.y) <= within_m]
         return bool(self._obstacles[n])
+
+    def all_near(self, poses: Sequence[Pose2D]) -> list[bool]:
+        """Return `near` of all robots; on a floor without patches nobody looks for one."""
+        return [self.near(n, pose) for n, pose in enumerate(poses)] if self._patches else [False] * len(poses)
 
     def standing_m(self, n: int) -> float:
         """Return the height [m] of the ground under robot `n`, the mean over its two wheels."""

@@ -51,6 +51,9 @@ EVENTS: dict[type[LeaseBody], LeaseEvent] = {
 }
 """Events of messages, without NACK, whose event follows from what was asked, and FENCE, which is for gateways."""
 
+_AGREEING = (Prepare, Propose, Hello)
+"""Messages that name what their sender and its team hold alike (E25)."""
+
 
 class Observed(NamedTuple):
     """One event and what came of it, told to an observer before the effects are carried out."""
@@ -300,7 +303,7 @@ class Lease:
     def _heard(self, src: Member, body: LeaseBody, now: float) -> LeaseEvent | None:
         """Note what any message tells, and return its event; None if it says nothing to act upon."""
         m = self._memory
-        if isinstance(body, Prepare | Propose | Hello):
+        if isinstance(body, _AGREEING):
             if body.agreed != m.agreed or not understands(body.wire):
                 return LeaseEvent.FOREIGN
             m.census.alike(src.id)
