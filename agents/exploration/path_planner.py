@@ -34,7 +34,7 @@ ROOMY = 60
 """Cost of a step up to which a robot has room to spare."""
 BARRED_M, BARRED_S = 0.15, 60.0
 """Radius [m] around a place where the body did not fit, and time [s] for which no route leads through it."""
-BARRED_AGAIN = 2
+BARRED_AGAIN = 1
 """Number of times that such places are tried once more, where no way is left without them, until the goal counts as
 walled in: noise may have barred a gap that the body passes."""
 MOVED_M = 0.4
