@@ -16,11 +16,12 @@ from typing import Annotated
 
 import msgspec
 import typer
+from msgspec.structs import replace
 
 from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan.fleet_file import FleetPlan, load
 from lfa.deploy.fleet.plan.host_plan import parts
-from lfa.deploy.fleet.remote.hosts import FleetHosts
+from lfa.deploy.fleet.remote.hosts import FleetHosts, StartedAs
 from lfa.deploy.fleet.remote.key_distribution import bundles
 from lfa.deploy.fleet.up import NotUp, await_health, digest_of, tell
 from lfa.deploy.process.signals import Interrupts
@@ -66,8 +67,12 @@ async def _upgrade(plan: FleetPlan, interrupts: Interrupts, wait_s: float, done:
         await fleet.reach()
         found, wires = await fleet.check(may_install=False), await fleet.wires()
         lines = fleet.lines() or refusals(plan.name, found, wires, digest)
+        started = {} if lines else await fleet.started_as()
+        lines = lines or fleet.lines() or differing(started)
         if lines:
             raise NotUp(lines, 1 if fleet.unreached else 2)
+        plan = as_started(plan, next(iter(started.values())))
+        digest, keys = digest_of(plan), bundles(plan)
         fleet.parts = parts(plan, max(one.run for one in found.values()), digest, keys)
         left = list(plan.hosts)
         while left:
@@ -105,6 +110,22 @@ def refusals(name: str, found: Mapping[str, Found], wires: Mapping[str, int], di
         elif len(others) > 1 and one.digest != digest:
             lines.append(f"host {host}: runs fleet {name} from another file than others: lfa down first")
     return lines
+
+
+def differing(started: Mapping[str, StartedAs]) -> list[str]:
+    """Return a line for the first machine that was started otherwise than those before it; empty: all alike."""
+    first, *others = started
+    for name in others:
+        if started[name] != started[first]:
+            says = [f"host {one} with {started[one].text()}" for one in (name, first)]
+            return [f"{', '.join(says)}: must be started alike, by lfa down and lfa up"]
+    return []
+
+
+def as_started(plan: FleetPlan, started: StartedAs) -> FleetPlan:
+    """Return the plan of a fleet that runs, as it was started: also with options of `lfa up` that its file lacks."""
+    file = replace(plan.file, secure=started.secure, engine=started.engine, boot=started.boot)
+    return replace(plan, file=file)
 
 
 def next_host(left: Sequence[str], host_of: Mapping[int, str], chain: Sequence[int]) -> str:

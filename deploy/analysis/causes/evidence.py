@@ -25,7 +25,7 @@ def failures(trace: RunTrace) -> list[Fact]:
     """Return the failures and orderly ends of a run, by time."""
     found = [*_ends(trace), *_stalls(trace)]
     standing = {fact.place: fact for fact in found if fact.kind == "stalled"}
-    found += _silences(trace, standing.get(WORLD_NAME))
+    found += _own(list(_silences(trace, standing.get(WORLD_NAME))))
     found += losses(trace)
     return sorted(found, key=lambda fact: fact.at_s)
 
@@ -112,6 +112,27 @@ def _silences(trace: RunTrace, world: Fact | None) -> Iterator[Fact]:
             proof = f"no {topic} in the recording after {before_s:.3f} s"
             until_s = None if after_s == ends_s else after_s
             yield Fact(before_s, "hardware silent", robot, text, until_s, part, proof)
+
+
+def _own(silences: list[Fact]) -> list[Fact]:
+    """Return the silences without those of sensors whose robot's driver fell silent with them: it reads them all."""
+    drivers = [fact for fact in silences if fact.other == "driver"]
+    return [
+        fact
+        for fact in silences
+        if fact.other == "driver"
+        or not any(
+            driver.place == fact.place and _about(driver.at_s, fact.at_s) and _about(driver.until_s, fact.until_s)
+            for driver in drivers
+        )
+    ]
+
+
+def _about(one_s: float | None, other_s: float | None) -> bool:
+    """Return True for times [s] that are the same but for a period of a sensor; None: the end of the run."""
+    if one_s is None or other_s is None:
+        return one_s == other_s
+    return abs(one_s - other_s) < STALL_S
 
 
 def _within(fact: Fact, from_s: float, until_s: float) -> bool:

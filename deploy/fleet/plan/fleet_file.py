@@ -26,6 +26,9 @@ LOCAL = ("localhost", "127.0.0.1", "::1")
 ROUTER_PORT = 7447
 PORT_MAX = 65535
 
+Engine = Literal["own", "systemd", "systemd-system"]
+"""What starts and watches a machine's processes."""
+
 
 class Machine(Struct, frozen=True, forbid_unknown_fields=True):
     """One machine. Omitted values are left to ssh: user, port and key come from `~/.ssh/config`."""
@@ -94,7 +97,7 @@ class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
     robots: Robots = Robots()
     links: LinkPlan = LinkPlan()
     restart: Restart = Restart()
-    engine: Literal["own", "systemd", "systemd-system"] = "own"
+    engine: Engine = "own"
     """Engine of the processes: our own supervisor, the user's systemd, or the machine's (also `lfa up --system`)."""
     boot: bool = False
     """True: systemd starts the processes when the machine is switched on (also `lfa up --boot`)."""

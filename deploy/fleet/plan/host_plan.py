@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Literal
 
 from msgspec import Struct
 
 from lfa.deploy.fleet.plan import files
-from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
+from lfa.deploy.fleet.plan.fleet_file import Engine, FleetPlan, Machine
 from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.process.restart_policy import Restart
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, toml
@@ -65,7 +64,7 @@ class HostPlan(Struct, frozen=True):
     """True: processes show certificates; the router does so to other routers, or to every process if secured."""
     spares: tuple[int, ...] = ()
     """Ids of the robots, here and elsewhere, that the mission does not name."""
-    engine: Literal["own", "systemd", "systemd-system"] = "own"
+    engine: Engine = "own"
     boot: bool = False
     """True: systemd starts the processes when the machine is switched on."""
     bundle: dict[str, str] = {}

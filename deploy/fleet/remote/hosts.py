@@ -8,11 +8,12 @@ import sys
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
+from msgspec import Struct
 
 from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.host.start_check import Found
-from lfa.deploy.fleet.plan.fleet_file import FleetPlan, Machine
-from lfa.deploy.fleet.plan.host_plan import HostPlan
+from lfa.deploy.fleet.plan.fleet_file import Engine, FleetPlan, Machine
+from lfa.deploy.fleet.plan.host_plan import PART, HostPlan
 from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, reach
 from lfa.deploy.fleet.remote.wheel import install
 from lfa.deploy.process.restart_policy import REFUSED_CODE
@@ -22,10 +23,27 @@ from lfa.protocol.file_reading import DamagedFile, decode_json
 
 WIRE = f"from lfa.protocol.messages.header import WIRE_VERSION; print('{ANSWER}' + str(WIRE_VERSION))"
 """Program for a machine's Python: print the version of the messages of its `lfa`."""
+STARTED = (
+    "import json, os, sys; part = json.load(open(os.path.join(os.path.expanduser(sys.argv[1]), sys.argv[2]))); "
+    f"print('{ANSWER}' + json.dumps({{name: part[name] for name in ('secure', 'engine', 'boot') if name in part}}))"
+)
+"""Program for a machine's Python, of any version of `lfa`: print how its part of the fleet was started."""
 END = "lfa.deploy.fleet.host.end"
 """Program that ends a machine's part, with a quarter of the imports of `host.py`."""
 CLOCK_S_MAX = 60.0
 """Maximum difference [s] of wall clocks; beyond it certificates start or end at the wrong time."""
+
+
+class StartedAs(Struct, frozen=True):
+    """What a fleet was started with, by its file or by options of `lfa up`."""
+
+    secure: bool = False
+    engine: Engine = "own"
+    boot: bool = False
+
+    def text(self) -> str:
+        """Return the settings as a fleet file has them."""
+        return f"secure = {str(self.secure).lower()}, engine = {self.engine}, boot = {str(self.boot).lower()}"
 
 
 class FleetHosts:
@@ -83,6 +101,20 @@ class FleetHosts:
             if done.answer is None:
                 raise Refused(f"python = {python}: has no lfa that says its version ({done.last_line})")
             answers[name] = int(done.answer)
+
+        await self._each(self._shells, one)
+        return answers
+
+    async def started_as(self) -> dict[str, StartedAs]:
+        """Return how the part of each reached machine, which runs, was started."""
+        answers: dict[str, StartedAs] = {}
+
+        async def one(name: str) -> None:
+            python, state = python_of(self._plan.hosts[name]), self.parts[name].state
+            done = await self._shells[name].run((python, "-P", "-c", STARTED, state, PART))
+            if done.answer is None:
+                raise Refused(f"{state}/{PART}: does not say how the fleet was started ({done.last_line})")
+            answers[name] = decode_json(done.answer, StartedAs)
 
         await self._each(self._shells, one)
         return answers

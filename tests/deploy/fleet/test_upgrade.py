@@ -16,7 +16,9 @@ from pathlib import Path
 import pytest
 
 from lfa.deploy.fleet.host.start_check import Found
-from lfa.deploy.fleet.upgrade import next_host, refusals
+from lfa.deploy.fleet.plan.fleet_file import load
+from lfa.deploy.fleet.remote.hosts import StartedAs
+from lfa.deploy.fleet.upgrade import as_started, differing, next_host, refusals
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol.messages.header import WIRE_VERSION
@@ -57,6 +59,20 @@ def test_what_cannot_be_upgraded_is_one_line_that_names_the_machine(found: Found
 def test_machines_that_run_two_other_files_are_refused() -> None:
     found = {name: Found("0.2.0", 0, run="now", digest=digest) for name, digest in (("a", "d"), ("b", "e"), ("c", "f"))}
     assert len(refusals("convoy", found, dict.fromkeys(found, WIRE_VERSION), "d")) == 2
+
+
+def test_a_fleet_is_upgraded_as_it_was_started_also_with_options_that_its_file_lacks(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.toml"
+    file.write_text('fleet = "convoy"\nscenario = "straight"\nhosts.a = { address = "localhost" }\n')
+    started = StartedAs(secure=True, engine="systemd-system", boot=True)
+    kept = as_started(load(file), started).file
+    assert (kept.secure, kept.engine, kept.boot) == (True, "systemd-system", True)
+
+
+def test_machines_that_were_started_otherwise_than_others_are_refused_in_one_line() -> None:
+    assert differing({"a": StartedAs(secure=True), "b": StartedAs(secure=True)}) == []
+    (line,) = differing({"a": StartedAs(secure=True), "b": StartedAs()})
+    assert line.startswith("host b with secure = false, engine = own, boot = false, host a with secure = true")
 
 
 # --- a real fleet: two machines of one computer, with an lfa of their own -------------------------------------------

@@ -13,8 +13,8 @@ from lfa.deploy.analysis.causes.fact import Fact
 from lfa.protocol.errors import Refused
 from tests.deploy.analysis.causes.drawn_faults import drawn, explained, objections
 
-KINDS = range(8)
-"""Seeds of one fault of each kind."""
+KINDS = (*range(8), 44)
+"""Seeds of one fault of each kind; the last is a driver that hangs, and with it all that it reads."""
 
 
 @pytest.fixture(scope="module")

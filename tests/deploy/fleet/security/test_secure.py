@@ -59,6 +59,11 @@ class Home:
     def lets_in(self, name: str, host: str, folder: Path) -> bool:
         return answers(self.socket(host), credentials(folder, name, clock.wall_ms()))
 
+    def chain(self) -> list[int]:
+        """Return the chain of the fleet, which runs: nothing is started."""
+        chain: list[int] = json.loads(self.lfa("up", str(self.file), "--secure", "--json").stdout)["chain"]
+        return chain
+
     def wrong(self) -> dict[str, str]:
         found: list[dict[str, Any]] = json.loads(self.lfa("doctor", str(self.file), "--json").stdout)["findings"]
         return {f"{one['host']} {one['check']}": one["says"] for one in found if not one["ok"]}
@@ -115,6 +120,17 @@ def test_e29_only_the_operators_certificate_stops_a_secured_fleet(home: Home) ->
         done = home.lfa(word, "--fleet", FLEET, "--json")
         assert done.returncode == 0, done.stdout + done.stderr
         assert json.loads(done.stdout)["done"] == [1, 2]
+
+
+def test_e35_a_secured_fleet_is_upgraded_host_by_host_and_stays_secured(home: Home) -> None:
+    last = {1: "a", 2: "b"}[home.chain()[0]]
+    done = home.lfa("upgrade", str(home.file), "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["upgraded"] == sorted("ab", key=lambda name: name == last)
+    assert sorted(home.chain()) == [1, 2]
+    for host in "ab":
+        assert not answers(home.socket(host)), "who shows no certificate is let in after the upgrade"
+        assert home.lets_in({"a": "robot1", "b": "robot2"}[host], host, home.state(host) / "keys")
 
 
 def test_a_revoked_robot_is_let_in_by_no_router_and_the_rest_goes_on(home: Home) -> None:
