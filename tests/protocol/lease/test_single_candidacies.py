@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from lfa.protocol.lease.effects import Effect, StepDown
+from lfa.protocol.lease.effects import Effect, Send, StepDown
 from lfa.protocol.lease.election import FORGET_GRANTS
 from lfa.protocol.lease.machine.lease import Lease, Observer
 from lfa.protocol.lease.machine.table import LeaseState
@@ -14,7 +14,9 @@ from lfa.protocol.messages.consensus import (
     Config,
     Fence,
     Fenced,
+    Grant,
     Grantee,
+    Hello,
     LeaseBody,
     Member,
     Nack,
@@ -29,6 +31,7 @@ from lfa.protocol.messages.consensus import (
 from tests.rigs.lease_scenes import (
     ME,
     OTHER,
+    OTHERS,
     STD,
     TRIO,
     TWO,
@@ -133,6 +136,32 @@ def test_e21_gateways_of_the_absent_are_waited_for_only_without_a_quorum() -> No
     asked = asks[-1]
     assert isinstance(asked, Prepare)
     assert sent(lease.receive(WITNESS, Promise(asked.term, config, None, False), at), Propose)
+
+
+def test_a_term_is_never_used_twice_also_by_a_candidate_whose_own_voter_is_still_silent() -> None:
+    lease, terms = alone(), list[Term]()
+    for at in (0.10, 0.15):
+        lease.request_forget((OTHER,), at)
+        [asks] = sent(lease.tick(at), Prepare)
+        assert isinstance(asks, Prepare)
+        terms.append(asks.term)
+    assert terms[0] < terms[1]
+
+
+def test_e21_a_robot_that_has_led_is_not_lonely_before_its_wait_counted_from_then() -> None:
+    lease = Lease(ME, replace(TWO, lonely="continue_after", continue_after_s=2.0), STD, 0.0, 0)
+    at = led_from = STD.grant_s + 0.001
+    for other in OTHERS:
+        lease.receive(other, Hello(None, lease.agreed), 0.0)
+    propose = proposed(lease, at)
+    for other in OTHERS:
+        lease.receive(other, Grant(propose.term, propose.round, propose.config.version, at), at)
+    assert lease.may_command(at)
+    fenced: list[str] = []
+    while "gateway2" not in fenced:
+        at = max(at, lease.next_deadline())
+        fenced = [effect.to for effect in lease.tick(at) if isinstance(effect, Send) and isinstance(effect.body, Fence)]
+    assert 2.0 <= at - led_from < 2.0 + STD.grant_s + STD.act_s
 
 
 # --- refused -----------------------------------------------------------------------------------------------------

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from msgspec.structs import replace
 
 from lfa.protocol.geometry import Twist
-from lfa.protocol.lease.effects import BecomeLeader, Effect, Send, StepDown
+from lfa.protocol.lease.agreement import agreement_of
+from lfa.protocol.lease.effects import BecomeLeader, Effect, Send, StandAside, StepDown
 from lfa.protocol.lease.gateway import Gateway
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.machine.table import LeaseState
@@ -24,6 +27,7 @@ from lfa.protocol.messages.consensus import (
     Promise,
     Propose,
     Release,
+    Roster,
     Term,
     Version,
 )
@@ -86,6 +90,32 @@ def test_e7_a_token_that_changes_after_the_leases_end_ends_it_first() -> None:
         lease, asked_at, _, _ = elected(slow_s=0.001)
         effects = lease.hint(OTHER.id, OTHER.incarnation, up, asked_at + STD.act_s)
         assert isinstance(effects[0], StepDown)
+
+
+def test_e7_a_word_that_comes_after_the_leases_end_ends_it_first() -> None:
+    words: dict[str, Callable[[Lease, float], list[Effect]]] = {
+        "gateway": lambda lease, at: lease.gateway_term(NO_TERM, at),
+        "hand-over": lambda lease, at: lease.request_handover(at),
+        "roster": lambda lease, at: lease.request_roster(Roster(), at),
+        "forget": lambda lease, at: lease.request_forget((), at),
+    }
+    for name, word in words.items():
+        lease, asked_at, _, _ = elected(slow_s=0.001)
+        effects = word(lease, asked_at + STD.act_s)
+        assert isinstance(effects[0], StepDown), name
+        assert effects[0].cause == "expired", name
+
+
+def test_e25_whoever_says_the_same_by_now_counts_as_odd_no_more() -> None:
+    for says_the_same, stands_aside in ((False, True), (True, False)):
+        lease = alone()
+        other = agreement_of(replace(TWO, witness=False), STD)
+        effects = lease.receive(WITNESS, Nack(NO_TERM, NO_TERM, None, 0.0, lease.config, other), 0.1)
+        assert effects == []
+        if says_the_same:
+            lease.receive(WITNESS, Hello(None, lease.agreed), 0.1)
+        effects = lease.receive(OTHER, Nack(NO_TERM, NO_TERM, None, 0.0, lease.config, other), 0.2)
+        assert any(isinstance(effect, StandAside) for effect in effects) == stands_aside
 
 
 def test_a_token_that_returns_makes_its_process_one_that_is_there() -> None:
