@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
 from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
 from lfa.protocol.transport.endpoints import check_endpoints
-from lfa.protocol.transport.tls_door import FAILED_S, TlsDoor
+from lfa.protocol.transport.tls_door import FAILED_S, LISTENERS, TlsDoor
 from lfa.protocol.transport.zenoh_config import (
     LINK_LEASE_MS,
     SECURE_PROTOCOLS,
@@ -53,8 +54,9 @@ def open_router(
         check_listen(endpoint, credentials, secure)
     for endpoint in connect:
         check_endpoints(endpoint, "connect")
-    doors = {endpoint: _free_port() for endpoint in listen if endpoint.startswith("tls/")}
-    behind = [f"tls/127.0.0.1:{doors[end]}#{HANDSHAKE_LIMIT}" if end in doors else end for end in listen]
+    doors = {endpoint: _free_ports(LISTENERS) for endpoint in listen if endpoint.startswith("tls/")}
+    behind = [endpoint for endpoint in listen if endpoint not in doors]
+    behind += [f"tls/127.0.0.1:{port}#{HANDSHAKE_LIMIT}" for ports in doors.values() for port in ports]
     config = session_config("router", behind, connect, lease_ms, credentials)
     if secure:
         assert credentials is not None
@@ -68,9 +70,9 @@ def open_router(
         os.umask(mask)
     opened: list[TlsDoor] = []
     try:
-        for endpoint, port in doors.items():
+        for endpoint, ports in doors.items():
             host, _, public = endpoint.removeprefix("tls/").rpartition(":")
-            opened.append(TlsDoor(host.strip("[]"), int(public), ("127.0.0.1", port)))
+            opened.append(TlsDoor(host.strip("[]"), int(public), [("127.0.0.1", port) for port in ports]))
     except OSError as error:
         session.close()  # type: ignore[no-untyped-call]
         raise Refused(f"listen {' '.join(listen)}: {error.strerror}") from None
@@ -88,11 +90,13 @@ def open_router(
     return close
 
 
-def _free_port() -> int:
-    """Return a free port on loopback, for the listener behind a door."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+def _free_ports(count: int) -> list[int]:
+    """Return free ports on loopback, for the listeners behind a door."""
+    with ExitStack() as probes:
+        found = [probes.enter_context(socket.socket()) for _ in range(count)]
+        for probe in found:
+            probe.bind(("127.0.0.1", 0))
+        return [int(probe.getsockname()[1]) for probe in found]
 
 
 def check_listen(endpoint: str, credentials: Credentials | None, secure: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import signal
 import socket
+import ssl
 import stat
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -22,8 +24,8 @@ from lfa.protocol import clock
 from lfa.protocol.lease.term_window import FREE
 from lfa.protocol.messages.codec import decode
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX
-from lfa.protocol.messages.team import Status
-from lfa.protocol.topics import RECORDER_NAME, TOPIC
+from lfa.protocol.messages.team import PoseStamped, Status
+from lfa.protocol.topics import RECORDER_NAME
 from lfa.protocol.transport.credentials import ACCESS_FILE
 from tests.rigs.lfa_runs import eventually
 from tests.rigs.secured_fleet import (
@@ -42,8 +44,9 @@ from tests.rigs.secured_fleet import (
 
 pytestmark = pytest.mark.processes
 
-FLOOD_S = 3.0
-SILENT_GAP_S, SILENT_S = 0.05, 12.0
+FLOOD, POSES = 50_000, 100
+FLOODED = (f"{TRAITOR}/lease/all", f"{TRAITOR}/obstacles", f"{TRAITOR}/pose", "robot1/pose")
+SILENT_GAP_S, SILENT_S, SILENT_ADDRESSES = 0.05, 12.0, 97
 REPLAYED = 20
 
 
@@ -301,14 +304,23 @@ def test_old_messages_of_another_played_again_on_its_key(fleet: Attacked) -> Non
 
 @contextmanager
 def silent_connections(fleet: Attacked) -> Iterator[None]:
-    """Twenty a second from anyone, without any certificate: Zenoh alone lets nobody in any more after some seconds."""
+    """Twenty a second from anyone, without any certificate: Zenoh alone lets nobody in any more after some seconds.
+
+    In turn they say nothing, a part of a ClientHello, and a whole one, from other addresses than the fleet's.
+    """
     silent: list[socket.socket] = []
     stop = threading.Event()
+    hello = _client_hello()
+    said = (b"", hello[:1], hello[:40], hello)
 
     def stand() -> None:
-        while not stop.wait(SILENT_GAP_S):
+        for n in count():
+            if stop.wait(SILENT_GAP_S):
+                return
             with suppress(OSError):
-                silent.append(socket.create_connection(("127.0.0.1", fleet.port), timeout=5.0))
+                source = (f"127.0.1.{1 + n % SILENT_ADDRESSES}", 0)
+                silent.append(socket.create_connection(("127.0.0.1", fleet.port), 5.0, source))
+                silent[-1].sendall(said[n % len(said)])
 
     standing = threading.Thread(target=stand)
     standing.start()
@@ -320,6 +332,15 @@ def silent_connections(fleet: Attacked) -> Iterator[None]:
         standing.join()
         for one in silent:
             one.close()
+
+
+def _client_hello() -> bytes:
+    """What a client says first."""
+    context = ssl.create_default_context()
+    sent = ssl.MemoryBIO()
+    with suppress(ssl.SSLWantReadError):
+        context.wrap_bio(ssl.MemoryBIO(), sent, server_hostname="localhost").do_handshake()
+    return sent.read()
 
 
 def _to_the_tail(fleet: Attacked, robot: int) -> None:
@@ -364,24 +385,29 @@ def test_made_up_terms_stop_nobody(fleet: Attacked) -> None:
 
 @pytest.mark.alone
 def test_a_flood(fleet: Attacked) -> None:
-    """As fast as it can, on its own keys and on others': nobody but robot 3 loses its place, and poses keep coming."""
-    poses = Counter[str]()
+    """On its own keys and on others': nobody but robot 3 loses its place, and of others' poses 8 of 10 come."""
+    poses: dict[str, list[int]] = {"robot1": [], "robot2": []}
+
+    def hear(sample: zenoh.Sample) -> None:
+        pose = decode(sample.payload.to_bytes(), PoseStamped)
+        if isinstance(pose, PoseStamped):
+            poses[str(sample.key_expr).split("/")[-2]].append(pose.header.seq)
+
     with fleet.open(fleet.unix, RECORDER_NAME) as onlooker, fleet.open(fleet.unix) as attacker:
-        onlooker.declare_subscriber(f"{BASE}/*/pose", lambda sample: poses.update([str(sample.key_expr)]))
-        keys_ = [f"{TRAITOR}/lease/all", f"{TRAITOR}/obstacles", f"{TRAITOR}/pose", "robot1/pose"]
-        flood = [attacker.declare_publisher(f"{BASE}/{key}") for key in keys_]
+        for robot in poses:
+            onlooker.declare_subscriber(f"{BASE}/{robot}/pose", hear)
+        flood = [attacker.declare_publisher(f"{BASE}/{key}") for key in FLOODED]
         begun, sent = clock.now(), 0
-        while clock.now() < begun + FLOOD_S:
+        while sent < FLOOD or min(map(len, poses.values())) < POSES:
             for publisher in flood * 25:
                 publisher.put(b"attack" * 30)
             sent += len(flood) * 25
             fleet.team.listen()
-            clock.sleep(0.001)  # about 70 000 a second: more would be a fight for this machine's processors
-        lasted_s = clock.now() - begun
-    print(f"{sent / lasted_s:.0f} messages/s, poses of robots: {dict(poses)}")
-    assert sent > 1000 * FLOOD_S
-    expected = TOPIC["pose"].rate_hz * lasted_s  # type: ignore[operator]
-    assert min(poses[f"{BASE}/robot{n}/pose"] for n in (1, 2)) > 0.6 * expected, poses
+            clock.sleep(0.004)  # about 20 000 a second: more would be a fight for this machine's processors
+    for robot, numbers in poses.items():
+        assert len(numbers) > 0.8 * (numbers[-1] - numbers[0]), (
+            f"{robot}: {len(numbers)} of {numbers[0]}..{numbers[-1]}"
+        )
     assert fleet.team.chain()[:2] in ((1, 2), ()), fleet.team.heard.describe(clock.now())
     assert not [event for event in fleet.team.heard.events if event.kind == "lease" and event.header.stamp > begun]
 

@@ -13,15 +13,18 @@ from lfa.protocol.transport.tls_door import (
     FAILURES_HZ,
     HANDSHAKE_RECORD,
     HELLO_S,
+    RETRY,
     WAITING_ALL_MAX,
     WAITING_MAX,
     Failures,
+    Handshake,
     TlsDoor,
     Waiting,
+    hello_length,
 )
 from tests.rigs.secured_fleet import free_port
 
-HELLO = bytes([HANDSHAKE_RECORD]) + b"\x03\x01hello"
+HELLO = bytes([HANDSHAKE_RECORD]) + b"\x03\x01\x00\x06\x01hello"
 
 
 @pytest.fixture
@@ -35,7 +38,7 @@ def inner() -> Iterator[socket.socket]:
 @pytest.fixture
 def public(inner: socket.socket) -> Iterator[tuple[str, int]]:
     where = ("127.0.0.1", free_port())
-    door = TlsDoor(*where, inner.getsockname())
+    door = TlsDoor(*where, [inner.getsockname()])
     yield where
     door.close()
 
@@ -60,7 +63,7 @@ def test_who_begins_a_handshake_is_relayed_both_ways_past_any_number_of_silent_o
             assert member.recv(100) == b"", "the end of the router's link is seen at once"
 
 
-@pytest.mark.parametrize("said", [b"", b"GET / HTTP/1.1\r\n\r\n"])
+@pytest.mark.parametrize("said", [b"", b"GET / HTTP/1.1\r\n\r\n", HELLO[:1], HELLO[:5], HELLO[:-1]])
 def test_silent_ones_and_other_languages_are_shown_out_and_never_reach_zenoh(
     said: bytes, public: tuple[str, int], inner: socket.socket
 ) -> None:
@@ -93,3 +96,66 @@ def test_an_address_whose_handshakes_fail_is_refused_and_others_are_not() -> Non
     assert failures.refuses("attacker", 0.0)
     assert not failures.refuses("robot", 0.0)
     assert not failures.refuses("attacker", 1.0 / FAILURES_HZ), "it is let in again, rarely"
+
+
+def test_who_begins_a_handshake_and_says_no_more_keeps_the_listener_from_the_next_for_a_moment(
+    public: tuple[str, int], inner: socket.socket
+) -> None:
+    """With one listener: four such connections, and a member after them."""
+    with ExitStack() as begun:
+        for _ in range(4):
+            begun.enter_context(_knock(public, HELLO))
+        with _knock(public, HELLO + b" of a member"):
+            for _ in range(5):
+                inside = begun.enter_context(inner.accept()[0])
+            assert inside.recv(100) == HELLO
+            assert inside.recv(100) == b" of a member"
+
+
+def test_of_those_who_wait_for_a_listener_the_address_that_failed_least_is_next() -> None:
+    waiting, failures = Waiting(), Failures()
+    failures.add("attacker", 0.0)
+    for number, address in enumerate(("attacker", "robot", "robot")):
+        waiting.add(number, address, 0.0)
+    assert waiting.first(failures) == 1
+    failures.add("robot", 0.0, member=True)
+    assert waiting.first(failures) == 1, "the end of a member's brief connection is no failure"
+    failures.succeed("attacker")
+    assert waiting.first(failures) == 0
+
+
+@pytest.mark.parametrize(
+    ("begun", "length"),
+    [
+        (b"", 6),
+        (HELLO[:3], 6),
+        (HELLO[:5], len(HELLO)),
+        (HELLO, len(HELLO)),
+        (b"\x16\x02", None),
+        (b"\x16\x03\x01\xff\xff", None),
+        (b"\x16\x03\x01\x00\x00", None),
+        (b"\x16\x03\x01\x00\x06\x02", None),
+    ],
+)
+def test_a_client_hello_has_a_length_and_nothing_else_has(begun: bytes, length: int | None) -> None:
+    assert hello_length(begun) == length
+
+
+@pytest.mark.parametrize("retried", [False, True])
+def test_a_handshake_is_finished_when_the_server_has_answered_the_clients_answer(retried: bool) -> None:
+    """A HelloRetryRequest is answered by one hello more. Then an answer shows that it was a member."""
+    shaking = Handshake()
+    if retried:
+        shaking.server_spoke(b"\x16\x03\x03" + RETRY)
+        shaking.client_spoke(HELLO)
+    shaking.server_spoke(b"certificate")
+    shaking.server_spoke(b"its second half")
+    assert not shaking.finished
+    shaking.client_spoke(b"certificate")
+    shaking.server_spoke(b"tickets")
+    assert shaking.finished
+    assert not shaking.member
+    shaking.client_spoke(b"open")
+    shaking.server_spoke(b"accepted")
+    assert shaking.finished
+    assert shaking.member
