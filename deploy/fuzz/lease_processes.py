@@ -146,11 +146,13 @@ class Hosts(GatewaySimulation):
     def _arrive(self, src: Member, to: int, body: LeaseBody) -> None:
         process = self.processes.get(to)
         if process is not None and process.alive:
-            if (src in self.foreign) != (process.member in self.foreign) and isinstance(
-                body, Prepare | Propose | Hello
-            ):
-                body = structs.replace(body, wire=body.wire + VERSIONS_APART)
-            self.deliver(process, process.lease.receive, (src, body))
+            self.hear(process, src, body)
+
+    def hear(self, process: Process, src: Member, body: LeaseBody) -> None:
+        """Deliver a message as `process` reads it, which may speak another version of the messages than `src` (E35)."""
+        if (src in self.foreign) != (process.member in self.foreign) and isinstance(body, Prepare | Propose | Hello):
+            body = structs.replace(body, wire=body.wire + VERSIONS_APART)
+        self.deliver(process, process.lease.receive, (src, body))
 
     def _at_gateway(self, src: Member, robot_id: int, body: LeaseBody) -> None:
         answered = self.fence(robot_id, body)

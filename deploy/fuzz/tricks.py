@@ -9,6 +9,7 @@ from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.schedules import FAULTS_UNTIL_S, MADE_UP_TERMS, ScheduledFault
 from lfa.protocol.lease.agreement import agreement_of, digest
 from lfa.protocol.messages.consensus import Fence, LeaseBody, Member, Prepare, Release, Term, Version
+from lfa.protocol.messages.header import WIRE_VERSION
 
 
 class Tricks:
@@ -65,10 +66,11 @@ class Tricks:
         team, source = self._team, self._team.processes[robot]
         team.report(Checker.wall_steps, team.now, robot)  # as a clock of another century would: it may be the highest
         term = Term(number, robot, source.member.incarnation)
-        said: tuple[LeaseBody, ...] = (Prepare(term, Version(term, 0), agreed=source.lease.agreed), Release(term))
+        asked = Prepare(term, Version(term, 0), agreed=source.lease.agreed, wire=WIRE_VERSION)
+        said: tuple[LeaseBody, ...] = (asked, Release(term))
         for process in list(team.processes.values()):
             for body in said if process.alive and process is not source else ():
-                team.deliver(process, process.lease.receive, (source.member, body))
+                team.hear(process, source.member, body)
         for other in team.robots:
             team.fence(other, Fence(term, term))
 

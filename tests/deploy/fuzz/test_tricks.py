@@ -45,6 +45,12 @@ def test_the_bug_that_a_trick_is_for_is_found_and_the_other_tricks_are_left_out(
     assert [trick.kind for trick in shrink(bad, name).tricks] == [kind]
 
 
+@pytest.mark.parametrize("seed", [1039, 1073])
+def test_a_made_up_term_is_not_read_by_a_process_of_another_version(seed: int) -> None:
+    assert {"made_up", "version"} <= {trick.kind for trick in draw(seed).tricks}
+    assert play(draw(seed)).violations == [], f"reproduce: lfa fuzz --seed {seed} -v"
+
+
 def test_drawn_schedules_have_every_trick_and_say_so() -> None:
     drawn = [draw(seed) for seed in range(60)]
     assert {trick.kind for one in drawn for trick in one.tricks} == set(TRICKS)
