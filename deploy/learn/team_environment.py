@@ -39,8 +39,9 @@ class TeamEnvironment(ParallelEnv[str, Observation, Action]):
     def __init__(self, scenario: Scenario, commanded: Sequence[int], faults: Sequence[Fault], step_s: float) -> None:
         """Prepare the environment. Raises Refused for a robot that the mission does not have, and for `step_s` <= 0."""
         strangers = [robot for robot in commanded if robot not in scenario.mission.robots]
-        if strangers or not commanded:
-            raise Refused(f"commanded={list(commanded)}: must be some of robots {list(scenario.mission.robots)}")
+        if strangers or not commanded or len(set(commanded)) < len(commanded):
+            right = f"must be some of robots {list(scenario.mission.robots)}, each once"
+            raise Refused(f"commanded={list(commanded)}: {right}")
         if not (isfinite(step_s) and step_s > 0.0):
             raise Refused(f"step_s={step_s}: must be a finite time [s] above 0")
         limits = scenario.mission.limits
@@ -69,7 +70,9 @@ class TeamEnvironment(ParallelEnv[str, Observation, Action]):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Begin a run drawn with `seed`, by default the seed after the last one, the first time the scenario's own."""
-        self._seed = self._seed + 1 if seed is None else seed
+        if not (seed is None or isinstance(seed, int | np.integer)):
+            raise Refused(f"seed={seed!r}: must be a whole number")
+        self._seed = self._seed + 1 if seed is None else int(seed)
         self._commanded = {}
         drawn = draw(self._scenario, self._seed)
         self._view = TeamView(drawn)
@@ -79,13 +82,17 @@ class TeamEnvironment(ParallelEnv[str, Observation, Action]):
         return {name: self._seen(name) for name in self.agents}, {name: {} for name in self.agents}
 
     def step(self, actions: Mapping[str, Action]) -> Steps:
-        """Go on for `step_s`. Raises ResetNeeded before the first `reset` and after the end of a run."""
+        """Go on for `step_s`. Raises ResetNeeded before the first `reset` and after the end of a run, and Refused for
+        actions that are none.
+        """
         run = self._run
         if run is None:
             raise ResetNeeded("step() before reset(): reset() begins a run")
         if not self.agents:
             over = "no commanded robot is left" if run.verdict is None else run.verdict.outcome
             raise ResetNeeded(f"step() after the end of the run ({over}): reset() begins the next one")
+        if not (isinstance(actions, Mapping) and set(actions) <= set(self.possible_agents)):
+            raise Refused(f"actions {actions!r}: must be a dict of actions by agent, of {self.possible_agents}")
         for name, agent in self._commanded.items():
             action = actions.get(name)
             agent.wanted = None if action is None else _twist(action)
@@ -125,7 +132,10 @@ def _id(name: str) -> int:
 
 def _twist(action: Action) -> Twist:
     """Return an action as a twist. Raises Refused for one that is no two finite numbers."""
-    values = np.asarray(action, float)
+    try:
+        values = np.asarray(action, float)
+    except (TypeError, ValueError):  # a text, or rows of several lengths
+        values = np.array([])
     if values.shape != (2,) or not np.isfinite(values).all():
         raise Refused(f"action {action!r}: must be two finite numbers, forward [m/s] and yaw rate [rad/s]")
     return Twist(float(values[0]), float(values[1]))

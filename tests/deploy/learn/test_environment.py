@@ -81,6 +81,7 @@ def test_at_the_time_limit_it_is_truncated_and_a_further_step_says_what_to_do() 
     ("arguments", "line"),
     [
         ({"commanded": [9]}, r"commanded=\[9\]: must be some of robots \[1, 2, 3, 4\]"),
+        ({"commanded": [2, 2]}, r"commanded=\[2, 2\]: must be some of robots \[1, 2, 3, 4\], each once"),
         ({"commanded": []}, r"commanded=\[\]: must be some of robots"),
         ({"step_s": 0.0}, r"step_s=0.0: must be a finite time \[s\] above 0"),
     ],
@@ -90,8 +91,22 @@ def test_a_bad_argument_is_one_line(arguments: dict[str, Any], line: str) -> Non
         environment("straight", **arguments)
 
 
-def test_an_action_that_is_no_twist_is_one_line() -> None:
+@pytest.mark.parametrize("action", [np.array([np.nan, 0.0]), [0.0, 0.0, 0.0], "fast", [[0.1], [0.1, 0.2]]])
+def test_an_action_that_is_no_twist_is_one_line(action: Any) -> None:
     env = environment("straight", [2], set=SHORT, robots=2)
     env.reset(1)
     with pytest.raises(Refused, match="must be two finite numbers"):
-        env.step({"robot2": np.array([np.nan, 0.0])})
+        env.step({"robot2": action})
+
+
+@pytest.mark.parametrize("actions", [{"robot9": [0.1, 0.0]}, {"robot1": [0.1, 0.0]}, [0.1, 0.0], []])
+def test_actions_of_nobody_whom_the_policy_commands_are_one_line(actions: Any) -> None:
+    env = environment("straight", [2], set=SHORT, robots=2)
+    env.reset(1)
+    with pytest.raises(Refused, match=r"must be a dict of actions by agent, of \['robot2'\]"):
+        env.step(actions)
+
+
+def test_a_seed_that_is_no_whole_number_is_one_line() -> None:
+    with pytest.raises(Refused, match="seed='first': must be a whole number"):
+        environment("straight", [2], set=SHORT, robots=2).reset("first")  # type: ignore[arg-type]
