@@ -222,7 +222,8 @@ TRANSITIONS = (
     Transition(E.RELEASE, ALL, voting.on_release, DROPPED, "E4",
                "end a bond of this term and start the election; answer the PREPARE that the bond refused"),
     Transition(E.HELLO, LEADS_NOT, voting.answer_hello, (), "E9 E23",
-               "without a leader, answer with the newest config; tell an earlier incarnation so"),
+               "without a leader, answer with the newest config, if it knows one or is of the first ids; tell an "
+               "earlier incarnation so"),
     Transition(E.HELLO, (S.LEADER,), leadership.on_hello, UP, "E9 E22 E23",
                "take the sender into the chain"),
     Transition(E.HELLO, UP, leadership.note_hello, (), "E9 E23",

@@ -135,8 +135,17 @@ def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
     later = m.peers.later_than(src)
     if later is not None:
         m.send(robot_name(src.id), Superseded(later))
-    elif m.leader is None and (body.version is None or body.version < m.config.version):
+    elif m.leader is None and (body.version is None or body.version < m.config.version) and _tells(m):
         m.refuse(src, NO_TERM, now)
+
+
+def _tells(m: LeaseMemory) -> bool:
+    """Return whether this process answers a HELLO: if it remembers a config, or is of the first ids.
+
+    Who remembers none has none to tell, but shows that it is there. In the first start of N robots N squared answers,
+    each with the names of N robots, would come eight times a second.
+    """
+    return not is_first(m.config) or m.me.id in m.election.all_member_ids[:VOTERS_MAX]
 
 
 def on_superseded(m: LeaseMemory, _src: Member, body: Superseded, now: float) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.messages.consensus import Hello, Member, Nack
 from lfa.protocol.mission import Leading, Mission
-from tests.rigs.lease_scenes import STD, Team
+from tests.rigs.lease_scenes import STD, Team, sent
 
 
 def test_e8_a_silent_follower_leaves_the_chain_after_t_chain_and_the_order_stays() -> None:
@@ -48,6 +50,25 @@ def test_e9_a_robot_in_place_without_a_vote_says_hello_to_its_leader_alone_and_s
         assert team.lease_of(leader).chain == tuple(alive)
         team.kill(leader)
     assert team.safe()
+
+
+def test_e9_in_the_first_start_of_many_robots_few_answer_who_says_hello() -> None:
+    """Each answer has the names of all: of N robots they would be N squared, eight times a second."""
+    mission = Mission(robots=tuple(range(1, 31)))
+    first = [Lease(Member(id, 1), mission, STD, 0.0, floor=0) for id in (*mission.robots, 0)]
+    hello = Hello(None, first[0].agreed)
+    answering = [id for id, lease in zip((*mission.robots, 0), first, strict=True) if _answers(lease, hello, 0.1)]
+    assert answering == [1, 2, 3, 4, 5, 6, 7]
+
+
+def test_e9_who_remembers_a_config_tells_it_to_a_blank_robot_whatever_its_own_id() -> None:
+    team = Team(robots=9, led_by=3.0)
+    for id in range(1, 9):
+        team.kill(id)
+    team.run(6.0)
+    last = team.lease_of(9)
+    assert last.leader is None
+    assert _answers(last, Hello(None, last.agreed), team.processes[9].clock.local(team.now))
 
 
 def test_e22_a_robot_left_out_stays_out_though_it_asks_and_returns_at_the_tail() -> None:
@@ -254,3 +275,8 @@ def test_learners_move_up_when_voters_die() -> None:
     voters = {m.id for m in team.lease_of(1).config.voters}
     assert voters == {0, 1, 5, 6, 7, 8, 9}
     assert team.safe()
+
+
+def _answers(lease: Lease, hello: Hello, now: float) -> bool:
+    """Return whether `lease` answers the `hello` of a robot 8, started again."""
+    return bool(sent(lease.receive(Member(8, 99), hello, now), Nack))
