@@ -46,10 +46,16 @@ class ArcPlanner:
         """True while no arc leads on although the robot faces along its route."""
 
     def steer(
-        self, points: Sequence[Point], route: Callable[[float], Point], wanted: Twist, turn_radps: float
+        self,
+        points: Sequence[Point],
+        route: Callable[[float], Point],
+        wanted: Twist,
+        turn_radps: float,
+        bend_mps: Callable[[float], float] = lambda _curvature: 0.0,
     ) -> Twist:
         """Return `wanted` or the twist of a better arc. `points` are in `base_link`, and so is `route(s)`, the point
-        `s` [m] ahead on the route; `turn_radps` is the largest rate of a turn on the spot.
+        `s` [m] ahead on the route; `turn_radps` is the largest rate of a turn on the spot, and `bend_mps(curvature)`
+        the speed [m/s] that an arc of this curvature [1/m] may have, where that is more than the wanted one's.
         """
         self.blocked = False
         if wanted.linear_x <= 0.0:
@@ -64,7 +70,7 @@ class ArcPlanner:
         if best is None:
             return self._turn(near, route, turn_radps)
         self._curvature, roomy_m = best
-        v = min(wanted.linear_x, self._close_mps(roomy_m))
+        v = min(max(wanted.linear_x, bend_mps(self._curvature)), self._close_mps(roomy_m))
         omega_max = self._limits.omega_max_radps
         v = min(v, omega_max / max(abs(self._curvature), 1e-9))
         return Twist(v, v * self._curvature)

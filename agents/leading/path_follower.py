@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, hypot, inf, pi
+from math import asin, atan2, hypot, inf, pi
 
 from lfa.agents.avoidance.safety import turn_on_spot
 from lfa.agents.config import CONTROL_PERIOD_S
@@ -46,6 +46,8 @@ class PathFollower(RouteTracker):
         self.slots_swing = slots_swing
         self._limits = limits
         self._period_s = period_s
+        self._straight_mps, self._ramp_mps = 0.0, 0.0
+        """Speeds [m/s] that the last step allowed straight ahead, and by the acceleration."""
         self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
 
     def narrow_bend_m(self, slots: Sequence[Slot], within_m: float) -> float | None:
@@ -93,10 +95,10 @@ class PathFollower(RouteTracker):
         v = min(
             self._cruise(slots), self._braking(straight if near_end else max(straight, left_m), ends), speed_max_mps
         )
-        if self._planned:
-            v *= max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)
-        # This limit is last: a share of it would be taken again in each following step.
-        v = min(v, abs(twist.linear_x) + self._leading.acceleration_mps2 * self._period_s)
+        # The acceleration's limit is last: a share of it would be taken again in each following step.
+        self._straight_mps = v
+        self._ramp_mps = abs(twist.linear_x) + self._leading.acceleration_mps2 * self._period_s
+        v = min(_share(bearing) * v if self._planned else v, self._ramp_mps)
         if ends and near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing, slots)
         if abs(bearing) > IN_PLACE_RAD:
@@ -104,6 +106,11 @@ class PathFollower(RouteTracker):
         reach = max(hypot(*target), 0.25)
         curvature = 2.0 * target[1] / (reach * reach)
         return Twist(v, v * curvature)
+
+    def bend_mps(self, curvature: float) -> float:
+        """Return the speed [m/s] that the last step allowed on an arc of `curvature` [1/m] beside a planned route."""
+        bearing = asin(min(1.0, 0.5 * self._look_ahead_m * abs(curvature)))
+        return min(_share(bearing) * self._straight_mps, self._ramp_mps)
 
     def _braking(self, straight: float, ends: bool) -> float:
         """Return the speed [m/s] from which the robot can stop at the next way-point that it drives up to."""
@@ -131,3 +138,8 @@ class PathFollower(RouteTracker):
             brake = (speed * speed + braking * (route.at_m[i + 1] - route.at_m[i])) ** 0.5
             speed = min(cruise, leader_speed_cap(slots, route.curvature[i], self._limits, PLANNED_MARGIN), brake)
         return speed
+
+
+def _share(bearing: float) -> float:
+    """Return the share of the speed that a planned route allows towards `bearing` [rad]."""
+    return max(SLOWEST_SHARE, 1.0 - abs(bearing) / IN_PLACE_RAD)

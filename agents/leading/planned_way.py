@@ -73,7 +73,7 @@ class PlannedWay:
             return STILL
         swing = self.lead.slots_swing and not alone
         turn_radps = TEAM_RADPS if swing else inf
-        twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps)
+        twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps, self.lead.bend_mps)
         if self._blocked is not None and distance(self._blocked[1], pose) > self._radius_m:
             self._blocked = None
         if self._arcs.blocked:
@@ -94,5 +94,5 @@ class PlannedWay:
             others = without(others, in_base(pose, (mate.x, mate.y)), self._radius_m + MATE_M)
         if len(others) == len(points):
             return False
-        self._arcs.steer(others, partial(self.lead.ahead, pose), wanted, turn_radps)
+        self._arcs.steer(others, partial(self.lead.ahead, pose), wanted, turn_radps, self.lead.bend_mps)
         return not self._arcs.blocked

@@ -76,3 +76,15 @@ def test_beside_what_is_close_a_robot_drives_as_fast_as_its_drive_can_brake(a_ma
     twist = ArcPlanner(RADIUS_M, limits).steer(posts, route_along_x(Pose2D()), Twist(2.0, 0.0), TURN_RADPS)  # type: ignore[arg-type]
     stops_within_room = sqrt(2.0 * 0.8 * a_max_mps2 * 0.12)
     assert stops_within_room <= twist.linear_x <= 1.2 * stops_within_room
+
+
+def test_an_arc_straighter_than_the_wanted_one_is_driven_as_fast_as_its_own_bend_allows() -> None:
+    """The wanted bend was slowed for how much it bends, and is not free: the speed that is told for the arc counts."""
+    limits, slow_bend = Limits(v_max_mps=2.0, a_max_mps2=4.0), Twist(0.5, 2.1)
+    posts = [(0.3, RADIUS_M + 0.3)]
+    route = route_along_x(Pose2D())
+    twist = ArcPlanner(RADIUS_M, limits).steer(posts, route, slow_bend, TURN_RADPS, lambda c: 1.0 / (1.0 + abs(c)))  # type: ignore[arg-type]
+    curvature = twist.angular_z / twist.linear_x
+    assert abs(curvature) < 2.1 / 0.5
+    assert twist.linear_x == pytest.approx(max(0.5, 1.0 / (1.0 + abs(curvature))))
+    assert twist.linear_x > 0.5
