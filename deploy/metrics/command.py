@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +13,7 @@ import typer
 from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.metrics.collector import FAMILIES, FleetMetrics
 from lfa.deploy.metrics.exposition import CONTENT_TYPE, openmetrics
+from lfa.deploy.metrics.page_server import MetricsServer
 from lfa.deploy.process.signals import Interrupts
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -23,8 +24,6 @@ PORT_MAX = 65535
 POLL_S = 0.1
 FIRST_S = 1.3
 """Time [s] to listen before the text is printed once: each process has published its status by then."""
-REQUEST_S = 2.0
-"""Longest time [s] that one client may take; the next one waits for it."""
 TOPICS = frozenset({"*/*", "*/*/*"})
 
 
@@ -82,8 +81,6 @@ def _serve(page: _Page, address: tuple[str, int], fleet: str) -> None:
     """Serve until Ctrl-C or SIGTERM. Raises Refused when the address cannot be listened at."""
 
     class Handler(BaseHTTPRequestHandler):
-        timeout = REQUEST_S
-
         def do_GET(self) -> None:
             if self.path.partition("?")[0] != "/metrics":
                 self.send_error(404, "only /metrics is here")
@@ -99,7 +96,7 @@ def _serve(page: _Page, address: tuple[str, int], fleet: str) -> None:
             """Print nothing: a scrape a second would fill a log."""
 
     try:
-        server = HTTPServer(address, Handler)
+        server = MetricsServer(address, Handler)
     except (OSError, OverflowError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise Refused(f"--listen {address[0]}:{address[1]}: {why}: must be a free address of this machine") from None
