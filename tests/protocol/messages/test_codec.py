@@ -155,7 +155,7 @@ def test_a_tile_of_a_map_is_a_whole_rectangle(columns: int) -> None:
         decode(encode(PlanNote(HEADER, (), 0.1, (0.0, 0.0), columns, bytes(4))), PlanNote)
 
 
-@pytest.mark.parametrize("control_hz", [0.0, -20.0, 1e-300, 19.9, 50.1, math.inf, math.nan])
+@pytest.mark.parametrize("control_hz", [0.0, -20.0, 1e-300, 9.9, 50.1, math.inf, math.nan])
 def test_a_mission_whose_control_rate_gives_no_durations_is_refused(control_hz: float) -> None:
     """Witness and driver compute deadman and bond from it, and check nothing else of a mission."""
     with pytest.raises(BadMessage):
