@@ -23,7 +23,7 @@ BEGIN, END = "<!-- begin: make bench-table -->\n", "<!-- end -->"
 BENCHES = ("lidar", "world", "sim", "agent", "agents", "lockstep", "latency", "router", "failover", "operate", "soak")
 """Benches of the table; those of driving and of campaigns have pages of their own."""
 BOTTLENECKS = {
-    "sim/1000*": "the agents' own steps, then the rows of the team's table, each heard by all",
+    "sim/1000*": "the first election, in which each process hears the tokens, HELLO and table rows of all",
     "sim/*": "encoding, recording and journalling of each message take as much as the agents' own steps",
     "agent*/*share of a core*": "wake-ups of Zenoh's threads, one for each message that is not pulled",
     "agent*/*": "the scheduler: more processes are ready than cores",

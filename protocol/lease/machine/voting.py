@@ -140,12 +140,13 @@ def answer_hello(m: LeaseMemory, src: Member, body: Hello, now: float) -> None:
 
 
 def _tells(m: LeaseMemory) -> bool:
-    """Return whether this process answers a HELLO: if it remembers a config, or is of the first ids.
+    """Return whether this process answers a HELLO: if it knows a config, in a small team, or as one of the first ids.
 
     Who remembers none has none to tell, but shows that it is there. In the first start of N robots N squared answers,
     each with the names of N robots, would come eight times a second.
     """
-    return not is_first(m.config) or m.me.id in m.election.all_member_ids[:VOTERS_MAX]
+    ids = m.election.all_member_ids
+    return not is_first(m.config) or len(ids) <= VOTERS_MAX or m.me.id in ids[:VOTERS_MAX]
 
 
 def on_superseded(m: LeaseMemory, _src: Member, body: Superseded, now: float) -> None:

@@ -61,6 +61,12 @@ def test_e9_in_the_first_start_of_many_robots_few_answer_who_says_hello() -> Non
     assert answering == [1, 2, 3, 4, 5, 6, 7]
 
 
+def test_e9_a_spare_that_remembers_no_config_answers_in_a_small_team() -> None:
+    mission = Mission(robots=(1, 2))
+    spare = Lease(Member(7, 1), mission, STD, 0.0, floor=0)
+    assert _answers(spare, Hello(None, spare.agreed), 0.1)
+
+
 def test_e9_who_remembers_a_config_tells_it_to_a_blank_robot_whatever_its_own_id() -> None:
     team = Team(robots=9, led_by=3.0)
     for id in range(1, 9):
