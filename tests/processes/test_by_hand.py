@@ -336,8 +336,8 @@ def test_who_holds_another_mission_than_its_team_ends_in_one_line(terminals: Ter
     ):
         odd = start(**other)
         _, said = odd.communicate(timeout=30.0)
-        event, reason = said.splitlines()
-        assert " robot3 mission " in event
+        *events, reason = said.splitlines()  # on a busy machine it also says what it missed
+        assert any(" robot3 mission " in event for event in events)
         assert (odd.returncode, reason) == (2, f"lfa-agent: {line}, which witness, robot1, robot2 hold")
     start()
     eventually(lambda: follows(terminals, "robot3"), "robot 3 follows nobody with the team's mission")
