@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from lfa.protocol.geometry import Number
 from lfa.protocol.messages.header import UNSAID_WIRE, Count, Header, Stamp
@@ -70,7 +71,7 @@ class Config(Struct, frozen=True, array_like=True):
     voters: tuple[Member, ...]
     tie: Member | None
     previous: Electorate | None
-    chain: tuple[Member, ...]
+    chain: Annotated[tuple[Member, ...], Meta(min_length=1)]
     roster: Roster = NO_CHANGE
 
 

@@ -5,6 +5,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
@@ -16,6 +17,7 @@ from lfa.protocol.messages.consensus import (
     Hello,
     LeaseNote,
     Member,
+    Nack,
     Prepare,
     Promise,
     Propose,
@@ -110,6 +112,18 @@ def test_numbers_that_a_core_would_compute_with_are_finite(bad: float) -> None:
     for message in wrong:
         with pytest.raises(BadMessage):
             decode(encode(message), type(message))
+
+
+def test_a_config_whose_chain_has_no_leader_is_refused() -> None:
+    """Whoever adopts a config compares the head of its chain with itself."""
+    nobody = structs.replace(CONFIG, chain=())
+    for body in (
+        Propose(TERM, nobody, 4, Member(1, 5)),
+        Promise(TERM, nobody, None, False),
+        Nack(TERM, TERM, None, 0.0, nobody),
+    ):
+        with pytest.raises(BadMessage, match="length >= 1"):
+            decode(encode(LeaseNote(HEADER, body)), LeaseNote)
 
 
 @pytest.mark.parametrize("n", [-1, 2**53 + 1, 2**63, 2**64 - 1])
