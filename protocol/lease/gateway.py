@@ -81,8 +81,6 @@ class Gateway:
             self._window.know(cmd.term.n)
         elif self._holder == 0:
             self._holder = cmd.holder
-        if cmd.as_leader:
-            self._latched = None
         self._twist, self._stamped_at = self._within_limits(cmd.twist), cmd.gateway.time
         self.stop.hear_agent(cmd.stop)
         return None

@@ -62,10 +62,11 @@ def rank(config: Config, me: int, passable: Gone) -> int:
 def led_by(config: Config, leader: Member, term: Term, gone: Gone, keep_leader: bool = False) -> Config:
     """Return `config` with version `(term, 0)` and the chain `leader`, then the old chain without lost leader and dead.
 
-    With `keep_leader` the old leader has handed its lease over and moves to the tail.
+    With `keep_leader` the old leader has handed its lease over and moves to the tail. `config` is not the first one,
+    which no quorum of promises can know.
     """
     old = config.chain
-    if not is_first(config) and old and old[0].id != leader.id:
+    if old[0].id != leader.id:
         old = (*old[1:], old[0]) if keep_leader else old[1:]
     rest = tuple(m for m in old if m.id != leader.id and not gone(m))
     return structs.replace(config, version=Version(term, 0), chain=(leader, *rest))

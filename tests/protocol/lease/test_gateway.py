@@ -6,8 +6,9 @@ import pytest
 
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.term_window import BURST, FREE, FRESH
 from lfa.protocol.lease.timing import timing_of
-from lfa.protocol.messages.consensus import Fence, GatewayStamp, Term
+from lfa.protocol.messages.consensus import NO_TERM, Fence, GatewayStamp, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.messages.stop import NEVER_STOPPED
@@ -150,6 +151,16 @@ def test_e13_a_gateway_that_starts_is_shut_for_the_longest_bond() -> None:
     assert gateway.command(command(OPEN), OPEN) is None
 
 
+def test_e26_the_term_of_an_obeyed_command_is_known_and_a_fence_a_little_above_it_is_believed() -> None:
+    """A gateway that knows no term believes less of others than that."""
+    for commanded in (True, False):
+        gateway, term = opened(), FREE + FRESH + 100
+        if commanded:
+            assert gateway.command(command(OPEN, n=term), OPEN) is None
+        above = Term(term + BURST, 2, 1)
+        assert gateway.fence(Fence(Term(term, 1, 1), above), OPEN).term == (above if commanded else NO_TERM)
+
+
 def test_e14_the_death_of_the_agent_bars_its_term_but_not_the_next() -> None:
     gateway = opened()
     gateway.command(command(OPEN), OPEN)
@@ -172,6 +183,15 @@ def test_only_the_newest_life_of_an_agent_is_obeyed() -> None:
     gateway.agent_up(6, OPEN)
     assert gateway.command(command(OPEN, life=5), OPEN) == "old_incarnation"
     assert gateway.command(command(OPEN, life=6), OPEN) is None
+
+
+def test_the_robot_brakes_for_a_later_life_of_its_agent_and_for_no_other() -> None:
+    for life, twist in ((4, GO), (5, GO), (6, STILL)):
+        gateway = opened()
+        gateway.command(command(OPEN), OPEN)
+        gateway.agent_up(life, OPEN)
+        assert gateway.twist(OPEN) == twist
+        assert gateway.agent == max(life, 5)
 
 
 def test_the_death_of_an_earlier_life_does_not_latch_a_later_one() -> None:

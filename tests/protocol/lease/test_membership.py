@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from lfa.protocol.lease.machine.lease import Lease
-from lfa.protocol.messages.consensus import Hello, Member, Nack
+from lfa.protocol.lease.membership import ids, led_by
+from lfa.protocol.messages.consensus import Hello, Member, Nack, Term
 from lfa.protocol.mission import Leading, Mission
-from tests.rigs.lease_scenes import STD, Team, sent
+from tests.rigs.lease_scenes import STD, Team, config_of, sent
 
 
 def test_e8_a_silent_follower_leaves_the_chain_after_t_chain_and_the_order_stays() -> None:
@@ -191,6 +192,13 @@ def test_bug_7_an_amnesiac_does_not_bring_an_old_majority_back() -> None:
     assert team.leaders() == [1]
     assert sorted(team.lease_of(4).chain) == [1, 2, 3, 4]
     assert team.safe()
+
+
+def test_e16_a_successor_that_was_not_the_next_leads_the_chain_before_it_and_the_old_leader_goes_to_its_tail() -> None:
+    config = config_of(Term(1, 1, 1))
+    for keep_leader, chain in ((True, (3, 2, 4, 1)), (False, (3, 2, 4))):
+        written = led_by(config, Member(3, 1), Term(2, 1, 1), lambda _: False, keep_leader)
+        assert ids(written.chain) == chain
 
 
 @pytest.mark.parametrize("cut_off", [(1, 2), (3, 4), (1, 3)])

@@ -63,13 +63,14 @@ def test_e33_a_spare_that_is_switched_on_after_its_admission_joins_then() -> Non
     assert team.lease_of(7).chain == (1, 2, 3, 4, 7)
 
 
-def test_e33_a_spare_takes_the_place_of_a_lost_robot() -> None:
+@pytest.mark.parametrize(("lost", "chain"), [(2, (1, 7, 3, 4)), (3, (1, 2, 7, 4)), (4, (1, 2, 3, 7))])
+def test_e33_a_spare_takes_the_place_of_a_lost_robot(lost: int, chain: tuple[int, ...]) -> None:
     team = Operated(spares=(7,))
-    team.kill(2)
+    team.kill(lost)
     team.run(2.0)
-    team.join(7, slot_of=2)
+    team.join(7, slot_of=lost)
     team.run(3.0)
-    assert team.lease_of(4).chain == (1, 7, 3, 4)
+    assert team.lease_of(1).chain == chain
     assert team.safe()
 
 
