@@ -74,17 +74,19 @@ def ask(voter: Acceptor, who: Member, term: Term, now: float, number: int = 0) -
 A, B = Member(1, 7), Member(2, 8)
 LOW, HIGH = Term(5, 1, 7), Term(6, 2, 8)
 
+OTHERS = (Member(0, 3), Member(2, 4))
+ME, (WITNESS, OTHER) = Member(1, 7), OTHERS
+TRIO = (ME, OTHER, WITNESS)
+TWO = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
+"""Robot 1, robot 2 and the witness of `alone`, and their mission."""
 
-def alone(observer: Observer | None = None) -> Lease:
+
+def alone(observer: Observer | None = None, mission: Mission = TWO) -> Lease:
     """Return the lease of robot 1 of two, with a witness, after a HELLO of both others."""
-    mission = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
-    lease = Lease(Member(1, 7), mission, STD, 0.0, 0, observer)
+    lease = Lease(ME, mission, STD, 0.0, 0, observer)
     for other in OTHERS:
         lease.receive(other, Hello(None, lease.agreed), 0.0)
     return lease
-
-
-OTHERS = (Member(0, 3), Member(2, 4))
 
 
 def sent(effects: list[Effect], kind: type) -> list[LeaseBody]:
@@ -102,20 +104,14 @@ def proposed(lease: Lease, at: float) -> Propose:
     return propose
 
 
-def elected(slow_s: float) -> tuple[Lease, float, float, list[Effect]]:
+def elected(slow_s: float, mission: Mission = TWO) -> tuple[Lease, float, float, list[Effect]]:
     """Return the lease of robot 1, the time of its request, the time of the grants `slow_s` later, and the effects."""
-    lease, asked_at = alone(), STD.grant_s + 0.001
+    lease, asked_at = alone(mission=mission), STD.grant_s + 0.001
     propose = proposed(lease, asked_at)
     at = asked_at + slow_s
     grant = Grant(propose.term, propose.round, propose.config.version, 0.0)
     effects = [e for other in OTHERS for e in lease.receive(other, grant, at)]
     return lease, asked_at, at, effects
-
-
-ME, (WITNESS, OTHER) = Member(1, 7), OTHERS
-TRIO = (ME, OTHER, WITNESS)
-TWO = Mission(robots=(1, 2), leading=Leading(route_m=((1.0, 0.0),)))
-"""Robot 1, robot 2 and the witness of `alone`, and their mission."""
 
 
 def led_by_other(lease: Lease, term: Term, now: float) -> Config:
@@ -126,9 +122,9 @@ def led_by_other(lease: Lease, term: Term, now: float) -> Config:
     return config
 
 
-def committed() -> tuple[Lease, float]:
-    """A lease whose config is joint with none any more and has been accepted by all, and when that was."""
-    lease, _, at, effects = elected(slow_s=0.001)
+def committed(mission: Mission = TWO) -> tuple[Lease, float]:
+    """Return a lease whose config is joint with none any more and has been accepted by all, and when that was."""
+    lease, _, at, effects = elected(slow_s=0.001, mission=mission)
     assert not lease.is_committed, "joint with the unanimous start"
     while not lease.is_committed:
         at = max(at, lease.next_deadline())
