@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
+import re
 import shutil
 import tarfile
+import tempfile
 from pathlib import Path
+from typing import BinaryIO
 
 from lfa.deploy.client.discovery import option
 from lfa.deploy.fleet.host.end import ANSWER
@@ -19,12 +23,20 @@ from lfa.deploy.recording.run_folder import JOURNALS
 from lfa.deploy.whole_output import whole_folder
 from lfa.protocol.errors import Refused
 
+PACKED_BYTES_MAX = 4 << 30
+"""Maximum size [bytes] of what one machine sends; the operator's disk keeps twice that at most."""
+MEMBERS_MAX = 1024
+"""Maximum number of entries that one machine sends: processes are fewer than ten, each starts again at times."""
+PIECE_BYTES = 256 * 1024
+MARK_BYTES_MAX = 64 * 1024
+"""Length [bytes] of the greeting and mark before the archive."""
+JOURNAL_NAME = re.compile(r"[A-Za-z0-9_.-]{1,120}\.bin")
 PACK = (
     "import pathlib, sys, tarfile\n"
     "runs = sorted(pathlib.Path(sys.argv[1]).expanduser().glob('*/journal'), key=lambda run: run.stat().st_mtime)\n"
     f"sys.stdout.write('{ANSWER}')\n"
     "sys.stdout.flush()\n"
-    "with tarfile.open(fileobj=sys.stdout.buffer, mode='w|') as packed:\n"
+    "with tarfile.open(fileobj=sys.stdout.buffer, mode='w|', format=tarfile.GNU_FORMAT) as packed:\n"
     "    for path in (path for run in runs[-1:] for path in sorted(run.glob('*.bin'))):\n"
     "        packed.add(path, path.name)\n"
 )
@@ -67,33 +79,64 @@ async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> 
     """Fetch the journals of one machine; return their number, or the failure."""
     machine = plan.hosts[name]
     try:
-        shell = await reach(machine)
-        try:
-            done = await shell.run((python_of(machine), "-P", "-c", PACK, part.state))
-        finally:
-            await shell.close()
+        run.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=run) as packed:
+            shell = await reach(machine)
+            try:
+                words = (python_of(machine), "-P", "-c", PACK, part.state)
+                done = await shell.run(words, into=packed, bytes_max=PACKED_BYTES_MAX)
+            finally:
+                await shell.close()
+            if done.code != 0 or not _to_answer(packed):
+                return f"gives no journals: {done.last_line}"
+            return await asyncio.to_thread(unpack, packed, run)
     except (Unreachable, Refused) as error:
         return str(error)
-    if done.code != 0 or done.answer is None:
-        return f"gives no journals: {done.last_line}"
-    try:
-        return unpack(done.answer, run)
     except tarfile.TarError as error:
         return f"gives no journals that can be read: {error}"
     except OSError as error:
-        return f"its journals are not kept: {error.filename}: {error.strerror}"
+        return f"its journals are not kept: {error.filename or run}: {error.strerror}"
 
 
-def unpack(packed: bytes, run: Path) -> int:
+def _to_answer(output: BinaryIO) -> bool:
+    """Move to what follows the mark in a program's output; return False without a mark near its begin."""
+    output.seek(0)
+    at = output.read(MARK_BYTES_MAX).find(ANSWER.encode())
+    output.seek(max(0, at) + len(ANSWER))
+    return at >= 0
+
+
+def unpack(packed: bytes | BinaryIO, run: Path) -> int:
     """Unpack the regular files `*.bin` of a tar file into the folder itself, skip the rest; return their number.
 
-    Raises OSError and TarError, and leaves none then.
+    Reads headers one by one, because `tarfile` obeys extended ones: a sparse file grows to any size, and the text of a
+    header fills the memory. Raises OSError and TarError, and leaves none then.
     """
+    source = io.BytesIO(packed) if isinstance(packed, bytes) else packed
     count = 0
-    with whole_folder(run / JOURNALS) as fresh, tarfile.open(fileobj=io.BytesIO(packed), mode="r|") as files:
-        for member in files:
-            content = files.extractfile(member) if member.isreg() else None
-            if content is not None and Path(member.name).suffix == ".bin":
-                (fresh / Path(member.name).name).write_bytes(content.read())
-                count += 1
-    return count
+    with whole_folder(run / JOURNALS) as fresh:
+        for _ in range(MEMBERS_MAX):
+            header = source.read(tarfile.BLOCKSIZE)
+            if header == bytes(tarfile.BLOCKSIZE):
+                return count
+            member = tarfile.TarInfo.frombuf(header, "utf-8", "replace")
+            if member.size < 0 or member.type == tarfile.GNUTYPE_SPARSE:
+                raise tarfile.ReadError("an entry whose size is not that of its content")
+            name = Path(member.name).name
+            wanted = member.type in (tarfile.REGTYPE, tarfile.AREGTYPE) and JOURNAL_NAME.fullmatch(name) is not None
+            _copy(source, member.size, fresh / name if wanted else Path(os.devnull))
+            count += wanted
+        raise tarfile.ReadError(f"more than {MEMBERS_MAX} entries")
+
+
+def _copy(source: BinaryIO, size: int, to: Path) -> None:
+    """Write the content of an entry of `size` [bytes], and pass its padding. Raises ReadError where it is cut off."""
+    with to.open("wb") as file:
+        left = size
+        while left:
+            piece = source.read(min(left, PIECE_BYTES))
+            if not piece:
+                raise tarfile.ReadError("unexpected end of data")
+            file.write(piece)
+            left -= len(piece)
+    source.read(-size % tarfile.BLOCKSIZE)

@@ -6,8 +6,9 @@ import asyncio
 import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 from msgspec import Struct
 
@@ -20,6 +21,9 @@ CONNECT_S = 6.0
 COMMAND_S = 40.0
 PYTHON_MIN = (3, 11)
 GREETING_MAX = 80
+OUTPUT_BYTES_MAX = 16 * 1024 * 1024
+"""Maximum length [bytes] of what a command may print to one of its outputs."""
+PIECE_BYTES = 256 * 1024
 PROBE = (
     "import sys\n"
     "sys.path[:] = [folder for folder in sys.path if folder]\n"  # -P, which Python has from 3.11 on
@@ -71,8 +75,14 @@ class Probed(Struct, frozen=True):
 class Shell(Protocol):
     """Interface for running commands on a machine."""
 
-    async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
-        """Run a command to its end. Raises Unreachable when the machine is lost meanwhile."""
+    async def run(
+        self, words: Sequence[str], stdin: bytes = b"", into: BinaryIO | None = None, bytes_max: int = OUTPUT_BYTES_MAX
+    ) -> Done:
+        """Run a command to its end; write its standard output to the file `into`, if given, in place of `Done.out`.
+
+        Raises Unreachable when the machine is lost meanwhile or prints more than `bytes_max`, and Refused when `into`
+        cannot be written.
+        """
 
     async def close(self) -> None: ...
 
@@ -84,13 +94,25 @@ class Unreachable(Exception):
 class Here:
     """Shell on this machine."""
 
-    async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
+    async def run(
+        self, words: Sequence[str], stdin: bytes = b"", into: BinaryIO | None = None, bytes_max: int = OUTPUT_BYTES_MAX
+    ) -> Done:
         pipe = asyncio.subprocess.PIPE
         try:
             child = await asyncio.create_subprocess_exec(*words, stdin=pipe, stdout=pipe, stderr=pipe)
         except OSError as error:
             return Done(127, b"", f"{words[0]}: {error.strerror}".encode())
-        out, err = await child.communicate(stdin)
+        try:
+            out, err = await _talk(child, stdin, into, bytes_max)
+        except BaseException:
+            with suppress(ProcessLookupError):
+                child.kill()
+            for output in (child.stdout, child.stderr):  # `wait` waits for the end of both
+                while output is not None and await output.read(PIECE_BYTES):
+                    pass
+            raise
+        finally:
+            await child.wait()
         return Done(child.returncode or 0, out, err)
 
     async def close(self) -> None:
@@ -103,22 +125,63 @@ class Ssh:
     def __init__(self, connection: Any) -> None:
         self._connection = connection
 
-    async def run(self, words: Sequence[str], stdin: bytes = b"") -> Done:
+    async def run(
+        self, words: Sequence[str], stdin: bytes = b"", into: BinaryIO | None = None, bytes_max: int = OUTPUT_BYTES_MAX
+    ) -> Done:
         import asyncssh
 
         first = f"~/{shlex.quote(words[0][2:])}" if words[0].startswith("~/") else shlex.quote(words[0])
         command = " ".join([first, *map(shlex.quote, words[1:])])
         try:
-            done = await self._connection.run(command, input=stdin, encoding=None, timeout=COMMAND_S)
+            async with asyncio.timeout(COMMAND_S), self._connection.create_process(command, encoding=None) as child:
+                out, err = await _talk(child, stdin, into, bytes_max)
+                await child.wait_closed()
         except TimeoutError:  # also raised by asyncssh
             raise Unreachable(f"no answer within {COMMAND_S:g} s to: {words[0]}") from None
         except (OSError, asyncssh.Error) as error:
             raise Unreachable(f"lost its connection ({error})") from None
-        return Done(-1 if done.returncode is None else done.returncode, bytes(done.stdout), bytes(done.stderr))
+        return Done(-1 if child.returncode is None else child.returncode, out, err)
 
     async def close(self) -> None:
         self._connection.close()
         await self._connection.wait_closed()
+
+
+async def _talk(child: Any, stdin: bytes, into: BinaryIO | None, bytes_max: int) -> tuple[bytes, bytes]:
+    """Give a process its input and return what it prints, in bounds. Raises as `Shell.run` does."""
+
+    async def give() -> None:
+        with suppress(OSError):  # it ends without reading
+            child.stdin.write(stdin)
+            await child.stdin.drain()
+            child.stdin.write_eof()
+
+    giving = asyncio.ensure_future(give())
+    out = asyncio.ensure_future(_read(child.stdout, into, bytes_max))
+    err = asyncio.ensure_future(_read(child.stderr, None, OUTPUT_BYTES_MAX))
+    try:
+        await asyncio.gather(giving, out, err)
+    finally:
+        for task in (giving, out, err):
+            task.cancel()
+    return out.result(), err.result()
+
+
+async def _read(output: Any, into: BinaryIO | None, bytes_max: int) -> bytes:
+    """Return all that a process prints, or write it to `into` and return nothing."""
+    got, length = bytearray(), 0
+    while piece := await output.read(PIECE_BYTES):
+        length += len(piece)
+        if length > bytes_max:
+            raise Unreachable(f"prints more than {bytes_max >> 20} MiB")
+        if into is None:
+            got += piece
+            continue
+        try:
+            into.write(piece)
+        except OSError as error:
+            raise Refused(f"what it prints is not kept: {error.strerror}") from None
+    return bytes(got)
 
 
 async def reach(machine: Machine) -> Shell:

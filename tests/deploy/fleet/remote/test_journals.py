@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import subprocess
 import sys
 import tarfile
+from contextlib import suppress
 from pathlib import Path
+
+import pytest
 
 from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import load
 from lfa.deploy.fleet.remote import journals
+from lfa.deploy.fleet.remote.ssh import Here, Unreachable
 
 
 def _state(tmp_path: Path) -> Path:
@@ -51,6 +56,75 @@ def test_a_machine_can_put_nothing_outside_of_the_folder(tmp_path: Path) -> None
     journals.unpack(sent.getvalue(), tmp_path / "run")
     assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"evil.bin", "good.bin"}
     assert all(path.parent.name == "journal" for path in tmp_path.rglob("*.bin"))
+
+
+def _as_sparse(claimed: int) -> bytes:
+    """A sparse file in the old form of GNU tar: no content, and `claimed` bytes of it."""
+    member = tarfile.TarInfo("robot2-7.bin")
+    member.type = tarfile.GNUTYPE_SPARSE
+    header = bytearray(member.tobuf(tarfile.GNU_FORMAT))
+    header[386:410] = b"%011o\0%011o\0" % (0, 0)
+    header[483:495] = b"%011o\0" % claimed
+    header[148:156] = b"%06o\0 " % (sum(header[:148]) + 8 * 32 + sum(header[156:]))
+    return bytes(header) + bytes(1024)
+
+
+def _as_pax_sparse(claimed: int) -> bytes:
+    """The same in the form of POSIX tar, whose extended header says what size the file is to have."""
+    sent = io.BytesIO()
+    with tarfile.open(fileobj=sent, mode="w", format=tarfile.PAX_FORMAT) as files:
+        member = tarfile.TarInfo("robot2-7.bin")
+        member.pax_headers = {"GNU.sparse.size": str(claimed), "GNU.sparse.map": "0,0"}
+        files.addfile(member)
+    return sent.getvalue()
+
+
+def _with_content() -> bytes:
+    sent = io.BytesIO()
+    with tarfile.open(fileobj=sent, mode="w") as files:
+        member = tarfile.TarInfo("robot1-1.bin")
+        member.size = 3000
+        files.addfile(member, io.BytesIO(bytes(3000)))
+    return sent.getvalue()
+
+
+def _with_members(number: int) -> bytes:
+    sent = io.BytesIO()
+    with tarfile.open(fileobj=sent, mode="w") as files:
+        for n in range(number):
+            files.addfile(tarfile.TarInfo(f"robot1-{n}.bin"))
+    return sent.getvalue()
+
+
+@pytest.mark.parametrize("packed", [_as_sparse(1 << 32), _as_pax_sparse(1 << 32)], ids=["gnu", "pax"])
+def test_a_machine_cannot_fill_the_disk_with_a_file_that_it_does_not_send(packed: bytes, tmp_path: Path) -> None:
+    with suppress(tarfile.TarError):
+        journals.unpack(packed, tmp_path / "run")
+    assert sum(path.stat().st_size for path in tmp_path.rglob("*") if path.is_file()) <= len(packed)
+
+
+@pytest.mark.parametrize(
+    "packed",
+    [
+        _with_members(journals.MEMBERS_MAX + 1),
+        _with_content()[:700],
+        tarfile.TarInfo("x.bin").tobuf()[:200],
+        b"\xff" * 512,
+        b"",
+    ],
+    ids=["too many", "cut off", "cut off in a header", "no tar", "empty"],
+)
+def test_an_archive_that_is_damaged_or_endless_is_refused_and_leaves_nothing(packed: bytes, tmp_path: Path) -> None:
+    with pytest.raises(tarfile.TarError):
+        journals.unpack(packed, tmp_path / "run")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_machine_that_sends_without_end_is_cut_off(tmp_path: Path) -> None:
+    words = (sys.executable, "-c", "while True: print('x' * 100000)")
+    with (tmp_path / "sent").open("wb") as file, pytest.raises(Unreachable, match="prints more than 1 MiB"):
+        asyncio.run(Here().run(words, into=file, bytes_max=1 << 20))
+    assert (tmp_path / "sent").stat().st_size <= 1 << 20
 
 
 def test_what_processes_here_keep_is_copied(tmp_path: Path) -> None:
