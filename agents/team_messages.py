@@ -42,9 +42,10 @@ class TeamMessages:
                     ahead.heard(message, now)
             case TableRow():
                 self._team.hear_row(robot, message, now)
-                least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
-                if ahead is not None and least_s is not None:
-                    ahead.clock.reported(least_s, now)
+                if ahead is not None:  # the row of each other robot of a large team is only noted
+                    least_s = next((delay.least_s for delay in message.delays if delay.robot == self._id), None)
+                    if least_s is not None:
+                        ahead.clock.reported(least_s, now)
             case ObstacleNote(kind="trap"):
                 navigator.avoid_trap(message, now)
             case ObstacleNote():

@@ -39,7 +39,8 @@ class TeamState:
         """Numbers of table rows received and lost, over all robots; a gap in a sender's numbers counts as lost. They
         show the quality of the radio link."""
         self._table: dict[int, tuple[TableRow, float]] = {}
-        self._robots: tuple[int, ...] = ()
+        self._robots: tuple[int, ...] | None = ()
+        """Robots in the order of their ids; None while that has to be sorted anew."""
         self._velocity: dict[int, tuple[float, float]] = {}
         """Velocity in `map`, from one row to the next."""
         self._reach: dict[int, tuple[float, float, float, float]] = {}
@@ -57,6 +58,8 @@ class TeamState:
     @property
     def robots(self) -> tuple[int, ...]:
         """Robots of which a row was heard, in the order of their ids."""
+        if self._robots is None:
+            self._robots = tuple(sorted(self._table))
         return self._robots
 
     def hear_sensors(self, sensors: Sensors, at: float) -> None:
@@ -81,7 +84,7 @@ class TeamState:
             self.rows_lost += row.header.seq - known[0].header.seq - 1
         self.rows_heard += 1
         if known is None:
-            self._robots = tuple(sorted((*self._robots, robot)))
+            self._robots = None
         reported = row.progress
         if reported is not None and reported.route == self.route and (row.role is Role.LEADER or self.progress is None):
             self.progress = reported

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from random import Random
+from typing import Any
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode
@@ -160,7 +161,7 @@ class Simulator(VirtualTime):
         message = decode(payload, TOPIC[key.split("/")[3]].type)
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        for process, _ in self._routes.of(key):
+        for process, _ in self._routes.of(key).receivers:
             self.at(self.now + LOCAL_DELAY_S, self._give, process, key, message, payload)
 
     def upcoming(self) -> Iterator[tuple[NodeHost, GrantedCall]]:
@@ -276,14 +277,19 @@ class Simulator(VirtualTime):
             self.link_model.places = {robot_name(robot.id): (robot.x, robot.y) for robot in message.robots}
         for tap in self.taps:
             tap(self.now, key, payload, message)
-        now, at, give, delays = self.now, self.at, self._give, self.link_model.delays
-        for process, link in self._routes.of(key):
-            if process is sender and key.split("/", 4)[3] in NO_ECHO:
+        now, give, delays = self.now, self._give, self.link_model.delays
+        sent_from, receivers = self._routes.of(key)
+        echoes = key.split("/", 4)[3] not in NO_ECHO
+        calls: list[tuple[float, Callable[..., None], tuple[Any, ...]]] = []
+        for process, place in receivers:
+            if process is sender and not echoes:
                 continue
             if self.deaf and (process.node.name, sender.node.name) in self.deaf:
                 continue
-            for delay_s in LOCAL_DELAYS_S if link is None else delays(*link):
-                at(now + delay_s, give, process, key, message, payload)
+            delays_s = LOCAL_DELAYS_S if sent_from is None or place == sent_from else delays(sent_from, place)
+            for delay_s in delays_s:
+                calls.append((now + delay_s, give, (process, key, message, payload)))
+        self.at_each(calls)
 
     def _refresh(self, process: _SimulatedNode) -> None:
         """Apply the node's changed interests; it also gets liveliness events for tokens that already exist."""
@@ -292,18 +298,20 @@ class Simulator(VirtualTime):
         process.interests = new
         self._routes.change(process, old - new, added)
         tokens = [expression for expression in added if _hears_tokens(expression)]
-        for other in list(self._processes.values()) if tokens else ():
-            if other is not process and any(matches(e, other.token) for e in tokens):
-                self._hint_later(process, PeerUp(other.node.name, other.node.incarnation), LOCAL_DELAY_S)
+        if tokens:
+            heard = [
+                PeerUp(other.node.name, other.node.incarnation)
+                for other in self._processes.values()
+                if other is not process and any(matches(e, other.token) for e in tokens)
+            ]
+            at, give = self.now + LOCAL_DELAY_S, self._give
+            self.at_each([(at, give, (process, "", event, b"")) for event in heard])
 
     def _announce(self, token: str, event: PeerUp | PeerDown, delay_s: float) -> None:
         """Deliver the event of a `token` to all who hear of it, but for its owner."""
-        for process, _ in self._routes.of(token):
-            if process.node.name != event.name:
-                self._hint_later(process, event, delay_s)
-
-    def _hint_later(self, process: _SimulatedNode, event: PeerUp | PeerDown, delay_s: float) -> None:
-        self.at(self.now + delay_s, self._give, process, "", event, b"")
+        at, give = self.now + delay_s, self._give
+        hear = [process for process, _ in self._routes.of(token).receivers if process.node.name != event.name]
+        self.at_each([(at, give, (process, "", event, b"")) for process in hear])
 
 
 def _unjournalled(node: Node) -> Journal:

@@ -9,7 +9,6 @@ the common latency: only the path's asymmetry is left.
 
 from __future__ import annotations
 
-from collections import deque
 from itertools import pairwise
 from math import isfinite
 
@@ -28,8 +27,13 @@ REPORT_TIMEOUT_S = 10.0
 class ClockOffset:
     """Clock offset of one sender in one incarnation. Create a new one when its incarnation changes."""
 
+    # A robot keeps one for each of its team, of which most are heard seldom: it is small.
+    __slots__ = (
+        "_anchor", "_bucket_end", "_buckets", "_drift", "_futures", "_report", "_value", "refused", "resets",
+    )  # fmt: skip
+
     def __init__(self) -> None:
-        self._buckets: deque[tuple[float, float]] = deque(maxlen=BUCKETS_MAX)
+        self._buckets: list[tuple[float, float]] = []
         self._bucket_end = 0.0
         self._anchor = 0.0
         self._value = 0.0
@@ -58,6 +62,7 @@ class ClockOffset:
         if received_at >= self._bucket_end:
             self._refit(received_at)
             self._buckets.append((received_at, delay))
+            del self._buckets[:-BUCKETS_MAX]
             self._bucket_end = received_at + BUCKET_S
         elif delay < self._buckets[-1][1]:
             self._buckets[-1] = (received_at, delay)
@@ -110,7 +115,7 @@ class ClockOffset:
 
     def _refit(self, now: float) -> None:
         """Fit the line below all windows' minima that is nearest to them on average."""
-        points = list(self._buckets)
+        points = self._buckets
         first, last = points[0][0], points[-1][0]
         self._anchor = now
         if last - first < DRIFT_SPAN_S:

@@ -20,6 +20,7 @@ class Election:
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float) -> None:
         self.me = me
         self.all_member_ids = all_member_ids(mission)
+        self._members = frozenset(self.all_member_ids)
         self._may_lead = frozenset(i for i in mission.robots if mission.may_lead(i))
         self._spares_lead = mission.can_lead is None
         self.at = NEVER
@@ -44,7 +45,7 @@ class Election:
 
     def takes_in(self, config: Config, robot_id: int) -> bool:
         """Return True if this id is of the team by the mission and the roster of `config`, the witness included."""
-        known = robot_id in self.all_member_ids or is_spare(config.roster, robot_id)
+        known = robot_id in self._members or is_spare(config.roster, robot_id)
         return known and robot_id not in config.roster.retired
 
     def rank(self, config: Config, robot_id: int, peers: FailureDetector) -> int:

@@ -73,22 +73,31 @@ def link_of(key: str, receiver: str) -> Link | None:
 
     A robot and its own hardware share a place; operator, recorder and ground truth never cross a link.
     """
+    sender, place = ends_of(key)
+    place = place_of(receiver) if place is None else place
+    return None if sender is None or sender == place else (sender, place)
+
+
+def ends_of(key: str) -> tuple[str | None, str | None]:
+    """Return the place that a message on `key` is sent from, and the one at which all hear it.
+
+    The first is None if it crosses no link, the second if each receiver hears it at its own place.
+    """
     where = address(key)
     if where is None or where.topic == "alive" or where.owner in _ON_NO_LINK:
-        return None
-    sender, place = _place(where.owner), _place(receiver)
+        return None, None
+    sender = place_of(where.owner)
     if where.to is not None and where.to.startswith("gateway"):
-        place = where.to.replace("gateway", "robot")
-    elif where.topic == "cmd_vel":
-        place = sender
-    return None if sender == place else (sender, place)
+        return sender, where.to.replace("gateway", "robot")
+    return sender, sender if where.topic == "cmd_vel" else None
 
 
 def _links(pairs: tuple[Link, ...]) -> frozenset[Link]:
-    return frozenset((_place(sender), _place(receiver)) for sender, receiver in pairs)
+    return frozenset((place_of(sender), place_of(receiver)) for sender, receiver in pairs)
 
 
-def _place(name: str) -> str:
+def place_of(name: str) -> str:
+    """Return the place of a process: the witness runs where the world does."""
     return WORLD_NAME if name == WITNESS_NAME else name
 
 

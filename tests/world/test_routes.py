@@ -36,7 +36,7 @@ def test_after_any_changes_exactly_those_hear_a_key_whose_subscriptions_match_it
         present[name] = new
         for where in KEYS:
             hear = [name for name, interests in present.items() if any(matches(e, where) for e in interests)]
-            assert [name for name, _ in found.of(where)] == hear
+            assert [name for name, _ in found.of(where).receivers] == hear
 
 
 def test_a_subscription_to_one_key_leaves_what_is_known_of_other_keys() -> None:
@@ -48,5 +48,19 @@ def test_a_subscription_to_one_key_leaves_what_is_known_of_other_keys() -> None:
         found.of(where)
     found.change("robot1", (), [key("f", "robot2", "pose")])
     with patch.object(routes, "matches", wraps=matches) as compared:
-        assert [name for where in KEYS for name, _ in found.of(where)] == ["robot1"] * 6
+        assert [name for where in KEYS for name, _ in found.of(where).receivers] == ["robot1"] * 6
     assert compared.call_count == 0, "the one wildcard is of another topic than the key of the new subscription"
+
+
+def test_keys_that_the_same_subscriptions_match_share_their_receivers_until_one_of_these_changes() -> None:
+    """A message of each of N robots to all others costs N lists of N receivers otherwise, and at each change anew."""
+    found = Routes[str]()
+    for name in NAMES:
+        found.add(name, name)
+        found.change(name, (), [key("f", "*", "table"), key("f", "*", "pose")])
+    tables = [found.of(key("f", name, "table")).receivers for name in NAMES]
+    assert all(receivers is tables[0] for receivers in tables)
+    found.change("robot5", [key("f", "*", "pose")], [])
+    assert found.of(key("f", "robot1", "table")).receivers is tables[0]
+    found.change("robot5", [key("f", "*", "table")], [])
+    assert [name for name, _ in found.of(key("f", "robot1", "table")).receivers] == NAMES[:4]
