@@ -1,4 +1,4 @@
-"""Discovery of agents on this machine by the command lines of this user's processes."""
+"""Discovery of a fleet's agents, world and witness on this machine by the command lines of this user's processes."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ DEFAULT_LISTEN = (default_endpoint(), "tcp/127.0.0.1:7450")
 
 
 class Running(Struct, frozen=True):
-    """Running process of one agent."""
+    """Running process of one agent, of a world or of a witness."""
 
     robot: int
+    """0: a world or a witness."""
     fleet: str
     endpoint: str
     identity: Identity
@@ -30,17 +31,20 @@ class Running(Struct, frozen=True):
 
 def agents() -> list[Running]:
     """Return this user's agents that run on this machine."""
-    found = (_agent(identity) for identity in own_processes())
-    return [agent for agent in found if agent is not None]
+    return [member for member in members() if member.robot]
 
 
-def _agent(identity: Identity) -> Running | None:
+def members() -> list[Running]:
+    """Return this user's agents, worlds and witnesses that run on this machine: a host may have a world alone."""
+    found = (_member(identity) for identity in own_processes())
+    return [member for member in found if member is not None]
+
+
+def _member(identity: Identity) -> Running | None:
     words = identity.arguments
-    if not programs(words) & {"lfa.agents.cli", "lfa-agent"}:
+    if not programs(words) & {"lfa.agents.cli", "lfa-agent", "lfa.world.cli", "lfa-world"}:
         return None
-    robot = whole_number(option(words, "--id", ""))
-    if robot is None:
-        return None
+    robot = whole_number(option(words, "--id", "")) or 0
     endpoint = option(words, "--connect", default_endpoint())
     keys = option(words, "--keys", "")
     return Running(robot, option(words, "--fleet", "fleet"), endpoint, identity, Path(keys) if keys else None)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from lfa.deploy.client.discovery import Running, agents, one_fleet, option
+from lfa.deploy.client.discovery import Running, members, one_fleet, option
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -39,11 +39,15 @@ class FleetAddress(Struct, frozen=True):
 
 
 def find(fleet: str | None, connect: str | None, keys: Path | None = None) -> FleetAddress:
-    """Return the address of a fleet that runs here, or of any given by name, router and keys. Raises Refused."""
-    running = [agent for agent in agents() if connect in (None, agent.endpoint)]
-    if running and (fleet is None or any(agent.fleet == fleet for agent in running)):
+    """Return the address of a fleet that runs here, or of any given by name, router and keys. Raises Refused.
+
+    A process may know several routers, its own and those that it goes over to; `connect` is one of them or all.
+    """
+    running = [one for one in members() if connect in (None, one.endpoint, *one.endpoint.split(","))]
+    if running and (fleet is None or any(one.fleet == fleet for one in running)):
         team = one_fleet(running, fleet)
-        return FleetAddress(team[0].fleet, team[0].endpoint, tuple(team), keys or team[0].keys)
+        robots = tuple(one for one in team if one.robot)
+        return FleetAddress(team[0].fleet, connect or team[0].endpoint, robots, keys or team[0].keys)
     if fleet is None:
         here = "runs on this machine" if connect is None else f"is at the router {connect}"
         raise Refused(f"no agent of yours {here}: say --fleet NAME, and --connect for another router")

@@ -20,6 +20,7 @@ from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.fleet import HostOrder, HostStatus, LogLines
+from lfa.protocol.messages.team import Ask
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import HOST_PREFIX, OPERATOR_NAME
 from lfa.protocol.transport.message_bus import send
@@ -128,6 +129,10 @@ class FleetView:
     def order(self, action: str, target: str = "", lines: int = 0) -> HostOrder:
         """Return a new order with its own sequence number; repeat it by `say` until it is obeyed."""
         return HostOrder(self._outbox.header("order", clock.now()), action, target, lines)
+
+    def ask(self, what: str) -> None:
+        """Ask the fleet to publish `what`, such as its roster."""
+        send(self._subscriber.bus, self._outbox.envelope("ask", Ask(self._outbox.header("ask", clock.now()), what)))
 
     def say(self, order: HostOrder) -> None:
         send(self._subscriber.bus, self._outbox.envelope("order", order))

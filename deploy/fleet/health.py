@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from lfa.deploy.client.fleet_state import FRESH_S, FleetState
+from lfa.deploy.client.roster.roster_call import state_in
 from lfa.protocol.incarnations import drawn_at, is_later
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.team import PoseStamped
+from lfa.protocol.messages.team import Event, PoseStamped
 from lfa.protocol.names import robot_id_of, robot_name
 
 GIVEN_UP = ("failed", "refused", "ended")
@@ -15,7 +16,10 @@ class Health:
     """Health monitor: `see` takes in messages, `missing` and `lost` return what is wrong."""
 
     def __init__(self, robots: tuple[int, ...], hosts: tuple[str, ...]) -> None:
+        """`robots` are those of the mission: the team, until a leader tells who has joined and who has retired."""
+        self._named = frozenset(map(robot_name, robots))
         self._robots = robots
+        self.team_told = False
         self._hosts = hosts
         self._state = FleetState()
         self._namesakes: dict[int, float] = {}
@@ -31,16 +35,22 @@ class Health:
         robot = robot_id_of(message.header.sender)
         if isinstance(message, PoseStamped) and robot and not self._own(robot, message.header.incarnation):
             self._namesakes[robot] = at
-        else:
-            self._state.update(at, message)
+            return
+        self._state.update(at, message)
+        if isinstance(message, Event) and (told := state_in(message)) is not None and told.accepted:
+            self._robots, self.team_told = told.team, True
 
     def lost(self) -> list[str]:
-        """Return a line for each process that has ended and will not be restarted, with the cause."""
+        """Return a line for each process that has ended and will not be restarted, with the cause.
+
+        A robot that has retired may end.
+        """
+        retired = self._named - set(map(robot_name, self._robots))
         return [
             f"host {host}: {report.ended or report.name}"
             for host, heard in sorted(self._state.hosts.items())
             for report in heard.message.processes
-            if report.state in GIVEN_UP
+            if report.state in GIVEN_UP and report.name not in retired
         ]
 
     def missing(self, now: float) -> list[str]:

@@ -17,6 +17,7 @@ import msgspec
 import typer
 from msgspec.structs import replace
 
+from lfa.agents.orders.roster_orders import QUESTION
 from lfa.deploy.fleet import fleet_view
 from lfa.deploy.fleet.fleet_view import Seen
 from lfa.deploy.fleet.health import Health
@@ -32,6 +33,10 @@ from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 
 POLL_S = 0.05
+ASK_S = 0.2
+"""Time [s] between questions to the leader who is in the team: spares may have joined, and robots retired."""
+TOLD_S = 2.0
+"""Time [s] in which a leader tells it; until then a robot that has ended may be one that has retired."""
 HEALTHY_S = 0.3
 """Duration [s] for which the fleet must be healthy without interruption."""
 
@@ -153,19 +158,23 @@ def await_health(plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Inter
     endpoints += [end for part in shares.values() for end in part.others[:1]]
     seen = Seen(plan.name, ",".join(dict.fromkeys(endpoints)), tuple(plan.hosts), own, plan, store(plan) / ISSUED)
     health = Health(plan.scenario.mission.robots, tuple(plan.hosts))
-    until, well_since, shown = clock.now() + wait_s, None, ""
+    began, well_since, shown = clock.now(), None, ""
+    ask_at = began
     try:
         with fleet_view.open_view(seen) as view:
             while True:
                 for at, message in view.hear():
                     health.see(at, message)
                 now = clock.now()
+                if now >= ask_at:
+                    ask_at = now + ASK_S
+                    view.ask(QUESTION)
                 lost, missing = health.lost(), health.missing(now)
-                if lost:
+                if lost and (health.team_told or now - began > TOLD_S):
                     raise NotUp(lost, 1)
                 if interrupts.signal is not None:
                     raise NotUp([f"ended by {interrupts.signal.name}"], 128 + interrupts.signal)
-                if missing and now > until:
+                if missing and now - began > wait_s:
                     raise NotUp([f"not healthy within {wait_s:g} s:", *missing], 1)
                 well_since = None if missing else well_since or now
                 if well_since is not None and now - well_since >= HEALTHY_S:

@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import io
 import os
-import subprocess
-import tarfile
-from pathlib import Path
 
 import pytest
 
 from lfa.protocol.messages.team import Status
 from tests.processes.test_by_hand import Terminals, terminals  # noqa: F401
 from tests.rigs.lfa_runs import eventually
+from tests.rigs.version_before import code_before
 
 pytestmark = pytest.mark.processes
-
-BEFORE = "8b1b7b48a8b5364425fd9c6574852c7a0b601dfd"
-"""Last commit with version 5 of the messages."""
-PACKAGES = ("agents", "deploy", "protocol", "world", ".namespace")
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
 def before(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Return the environment of a process that runs the code of that commit."""
-    packed = subprocess.run(["git", "archive", BEFORE, *PACKAGES], cwd=ROOT, capture_output=True, check=False)
-    if packed.returncode != 0:
-        pytest.skip(f"this clone has no commit {BEFORE[:8]}: {packed.stderr.decode().strip()}")
-    folder = tmp_path_factory.mktemp("before")
-    with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
-        archive.extractall(folder, filter="tar")
-    return {**os.environ, "PYTHONPATH": str(folder / ".namespace")}
+    return {**os.environ, "PYTHONPATH": str(code_before(tmp_path_factory.mktemp("before")))}
 
 
 def _chains(terminals: Terminals) -> dict[str, tuple[int, ...]]:  # noqa: F811

@@ -10,6 +10,7 @@ import pytest
 
 from lfa.deploy.client.session import FleetAddress, Subscriber, listen
 from lfa.deploy.fleet.health import Health
+from lfa.deploy.fleet.plan.host_plan import KEYS
 from lfa.protocol import clock
 from lfa.protocol.messages.team import Event, PoseStamped
 from lfa.protocol.names import robot_id_of
@@ -87,8 +88,13 @@ class Onlooker:
 
 @contextmanager
 def onlooker(machines: Machines, at: str, robots: tuple[int, ...]) -> Iterator[Onlooker]:
-    """Open an observer session at machine `at`'s router over its unix socket, without a network in between."""
-    part = machines.part(at)
-    eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at}")), f"no router answers at {at}")
-    with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS, every=True) as subscriber:
+    """Open an observer session at machine `at`'s router over its unix socket, without a network in between.
+
+    `at` may name several machines: when the router of one is lost, the session goes over to the next.
+    """
+    part = machines.part(at[0])
+    eventually(lambda: answers(part.socket, part.known_as(f"{HOST_PREFIX}{at[0]}")), f"no router answers at {at[0]}")
+    sockets = ",".join(machines.part(name).socket for name in at)
+    keys = part.folder / KEYS if part.secure else None
+    with listen(FleetAddress(part.fleet, sockets, (), keys), TOPICS, every=True) as subscriber:
         yield Onlooker(subscriber, robots, machines.keep)

@@ -35,9 +35,14 @@ def leads(live: Team, since: float) -> list[int]:
 
 
 def check_terms(live: Team) -> None:
+    """Assert I2 from outside, by what the team's gateways have told."""
+    check_terms_in(live.heard.events)
+
+
+def check_terms_in(events: Sequence[Event]) -> None:
     """Assert I2 from outside: over all gateways, accepted leader commands never return to an older term."""
     newest = Term()
-    for event in _commands(live):
+    for event in _commands_in(events):
         assert event.term is not None and event.term >= newest, (
             f"robot {event.data['robot']} was obeyed as leader of {event.term} after {newest}"
         )
@@ -45,7 +50,11 @@ def check_terms(live: Team) -> None:
 
 
 def _commands(live: Team) -> list[Event]:
-    return sorted((e for e in live.heard.events if e.kind == "leader_command"), key=lambda e: e.header.stamp)
+    return _commands_in(live.heard.events)
+
+
+def _commands_in(events: Sequence[Event]) -> list[Event]:
+    return sorted((e for e in events if e.kind == "leader_command"), key=lambda e: e.header.stamp)
 
 
 def pass_time(live: Team, for_s: float) -> None:

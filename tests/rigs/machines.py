@@ -28,6 +28,8 @@ NAMES = "abcdefgh"
 KEPT = "lfa-failed-hosts-"
 """Prefix of the folder in which a failed test leaves the journals and logs of its machines."""
 SSHD = "/usr/sbin/sshd"
+ALONE = ("unshare", "--pid", "--fork", "--kill-child", "--mount-proc")
+"""Start of a command that sees no processes but its own."""
 LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
 
 
@@ -169,13 +171,41 @@ class Machines:
 
     # --- actions ---------------------------------------------------------------------------------------------------
 
-    def lfa(self, *arguments: str, on: int = OPERATOR, timeout_s: float = 90.0) -> subprocess.CompletedProcess[str]:
-        """Run `lfa ARGUMENTS` on one of the hosts, by default on the operator's."""
+    def lfa(
+        self, *arguments: str, on: int = OPERATOR, python: Path | None = None, timeout_s: float = 90.0
+    ) -> subprocess.CompletedProcess[str]:
+        """Run `lfa ARGUMENTS` on one of the hosts, by default on the operator's, with this Python or with another."""
+        command = [*self.net.enter(on), *self._words(arguments, python)]
+        return self._run(command, timeout_s)
+
+    def lfa_from_afar(self, *arguments: str, timeout_s: float = 90.0) -> subprocess.CompletedProcess[str]:
+        """Run `lfa ARGUMENTS` on the operator's host, where no process of the fleet can be seen."""
+        return self._run([*self.net.enter(OPERATOR), *ALONE, *self._words(arguments, None)], timeout_s)
+
+    def lfa_begins(self, *arguments: str, on: int = OPERATOR) -> subprocess.Popen[str]:
+        """Start `lfa ARGUMENTS` on one of the hosts; the caller ends it."""
+        command = [*self.net.enter(on), *self._words(arguments, None)]
+        pipe = subprocess.PIPE
+        return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=self._environment(), cwd=self.folder)
+
+    @staticmethod
+    def _words(arguments: tuple[str, ...], python: Path | None) -> tuple[str, ...]:
+        return (LFA[0] if python is None else str(python), *LFA[1:], *arguments)
+
+    def _environment(self) -> dict[str, str]:
         environment = {**os.environ, "HOME": str(self.home)}
         environment.pop("SSH_AUTH_SOCK", None)
-        command = [*self.net.enter(on), *LFA, *arguments]
+        return environment
+
+    def _run(self, command: list[str], timeout_s: float) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            command, capture_output=True, text=True, timeout=timeout_s, check=False, env=environment, cwd=self.folder
+            command,
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+            check=False,
+            env=self._environment(),
+            cwd=self.folder,
         )
 
     def kill(self, name: str) -> float:

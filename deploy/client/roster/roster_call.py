@@ -40,6 +40,16 @@ class RosterState(Struct, frozen=True):
         return team_of(self.roster, self.robots)
 
 
+def state_in(event: Event) -> RosterState | None:
+    """Return the team that a leader tells in this event; None if it tells none."""
+    if event.kind != QUESTION:
+        return None
+    try:
+        return msgspec.convert(event.data, RosterState)
+    except msgspec.ValidationError:
+        return None
+
+
 class RosterOutcome(Struct, frozen=True):
     """Result of a change."""
 
@@ -75,11 +85,8 @@ class RosterCall:
             return
         if event.kind == refused_kind(self.command) and event.data.get("robot") == self._robot:
             self._leader, self._reason = leader, str(event.data.get("reason"))
-        if event.kind != QUESTION:
-            return
-        try:
-            state = msgspec.convert(event.data, RosterState)
-        except msgspec.ValidationError:
+        state = state_in(event)
+        if state is None:
             return
         if self._state is None:
             change = (state.roster, state.robots, state.chain, self._robot)

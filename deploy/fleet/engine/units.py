@@ -16,6 +16,7 @@ from lfa.protocol.topics import WORLD_NAME
 SUPERVISOR_NAME = "supervisor"
 Scope = Literal["user", "system"]
 """Whose systemd: the user's own manager, or the machine's."""
+WANTS = "Wants="
 MEMORY_MAX = {ROUTER_NAME: "512M", WORLD_NAME: "1G"}
 AGENT_MEMORY_MAX = "256M"
 WANTED_BY: dict[Scope, str] = {"user": "default.target", "system": "multi-user.target"}
@@ -76,9 +77,17 @@ def units(
     }
     wanted = " ".join(made)
     made[target_of(fleet, host)] = (
-        f"[Unit]\nDescription=lfa: fleet {fleet} on {host}\nWants={wanted}\n\n[Install]\nWantedBy={WANTED_BY[scope]}\n"
+        f"[Unit]\nDescription=lfa: fleet {fleet} on {host}\n{WANTS}{wanted}\n\n[Install]\nWantedBy={WANTED_BY[scope]}\n"
     )
     return made
+
+
+def services_of(target: str) -> list[str]:
+    """Return the names of the services that the text of a target binds.
+
+    The beginning of their names would not do: that of a host `a` is one of a host `a-2`, too.
+    """
+    return next((line[len(WANTS) :].split() for line in target.splitlines() if line.startswith(WANTS)), [])
 
 
 def _service(

@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 
 from lfa.deploy.fleet.engine.systemd import ANSWER_S, check_here, systemctl, unit_folder
-from lfa.deploy.fleet.engine.units import SUPERVISOR_NAME, Scope, target_of, units
+from lfa.deploy.fleet.engine.units import SUPERVISOR_NAME, Scope, services_of, target_of, units
 from lfa.deploy.fleet.host.ledger import SUPERVISOR
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
@@ -66,9 +66,8 @@ def stop_units(part: HostPlan) -> None:
     systemctl(scope, "stop", target)
     with suppress(Refused):  # it was not enabled
         systemctl(scope, "disable", target)
-    for path in folder.glob(f"{target.removesuffix('.target')}*"):
-        if path.suffix in (".service", ".target"):
-            path.unlink()
+    for name in (*services_of((folder / target).read_text(encoding="utf-8")), target):
+        (folder / name).unlink(missing_ok=True)
     systemctl(scope, "daemon-reload")
 
 

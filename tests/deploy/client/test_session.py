@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +16,9 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.transport.zenoh_config import default_endpoint
 
 MINE, OTHER, THIRD = "unixsock-stream//tmp/mine", "tcp/127.0.0.1:7999", "tcp/far:7450"
+OWN, NEXT = "unixsock-stream//tmp/worlds", "tls/10.0.0.2:7447"
+"""Routers of a host that has the world alone: its own and the next one."""
+KEYS = Path("/var/keys")
 USUAL = "the machine's usual endpoint"
 """Its folder is another one in each process of the tests."""
 
@@ -22,10 +26,15 @@ USUAL = "the machine's usual endpoint"
 @pytest.fixture
 def two_fleets(monkeypatch: pytest.MonkeyPatch) -> None:
     running = [
-        Running(robot, fleet, endpoint, Identity(robot, 1, 0, ()))
-        for robot, fleet, endpoint in ((1, "mine", MINE), (2, "mine", MINE), (1, "other", OTHER))
+        Running(robot, fleet, endpoint, Identity(robot, 1, 0, ()), keys)
+        for robot, fleet, endpoint, keys in (
+            (1, "mine", MINE, None),
+            (2, "mine", MINE, None),
+            (1, "other", OTHER, None),
+            (0, "worlds", f"{OWN},{NEXT}", KEYS),
+        )
     ]
-    monkeypatch.setattr(session, "agents", lambda: running)
+    monkeypatch.setattr(session, "members", lambda: running)
 
 
 @pytest.mark.usefixtures("two_fleets")
@@ -36,6 +45,8 @@ def two_fleets(monkeypatch: pytest.MonkeyPatch) -> None:
         (None, MINE, "mine", MINE, 2),
         (None, OTHER, "other", OTHER, 1),
         ("other", OTHER, "other", OTHER, 1),
+        ("worlds", None, "worlds", f"{OWN},{NEXT}", 0),
+        (None, OWN, "worlds", OWN, 0),
         ("far", THIRD, "far", THIRD, 0),
         ("far", None, "far", USUAL, 0),
     ],
@@ -46,6 +57,12 @@ def test_another_fleet_does_not_stop_a_command_that_names_its_own(
     found = find(fleet, connect)
     at = default_endpoint() if endpoint == USUAL else endpoint
     assert (found.name, found.endpoint, len(found.team)) == (name, at, robots)
+
+
+@pytest.mark.usefixtures("two_fleets")
+@pytest.mark.parametrize("connect", [None, OWN, NEXT])
+def test_a_command_shows_the_certificate_of_its_host_at_each_of_the_hosts_routers(connect: str | None) -> None:
+    assert find("worlds", connect).keys == KEYS
 
 
 @pytest.mark.usefixtures("two_fleets")

@@ -7,7 +7,7 @@ from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.consensus import Role, Term
 from lfa.protocol.messages.fleet import HostStatus, ProcessReport
 from lfa.protocol.messages.header import Header
-from lfa.protocol.messages.team import PoseStamped, Tracking
+from lfa.protocol.messages.team import Event, PoseStamped, Tracking
 
 TERM = Term(7, 1, 1)
 
@@ -24,6 +24,16 @@ def _pose(robot: int, role: Role, term: Term = TERM) -> PoseStamped:
 def _tracking(robot: int, ahead: int) -> Tracking:
     header = Header(f"robot{robot}", 1, 1, 0.0)
     return Tracking(header, ahead, 1.0, 0.0, 0.0, 0.0, Pose2D(0.0, 0.0, 0.0), 0.0, False, "keep")
+
+
+def _ended(name: str) -> ProcessReport:
+    return ProcessReport(name, "ended", 0, 1, 0, 1.0, f"{name} ended")
+
+
+def _told(spares: list[int], retired: list[int], accepted: bool = True) -> Event:
+    """Return the leader's answer on who is in the team."""
+    team = {"robots": [1, 2, 3], "spares": [[one, 0] for one in spares], "retired": retired}
+    return Event(Header("robot1", 1, 2, 0.0), "roster", TERM, {**team, "chain": [1], "accepted": accepted})
 
 
 def _whole(at: float = 0.0) -> Health:
@@ -82,3 +92,27 @@ def test_what_is_given_up_will_not_come() -> None:
     health = _whole()
     health.see(0.2, _host(state="refused", ended="robot1 ended (exit code 2): lfa-agent: robot1 already runs"))
     assert health.lost() == ["host a: robot1 ended (exit code 2): lfa-agent: robot1 already runs"]
+
+
+def test_e34_a_retired_robot_is_missed_by_nobody_and_may_end() -> None:
+    health = _whole()
+    health.see(0.1, _tracking(2, 9))
+    health.see(0.1, _tracking(3, 1))
+    health.see(0.2, _told([], [2]))
+    assert (health.missing(0.5), health.chain(0.5)) == ([], (1, 3))
+    health.see(0.3, HostStatus(Header("host-a", 1, 1, 0.0), "a", "0", "r", (0, 0), (_ended("robot2"),)))
+    assert health.lost() == []
+    health.see(0.4, HostStatus(Header("host-a", 1, 1, 0.0), "a", "0", "r", (0, 0), (_ended("robot3"),)))
+    assert health.lost() == ["host a: robot3 ended"]
+
+
+def test_e33_a_spare_that_has_joined_is_missing_until_it_is_in_the_chain() -> None:
+    health = _whole()
+    health.see(0.1, _told([7], []))
+    assert health.missing(0.5) == ["robot7: no pose"]
+
+
+def test_e33_a_team_that_no_quorum_has_accepted_is_not_waited_for() -> None:
+    health = _whole()
+    health.see(0.1, _told([7], [], accepted=False))
+    assert (health.missing(0.5), health.team_told) == ([], False)

@@ -20,6 +20,7 @@ import pytest
 
 from lfa.deploy.fleet.engine.units import units
 from lfa.deploy.fleet.host.ledger import SUPERVISOR, watchers
+from lfa.deploy.fleet.plan.host_plan import PART, read
 from lfa.deploy.process.identity import identify, own_processes, send_signal
 from lfa.deploy.process.process_group import ProcessSpec
 from lfa.deploy.process.restart_policy import Restart
@@ -111,6 +112,26 @@ def test_up_restart_logs_and_down_go_by_systemd(home: StandIn) -> None:
     down = home.lfa("down", "--fleet", FLEET)
     assert down.returncode == 0, down.stderr
     assert (home.left(), list(home.units.iterdir())) == ([], [])
+
+
+@pytest.mark.processes
+def test_e35_an_upgrade_leaves_the_processes_to_systemd_and_to_the_boot(home: StandIn) -> None:
+    """The two hosts are one machine, and the units of one begin like the other's."""
+    second = 'hosts.here-2 = { address = "127.0.0.1", router_port = 7653 }\nrobots.on = { 1 = "here-2", 2 = "here" }\n'
+    home.file.write_text(TEXT.replace('engine = "systemd"\n', "") + second)
+    up = home.lfa("up", str(home.file), "--boot")
+    assert up.returncode == 0, up.stderr
+    before, units_before = home.rows(), sorted(home.units.iterdir())
+    done = home.lfa("upgrade", str(home.file), "--json")
+    assert (done.returncode, json.loads(done.stdout)["upgraded"]) == (0, ["here", "here-2"]), done.stderr
+    after = home.rows()
+    assert {row["state"] for row in after.values()} == {"running"}
+    assert before.keys() == after.keys() and {row["pid"] for row in before.values()}.isdisjoint(
+        row["pid"] for row in after.values()
+    )
+    assert sorted(home.units.iterdir()) == units_before
+    part = read(home.state / PART)
+    assert (part.engine, part.boot) == ("systemd", True)
 
 
 def test_a_machine_without_systemd_is_refused_before_anything_starts(home: StandIn) -> None:

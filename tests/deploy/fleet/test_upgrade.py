@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import os
 import shutil
 import signal
 import subprocess
-import sys
-import tarfile
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,8 +19,8 @@ from lfa.deploy.fleet.upgrade import as_started, differing, next_host, refusals
 from lfa.deploy.process import identity
 from lfa.deploy.process.identity import own_processes
 from lfa.protocol.messages.header import WIRE_VERSION
-from tests.processes.test_mixed_wires import BEFORE, PACKAGES, ROOT
 from tests.rigs.lfa_runs import LFA
+from tests.rigs.version_before import code_before, python_with
 
 HOST_OF = {1: "a", 2: "b", 3: "c"}
 RUNS = Found("0.2.0", 0, run="now", digest="d")
@@ -101,21 +98,6 @@ class Convoy:
         return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=environment)
 
 
-def _python(folder: Path, name: str) -> Path:
-    """Return the Python of a new environment with the code of the commit before."""
-    packed = subprocess.run(["git", "archive", BEFORE, *PACKAGES], cwd=ROOT, capture_output=True, check=False)
-    if packed.returncode != 0:
-        pytest.skip(f"this clone has no commit {BEFORE[:8]}: {packed.stderr.decode().strip()}")
-    venv, code = folder / name, folder / f"{name}-code"
-    with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
-        archive.extractall(code, filter="tar")
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(venv)], check=True)
-    site = next((venv / "lib").glob("python*/site-packages"))
-    needed = [str(code / ".namespace"), *(path for path in sys.path if path.endswith("-packages"))]
-    (site / "needed.pth").write_text("".join(f"{path}\n" for path in needed))
-    return venv / "bin" / "python"
-
-
 @pytest.fixture
 def convoy() -> Iterator[Convoy]:
     made = Convoy(Path(tempfile.mkdtemp(prefix="lfa-", dir="/tmp")))
@@ -131,7 +113,8 @@ def convoy() -> Iterator[Convoy]:
 
 @pytest.mark.processes
 def test_e35_a_running_fleet_is_upgraded_host_by_host_and_the_leaders_host_last(convoy: Convoy) -> None:
-    pythons = {name: _python(convoy.folder, name) for name in ("a", "b")}
+    code = code_before(convoy.folder / "code")
+    pythons = {name: python_with(code, convoy.folder / name) for name in ("a", "b")}
     convoy.write(pythons)
     up = convoy.lfa("up", str(convoy.file), python=pythons["a"])
     assert up.returncode == 0, up.stderr
