@@ -68,5 +68,7 @@ class LatchKept(Checker):
         if robot_id not in self._certain:
             self.broken(at, f"robot {robot_id} drives, and its gateway may not know of a stop")
         elif self._word.get(robot_id, NO_STOP).stand:
-            knows = "a stop" if word.stand else "an older resume"
+            stop = self._word[robot_id]
+            resume = "an older resume" if word < stop else "a later resume by its agent alone"
+            knows = "a stop" if word.stand else resume
             self.broken(at, f"robot {robot_id} drives after a stop reached its gateway, which knows {knows}")

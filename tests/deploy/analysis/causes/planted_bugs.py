@@ -59,6 +59,7 @@ SHOWN_IN: dict[str, tuple[str, int]] = {
     "the highest number is the latest": ("E23", 4),
     "a stop is not held": ("E28", 0),
     "late and replayed words of a stop are believed": ("E29", 47),
+    "an agent lifts a stop": ("E30", 7),
     "spares vote like others": ("E33", 31),
     "whoever says HELLO is taken in": ("E33", 0),
     "a full house leaves out the spare that asks for it": ("E33", 47),

@@ -24,6 +24,7 @@ SHORT = (
     "a bond of half the lease",
     "PREPARE and PROPOSE ignore a live grant",
     "a stop is not held",
+    "an agent lifts a stop",
     "clocks 25 % wrong against an eps of 0.1 %",
     "the wall clock in lease arithmetic",
     "an earlier incarnation is dropped in silence",
