@@ -11,7 +11,16 @@ from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import NO_TERM, Role, Term
-from lfa.protocol.messages.team import Level, ObstacleNote, PlanNote, PoseStamped, Status, TableRow, Tracking
+from lfa.protocol.messages.team import (
+    REFUSED_OF,
+    Level,
+    ObstacleNote,
+    PlanNote,
+    PoseStamped,
+    Status,
+    TableRow,
+    Tracking,
+)
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Vitals
 from lfa.protocol.outbox import Outbox
@@ -212,7 +221,7 @@ def _counters(vitals: Vitals, rows_heard: int, rows_lost: int) -> dict[str, floa
         "rss_mib": round(vitals.rss_mib, 1),
         "rows_heard": rows_heard,
         "rows_lost": rows_lost,
-    }
+    } | {f"{REFUSED_OF}{member}": number for member, number in vitals.refused}
 
 
 def _health(navigator: Navigator, lease: Lease, role: Role, others: tuple[str, ...], now: float) -> tuple[str, Level]:

@@ -14,11 +14,13 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.fleet import HostStatus
 from lfa.protocol.messages.simulation import Truth
-from lfa.protocol.messages.team import Event, PoseStamped, Status, Tracking
+from lfa.protocol.messages.team import REFUSED_OF, Event, PoseStamped, Status, Tracking
 from lfa.protocol.names import robot_id_of
 from lfa.protocol.topics import HOST_PREFIX
 
 M = TypeVar("M")
+COUNT_MAX = 2.0**53
+"""Greatest counter that is believed: any number may stand there."""
 FRESH_S = 1.0
 """Age [s] from which a pose is outdated: its robot counts as silent."""
 
@@ -73,6 +75,16 @@ class FleetState:
                     self._catch_up(robot, message.counters)
             case Event() if robot:
                 self._event(robot, message)
+
+    def refused(self) -> dict[str, int]:
+        """Return how many messages and tokens all robots together refused of a member for its rates, by its name."""
+        found: dict[str, int] = {}
+        for heard in self.status.values():
+            for name, number in heard.message.counters.items():
+                if name.startswith(REFUSED_OF) and 0.0 < number <= COUNT_MAX:  # False for nan
+                    member = name.removeprefix(REFUSED_OF)
+                    found[member] = found.get(member, 0) + int(number)
+        return found
 
     def forget(self, robot: int) -> None:
         """Forget what an ended incarnation of a robot said."""

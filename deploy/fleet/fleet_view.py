@@ -102,6 +102,11 @@ class FleetView:
         return {name: heard.message.text for name, heard in self._state.status.items()}
 
     @property
+    def refused(self) -> dict[str, int]:
+        """Number of messages and tokens that all robots together refused of a member for its rates, by its name."""
+        return self._state.refused()
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the machines: from the fleet's file, else all with a liveliness token or a received status."""
         there = {name.removeprefix(HOST_PREFIX) for name in self._subscriber.living if name.startswith(HOST_PREFIX)}

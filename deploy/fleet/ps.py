@@ -38,14 +38,17 @@ def command(
             clock.sleep(0.05)
             view.hear()
         now = clock.now()
-        facts, silent = rows(view), view.silent(now)
+        facts, silent, refused = rows(view), view.silent(now), view.refused
     if as_json:
-        print_visible(msgspec.json.encode({"fleet": seen.name, "silent": silent, "processes": facts}).decode())
+        said = {"fleet": seen.name, "silent": silent, "refused": refused, "processes": facts}
+        print_visible(msgspec.json.encode(said).decode())
     else:
         from rich.console import Console
 
         console = Console(width=max(WIDTH_MIN, shutil.get_terminal_size().columns))
         console.print(table(facts))
+        for line in others_refused(refused, facts):
+            print_visible(line)
         for name in silent:
             print_visible(f"host {visible(name)} is silent")
     return 1 if silent or not facts or any(row["state"] != "running" for row in facts) else 0
@@ -67,6 +70,7 @@ def rows(view: FleetView) -> list[dict[str, Any]]:
             "pid": report.pid,
             "starts": report.starts,
             "up_s": report.up_s,
+            "refused": view.refused.get(report.name, 0),
             "says": view.texts.get(report.name, ""),
             "ended": report.ended,
         }
@@ -80,11 +84,18 @@ def table(facts: list[dict[str, Any]]) -> Table:
     from rich.table import Table
 
     made = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    for head in ("host", "process", "state", "pid", "starts", "up", "says"):
-        made.add_column(head, justify="right" if head in ("pid", "starts", "up") else "left", no_wrap=head != "says")
+    for head in ("host", "process", "state", "pid", "starts", "up", "refused", "says"):
+        right = head in ("pid", "starts", "up", "refused")
+        made.add_column(head, justify="right" if right else "left", no_wrap=head != "says")
     for row in facts:
         style = "" if row["state"] == "running" else "bold red"
         says = row["says"] if row["state"] == "running" and row["says"] else row["ended"]
         cells = (row["host"], row["process"], row["state"], str(row["pid"] or ""), str(row["starts"]))
-        made.add_row(*map(cell, (*cells, f"{row['up_s']:.0f} s", says)), style=style)
+        made.add_row(*map(cell, (*cells, f"{row['up_s']:.0f} s", str(row["refused"] or ""), says)), style=style)
     return made
+
+
+def others_refused(refused: dict[str, int], facts: list[dict[str, Any]]) -> list[str]:
+    """Return a line per member of which robots refused something and which is no process of a machine's supervisor."""
+    shown = {row["process"] for row in facts}
+    return [f"{n} messages or tokens of {visible(name)} refused" for name, n in refused.items() if name not in shown]

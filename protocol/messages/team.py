@@ -149,6 +149,10 @@ class Level(StrEnum):
     STALE = "STALE"
 
 
+REFUSED_OF = "refused_of_"
+"""Prefix of the counters of a `Status` that say how much of which member its sender refused, since its start."""
+
+
 class Status(Struct, frozen=True, array_like=True, tag="status"):
     """Diagnostics as in ROS: a level, a sentence, and counters."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lfa.agents.agent import Agent
 from lfa.agents.input_watch import TOLD_S
-from lfa.protocol.messages.team import Event, Status
+from lfa.protocol.messages.team import REFUSED_OF, Event, Status
 from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.node import Received, Vitals
 
@@ -36,6 +36,15 @@ def test_a_member_that_was_quiet_meanwhile_is_told_again() -> None:
     assert [len(events) for events, _ in again] == [1, 0, 0, 1]
     assert "refused" in again[1][1]
     assert "refused" not in again[2][1]
+
+
+def test_a_status_counts_what_was_refused_of_each_member() -> None:
+    agent = Agent(2, 1, "f", 1, MISSION)
+    agent.tick(0.0)
+    vitals = Vitals(0.0, 9, 0, 0.0, 0.0, 0.0, (("robot3", 7), ("operator", 2)))
+    status = next(sent.message for sent in agent.receive(Received(1.0, "", vitals)) if isinstance(sent.message, Status))
+    counted = {name: n for name, n in status.counters.items() if name.startswith(REFUSED_OF)}
+    assert counted == {"refused_of_robot3": 7, "refused_of_operator": 2}
 
 
 def test_without_refusals_nothing_is_told() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf, nan
 from typing import Any
 
 import pytest
@@ -90,3 +91,12 @@ def test_no_event_of_any_sender_ends_a_view(chain: object, seq: object) -> None:
     state = _state(_adopts(1, [1, 2]), _adopts(2, chain, seq), _adopts(3, [1], 3, None), _status(2, config_n=7.0))
     assert state.chains[1].chain == (1, 2)
     assert len({state.chains.get(robot) for robot in (1, 2, 3)}) >= 1
+
+
+def test_what_robots_refused_of_a_member_is_summed_and_what_is_no_number_is_left_out() -> None:
+    state = _state(
+        _status(1, refused_of_robot3=7.0, dropped=9.0),
+        _status(2, refused_of_robot3=5.0, refused_of_operator=nan),
+        _status(4, refused_of_robot3=inf, refused_of_x=-1.0),
+    )
+    assert state.refused() == {"robot3": 12}
