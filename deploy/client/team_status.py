@@ -22,6 +22,8 @@ LEADERS_KEPT = 300
 EVENTS_KEPT = 50
 STATUS_S_MAX = TOPIC["status"].timeout_s or 3.0
 LISTED_MAX = 12
+TEXT_MAX = 200
+"""Number of characters shown of one value of an event."""
 DULL = ("peer_up", "peer_down")
 
 
@@ -149,4 +151,5 @@ def _short(value: Any) -> str:
         return f"{_short(value[:3])}-...-{_short(value[-1])} ({len(value)})"
     if isinstance(value, list | tuple):
         return "-".join(_short(item) for item in value)
-    return str(value)
+    text = str(value)
+    return text if len(text) <= TEXT_MAX else f"{text[:TEXT_MAX]}..."

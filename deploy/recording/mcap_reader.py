@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from lfa.deploy.recording import mcap_channels
 from lfa.deploy.recording.mcap_chunks import records
-from lfa.deploy.recording.recorder import RECORDING, parts
+from lfa.deploy.recording.recorder import RECORDING, TIME_S_MAX, parts
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol.errors import Refused
 from lfa.protocol.names import robot_id_of
@@ -143,6 +143,8 @@ def _recorded(path: Path, topics: frozenset[str]) -> Iterator[tuple[str, float, 
         elif opcode == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
             channel_id, _, log_time = _MESSAGE.unpack_from(body)
             if channel_id in wanted:
+                if log_time > TIME_S_MAX * 1e9:
+                    raise Refused(f"{path}: a message of {log_time / 1e9:g} s: by another program, or damaged")
                 yield wanted[channel_id], log_time / 1e9, body[_MESSAGE.size :]
 
 

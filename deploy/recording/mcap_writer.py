@@ -35,6 +35,7 @@ from lfa.protocol.output import AppendedFile
 
 COMPRESSION = "zstd"
 _OPCODE = int(Opcode.MESSAGE)
+UINT32 = 0xFFFFFFFF
 _MESSAGE = Struct("<BQHIQQ")
 """Record header (opcode, length), then message header (channel, sequence, log time, publish time)."""
 _FIELDS_BYTES = _MESSAGE.size - 9
@@ -94,7 +95,7 @@ class ChunkWriter:
             self._metadata.append(MetadataIndex(offset=offset, length=len(written), name=name))
 
     def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
-        """Add a message to the chunk in progress; times in ns."""
+        """Add a message to the chunk in progress; times in ns. Of `sequence` MCAP keeps the lower 32 bits."""
         if not self._indexes or log_time < self._chunk_from_ns:
             self._chunk_from_ns = log_time
         if log_time > self._chunk_until_ns:
@@ -103,7 +104,9 @@ class ChunkWriter:
         if index is None:
             index = self._indexes[channel_id] = []
         index += (log_time, len(chunk))
-        chunk += _MESSAGE.pack(_OPCODE, _FIELDS_BYTES + len(data), channel_id, sequence, log_time, publish_time)
+        chunk += _MESSAGE.pack(
+            _OPCODE, _FIELDS_BYTES + len(data), channel_id, sequence & UINT32, log_time, publish_time
+        )
         chunk += data
         if len(chunk) > self._size_max:
             self._end_chunk()

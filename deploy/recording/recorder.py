@@ -29,6 +29,8 @@ PART = "recording-{}.mcap"
 """Name of the second and later files of a recording in several files."""
 EVENTS = "events.jsonl"
 HOLES_NAMED = 3
+TIME_S_MAX = 2.0**31 - 1.0
+"""Latest time [s] of a message, that which ROS can say: 68 years."""
 FLUSH_S = 1.0  # interval between flushes, the most that a SIGKILL of the recorder loses
 ONLOOKERS = (WORLD_NAME, OPERATOR_NAME, RECORDER_NAME)
 CHUNK_BYTES_MAX = 4 * 1024 * 1024
@@ -119,8 +121,8 @@ class Recorder:
             raise OSError(ENOSPC, reason, str(folder))
 
     def record(self, t: float, key: str, message: Message) -> None:
-        """Record `message`, sent on `key` at `t` [s] since the run's start; a negative `t` is recorded as 0."""
-        t = t if t > 0.0 else 0.0
+        """Record `message`, sent on `key` at `t` [s] since the run's start; `t` is kept in [0, TIME_S_MAX]."""
+        t = min(t, TIME_S_MAX) if t > 0.0 else 0.0  # a foreign key may say any time; nan is 0
         allowance = self._caps.admits(t, key)
         if allowance is None:
             return

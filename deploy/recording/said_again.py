@@ -16,6 +16,8 @@ from lfa.protocol.topics import address
 
 HEARD = frozenset({Event, Sensors, Status})
 """Types of the messages that can say such a fact; a look-up spares all others, a recording's most, the rest."""
+COUNT_MAX = 2.0**53
+"""Greatest number of a term or of a config (`messages/header.py`)."""
 
 
 class SaidAgain:
@@ -64,8 +66,8 @@ class SaidAgain:
             say("leader_command", status.term, robot=robot)
         if status.role.value != self._roles.get(robot, Role.WAITING.value):
             say("role", status.term, role=status.role.value)
-        term = Term(int(status.counters.get("config_n", 0)), status.term.issuer, status.term.incarnation)
-        version = (term, int(status.counters.get("config_seq", 0)))
+        term = Term(_count(status, "config_n"), status.term.issuer, status.term.incarnation)
+        version = (term, _count(status, "config_seq"))
         if status.chain and term.n > NO_TERM.n and self._older(robot, version):
             say("chain", term, chain=list(status.chain), seq=version[1])
         return found
@@ -73,6 +75,12 @@ class SaidAgain:
     def _older(self, robot: int, version: tuple[Term, int]) -> bool:
         known = self._chains.get(robot)
         return known is None or (known[0].n, known[1]) < (version[0].n, version[1])
+
+
+def _count(status: Status, name: str) -> int:
+    """Return a counter, which is any number where a foreign process says it; 0 for what is none."""
+    value = status.counters.get(name, 0.0)
+    return int(value) if 0.0 <= value <= COUNT_MAX else 0
 
 
 def _number(event: Event, name: str) -> int:

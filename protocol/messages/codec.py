@@ -76,6 +76,10 @@ _encoder = msgspec.msgpack.Encoder()
 _decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(Message).decode
 
 
+DATA_DEPTH_MAX = 8
+"""Maximum nesting of what an event or an operator's command says; its readers descend into it."""
+
+
 class BadMessage(ValueError):
     """Bytes from the network that are no valid message: too long, truncated, foreign, or with numbers out of bounds."""
 
@@ -118,7 +122,26 @@ def _fitting_mission(message: MissionNote) -> bool:
     return CONTROL_HZ_MIN <= message.mission.control_hz <= CONTROL_HZ
 
 
+def _fitting_event(message: Event) -> bool:
+    return _plain(message.data, DATA_DEPTH_MAX)
+
+
+def _fitting_command(message: OperatorNote) -> bool:
+    return _plain(message.arguments, DATA_DEPTH_MAX)
+
+
+def _plain(value: Any, depth: int) -> bool:
+    """Return True for what JSON says, in at most `depth` levels; msgpack also has extensions, and keys of any type."""
+    if isinstance(value, dict):
+        return depth > 0 and all(isinstance(name, str) and _plain(one, depth - 1) for name, one in value.items())
+    if isinstance(value, list | tuple):
+        return depth > 0 and all(_plain(one, depth - 1) for one in value)
+    return value is None or isinstance(value, str | int | float)
+
+
 _FITS: dict[type, Callable[[Any], bool]] = {
+    Event: _fitting_event,
+    OperatorNote: _fitting_command,
     GroundProfile: _fitting_ground,
     PlanNote: _fitting_plan,
     MissionNote: _fitting_mission,

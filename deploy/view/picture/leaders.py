@@ -49,7 +49,7 @@ class LeaderTable:
                 self._note_fault(str(data.get("deed")), data.get("robot"))
             case "died" if robot is not None:
                 self._hit.setdefault(robot, ENDINGS["died"])
-            case "lease" if robot is not None and data.get("change") in CHANGES:
+            case "lease" if robot is not None and str(data.get("change")) in CHANGES:
                 self._hit.setdefault(robot, CHANGES[str(data["change"])])
                 self.stepped_down = True
             case "stuck" if robot is not None:

@@ -7,6 +7,7 @@ each robot the columns `COLUMNS`. Pure: times come with the messages.
 from __future__ import annotations
 
 from base64 import b64encode
+from contextlib import suppress
 from math import atan2, hypot, isfinite
 from typing import Any
 
@@ -241,10 +242,12 @@ class Picture:
             case "formation" if data.get("side"):
                 self.sides.append((t, str(data["side"])))
             case "chain" if isinstance(data.get("chain"), list | tuple) and message.term is not None:
-                version = (int(message.term.n), int(message.term.issuer), int(data.get("seq", 0)))
+                seq = data.get("seq")
+                version = (int(message.term.n), int(message.term.issuer), seq if isinstance(seq, int) else 0)
                 changed = version > self._version
                 if changed:
-                    self._version, self.chain = version, tuple(data["chain"])
+                    self._version = version
+                    self.chain = tuple(one for one in data["chain"] if isinstance(one, int))
         facts = {name: value for name, value in data.items() if name != "robot" or kind == "fault"}
         echo = (kind == "formation" and "side" not in data) or (kind == "chain" and not changed)
         text = None if kind in SILENT or echo else event_text("", kind, facts)
@@ -262,7 +265,8 @@ class Picture:
         shown = self._robots.get(target) if isinstance(target, int) else None
         match action:
             case "loss":
-                self.loss_ordered = float(target) if target else 0.0
+                with suppress(ValueError, TypeError):  # any sender may have written it
+                    self.loss_ordered = float(target) if target else 0.0
             case "cut" | "heal":
                 self.loss_ordered = self.loss_ordered if target else 0.0
                 self._cut(action, "" if target is None else str(target))
@@ -283,5 +287,5 @@ class Picture:
 
 def _scan_row(scan: Any) -> list[Any]:
     """Return first angle [rad], increment [rad] and ranges [cm] of a laser scan, 0 for a beam without a range."""
-    ranges = [round(CM * r) if isfinite(r) else 0 for r in map(float, scan.ranges_m)]
+    ranges = [round(CM * r) if isfinite(CM * r) else 0 for r in map(float, scan.ranges_m)]
     return [float(scan.angle_min), float(scan.angle_increment), ranges]

@@ -13,10 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from msgspec import structs
 
 from lfa.deploy.recording import event_log, mcap_channels, mcap_reader
 from lfa.deploy.recording.mcap_writer import ChunkWriter
-from lfa.deploy.recording.recorder import EVENTS, RECORDING, Recorder, parts
+from lfa.deploy.recording.recorder import EVENTS, RECORDING, TIME_S_MAX, Recorder, parts
+from lfa.protocol.errors import Refused
 from lfa.protocol.lease.membership import first_config
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import LeaseNote, Member, Nack, Term
@@ -49,6 +51,27 @@ def test_a_scans_beams_out_of_range_are_recorded(tmp_path: Path) -> None:
     ranges = [float(r) for r in scan.ranges_m]
     assert ranges[:3] == [1.5, inf, -inf]
     assert isnan(ranges[3])
+
+
+def test_no_number_that_a_member_may_say_ends_the_recorder(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {})
+    for t, seq in ((0.1, 2**53), (inf, 1), (nan, 2), (1e308, 3)):
+        scan = structs.replace(_scan((1.0,)), header=Header("robot2", 7, seq, t))
+        recorder.record(t, key("f", "robot2", "scan"), scan)
+    recorder.close()
+    times = [t for _, _, t, _ in mcap_reader.messages(tmp_path, frozenset({"scan"}))]
+    assert times == [0.1, TIME_S_MAX, 0.0, TIME_S_MAX]
+
+
+def test_a_message_of_a_time_that_no_recorder_writes_is_refused(tmp_path: Path) -> None:
+    with (tmp_path / RECORDING).open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/robot2/scan", "json", writer.register_schema("LaserScan", "", b""))
+        writer.add_message(channel, 2**63, mcap_channels.encode(_scan((1.0,))), 0)
+        writer.finish()
+    with pytest.raises(Refused, match="by another program, or damaged"):
+        list(mcap_reader.recorded(tmp_path, frozenset({"scan"})))
 
 
 def test_the_schema_says_that_a_range_may_be_a_word(tmp_path: Path) -> None:

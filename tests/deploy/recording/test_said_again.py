@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from math import inf, nan
 from pathlib import Path
+
+import pytest
+from msgspec import structs
 
 from lfa.deploy.recording import event_log
 from lfa.deploy.recording.holes import STATE_GAP_MAX, Holes
@@ -82,3 +86,13 @@ def test_a_recording_with_holes_says_where_and_when() -> None:
 
 def test_short_gaps_of_states_are_no_holes() -> None:
     assert Recording(messages=1, files=1, bytes=1, missing=4).losses() == []
+
+
+@pytest.mark.parametrize("number", [inf, -inf, nan, -1.0])
+def test_a_counter_that_is_no_number_of_a_config_ends_nobody(number: float, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {})
+    status = _status(1, Role.LEADER, FIRST, (1, 2))
+    for name in status.counters:
+        recorder.record(1.0, "lfa/x/robot1/status", structs.replace(status, counters={**status.counters, name: number}))
+    recorder.close()
+    assert all(line["kind"] != "chain" or line["seq"] == 0 for line in event_log.lines(tmp_path))

@@ -1,14 +1,16 @@
 """The codec: what is said arrives as it was said; what is no message of ours is refused and crashes nothing."""
 
 import math
+from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
 from lfa.protocol.geometry import Pose2D, Twist
-from lfa.protocol.messages.codec import BadMessage, Message, decode, encode
+from lfa.protocol.messages.codec import DATA_DEPTH_MAX, BadMessage, Message, decode, encode
 from lfa.protocol.messages.consensus import (
     Config,
     GatewayStamp,
@@ -27,7 +29,17 @@ from lfa.protocol.messages.consensus import (
 )
 from lfa.protocol.messages.header import MESSAGE_BYTES_MAX, Header
 from lfa.protocol.messages.robot import CmdVel, GroundProfile, LaserScan, Localization, Sensors
-from lfa.protocol.messages.team import Delay, Event, FormationNote, MissionNote, PlanNote, PoseStamped, Slot, TableRow
+from lfa.protocol.messages.team import (
+    Delay,
+    Event,
+    FormationNote,
+    MissionNote,
+    OperatorNote,
+    PlanNote,
+    PoseStamped,
+    Slot,
+    TableRow,
+)
 from lfa.protocol.mission import Mission
 from lfa.protocol.topics import TOPICS
 
@@ -174,6 +186,26 @@ def test_a_mission_whose_control_rate_gives_no_durations_is_refused(control_hz: 
     """Witness and driver compute deadman and bond from it, and check nothing else of a mission."""
     with pytest.raises(BadMessage):
         decode(encode(MissionNote(HEADER, Mission(control_hz=control_hz))), MissionNote)
+
+
+def _nested(depth: int) -> Any:
+    return [_nested(depth - 1)] if depth else 1.0
+
+
+@pytest.mark.parametrize(
+    "value",
+    [_nested(DATA_DEPTH_MAX), _nested(700), msgspec.msgpack.Ext(7, b"x"), {1: 2}, {"a": {None: 1}}, b"bytes"],
+    ids=["deep", "as deep as a decoder goes", "an extension", "a number as key", "none as key", "bytes"],
+)
+def test_what_no_json_says_or_no_reader_descends_into_is_no_event_and_no_command(value: Any) -> None:
+    for message in (Event(HEADER, "x", None, {"a": value}), OperatorNote(HEADER, "x", {"a": value})):
+        with pytest.raises(BadMessage):
+            decode(encode(message), type(message))
+
+
+def test_an_event_may_say_lists_of_lists() -> None:
+    event = Event(HEADER, "x", None, {"a": _nested(DATA_DEPTH_MAX - 1)})
+    assert decode(encode(event), Event) == event
 
 
 def test_a_message_of_another_topic_is_refused() -> None:
