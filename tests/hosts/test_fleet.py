@@ -10,6 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from lfa.deploy.bench.harness.team import endless
+from lfa.deploy.client.session import FleetAddress, listen
+from lfa.deploy.client.stop_fleet import TOPICS, stop_fleet
 from lfa.deploy.recording.run_folder import toml
 from lfa.protocol import clock
 from lfa.protocol.messages.team import Event
@@ -29,6 +31,7 @@ START_S_MAX = 150.0
 """Limit [s] for the fleet to become healthy: a busy machine takes longer than the bar, which is told apart from it."""
 FAILED_OVER_S, UNTOUCHED_S = 0.5, 0.3
 DRIVES_ON_S = 3.0
+STOPPED_S = 1.0
 PATIENCE_S = 30.0
 WATCH_S = 3.0
 
@@ -88,6 +91,30 @@ def test_any_machine_tells_what_runs_everywhere(up: tuple[Machines, float]) -> N
     expected = {(n, "router") for n in fleet.names} | {(WORLD, "world")}
     expected |= {(n, f"robot{r}") for n in fleet.names for r in _robots_on(fleet, n)}
     assert told == [expected, expected]
+
+
+@pytest.mark.parametrize("percent", [0, pytest.param(20, marks=pytest.mark.long), 60])
+def test_e28_a_stop_reaches_all_robots_on_four_machines_or_names_them_whatever_is_lost(
+    up: tuple[Machines, float], figure: Figure, percent: int
+) -> None:
+    """Packets between all machines are lost, in both directions."""
+    fleet = up[0]
+    part = fleet.part(WORLD)
+    with onlooker(fleet, WORLD, ROBOTS) as look, listen(FleetAddress(part.fleet, part.socket, ()), TOPICS) as operator:
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole", PATIENCE_S)
+        operator.wait(0.0)
+        fleet.net.lose(percent)
+        began = clock.now()
+        outcome = stop_fleet(operator, stand=True)
+        took_s = clock.now() - began
+        fleet.net.heal()
+        again = stop_fleet(operator, stand=True)
+        resumed = stop_fleet(operator, stand=False)
+    loss = f"lfa stop, 12 robots on 4 hosts, {percent} % loss"
+    figure(f"{loss}: all stopped, or named ({len(outcome.silent)})", took_s, STOPPED_S)
+    assert sorted((*outcome.done, *outcome.silent, *outcome.moving)) == list(ROBOTS)
+    assert percent > 0 or outcome.complete
+    assert (again.complete, resumed.complete) == (True, True)
 
 
 def test_when_the_operators_machine_is_cut_off_no_robot_notices(up: tuple[Machines, float], figure: Figure) -> None:
