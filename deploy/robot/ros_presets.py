@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Struct
 
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_text
+from lfa.protocol.file_reading import read_text
 
 
 class RosPreset(Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,9 +53,9 @@ def load_preset(name: str) -> RosPreset:
         raise Refused(
             f"--robot {name}: {error.strerror}: must be a file with keys such as odom, scan, cmd_vel"
         ) from None
-    except (msgspec.DecodeError, DamagedFile) as error:
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:  # DamagedFile is a ValueError
         keys = ", ".join(RosPreset.__struct_fields__)
-        raise Refused(f"--robot {name}: {error}: must be TOML with keys {keys}") from None
+        raise Refused(f"--robot {name}: {' '.join(str(error).split())}: must be TOML with keys {keys}") from None
 
 
 def full_name(namespace: str, name: str) -> str:

@@ -41,7 +41,8 @@ def loaded(text: str) -> dict[str, Any]:
     except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         line = "" if mark is None else f"line {mark.line + 1}: "
-        raise Refused(f"{line}{getattr(error, 'problem', None) or str(error)[:80]}: must be YAML") from None
+        said = " ".join(str(getattr(error, "problem", None) or error).split())[:80]
+        raise Refused(f"{line}{said}: must be YAML") from None
     if not isinstance(value, dict):
         raise Refused("must be YAML with the keys world, robot and obstacle")
     return value
