@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from lfa.deploy.bench.harness.team import endless
 from lfa.deploy.client.session import FleetAddress, listen
+from lfa.deploy.client.stop_call import StopOutcome
 from lfa.deploy.client.stop_fleet import TOPICS, stop_fleet
 from lfa.deploy.recording.run_folder import toml
 from lfa.protocol import clock
@@ -93,28 +94,65 @@ def test_any_machine_tells_what_runs_everywhere(up: tuple[Machines, float]) -> N
     assert told == [expected, expected]
 
 
+def _stopped(fleet: Machines, name: str) -> tuple[StopOutcome, float]:
+    """Say stop at that machine's router; return the outcome, and the time [s] that it took."""
+    part = fleet.part(name)
+    with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS) as operator:
+        began = clock.now()
+        return stop_fleet(operator, stand=True), clock.now() - began
+
+
+def _resumed(fleet: Machines, look: Onlooker) -> bool:
+    """Once all are in one chain, say stop again and then resume; return whether all have done as told."""
+    look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
+    part = fleet.part(WORLD)
+    with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS) as operator:
+        return stop_fleet(operator, stand=True).complete and stop_fleet(operator, stand=False).complete
+
+
 @pytest.mark.parametrize("percent", [0, pytest.param(20, marks=pytest.mark.long), 60])
-def test_e28_a_stop_reaches_all_robots_on_four_machines_or_names_them_whatever_is_lost(
+def test_e28_a_stop_reaches_all_robots_of_four_machines_or_names_them_whatever_is_lost(
     up: tuple[Machines, float], figure: Figure, percent: int
 ) -> None:
-    """Packets between all machines are lost, in both directions."""
+    """Packets between all machines are lost; the gateways are with the world, the word is said at another machine."""
     fleet = up[0]
-    part = fleet.part(WORLD)
-    with onlooker(fleet, WORLD, ROBOTS) as look, listen(FleetAddress(part.fleet, part.socket, ()), TOPICS) as operator:
+    with onlooker(fleet, WORLD, ROBOTS) as look:
         look.wait(lambda: look.whole(set(ROBOTS)), "not whole", PATIENCE_S)
-        operator.wait(0.0)
         fleet.net.lose(percent)
-        began = clock.now()
-        outcome = stop_fleet(operator, stand=True)
-        took_s = clock.now() - began
+        outcome, took_s = _stopped(fleet, "c")
         fleet.net.heal()
-        again = stop_fleet(operator, stand=True)
-        resumed = stop_fleet(operator, stand=False)
-    loss = f"lfa stop, 12 robots on 4 hosts, {percent} % loss"
-    figure(f"{loss}: all stopped, or named ({len(outcome.silent)})", took_s, STOPPED_S)
+        assert _resumed(fleet, look)
+    named = f"{len(outcome.silent)} named"
+    figure(f"lfa stop, 12 robots on 4 hosts, {percent} % loss: all stopped, or {named}", took_s, STOPPED_S)
     assert sorted((*outcome.done, *outcome.silent, *outcome.moving)) == list(ROBOTS)
     assert percent > 0 or outcome.complete
-    assert (again.complete, resumed.complete) == (True, True)
+
+
+def test_e28_a_stop_reaches_every_gateway_while_the_leaders_machine_is_cut_off(
+    up: tuple[Machines, float], figure: Figure
+) -> None:
+    fleet = up[0]
+    with onlooker(fleet, WORLD, ROBOTS) as look:
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole", PATIENCE_S)
+        name = next(n for n in fleet.names if look.chain()[0] in _robots_on(fleet, n))
+        fleet.net.unplug(fleet.host(name))
+        outcome, took_s = _stopped(fleet, next(n for n in "bc" if n != name))
+        fleet.net.plug_in(fleet.host(name))
+        assert _resumed(fleet, look)
+    figure("lfa stop, the leader's host cut off: all stopped", took_s, STOPPED_S)
+    assert outcome.done == ROBOTS
+
+
+def test_e28_a_stop_on_a_machine_that_is_cut_off_names_every_robot(up: tuple[Machines, float], figure: Figure) -> None:
+    fleet = up[0]
+    with onlooker(fleet, WORLD, ROBOTS) as look:
+        look.wait(lambda: look.whole(set(ROBOTS)), "not whole", PATIENCE_S)
+        fleet.net.unplug(fleet.host("c"))
+        outcome, took_s = _stopped(fleet, "c")
+        fleet.net.plug_in(fleet.host("c"))
+        assert _resumed(fleet, look)
+    figure("lfa stop, said on a host that is cut off: all named", took_s, STOPPED_S)
+    assert (outcome.silent, outcome.done) == (ROBOTS, ())
 
 
 def test_when_the_operators_machine_is_cut_off_no_robot_notices(up: tuple[Machines, float], figure: Figure) -> None:
