@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from math import atan2, cos, hypot, inf, pi, sin, sqrt
 
 from lfa.agents.avoidance.safety import BRAKING_SHARE, turn_on_spot
-from lfa.agents.perception.scan import Point, free_along
+from lfa.agents.perception.scan import STRAIGHT_RADPS, Point, free_along
 from lfa.protocol.geometry import Twist, wrap
 from lfa.protocol.mission import Limits
 
@@ -33,6 +33,11 @@ the last one's."""
 ALIGNED_RAD = 0.15
 BACK_MPS = 0.15
 BACK_FREE_M = 0.06
+ROUNDING_M = 1e-6
+"""Distance [m] that covers rounding errors where points beside an arc are chosen."""
+
+Near = tuple[float, float, float]
+"""Square of a point's distance [m^2], and the point in `base_link` [m]: in this order the nearest are first."""
 
 
 class ArcPlanner:
@@ -65,10 +70,10 @@ class ArcPlanner:
             self._curvature = None
             return wanted
         reach_m = look_m + self._radius_m + ROOM_M
-        near = [point for point in points if point[0] * point[0] + point[1] * point[1] < reach_m * reach_m]
+        near = sorted([(far, x, y) for x, y in points if (far := x * x + y * y) < reach_m * reach_m])
         best = self._best(near, route, wanted, look_m)
         if best is None:
-            return self._turn(near, route, turn_radps)
+            return self._turn([(x, y) for _, x, y in near], route, turn_radps)
         self._curvature, roomy_m = best
         v = min(max(wanted.linear_x, bend_mps(self._curvature)), self._close_mps(roomy_m))
         omega_max = self._limits.omega_max_radps
@@ -76,22 +81,28 @@ class ArcPlanner:
         return Twist(v, v * self._curvature)
 
     def _best(
-        self, points: Sequence[Point], route: Callable[[float], Point], wanted: Twist, look_m: float
+        self, near: Sequence[Near], route: Callable[[float], Point], wanted: Twist, look_m: float
     ) -> tuple[float, float] | None:
         """Return the curvature [1/m] of the best arc, and its length [m] before something is nearer beside it than
         `ROOM_M`, which is inf where nothing is; None without an arc.
         """
+        width_m = self._radius_m + ROOM_M
+        ahead = [point for point in near if point[1] > 0.0]
         least, best = inf, None
         own = wanted.angular_z / wanted.linear_x
         for curvature in (own, *CURVATURES_PER_M, *(-c for c in CURVATURES_PER_M[1:])):
             arc = Twist(1.0, curvature)
-            free_m = min(free_along(points, arc, self._radius_m + SKIN_M), look_m)
+            points = _beside(ahead if _leads_away(curvature, look_m, width_m) else near, curvature, width_m)
+            free_m = free_along(points, arc, self._radius_m + SKIN_M, look_m)
             if free_m < LEAST_M:
                 continue
-            roomy_m = min(free_along(points, arc, self._radius_m + ROOM_M), free_m)
-            cost = _off(route, curvature, free_m) + SHORT * (look_m - free_m) + CLOSE * (free_m - roomy_m)
+            cost = _off(route, curvature, free_m) + SHORT * (look_m - free_m)
             if self._curvature is not None and curvature != self._curvature:
                 cost += CHANGE_M
+            if cost >= least:
+                continue
+            roomy_m = free_along(points, arc, width_m, free_m)
+            cost += CLOSE * (free_m - roomy_m)
             if cost < least:
                 least, best = cost, (curvature, roomy_m if roomy_m < free_m else inf)
         return best
@@ -113,6 +124,22 @@ class ArcPlanner:
         self.blocked = True
         free_m = free_along(points, Twist(-1.0, 0.0), self._radius_m + SKIN_M)
         return Twist(-BACK_MPS if free_m > BACK_FREE_M else 0.0, 0.0)
+
+
+def _leads_away(curvature: float, look_m: float, width_m: float) -> bool:
+    """Return whether an arc of `look_m` [m] meets nothing that lies behind the robot: it does not come round."""
+    return abs(curvature) * look_m < pi / 2 and abs(curvature) * width_m < 1.0
+
+
+def _beside(near: Sequence[Near], curvature: float, width_m: float) -> list[Point]:
+    """Return the points that may be nearer than `width_m` [m] beside an arc: few are, and each arc asks twice."""
+    width_m += ROUNDING_M
+    if abs(curvature) <= STRAIGHT_RADPS:
+        return [(x, y) for _, x, y in near if -width_m < y < width_m]
+    center_y = 1.0 / curvature
+    inner_m, outer_m, twice = abs(center_y) - width_m, abs(center_y) + width_m, 2.0 * center_y
+    low, high = inner_m * abs(inner_m) - center_y * center_y, outer_m * outer_m - center_y * center_y
+    return [(x, y) for far, x, y in near if low < far - twice * y < high]
 
 
 def _off(route: Callable[[float], Point], curvature: float, length_m: float) -> float:

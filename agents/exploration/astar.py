@@ -20,6 +20,8 @@ LONG_CELLS, ROOM_CELLS_MAX = 12_000, 60_000
 """Number of expanded cells after which a search checks whether the robot is enclosed, and the size in cells of the
 largest region for which that is checked."""
 
+_NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
+
 
 def search(costmap: Costmap, start: int, goal: int, toward: bytearray) -> Generator[int, None, bool]:
     """Search a way from `goal` to `start`; yield cells expanded, return True if there is one.
@@ -54,13 +56,14 @@ def _spread(costmap: Costmap, goal: int, start: int, toward: bytearray) -> Itera
     grid, near, prices = costmap.grid, costmap.near, costmap.prices
     columns, scores = grid.columns, grid.scores
     steps = tuple(
-        (number, offset, DIAGONAL if abs(offset) not in (1, columns) else STRAIGHT)
-        for number, offset in enumerate(_offsets(columns), start=1)
+        (number, row * columns + column, DIAGONAL if row and column else STRAIGHT, row, column)
+        for number, (row, column) in enumerate(_NEIGHBOURS, start=1)
     )
     best = memoryview(bytearray(4 * len(near))).cast("i")
     closed = bytearray(len(near))
     start_row, start_column = divmod(start, columns)
-    rim = (REACH, grid.rows - REACH)
+    row_max, column_max = grid.rows - REACH, columns - REACH
+    unseen, beyond = UNSEEN - FREE, DIAGONAL - STRAIGHT
     heap = [goal]
     best[goal] = 1
     looked = 0
@@ -77,10 +80,11 @@ def _spread(costmap: Costmap, goal: int, start: int, toward: bytearray) -> Itera
             yield looked
             looked = 0
         row, column = divmod(cell, columns)
-        if not (rim[0] <= row < rim[1] and REACH <= column < columns - REACH):
+        if not (REACH <= row < row_max and REACH <= column < column_max):
             continue
         cost = best[cell]
-        for number, offset, length in steps:
+        south, west = start_row - row, start_column - column
+        for number, offset, length, up, right in steps:
             other = cell + offset
             if closed[other]:
                 continue
@@ -88,16 +92,15 @@ def _spread(costmap: Costmap, goal: int, start: int, toward: bytearray) -> Itera
             if price == 0:
                 continue
             if scores[other] == 0:
-                price += UNSEEN - FREE
+                price += unseen
             total = cost + length * price
             known = best[other]
             if known == 0 or total < known:
                 best[other] = total
                 toward[other] = number
-                row, column = divmod(other, columns)
-                dr, dc = abs(row - start_row), abs(column - start_column)
-                guess = GUESS * (STRAIGHT * max(dr, dc) + (DIAGONAL - STRAIGHT) * min(dr, dc))
-                heappush(heap, (total + guess) << 24 | other)
+                dr, dc = abs(south - up), abs(west - right)
+                far = STRAIGHT * dr + beyond * dc if dr > dc else STRAIGHT * dc + beyond * dr
+                heappush(heap, (total + GUESS * far) << 24 | other)
     yield looked
 
 
@@ -107,7 +110,7 @@ def _closed_in(costmap: Costmap, start: int, goal: int) -> Generator[int, None, 
     seen = bytearray(len(near))
     seen[start] = 1
     cells = [start]
-    for cell in cells:
+    for looked, cell in enumerate(cells, start=1):
         if cell == goal or len(cells) > ROOM_CELLS_MAX:
             return False
         row, column = divmod(cell, columns)
@@ -117,9 +120,10 @@ def _closed_in(costmap: Costmap, start: int, goal: int) -> Generator[int, None, 
             if not seen[other] and prices[near[other]]:
                 seen[other] = 1
                 cells.append(other)
-        yield 1
+        if looked % LOOKED_PER_YIELD == 0:
+            yield LOOKED_PER_YIELD
     return True
 
 
 def _offsets(columns: int) -> tuple[int, ...]:
-    return tuple(row * columns + column for row in (-1, 0, 1) for column in (-1, 0, 1) if row or column)
+    return tuple(row * columns + column for row, column in _NEIGHBOURS)

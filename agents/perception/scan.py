@@ -60,29 +60,33 @@ def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Poi
     return [p for p in points if (dx := p[0] - x) * dx + (dy := p[1] - y) * dy > limit]
 
 
-def free_along(points: Sequence[Point], twist: Twist, half_width_m: float) -> float:
+def free_along(points: Sequence[Point], twist: Twist, half_width_m: float, within_m: float = inf) -> float:
     """Return the distance [m] that a robot of `half_width_m` can drive along the arc of `twist` before it meets a
     point.
 
-    Return inf if it meets none. Points already within the half width count only when the motion leads towards them.
+    Return `within_m` if it meets none before. Points already within the half width count only when the motion leads
+    towards them.
     """
     v, omega = twist.linear_x, twist.angular_z
     if v == 0.0:
-        return inf
+        return within_m
     sign = 1.0 if v > 0.0 else -1.0
     if abs(omega) <= STRAIGHT_RADPS * abs(v):
         ahead = [_straight(sign * x, y, half_width_m) for x, y in points if -half_width_m < y < half_width_m]
-        return min(ahead, default=inf)
+        return min(min(ahead, default=inf), within_m)
     radius = abs(v / omega)
     left = 1.0 if omega * sign > 0.0 else -1.0
     center_y, inner_m, outer_m = left * radius, radius - half_width_m, radius + half_width_m
-    free_m, far, near = inf, outer_m * outer_m * ROUNDED, inner_m * abs(inner_m) / ROUNDED
-    for x, y in points:  # most points are off the bend: they are skipped without a call
-        beside = y - center_y
-        if near < x * x + beside * beside < far:
+    free_m, far, near = within_m, outer_m * outer_m * ROUNDED, inner_m * abs(inner_m) / ROUNDED
+    sooner = (free_m + half_width_m) ** 2 * ROUNDED
+    for x, y in points:  # most points are off the bend, or farther than its free part: they are skipped without a call
+        beside, square = y - center_y, x * x
+        if near < square + beside * beside < far and square + y * y < sooner:
             from_center = hypot(x, beside)
             if inner_m < from_center < outer_m and from_center > 0.0:
-                free_m = min(free_m, _bent(sign * x, left * y, from_center, radius, half_width_m))
+                met_m = _bent(sign * x, left * y, from_center, radius, half_width_m)
+                if met_m < free_m:
+                    free_m, sooner = met_m, (met_m + half_width_m) ** 2 * ROUNDED
     return free_m
 
 

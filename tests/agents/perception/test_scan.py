@@ -2,7 +2,7 @@
 
 from math import hypot, inf, nan, pi
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -74,3 +74,16 @@ def test_a_point_that_was_passed_does_not_bar_a_bend() -> None:
 
 def test_the_smallest_of_speeds_straight_ahead_is_straight() -> None:
     assert free_along([(1.0, 0.0)], Twist(5e-324, 0.0), 0.2) == 0.8
+
+
+@given(st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), max_size=20), st.floats(-9.0, 9.0))
+def test_points_beyond_a_limit_of_the_free_way_do_not_change_it(points: list[tuple[float, float]], bend: float) -> None:
+    for arc in (Twist(1.0, bend), Twist(-1.0, bend)):
+        assert free_along(points, arc, 0.2, 0.9) == min(free_along(points, arc, 0.2), 0.9)
+
+
+@example([(1.0, 0.24), (1.1, 0.06)], 0.1)  # the farther one is met first: the nearer one at the side only
+@given(st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), max_size=20), st.floats(-9.0, 9.0))
+def test_the_free_way_among_points_ends_at_the_first_of_them(points: list[tuple[float, float]], bend: float) -> None:
+    arc = Twist(0.5, 0.5 * bend)
+    assert free_along(points, arc, 0.2) == min((free_along([point], arc, 0.2) for point in points), default=inf)
