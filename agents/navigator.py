@@ -80,7 +80,7 @@ class Navigator:
         )
         self._lead_route = LeadRoute(self.leading, self._detour, self._obstacles, mission, self.hand_driving)
         self._own = OwnBehaviors(mission)
-        self._crossing = Crossing(mission.radius_m, mission.leading.cruise_mps)
+        self._crossing = Crossing(mission.radius_m, mission.leading.cruise_mps, mission.limits.a_max_mps2)
 
     @property
     def predecessor(self) -> Predecessor | None:
@@ -207,7 +207,7 @@ class Navigator:
             wanted = STILL
         if role is not Role.WAITING:
             wanted = self._own.step(BehaviorInput(now, role, pose, self._last, wanted, still, moving))
-            wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving)
+            wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving, self._last)
             wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now)
         self._back_out.keep(pose)
         self._watch(role, pose, wanted, now)

@@ -11,22 +11,26 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import hypot, inf
 
-from msgspec import Struct
-
 from lfa.agents.avoidance.decision import Action, Decision, Situation, decide
+from lfa.agents.avoidance.evasion import (
+    CLEARANCE_M,
+    ESCAPES,
+    EVASIONS,
+    ONWARD,
+    SLOW,
+    Evasion,
+    apart_m,
+    care_of,
+    closest_m,
+    kept_m,
+    leads_to,
+    side_of,
+)
 from lfa.agents.avoidance.moving_points import AWAY_M
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, free_along
-from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, slowed, wrap
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, in_base, slowed, wrap
 
-CLEARANCE_M = 0.6
-"""Least distance [m] from the robot's centre to the surface of a moving obstacle; less within the horizon is a
-conflict."""
-HORIZON_S = 4.0
-LOOK_S = 6.0
-"""Prediction time [s] for choosing the action with the largest clearance when no action keeps `CLEARANCE_M` within the
-horizon: an obstacle that comes slowly from behind has not reached a waiting robot at the end of the horizon."""
-STEP_S = 0.25
 SLOW_SHARE, CRUISE_MPS = 0.4, 0.5
 """Share of the cruise speed [m/s] that a slowed robot drives at most. A share of what it wants would be taken again in
 each step, since that grows from its last speed: it would crawl.
@@ -37,8 +41,10 @@ SOON_S = 2.0
 """Time [s] ahead within which what comes on is given way to again, however long it was waited for."""
 HOLD_S = 1.0
 """Time [s] after the last conflict before a robot may choose a less careful action."""
-WORTH_M = 0.1
-"""Clearance [m] that another evasion must win over the present action, or over waiting."""
+WORTH_M, WORTH_CLOSE_M = 0.1, 0.05
+"""Clearance [m] that another evasion must win over the present action, or over waiting; less where it comes close."""
+USUAL_MPS = 0.5
+"""Speed [m/s] beyond which that clearance grows in proportion: where something fast comes by is less certain."""
 BODY_M = 0.05
 """Clearance [m] to what stands that an evasion keeps beside the body."""
 ROOM_S = 1.2
@@ -46,37 +52,15 @@ ROOM_S = 1.2
 MATE_M, MATE_S, MATES_WITHIN_M = 0.15, 1.5, 2.0
 """Room [m] between two bodies, and time [s] ahead, that an evasion keeps from team-mates, which evade as well, and the
 distance [m] of those that are looked at."""
-
-
-class Evasion(Struct, frozen=True):
-    """Motion out of the way: a bend of `turn_rad` [rad], then straight on, at `v_mps` [m/s]."""
-
-    action: Action
-    v_mps: float
-    omega_radps: float = 0.0
-    turn_rad: float = 0.0
-
-
-EVASIONS = (
-    Evasion(Action.WAIT, 0.0),
-    Evasion(Action.RIGHT, 0.45, -0.9, 1.0),
-    Evasion(Action.LEFT, 0.45, 0.9, 1.0),
-    Evasion(Action.RIGHT, 0.25, -1.2, 1.5),
-    Evasion(Action.LEFT, 0.25, 1.2, 1.5),
-    Evasion(Action.AHEAD, 0.25),
-    Evasion(Action.BACK, -0.25),
-)
-"""Of two that keep the same distance the first is taken: to the right first, as two that meet both do."""
 DRIVEN_M = 0.3
 """Clearance [m] that backing off must keep beyond the others: what comes after a robot that backs off drives it on."""
 CLOSE_M, CLOSE_S = 0.35, 1.0
 """Room [m] to what comes on below which the way that it means to pass by does not count any more, for it may turn, and
-the time [s] within which the robot makes as much room as it can."""
-SLOW = Evasion(Action.SLOW, 0.0)
-CARE = {Action.SLOW: 0, Action.WAIT: 1}
-"""How much more an action does than to slow down; the others do most."""
-MOST_CARE = 2
-
+the time [s] within which the robot makes as much room as it can, whether it turns or goes on."""
+GOES_SHARE = 0.3
+"""Cosine of the angle off the direction away from the robot up to which what moves goes away."""
+WARY_S, WARY_M = 0.8, 0.1
+"""Time [s] within which what moves, if it turns towards a robot that drives on, must not come nearer than this [m]."""
 
 Mates = Callable[[Pose2D, float, float], Sequence[Feature]]
 """Function that returns the team-mates within a distance [m] of a pose, at a time [s], with their radius as 0."""
@@ -85,10 +69,11 @@ Mates = Callable[[Pose2D, float, float], Sequence[Feature]]
 class Crossing:
     """Give-way behaviour of one robot towards moving obstacles, for a bounded time."""
 
-    def __init__(self, radius_m: float = 0.15, cruise_mps: float = CRUISE_MPS) -> None:
+    def __init__(self, radius_m: float = 0.15, cruise_mps: float = CRUISE_MPS, a_max_mps2: float = 1.0) -> None:
         self._radius_m = radius_m
+        self._a_max_mps2 = a_max_mps2
         self._slow_mps = SLOW_SHARE * cruise_mps
-        self._evasion, self._heading = SLOW, 0.0
+        self._evasion, self._heading, self._last = SLOW, 0.0, STILL
         self.decision: Decision | None = None
         self._waiting_since: float | None = None
         self._held_until = 0.0
@@ -109,20 +94,22 @@ class Crossing:
         now: float,
         points: Sequence[Point] = (),
         mates: Mates = lambda _pose, _within_m, _now: (),
+        last: Twist = STILL,
     ) -> Twist:
         """Return `wanted`, or a slower or evading twist. `moving` holds as of now, in `map` like `pose`; `points` are
-        what stands, in `base_link`; `mates` is asked where room is made.
+        what stands, in `base_link`; `mates` is asked where room is made; `last` is the last command.
         """
-        near = _closest(moving, pose, wanted)
+        self._last = last
+        near = closest_m(moving, pose, wanted)
         if near >= CLEARANCE_M and now >= self._held_until:
             self.decision, self._waiting_since, self._impatient = None, None, False
             self._evasion = SLOW
-            return wanted
+            return self._wary(moving, pose, wanted)
         self._near = near if near < CLEARANCE_M else self._near
         if self._waiting_since is None:
             self._waiting_since = now
         self._impatient = now - self._waiting_since > WAIT_S_MAX
-        if self._impatient and _closest(moving, pose, wanted, SOON_S) < self._radius_m + AWAY_M:
+        if self._impatient and closest_m(moving, pose, wanted, SOON_S) < self._radius_m + AWAY_M:
             self._impatient, self._waiting_since = False, now  # what was waited for comes on
         if self._impatient:
             self.decision = None
@@ -130,29 +117,47 @@ class Crossing:
         evasion = (
             SLOW if near >= CLEARANCE_M else self._less(moving, pose, wanted, points, mates(pose, MATES_WITHIN_M, now))
         )
-        if self.decision is None or _care(evasion.action) >= _care(self.decision.action) or now >= self._held_until:
+        if self.decision is None or care_of(evasion.action) >= care_of(self.decision.action) or now >= self._held_until:
             row = decide(Situation("moving", near, closest_m=min(near, self._near)))
             named = ("", "") if row is None else (row.name, row.updates)
             self.decision = Decision(evasion.action, near, 0.0, "moving", *named)
             self._held_until = now + HOLD_S if near < CLEARANCE_M else self._held_until
             if evasion != self._evasion:
-                self._evasion, self._heading = evasion, wrap(pose.theta + evasion.turn_rad * _side(evasion))
+                self._evasion, self._heading = evasion, wrap(pose.theta + evasion.turn_rad * side_of(evasion))
         if self._evasion.action not in (Action.WAIT, Action.BACK):
             self._waiting_since = now  # a robot that drives on or makes room does not wait
-        return self._done(self._present(pose), wanted)
+        twist = self._done(self._present(pose), wanted)
+        return self._wary(moving, pose, twist) if self._evasion.action in ONWARD else twist
+
+    def _wary(self, moving: Sequence[Feature], pose: Pose2D, twist: Twist) -> Twist:
+        """Return `twist`, slowed towards what it comes nearer to, so that this may turn and not meet the robot within
+        `WARY_S`.
+        """
+        for feature in moving:
+            x, y = in_base(pose, (feature.x, feature.y))
+            off_m = max(hypot(x, y), 1e-6)
+            ahead = (x if twist.linear_x >= 0.0 else -x) / off_m
+            away_mps = ((feature.x - pose.x) * feature.vx + (feature.y - pose.y) * feature.vy) / off_m
+            if ahead > 0.0 and abs(twist.linear_x) * ahead > away_mps:
+                speed = hypot(feature.vx, feature.vy)
+                room_m = off_m - feature.radius_m - self._radius_m - WARY_M - WARY_S * speed
+                twist = slowed(twist, max(0.0, room_m, WARY_S * away_mps) / (WARY_S * ahead))
+        return twist
 
     def _present(self, pose: Pose2D) -> Evasion:
         """Return what is left of the present evasion: its bend ends at the heading that it was chosen for."""
         evasion = self._evasion
         if not evasion.turn_rad:
             return evasion
-        left_rad = max(0.0, _side(evasion) * wrap(self._heading - pose.theta))
+        left_rad = max(0.0, side_of(evasion) * wrap(self._heading - pose.theta))
         return Evasion(evasion.action, evasion.v_mps, evasion.omega_radps if left_rad > 0.0 else 0.0, left_rad)
 
     def _comes_close(self, feature: Feature, pose: Pose2D) -> bool:
-        """Return whether an obstacle is so near that it reaches the robot if it turns towards it, and comes nearer."""
+        """Return whether an obstacle is so near that it reaches the robot if it turns towards it, and does not go."""
         x, y = feature.x - pose.x, feature.y - pose.y
-        return hypot(x, y) < feature.radius_m + self._radius_m + CLOSE_M and x * feature.vx + y * feature.vy < 0.0
+        off_m, speed = hypot(x, y), hypot(feature.vx, feature.vy)
+        goes = x * feature.vx + y * feature.vy > GOES_SHARE * off_m * speed
+        return not goes and off_m < feature.radius_m + self._radius_m + CLOSE_M
 
     def _less(
         self,
@@ -163,29 +168,41 @@ class Crossing:
         mates: Sequence[Feature],
     ) -> Evasion:
         """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
-        if _closest(moving, pose, self._done(SLOW, wanted)) >= CLEARANCE_M:
+        if closest_m(moving, pose, self._done(SLOW, wanted)) >= CLEARANCE_M:
             return SLOW
-        if _closest(moving, pose, STILL) >= CLEARANCE_M:
+        if closest_m(moving, pose, STILL) >= CLEARANCE_M:
             return EVASIONS[0]
         best, most = EVASIONS[0], -inf
+        fastest = max(hypot(feature.vx, feature.vy) for feature in moving)
         close = [feature for feature in moving if self._comes_close(feature, pose)]
         under_way = self.decision is not None and self._evasion is not SLOW
-        candidates = (self._present(pose), *EVASIONS) if under_way else EVASIONS
+        candidates = (*EVASIONS, *ESCAPES) if close else EVASIONS
+        candidates = (self._present(pose), *candidates) if under_way else candidates
         for evasion in candidates:
             twist = self._done(evasion, wanted)
             if twist.linear_x and free_along(points, twist, self._radius_m + BODY_M) < abs(twist.linear_x) * ROOM_S:
                 continue
-            if twist.linear_x and _closest(mates, pose, twist, MATE_S) < 2.0 * self._radius_m + MATE_M:
+            if twist.linear_x and closest_m(mates, pose, twist, MATE_S) < 2.0 * self._radius_m + MATE_M:
                 continue
+            if any(leads_to(feature, pose, twist) for feature in close):
+                continue  # it would be braked, and met on its way past
             if close:
-                kept = _apart(close, along_arc(pose, twist, CLOSE_S), 0.5 * CLOSE_S)
+                place = self._soon(pose, twist)
+                kept = min(apart_m(close, place, 0.5 * CLOSE_S), apart_m(close, place, CLOSE_S))
             else:
-                kept = _kept(moving, pose, evasion, twist)
+                kept = kept_m(moving, pose, evasion, twist)
                 kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
-            kept += WORTH_M if evasion is candidates[0] else 0.0  # the present one, or waiting
+            if evasion is candidates[0]:  # the present one, or waiting
+                kept += WORTH_CLOSE_M if close else WORTH_M * max(1.0, fastest / USUAL_MPS)
             if kept > most:
                 best, most = evasion, kept
         return self._evasion if under_way and best is candidates[0] else best
+
+    def _soon(self, pose: Pose2D, twist: Twist) -> Pose2D:
+        """Return the pose after `CLOSE_S` of `twist`, which the drive reaches from its last speed step by step."""
+        before = self._last.linear_x
+        lag_s = min(0.5 * abs(twist.linear_x - before) / self._a_max_mps2, CLOSE_S)
+        return along_arc(along_arc(pose, Twist(before, twist.angular_z), lag_s), twist, CLOSE_S - lag_s)
 
     def _done(self, evasion: Evasion, wanted: Twist) -> Twist:
         """Return the twist of an evasion where `wanted` is the motion without it."""
@@ -193,48 +210,3 @@ class Crossing:
             return slowed(wanted, self._slow_mps)
         v = max(wanted.linear_x, evasion.v_mps) if evasion.action is Action.AHEAD else evasion.v_mps
         return Twist(v, evasion.omega_radps)
-
-
-def _apart(moving: Sequence[Feature], place: Pose2D, later_s: float) -> float:
-    """Return the least distance [m] from `place` to the surface of what moves, `later_s` [s] from now."""
-    return min(hypot(x - place.x, y - place.y) - f.radius_m for f in moving for x, y in [f.at(later_s)])
-
-
-def _care(action: Action) -> int:
-    return CARE.get(action, MOST_CARE)
-
-
-def _side(evasion: Evasion) -> float:
-    return 1.0 if evasion.omega_radps > 0.0 else -1.0
-
-
-def _kept(moving: Sequence[Feature], pose: Pose2D, evasion: Evasion, twist: Twist) -> float:
-    """Return the least distance [m] to what moves within `LOOK_S` of an evasion: its bend, then straight on."""
-    if not evasion.turn_rad:
-        return min(_closest(moving, pose, twist, LOOK_S), CLEARANCE_M)
-    bend_s = evasion.turn_rad / abs(evasion.omega_radps)
-    least = _closest(moving, pose, twist, bend_s)
-    later = [Feature(f.kind, *f.at(bend_s), f.radius_m, f.vx, f.vy) for f in moving]
-    straight = Twist(twist.linear_x, 0.0)
-    return min(least, _closest(later, along_arc(pose, twist, bend_s), straight, LOOK_S - bend_s), CLEARANCE_M)
-
-
-def _closest(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: float = HORIZON_S) -> float:
-    """Return the least distance [m] between the robot's centre and an obstacle's surface within `within_s` [s] from
-    now.
-
-    Only approaches count: an obstacle that is already near and moves away is no conflict.
-    """
-    least = inf
-    if not moving:
-        return least
-    times = [n * STEP_S for n in range(1, round(within_s / STEP_S) + 1)]
-    way = [(later, along_arc(pose, twist, later)) for later in times]
-    for feature in moving:
-        x, y, vx, vy, radius_m = feature.x, feature.y, feature.vx, feature.vy, feature.radius_m
-        first = hypot(x - pose.x, y - pose.y)
-        for later, there in way:
-            apart = hypot(x + vx * later - there.x, y + vy * later - there.y)
-            if apart < first and apart - radius_m < least:
-                least = apart - radius_m
-    return least

@@ -33,6 +33,9 @@ MOVING_MPS = 0.12
 ANCHOR_S = 1.0
 """Minimum time [s] over which the mean speed must reach `MOVING_MPS`, as the present one must, for a moving
 obstacle."""
+QUICK_S, QUICK_M, QUICK_MPS = 0.3, 0.3, 0.5
+"""The same for what comes fast: the minimum time [s], way [m] and mean speed [m/s] of all of it. After `ANCHOR_S` it
+would be there."""
 SLOW_MPS, SLOW_M, SLOW_S, ANCHORS_MAX = 0.02, 0.1, 3.0, 7
 """Mean speed [m/s] of the slowest motion that is told, the way [m] that it must have come, more than errors explain,
 the minimum time [s] of that, and the number of anchors that are kept for it."""
@@ -118,6 +121,8 @@ class _Track(Struct):
         at, before, seen = self.anchors[-2] if len(self.anchors) > 1 else self.anchors[0]
         lasted = self.seen_at - at
         far = [hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)]
+        if lasted < ANCHOR_S and min(far) > max(QUICK_M, QUICK_MPS * lasted) and lasted >= QUICK_S:
+            return self._has_left(before, seen, view)
         far_m = far[0] if self.moves else min(far)
         if lasted < ANCHOR_S or far_m <= MOVING_MPS * lasted or hypot(self.vx, self.vy) <= MOVING_MPS:
             return False

@@ -8,8 +8,8 @@ from math import acos, atan2, cos, hypot, inf, pi, sin, sqrt
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.robot import LaserScan
 
-SIGHT_M = 2.5
-"""Range [m] beyond which points do not matter to a robot that stops within half a metre."""
+SIGHT_M = 5.0
+"""Range [m] beyond which points do not matter: what moves at 1.5 m/s needs three seconds from there."""
 STRAIGHT_RADPS = 1e-3
 READING_M_MIN = 0.05
 """Range [m] below which a reading is none, whatever `range_min_m` allows: some scanners report 0 for no echo. Half a

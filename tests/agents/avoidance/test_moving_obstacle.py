@@ -149,3 +149,36 @@ def test_from_what_comes_close_a_robot_drives_away_whatever_way_it_means_to_pass
     twist = Crossing().give_way(passes_by, Pose2D(), STILL, 0.0)
     assert (twist.linear_x < 0.0) is backs
     assert twist.linear_x != 0.0
+
+
+def test_a_robot_slows_down_towards_what_passes_near_for_it_may_turn() -> None:
+    """It goes by ahead, and will not have met the robot; the nearer it is, the slower the robot drives towards it."""
+    speeds = [Crossing().give_way(crosser(x, 0.3, 0.2, 0.3), Pose2D(), AHEAD, 0.0).linear_x for x in (0.9, 1.1, 2.0)]
+    assert speeds[0] < speeds[1] < AHEAD.linear_x
+    assert speeds[2] == AHEAD.linear_x
+
+
+def test_what_is_faster_than_an_evasion_is_escaped_from_at_a_higher_speed() -> None:
+    """It comes on from behind at 0.6 m/s, and turns after the robot: ahead at 0.25 m/s it would reach it."""
+    twist = Crossing().give_way(crosser(-0.65, 0.0, 0.6, 0.0), Pose2D(), STILL, 0.0)
+    assert twist.linear_x > 0.6
+
+
+def test_a_robot_at_speed_turns_away_from_what_comes_close_while_it_rolls_on() -> None:
+    """What comes by on its left: from rest it backs off with its tail away from it, at speed its nose goes first."""
+    comes = crosser(0.6, 0.4, -0.4, 0.0)
+    from_rest = Crossing(a_max_mps2=0.5).give_way(comes, Pose2D(), STILL, 0.0)
+    at_speed = Crossing(a_max_mps2=0.5).give_way(comes, Pose2D(), STILL, 0.0, last=Twist(0.6, 0.0))
+    assert at_speed.angular_z < 0.0 < from_rest.angular_z
+
+
+def test_what_comes_fast_is_passed_on_one_side_although_its_direction_is_not_certain() -> None:
+    """At 1.5 m/s from 4 m an estimate that is off by a few degrees points now to the left, now to the right of it."""
+    crossing, pose, x, turns = Crossing(), Pose2D(), 4.0, set()
+    for n in range(80):
+        aside = 0.12 if n // 10 % 2 else -0.12
+        twist = crossing.give_way(crosser(x, 0.0, -1.5, aside), pose, AHEAD, 0.02 * n)
+        pose = along_arc(pose, twist, 0.02)
+        x -= 1.5 * 0.02
+        turns.add(None if crossing.decision is None else crossing.decision.action)
+    assert len(turns & {Action.LEFT, Action.RIGHT}) == 1, turns

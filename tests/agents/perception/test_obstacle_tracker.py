@@ -69,6 +69,14 @@ def test_a_thing_that_moves_is_told_with_its_velocity(speed: float) -> None:
     assert feature.vy == pytest.approx(speed, abs=0.05)
 
 
+@pytest.mark.parametrize("speed", [1.0, 1.5])
+def test_what_comes_fast_is_told_before_it_has_come_a_metre(speed: float) -> None:
+    scans = int(1.0 / (0.1 * speed))
+    positions = [(4.5 - speed * 0.1 * n, 0.0) for n in range(scans)]
+    [feature] = seen(positions, [(0.0, 0.0)] * scans).moving(0.1 * (scans - 1))
+    assert feature.vx < -0.5 * speed
+
+
 @pytest.mark.parametrize("speed", [0.03, 0.05, 0.1])
 def test_what_creeps_is_told_with_its_mean_velocity(speed: float) -> None:
     positions = [(1.5, -0.3 + speed * 0.1 * n) for n in range(60)]

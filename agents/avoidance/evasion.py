@@ -1,0 +1,108 @@
+"""Motions out of the way of what moves, and the distance that each of them would keep from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot, inf
+
+from msgspec import Struct
+
+from lfa.agents.avoidance.decision import Action
+from lfa.agents.avoidance.moving_points import ASIDE_SHARE
+from lfa.agents.perception.obstacle_tracker import Feature
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, in_base
+
+CLEARANCE_M = 0.6
+"""Least distance [m] from the robot's centre to the surface of a moving obstacle; less within the horizon is a
+conflict."""
+HORIZON_S = 4.0
+LOOK_S = 6.0
+"""Prediction time [s] for choosing the action with the largest clearance when no action keeps `CLEARANCE_M` within the
+horizon: an obstacle that comes slowly from behind has not reached a waiting robot at the end of the horizon."""
+STEP_S = 0.25
+
+
+class Evasion(Struct, frozen=True):
+    """Motion out of the way: a bend of `turn_rad` [rad], then straight on, at `v_mps` [m/s]."""
+
+    action: Action
+    v_mps: float
+    omega_radps: float = 0.0
+    turn_rad: float = 0.0
+
+
+EVASIONS = (
+    Evasion(Action.WAIT, 0.0),
+    Evasion(Action.RIGHT, 0.45, -0.9, 1.0),
+    Evasion(Action.LEFT, 0.45, 0.9, 1.0),
+    Evasion(Action.RIGHT, 0.25, -1.2, 1.5),
+    Evasion(Action.LEFT, 0.25, 1.2, 1.5),
+    Evasion(Action.AHEAD, 0.25),
+    Evasion(Action.BACK, -0.25),
+)
+"""Of two that keep the same distance the first is taken: to the right first, as two that meet both do."""
+ESCAPES = (
+    Evasion(Action.RIGHT, 0.7, -1.2, 1.5),
+    Evasion(Action.LEFT, 0.7, 1.2, 1.5),
+    Evasion(Action.AHEAD, 0.7),
+    Evasion(Action.BACK, -0.25, -0.9, 1.5),
+    Evasion(Action.BACK, -0.25, 0.9, 1.5),
+)
+"""More of them for what comes close: it may be faster than the others are, or behind."""
+SLOW = Evasion(Action.SLOW, 0.0)
+CARE = {Action.SLOW: 0, Action.WAIT: 1}
+"""How much more an action does than to slow down; the others do most."""
+MOST_CARE = 2
+ONWARD = (Action.SLOW, Action.AHEAD)
+"""Evasions that are the wanted motion, at another speed."""
+
+
+def apart_m(moving: Sequence[Feature], place: Pose2D, later_s: float) -> float:
+    """Return the least distance [m] from `place` to the surface of what moves, `later_s` [s] from now."""
+    return min(hypot(x - place.x, y - place.y) - f.radius_m for f in moving for x, y in [f.at(later_s)])
+
+
+def leads_to(feature: Feature, pose: Pose2D, twist: Twist) -> bool:
+    """Return whether `twist` drives at what moves: the last function before the wheels brakes for it."""
+    x, y = in_base(pose, (feature.x, feature.y))
+    return twist.linear_x * x > ASIDE_SHARE * hypot(x, y) * abs(twist.linear_x)
+
+
+def care_of(action: Action) -> int:
+    return CARE.get(action, MOST_CARE)
+
+
+def side_of(evasion: Evasion) -> float:
+    return 1.0 if evasion.omega_radps > 0.0 else -1.0
+
+
+def kept_m(moving: Sequence[Feature], pose: Pose2D, evasion: Evasion, twist: Twist) -> float:
+    """Return the least distance [m] to what moves within `LOOK_S` of an evasion: its bend, then straight on."""
+    if not evasion.turn_rad:
+        return min(closest_m(moving, pose, twist, LOOK_S), CLEARANCE_M)
+    bend_s = evasion.turn_rad / abs(evasion.omega_radps)
+    least = closest_m(moving, pose, twist, bend_s)
+    later = [Feature(f.kind, *f.at(bend_s), f.radius_m, f.vx, f.vy) for f in moving]
+    straight = Twist(twist.linear_x, 0.0)
+    return min(least, closest_m(later, along_arc(pose, twist, bend_s), straight, LOOK_S - bend_s), CLEARANCE_M)
+
+
+def closest_m(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: float = HORIZON_S) -> float:
+    """Return the least distance [m] between the robot's centre and an obstacle's surface within `within_s` [s] from
+    now.
+
+    Only approaches count: an obstacle that is already near and moves away is no conflict.
+    """
+    least = inf
+    if not moving:
+        return least
+    times = [n * STEP_S for n in range(1, round(within_s / STEP_S) + 1)]
+    way = [(later, along_arc(pose, twist, later)) for later in times]
+    for feature in moving:
+        x, y, vx, vy, radius_m = feature.x, feature.y, feature.vx, feature.vy, feature.radius_m
+        first = hypot(x - pose.x, y - pose.y)
+        for later, there in way:
+            apart = hypot(x + vx * later - there.x, y + vy * later - there.y)
+            if apart < first and apart - radius_m < least:
+                least = apart - radius_m
+    return least
