@@ -103,6 +103,11 @@ def _lines(folder: Path, recording: Recording, came: int, summary: Summary | Non
     yield f"{recording.messages} messages, {lost} lost, {files}, {came} journals: {folder}{with_holes}"
 
 
+def _name(scenario: Scenario, fleet: str) -> str:
+    """Return the name of a recorded run's scenario: the fleet's, where its world runs a file of a run folder."""
+    return fleet if scenario.name == Path(SCENARIO).stem else scenario.name
+
+
 class _Followed:
     """Recording of a fleet, and what becomes of the fleet's run meanwhile."""
 
@@ -110,7 +115,7 @@ class _Followed:
         """Create the run folder. Raises Refused."""
         world = world_of_fleet(fleet)
         self._scenario = world[0] if world else None
-        name, seed = (world[0].name, world[1]) if world else (fleet.name, 0)
+        name, seed = (_name(world[0], fleet.name), world[1]) if world else (fleet.name, 0)
         self.folder = _folder(fleet, out, self._scenario)
         self._about = About(name, "recorded", seed, fleet.name, provenance())
         self._recorder = Recorder(self.folder, self._about.metadata(), split_bytes=split_bytes, keep=keep)

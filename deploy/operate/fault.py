@@ -16,7 +16,7 @@ import typer
 from lfa.deploy.client.discovery import DEFAULT_LISTEN, LISTEN_S, Running, agents, one_fleet, option, programs
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.deploy.client.operator import Operator
-from lfa.deploy.faults.link_faults import goal_of, note
+from lfa.deploy.faults.link_faults import goal_of, note, order
 from lfa.deploy.faults.script import COMMON, FAULT_ACTIONS, GOAL, LEADER, ORDERS, RESTART, SIGNALS
 from lfa.deploy.operate import go
 from lfa.deploy.operate.options import AsJson, FleetName
@@ -34,6 +34,7 @@ from lfa.protocol.transport.message_bus import Decoder, send
 from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import RouterAbsent
 
+OBSTACLE = "obstacle"
 RESTART_S_MAX, ORDER_EVERY_S = 2.0, 0.3  # time [s] to wait for a restart, and between two orders
 SENT_S = 0.05  # delay [s] so that the event about a fault leaves before the fault
 
@@ -47,12 +48,16 @@ def command(
             "for obstacle: x,y,radius; for goal: x,y; for formation: a side."
         ),
     ] = "",
+    more: Annotated[list[str] | None, typer.Argument(help="No more than one word belongs there.")] = None,
     fleet: FleetName = None,
     as_json: AsJson = False,
 ) -> int:
     """Inject a fault into a fleet that runs on this machine. Raises Refused."""
     if action not in FAULT_ACTIONS:
         raise Refused(f"{action!r}: must be one of {', '.join(FAULT_ACTIONS)}")
+    target = " ".join((target, *(more or ())))  # words where one belongs are refused as it is, with its form
+    if action == OBSTACLE:
+        order(action, target, ())  # a place that is none is refused before a fleet is looked for
     if action == GOAL:
         return go.command(*goal_of(target), fleet=fleet, as_json=as_json)
     team = one_fleet(agents(), fleet)

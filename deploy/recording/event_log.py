@@ -184,12 +184,21 @@ def failovers(events: Sequence[Line], leader_terms: Sequence[LeaderTerm]) -> lis
                 victim=led.robot_id,
                 at_s=fault.at_s,
                 leader=leader,
-                lease_ms=_ms(fault.at_s, acquired[0] if acquired else None),
+                lease_ms=_ms(fault.at_s, _held_from(acquired, successor)),
                 first_command_ms=_ms(fault.at_s, None if successor is None else successor.from_s),
                 chain_ms=_ms(fault.at_s, _chain_closed(later, led.robot_id)),
             )
         )
     return found
+
+
+def _held_from(acquired: Sequence[float], successor: LeaderTerm | None) -> float | None:
+    """Return the time [s] from which the new leader held the lease; None if it never said so.
+
+    It says so after it has sent its first command, and that may arrive first: who commands holds the lease.
+    """
+    commands_s = float("inf") if successor is None else successor.from_s
+    return min(acquired[0], commands_s) if acquired else None
 
 
 def last_chain(events: Sequence[Line]) -> list[int]:

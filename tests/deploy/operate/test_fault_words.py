@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from lfa.deploy.operate.fault import effect
+from lfa.deploy.operate.fault import command, effect
+from lfa.protocol.errors import Refused
 
 
 @pytest.mark.parametrize(
@@ -23,3 +24,13 @@ from lfa.deploy.operate.fault import effect
 )
 def test_an_order_about_links_says_what_it_did(action: str, target: str, said: str) -> None:
     assert effect(action, target) == said
+
+
+@pytest.mark.parametrize(
+    ("words", "form"),
+    [(("obstacle", "3", "1"), "must be x, y and a radius"), (("goal", "3", "1"), "must be x and y")],
+)
+def test_words_in_the_place_of_one_are_answered_with_its_form(words: tuple[str, ...], form: str) -> None:
+    action, target, *more = words
+    with pytest.raises(Refused, match=form):
+        command(action, target, more)

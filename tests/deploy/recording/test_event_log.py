@@ -36,6 +36,12 @@ def test_a_failover_counts_from_the_fault() -> None:
     assert failover == Failover("kill", 1, 8.0, 2, lease_ms=110.0, first_command_ms=120.0, chain_ms=150.0)
 
 
+def test_a_lease_is_held_no_later_than_the_first_command_under_it() -> None:
+    late = [line if line["kind"] != "lease" else {**line, "t": 8.13} for line in KILLED]
+    (failover,) = event_log.failovers(sorted(late, key=lambda line: line["t"]), event_log.leader_terms(late))
+    assert (failover.lease_ms, failover.first_command_ms) == (120.0, 120.0)
+
+
 def _killed_unannounced(*more: Line, kind: str = "peer_down") -> list[Line]:
     vanished = _line(8.0, 1, kind, name="robot1", incarnation=5)
     return sorted([line for line in KILLED if line["kind"] != "fault"] + [vanished, *more], key=lambda line: line["t"])
