@@ -2,14 +2,14 @@
 
 A scanner that hangs publishes nothing, or the same scan again and again. A repeated scan counts as none once the robot
 has moved far enough for its ranges to change. So does a scan in which no beam has measured anything, as under a cap or
-with a dead laser, and one that was made long before it arrived.
+with a dead laser or with limits that exclude each other, and one that was made long before it arrived.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from itertools import pairwise
-from math import cos, hypot, inf, isnan, sin
+from math import cos, hypot, inf, isnan, pi, sin
 
 from lfa.agents.perception.scan import READING_M_MIN
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, wrap
@@ -91,8 +91,14 @@ def _slow_hz(periods: deque[float]) -> float | None:
 
 
 def _has_measured(scan: LaserScan) -> bool:
-    """Return whether any beam has a reading: a distance, or nothing within the range."""
-    return any(r >= READING_M_MIN for r in scan.ranges_m)
+    """Return whether any beam has a reading: a distance, or nothing within the range.
+
+    None has where the limits exclude each other, or all beams point the same way: such a scan shows no obstacle, as a
+    free room does.
+    """
+    low = max(scan.range_min_m, READING_M_MIN)
+    spread = len(scan.ranges_m) < 2 or 0.0 < abs(scan.angle_increment) <= pi
+    return low < scan.range_max_m and spread and any(r >= low for r in scan.ranges_m)
 
 
 def _are_equal(ranges_m: tuple[float, ...], others_m: tuple[float, ...]) -> bool:

@@ -41,6 +41,10 @@ PRESETS: dict[str, RosPreset] = {
 }
 
 
+LASER_M_MAX = 100.0
+"""Greatest offset [m], and angle [rad], of a scanner from its base."""
+
+
 def load_preset(name: str) -> RosPreset:
     """Return the preset `name`, or that of a TOML file. Raises Refused."""
     if name in PRESETS:
@@ -48,7 +52,10 @@ def load_preset(name: str) -> RosPreset:
     if not name.endswith(".toml"):
         raise Refused(f"--robot {name}: must be one of {', '.join(PRESETS)}, or a file NAME.toml with such keys")
     try:
-        return msgspec.toml.decode(read_text(Path(name)), type=RosPreset)
+        preset = msgspec.toml.decode(read_text(Path(name)), type=RosPreset)
+        if preset.laser is not None and not all(abs(value) <= LASER_M_MAX for value in preset.laser):  # also nan
+            raise ValueError(f"laser = {list(preset.laser)}, each at most {LASER_M_MAX:g}")
+        return preset
     except OSError as error:
         raise Refused(
             f"--robot {name}: {error.strerror}: must be a file with keys such as odom, scan, cmd_vel"

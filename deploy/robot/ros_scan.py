@@ -16,6 +16,8 @@ _UNUSUAL = {
     "zero": "such beams count as not measured",
     "-inf": "something nearer than range_min counts there (REP-117)",
 }
+STEP_RAD_MIN = 1e-6
+"""Least angle [rad] between two beams; a turn of the finest scanners has a hundred thousand."""
 CENTRED_M = 1e-3
 """Distance [m] of the scanner from the base's centre below which beams keep their ranges."""
 
@@ -28,7 +30,7 @@ def converted(message: Any, mount: Pose2D) -> Scan:
     """
     step, count = float(message.angle_increment), len(message.ranges)
     low, high, first = float(message.range_min), float(message.range_max), float(message.angle_min)
-    angles = 0.0 < abs(step) <= TAU and abs(first) <= 2.0 * TAU
+    angles = STEP_RAD_MIN <= abs(step) <= TAU and abs(first) <= 2.0 * TAU
     if not count or not angles or not (0.0 <= low < high and isfinite(high)):
         raise Refused(
             f"{count} beams from {first:g} rad by {step:g} rad, {low:g} to {high:g} m: must be finite, above 0, angles "

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from math import cos, inf, nan, sin
 from pathlib import Path
+from typing import Any
 
 import pytest
+from msgspec import structs
 
 from lfa.agents.perception.scan_age import SCAN_S_MAX, ScanAge
 from lfa.deploy.recording import event_log
@@ -114,6 +116,37 @@ def test_a_scanner_that_measures_nothing_stops_its_robot(bad: float) -> None:
         assert not age.update(scan(*(bad,) * 8), Pose2D(), 0.1 * n)
     assert age.limited(GO, 1.9) == STILL
     assert age.update(scan(inf, bad), Pose2D(), 2.0), "nothing within the range is a reading"
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"range_min_m": 8.0, "range_max_m": 0.05},
+        {"range_min_m": 8.0, "range_max_m": 8.0},
+        {"range_max_m": 0.0},
+        {"range_max_m": -8.0},
+        {"range_max_m": 0.04},
+        {"angle_increment": 0.0},
+        {"angle_increment": 1e9},
+        {"ranges_m": ()},
+        {"ranges_m": (-1.0, -2.0)},
+        {"range_min_m": 2.0, "ranges_m": (0.1, 1.9)},
+    ],
+    ids=str,
+)
+def test_a_scan_in_which_nothing_can_be_seen_is_none(said: dict[str, Any]) -> None:
+    """It shows no obstacle, as a free room does: its robot would drive on at full speed."""
+    age = ScanAge()
+    age.update(scan(1.0, 2.0), Pose2D(), 0.0)
+    for n in range(1, 20):
+        assert not age.update(structs.replace(scan(1.0, 2.0 + 0.1 * n), **said), Pose2D(), 0.1 * n)
+    assert age.limited(GO, 1.9) == STILL
+
+
+def test_beams_from_left_to_right_and_a_single_beam_are_a_scan() -> None:
+    age = ScanAge()
+    assert age.update(structs.replace(scan(1.0, 2.0), angle_increment=-0.1), Pose2D(), 0.0)
+    assert age.update(structs.replace(scan(1.5), angle_increment=0.0), Pose2D(), 0.1)
 
 
 def test_a_scan_that_was_made_long_ago_is_none() -> None:

@@ -344,6 +344,14 @@ def test_a_link_to_another_machine_is_refused_unless_the_robot_stops_by_itself()
     check_place(RosOptions("tcp/10.0.0.7:7447", 0, None, RosPreset(), stops_by_itself=True))
 
 
+@pytest.mark.parametrize("laser", ["[nan, 0.0, 0.0]", "[0.0, inf, 0.0]", "[1e308, 0.0, 0.0]"])
+def test_a_scanner_of_a_preset_is_mounted_on_its_robot(laser: str, tmp_path: Any) -> None:
+    own = tmp_path / "rover.toml"
+    own.write_text(f"laser = {laser}\n")
+    with pytest.raises(Refused, match="each at most 100"):
+        load_preset(str(own))
+
+
 def test_a_preset_is_named_or_a_file_of_ones_own(tmp_path: Any) -> None:
     own = tmp_path / "rover.toml"
     own.write_text('odom = "wheel/odom"\nlaser = [0.1, 0.0, 3.14]\n')

@@ -79,7 +79,8 @@ def test_of_more_beams_than_are_passed_on_the_nearest_readings_are_kept() -> Non
 
 
 @pytest.mark.parametrize(
-    "bad", [scan([1.0], step=0.0), scan([1.0], step=nan), scan([1.0], high=nan), scan([1.0], low=5.0, high=1.0),
+    "bad", [scan([1.0], step=0.0), scan([1.0], step=nan), scan([1.0], step=1e-320),
+            scan([1.0], high=nan), scan([1.0], low=5.0, high=1.0),
             scan([1.0], first=inf), scan([], step=0.1)],
 )  # fmt: skip
 def test_what_describes_no_scan_is_refused(bad: Any) -> None:
