@@ -82,9 +82,9 @@ def test_e35_machines_are_upgraded_over_ssh_the_leaders_last_and_never_do_two_le
         finally:
             upgrade.kill()
             out, err = upgrade.communicate()
+        assert upgrade.returncode == 0, err
         look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
         check_terms_in(look.events)
-    assert upgrade.returncode == 0, err
     steps = [line for line in err.splitlines() if "from version" in line]
     assert {line[8:].partition(";")[0] for line in steps} == {f"from version 5 of the messages to {WIRE_VERSION}"}
     leader = int(steps[-1].rpartition("robot")[2].split()[0])
