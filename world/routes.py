@@ -8,7 +8,6 @@ keys that the same expressions match share one list of receivers.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
 from typing import Generic, NamedTuple, TypeVar
 
 from lfa.protocol.topics import matches
@@ -57,6 +56,9 @@ class Routes(Generic[Receiver]):
         """Receivers of the keys that the same expressions match."""
         self._shared_by: dict[str, list[tuple[str, ...]]] = {}
         """What is kept in `_shared` and changes with an expression."""
+        self._known: dict[str, KeyReceivers[Receiver]] = {}
+        self._known_by: dict[tuple[str, ...], list[str]] = {}
+        """Keys whose receivers are known from what is kept in `_shared`."""
 
     def add(self, receiver: Receiver, name: str) -> None:
         """Add the process `name`, which subscribes to nothing yet."""
@@ -81,16 +83,21 @@ class Routes(Generic[Receiver]):
 
     def of(self, key: str) -> KeyReceivers[Receiver]:
         """Return who hears `key`."""
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = self._found(key)
+        return known
+
+    def _found(self, key: str) -> KeyReceivers[Receiver]:
         ending = _ending(key)
-        among = self._ways.get(ending)
-        if among is None:
-            among = self._ways[ending] = {}
+        among = self._ways.setdefault(ending, {})
         way = among.get(key)
         if way is None:
             way = among[key] = _Way(*ends_of(key), self._matches(key, ending))
         receivers = self._shared.get(way.matching)
         if receivers is None:
             receivers = self._receivers(way.matching)
+        self._known_by.setdefault(way.matching, []).append(key)
         if way.place is None:
             return KeyReceivers(way.sender, receivers)
         if way.place == way.sender:
@@ -122,20 +129,22 @@ class Routes(Generic[Receiver]):
         ending = _ending(expression)
         if "*" not in expression:
             self._ways.get(ending, {}).pop(expression, None)
+            self._known.pop(expression, None)
             return
         self._wild.setdefault(ending, []).append(expression)
-        if ANY in ending:
-            self._ways.clear()
-        else:
-            self._ways.pop(ending, None)
+        endings = list(self._ways) if ANY in ending else [ending]
+        for among in endings:
+            for key in self._ways.pop(among, ()):
+                self._known.pop(key, None)
 
     def _forget(self, expression: str) -> None:
         """Forget the receivers that follow from who subscribes to the expression."""
         for matching in self._shared_by.pop(expression, ()):
             self._shared.pop(matching, None)
+            for key in self._known_by.pop(matching, ()):
+                self._known.pop(key, None)
 
 
-@lru_cache(maxsize=65536)
 def _ending(expression: str) -> str:
     """Return what follows the owner in a key or expression: its topic, and the receiver or that it is a wildcard."""
     topic, *rest = expression.split("/")[3:] or [ANY]
