@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.installed-docs
 PAGES := README.md CHANGELOG.md CONTRIBUTING.md agents world protocol deploy tests
 
-.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers lint bench bench-table soak fuzz fuzz-stops model planted hunt why mutants coverage same pages pictures docs clean setup test-driving
+.PHONY: demo test test-fast test-wheel test-hosts test-hosts-short test-campaign peers peers-learn lint bench bench-table soak fuzz fuzz-stops model planted hunt why mutants coverage same pages pictures docs clean setup test-driving
 
 COMPUTE := 'not processes and not hosts and not campaign'
 TEAMS := 'processes and not hosts and not campaign and not wheel'
@@ -46,6 +46,14 @@ peers: .peers/genuine/.installed .peers/sdk/.installed .peers/foxglove/.installe
 .peers/%/.installed: tests/deploy/ros/peers/%.txt
 	$(PYTHON) -m venv .peers/$*
 	.peers/$*/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	touch $@
+
+# Simulators of others that `lfa bench learn` measures beside this one. Fetches some 3 GB once.
+peers-learn: .peers/learn/.installed
+
+.peers/learn/.installed: tests/deploy/bench/learn_peers.txt
+	$(PYTHON) -m venv .peers/learn
+	.peers/learn/bin/python -m pip install --quiet --disable-pip-version-check -r $<
 	touch $@
 
 # The tests that start no process.

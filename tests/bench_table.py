@@ -20,7 +20,9 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "deploy" / "docs" / "performance.md"
 KEPT = ROOT / "runs" / "bench"
 BEGIN, END = "<!-- begin: make bench-table -->\n", "<!-- end -->"
-BENCHES = ("lidar", "world", "sim", "agent", "agents", "lockstep", "latency", "router", "failover", "operate", "soak")
+BENCHES = (
+    "lidar", "world", "sim", "agent", "agents", "lockstep", "latency", "router", "failover", "operate", "soak", "learn",
+)  # fmt: skip
 """Benches of the table; those of driving and of campaigns have pages of their own."""
 BOTTLENECKS = {
     "sim/1000*": "the first election, in which each process hears the tokens, HELLO and table rows of all",

@@ -53,7 +53,7 @@ ORDER = (
     "deploy/fleet", "deploy/web", "deploy/bench/harness",
     "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/engines", "deploy/campaign/commands",
     "deploy/bench/control_cases", "deploy/bench/driving", "deploy/bench/agents",
-    "deploy/bench/operate", "deploy/bench/sim", "deploy/bench/web",
+    "deploy/bench/operate", "deploy/bench/sim", "deploy/bench/web", "deploy/bench/learn",
     "deploy/bench/router", "deploy/bench/soak", "deploy/bench/lockstep", "deploy/bench", "deploy/bench/latency",
     "deploy/cli", "deploy/completion",
 )  # fmt: skip

@@ -64,6 +64,7 @@ TESTED: dict[str, str] = {
     "lfa fault kill leader": "tests/processes/test_readme_commands.py",
     **dict.fromkeys(("lfa bench NAME", "lfa bench router"), "tests/deploy/bench/test_router.py"),
     "lfa bench agents": "tests/deploy/bench/test_agents.py",
+    "lfa bench learn": "tests/deploy/bench/test_learn.py",
 }
 """Commands of the site's pages that a test of their own runs."""
 EXECUTED: dict[str, str] = {
