@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from lfa.agents.avoidance.decision import TABLE, Situation, decide
+from lfa.agents.avoidance.decision import TABLE, Class, Situation, decide
 
 S = Situation
 CASES = [
@@ -47,5 +47,32 @@ def test_obstacles_update_speed_and_position_and_the_environment_the_angle() -> 
         assert row.updates == ("speed and position" if obstacle else "angle")
 
 
-def test_who_is_barred_on_all_sides_has_no_row() -> None:
-    assert decide(S("wall", 0.1, left_m=0.1, right_m=0.1, rear_m=0.1, back_m=0.1)) is None
+@pytest.mark.parametrize(
+    ("kind", "width_m"),
+    [("wall", 0.0), ("ditch", 0.4), ("pothole", inf), ("stationary", 0.4), ("stationary", inf), ("bump", 0.4)],
+)
+def test_who_is_barred_on_all_sides_has_no_row(kind: Class, width_m: float) -> None:
+    barred = S(kind, 0.1, width_m, left_m=0.1, right_m=0.1, rear_m=0.1, back_m=0.1, crept=True)
+    assert decide(barred) is None
+
+
+@pytest.mark.parametrize(
+    ("situation", "action"),
+    [
+        (S("moving", 2.0, closest_m=0.6), "continue"),
+        (S("wall", 0.3, left_m=0.5, right_m=0.1), "aside"),
+        (S("wall", 0.3, left_m=0.1, right_m=0.1, rear_m=0.2), "u_turn"),
+        (S("wall", 0.2, back_m=0.2), "back"),
+    ],
+)
+def test_room_that_is_just_enough_is_enough_and_a_turn_needs_more(situation: Situation, action: str) -> None:
+    row = decide(situation)
+    assert row is not None
+    assert row.action == action
+
+
+@pytest.mark.parametrize(("kind", "action"), [("ditch", "aside"), ("pothole", "u_turn"), ("bump", "aside")])
+def test_what_could_be_crossed_is_not_crossed_while_its_far_edge_is_out_of_sight(kind: Class, action: str) -> None:
+    row = decide(S(kind, 1.0, inf, crossable=True))
+    assert row is not None
+    assert row.action == action

@@ -174,6 +174,7 @@ def test_the_leader_is_capped_so_that_no_follower_exceeds_nine_tenths_of_v_max()
         cap = leader_speed_cap(slots, curvature, LIMITS)
         assert max([1.0, *speed_factors(slots, curvature)]) * cap <= 0.9 * LIMITS.v_max_mps + 1e-9
     assert leader_speed_cap((), 0.0, Limits(v_max_mps=0.8)) == pytest.approx(0.8)
+    assert leader_speed_cap(slots, 0.0, Limits(v_max_mps=0.8)) == pytest.approx(0.9 * 0.8)
     assert leader_speed_cap((), 4.0, LIMITS) == pytest.approx(0.9 * LIMITS.omega_max_radps / 4.0)
     assert leader_speed_floor(slots, 0.25) == pytest.approx(0.05 / speed_factors(slots, 0.25)[-1])
 
