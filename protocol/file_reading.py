@@ -11,6 +11,8 @@ from typing import BinaryIO, TypeVar
 
 import msgspec
 
+from lfa.protocol.errors import Refused
+
 FILE_BYTES_MAX = 16 * 1024 * 1024
 
 Decoded = TypeVar("Decoded")
@@ -65,6 +67,22 @@ def read_text(path: Path, bytes_max: int = FILE_BYTES_MAX) -> str:
 def read_json(path: Path, kind: type[Decoded], bytes_max: int = FILE_BYTES_MAX) -> Decoded:
     """Return the value of type `kind` in a regular file. Raises OSError and DamagedFile."""
     return decode_json(read_bytes(path, bytes_max), kind)
+
+
+def read_given_json(
+    path: Path, kind: type[Decoded], must: str, *, bytes_max: int = FILE_BYTES_MAX, option: str = ""
+) -> Decoded:
+    """Return the value of type `kind` in a file that a person has named, by `option` if not by itself.
+
+    Raises Refused with the path, what is wrong and, by `must`, what would be right.
+    """
+    try:
+        return read_json(path, kind, bytes_max)
+    except OSError as error:
+        reason = error.strerror
+    except DamagedFile as error:
+        reason = str(error)
+    raise Refused(f"{f'{option} {path}'.lstrip()}: {reason}: {must}")
 
 
 def decode_json(data: bytes, kind: type[Decoded]) -> Decoded:

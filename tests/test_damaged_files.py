@@ -31,7 +31,7 @@ from lfa.deploy.process.identity import Identity
 from lfa.deploy.recording import event_log, mcap_reader
 from lfa.deploy.recording.recorder import EVENTS, RECORDING, Recorder
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.file_reading import DamagedFile, read_given_json, read_json
 from lfa.protocol.messages.consensus import Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.simulation import TrueRobot, Truth
@@ -358,6 +358,19 @@ def test_a_pipe_or_a_device_in_a_files_place_holds_nobody_up(tmp_path: Path) -> 
     for path in (tmp_path / "fifo", Path("/dev/zero")):
         with pytest.raises(DamagedFile, match="no regular file"):
             read_json(path, dict)
+
+
+def test_a_file_that_a_person_has_named_is_refused_with_its_option_the_reason_and_what_would_be_right(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "given.json"
+    with pytest.raises(Refused) as missing:
+        read_given_json(path, list, "must be a list", option="--list")
+    assert str(missing.value) == f"--list {path}: No such file or directory: must be a list"
+    path.write_text("{}")
+    with pytest.raises(Refused) as wrong:
+        read_given_json(path, list, "must be a list")
+    assert str(wrong.value) == f"{path}: Expected `array`, got `object`: must be a list"
 
 
 @pytest.mark.parametrize(

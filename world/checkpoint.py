@@ -15,7 +15,7 @@ import msgspec
 from msgspec.structs import replace
 
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.file_reading import read_given_json
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.node import Envelope, Received
 from lfa.protocol.output import replace_file, write_line
@@ -31,12 +31,7 @@ AGAIN_S = 5.0
 def read(run: Path) -> Memory:
     """Return the state last written for the run in that folder. Raises Refused if there is none."""
     path = run / STATE if run.is_dir() else run
-    try:
-        return read_json(path, Memory)
-    except OSError as error:
-        raise Refused(f"--resume {path}: cannot be read ({error.strerror}), must be a run folder with one") from None
-    except DamagedFile as error:
-        raise Refused(f"--resume {path}: no state of a world ({error})") from None
+    return read_given_json(path, Memory, "must be the state of a world, or a run folder with one", option="--resume")
 
 
 def resumed(scenario: Scenario, memory: Memory) -> Scenario:

@@ -28,7 +28,7 @@ from lfa.deploy.recording import mcap_reader
 from lfa.deploy.recording.mcap_reader import Array
 from lfa.deploy.recording.run_folder import RUNS
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.file_reading import read_given_json
 
 FOUND_IN = Path("shared") / "data" / "barn" / "worlds.json"
 LEFT_M, RIGHT_M, BOTTOM_M, TOP_M = -4.35, -0.15, 0.15, 9.6
@@ -241,12 +241,7 @@ def inside(world: BarnWorld) -> list[tuple[float, float]]:
 
 def read(path: Path) -> BarnWorlds:
     """Read a file of worlds. Raises `Refused` with one line if that is impossible."""
-    try:
-        return read_json(path, BarnWorlds)
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}: must be a file of BARN worlds (--worlds FILE)") from error
-    except DamagedFile as error:
-        raise Refused(f"{path}: {error}: must be BARN worlds in JSON") from error
+    return read_given_json(path, BarnWorlds, "must be BARN worlds in JSON (--worlds FILE)")
 
 
 def found() -> Path:

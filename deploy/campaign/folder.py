@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from lfa.deploy.campaign.items import ItemResult
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.file_reading import DamagedFile, read_given_json, read_json
 from lfa.protocol.output import replace_file
 
 DESCRIPTION = "campaign.json"
@@ -122,12 +122,8 @@ def open_folder(path: Path, campaign: Campaign) -> CampaignFolder:
 
 def read_description(path: Path) -> Campaign:
     """Return what the campaign in the folder `path` is. Raises Refused for a folder that is none."""
-    try:
-        return read_json(path / DESCRIPTION, Campaign, DESCRIPTION_BYTES_MAX)
-    except OSError as error:
-        raise Refused(f"{path / DESCRIPTION}: {error.strerror}: must be the folder of a campaign") from None
-    except DamagedFile as error:
-        raise Refused(f"{path / DESCRIPTION}: damaged, or of another version ({error})") from None
+    must = "must be the folder of a campaign that this version began"
+    return read_given_json(path / DESCRIPTION, Campaign, must, bytes_max=DESCRIPTION_BYTES_MAX)
 
 
 def _ours(name: str) -> bool:

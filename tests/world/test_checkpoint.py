@@ -50,7 +50,7 @@ def test_a_folder_without_a_state_is_refused_in_one_line(tmp_path: Path) -> None
     with pytest.raises(Refused, match="--resume"):
         checkpoint.read(tmp_path)
     (tmp_path / STATE).write_text("{")
-    with pytest.raises(Refused, match="no state of a world"):
+    with pytest.raises(Refused, match="must be the state of a world"):
         checkpoint.read(tmp_path)
 
 

@@ -14,8 +14,7 @@ from lfa.deploy.process.process_group import ROUTER_NAME, ProcessSpec
 from lfa.deploy.process.restart_policy import Restart
 from lfa.deploy.recording.run_folder import JOURNALS, SCENARIO, toml
 from lfa.protocol import clock
-from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.file_reading import read_given_json
 from lfa.protocol.mission import Profile
 from lfa.protocol.names import WITNESS_NAME, robot_name
 from lfa.protocol.topics import WORLD_NAME
@@ -212,9 +211,4 @@ def rows(part: HostPlan) -> list[ProcessSpec]:
 
 def read(path: Path) -> HostPlan:
     """Return the plan in a file that `lfa up` wrote. Raises Refused for any other file."""
-    try:
-        return read_json(path, HostPlan)
-    except OSError as error:
-        raise Refused(f"{path}: cannot be read ({error.strerror})") from None
-    except DamagedFile as error:
-        raise Refused(f"{path}: no part of a fleet ({error}): lfa up writes it") from None
+    return read_given_json(path, HostPlan, "must be a host's part of a fleet, as lfa up writes it")

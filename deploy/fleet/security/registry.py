@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from lfa.deploy.fleet.security.access_rules import KeyPlan
 from lfa.protocol.errors import Refused
-from lfa.protocol.file_reading import DamagedFile, read_json
+from lfa.protocol.file_reading import read_given_json
 
 REGISTRY, HOSTS, CA_KEY, REQUESTS = "fleet.json", "hosts", "ca.key", "requests"
 
@@ -31,13 +31,7 @@ class Registry(Struct, frozen=True):
 
 def load(folder: Path) -> Registry:
     """Return the registry in `folder`. Raises Refused when it holds no fleet's keys."""
-    path = folder / REGISTRY
-    try:
-        return read_json(path, Registry)
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}, make it with: lfa keys init {folder}") from None
-    except DamagedFile as error:
-        raise Refused(f"{path}: {error}, must be what `lfa keys` wrote") from None
+    return read_given_json(folder / REGISTRY, Registry, f"must be what lfa keys writes: lfa keys init {folder}")
 
 
 def check_names(registry: Registry, names: Sequence[str]) -> None:
