@@ -37,6 +37,8 @@ class PaperRow(Struct, frozen=True):
     """Worst value of all runs; None if no run has a value."""
     unit: str
     bar: str
+    ratio: float | None
+    """Value divided by the number in `bar`; None without a value or with a bar of 0."""
     holds: int
     """Number of runs in which the property holds, out of the `of` runs that have a value."""
     of: int
@@ -134,7 +136,13 @@ def _row(name: str, found: Sequence[Finding]) -> PaperRow:
     holds = sum(one.status == "ok" for one in judged)
     worst = max(judged, key=_badness, default=None)
     value = None if worst is None else worst.value
-    return PaperRow(name, value, found[0].unit, found[0].bar, holds, len(judged), holds == len(judged))
+    ratio = None if value is None else _over_bar(value, found[0].bar)
+    return PaperRow(name, value, found[0].unit, found[0].bar, ratio, holds, len(judged), holds == len(judged))
+
+
+def _over_bar(value: float, bar: str) -> float | None:
+    _, number, *_ = bar.split()
+    return None if float(number) == 0.0 else float(f"{value / float(number):.4g}")
 
 
 def _badness(finding: Finding) -> float:

@@ -37,6 +37,16 @@ def test_a_row_has_the_worst_value_and_in_how_many_runs_it_holds(
     assert row.ok == (row.holds == row.of)
 
 
+@pytest.mark.parametrize(
+    ("bar", "values", "ratio"),
+    [(LESS, (0.01, 0.03), 1.5), (MORE, (1.0, 0.81), 0.9), (NONE, (2.0,), None), (MORE, (float("nan"),), None)],
+)
+def test_a_row_has_the_ratio_of_its_worst_value_to_the_bar(
+    bar: Bar, values: tuple[float, ...], ratio: float | None
+) -> None:
+    assert paper._row("path", findings(bar, *values)).ratio == ratio
+
+
 def test_the_cost_of_a_world_is_a_row_beside_its_bar(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
