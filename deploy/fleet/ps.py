@@ -84,14 +84,16 @@ def table(facts: list[dict[str, Any]]) -> Table:
     from rich.table import Table
 
     made = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    for head in ("host", "process", "state", "pid", "starts", "up", "refused", "says"):
-        right = head in ("pid", "starts", "up", "refused")
+    caps = ("refused",) if any(row.get("refused") for row in facts) else ()  # a column that is empty nearly always
+    for head in ("host", "process", "state", "pid", "starts", "up", *caps, "says"):
+        right = head in ("pid", "starts", "up", *caps)
         made.add_column(head, justify="right" if right else "left", no_wrap=head != "says")
     for row in facts:
         style = "" if row["state"] == "running" else "bold red"
         says = row["says"] if row["state"] == "running" and row["says"] else row["ended"]
         cells = (row["host"], row["process"], row["state"], str(row["pid"] or ""), str(row["starts"]))
-        made.add_row(*map(cell, (*cells, f"{row['up_s']:.0f} s", str(row["refused"] or ""), says)), style=style)
+        counted = [str(row.get(name) or "") for name in caps]
+        made.add_row(*map(cell, (*cells, f"{row['up_s']:.0f} s", *counted, says)), style=style)
     return made
 
 

@@ -58,6 +58,15 @@ def test_ps_shows_a_hostile_text_as_text(says: str, field: str) -> None:
     assert not set(written.replace("\n", "")) & set("\x1b\x07\x9b\u202e\r")
 
 
+def test_ps_counts_what_was_refused_of_a_member_once_something_was() -> None:
+    row = {"host": "a", "process": "robot3", "state": "running", "pid": 1, "starts": 1, "up_s": 1.0, "says": ""}
+    quiet, loud = ({**row, "ended": "", "refused": number} for number in (0, 1400))
+    assert "refused" not in _printed(ps.table([quiet]))
+    assert "1400" in _printed(ps.table([quiet, loud]))
+    others = ps.others_refused({"robot3": 1400, "operator\x1b[2J": 2}, [loud])
+    assert others == ["2 messages or tokens of operator\\x1b[2J refused"]
+
+
 @pytest.mark.parametrize("says", HOSTILE)
 def test_watch_shows_a_hostile_state_as_text(says: str) -> None:
     row = RobotStatus(1, "leader", 7, None, None, None, 0.0, 0.1, says, None, None, None)
