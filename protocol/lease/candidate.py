@@ -55,12 +55,6 @@ class Candidate:
         self.ask_at = self._bound_until
 
     @property
-    def deadline(self) -> float:
-        if self.holder is None:
-            return self.ask_at
-        return self.gives_up_at if self.transferred else self.holder.next_round_at
-
-    @property
     def gives_up_at(self) -> float:
         """Time [s] at which the candidacy is abandoned: grants received by then without a quorum have expired."""
         return float("inf") if self.holder is None else self.holder.began_at + self._act_s
