@@ -100,11 +100,12 @@ bench-table: $(STAMP)
 soak: $(STAMP)
 	$(BIN)/lfa bench soak --minutes $(or $(MINUTES),30)
 
-# A thousand drawn schedules of faults on leases and gateways, systematic and guided ones, and some on whole robots.
+# A thousand drawn schedules of faults on leases and gateways, systematic and guided ones, teams that lag, and some on whole robots.
 fuzz: $(STAMP)
 	$(BIN)/lfa fuzz --seeds $(or $(SEEDS),1000) --jobs 2
 	$(BIN)/lfa fuzz --systematic --seeds 300 --jobs 2
 	$(BIN)/lfa fuzz --guided --seeds 100
+	$(BIN)/lfa fuzz --lagging --seeds 300 --jobs 2
 	$(BIN)/lfa fuzz --whole --seeds 60 --jobs 2
 
 # 100 000 schedules of faults with operators who stop and resume (of 105 000, one in 21 draws none), some with spares that join

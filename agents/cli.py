@@ -103,7 +103,7 @@ def _parser() -> argparse.ArgumentParser:
         "the first that answers, the next one when it is lost")
     add("--keys", type=Path, metavar="DIR", help="this machine's folder of `lfa keys`, with the robot's certificate")
     add("--link", choices=sorted(LINK_LEASES_MS), default="std",
-        help="time after which a silent link counts as lost: fast (0.5 s), std (1 s) or wifi (2 s)")
+        help="time after which a silent link counts as lost: fast (0.5 s), std (1 s), wifi or auto (2 s)")
     add("--mission", type=Path, metavar="FILE", help="mission as JSON or TOML; without it, received over Zenoh")
     add("--spare", action="store_true", help="a robot that the mission does not name: it waits for lfa join")
     add("--journal", type=Path, metavar="DIR", help="folder for the journal of inputs")

@@ -25,7 +25,7 @@ TieBreak = Literal["witness", "head", "none"]
 ColdStart = Literal["full_house", "majority"]
 Shrink = Literal["dynamic", "static"]
 Lonely = Literal["stop", "continue_after"]
-Profile = Literal["fast", "std", "wifi"]
+Profile = Literal["fast", "std", "wifi", "auto"]
 Parameter = bool | float | str | tuple[float, ...]
 """Value of a plug-in's own parameter."""
 
@@ -120,6 +120,8 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     """Ids in the order of the first chain; the first leads."""
     witness: bool = True
     profile: Profile = "std"
+    """Durations of the lease: fixed ones (`fast`, `std`; `wifi` for radio), or such that follow how late processes and
+    links are (`auto`, for busy machines)."""
     control_hz: float = CONTROL_HZ
     """Rate [Hz] of each robot's control steps, with its commands and poses, and of a simulated robot's odometry. A
     lower rate lets a machine run more robots; the deadman D, and the age at which odometry is too old to drive by, are

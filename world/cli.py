@@ -40,7 +40,7 @@ def start(
     connect: Annotated[str | None, typer.Option(help="Router, as tcp/127.0.0.1:7450; a,b: tried in turn.")] = None,
     keys: Annotated[Path | None, typer.Option(help="This machine's key folder from `lfa keys`.")] = None,
     link: Annotated[
-        Literal["fast", "std", "wifi"], typer.Option(help="Timeout of a silent link: 0.5, 1 or 2 s.")
+        Literal["fast", "std", "wifi", "auto"], typer.Option(help="Timeout of a silent link: 0.5, 1, 2 or 2 s.")
     ] = "std",
     journal: Annotated[Path | None, typer.Option(help="Folder for the journal of inputs.")] = None,
     witness: Annotated[bool, typer.Option(help="Host the mission's witness here.")] = True,

@@ -18,10 +18,11 @@ from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.analysis.verification.words_kept import WORDS_KEPT
 from lfa.deploy.client.stop_call import StopOutcome
 from lfa.deploy.fuzz.held_messages import MessageHolder
+from lfa.deploy.fuzz.lease_processes import Process
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.roster_calls import RosterCalls
-from lfa.deploy.fuzz.schedules import DURATION_S, FAULTS_UNTIL_S, LEADER, Schedule, ScheduledFault
+from lfa.deploy.fuzz.schedules import LEADER, Schedule, ScheduledFault
 from lfa.deploy.fuzz.stops import StopQuestions, StopTraffic
 from lfa.deploy.fuzz.tricks import Tricks
 from lfa.protocol.lease.membership import team_of
@@ -32,12 +33,15 @@ from lfa.protocol.names import WITNESS_ID
 from lfa.protocol.transport.link_model import Radio
 
 if TYPE_CHECKING:
+    from lfa.deploy.fuzz.agent_processes import AgentProcess
     from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 
 Simulation = Union["LeaseSimulation", "AgentSimulation"]
 """Simulation that executes a schedule: leases only, or complete agents."""
 RADIO_FIELDS = {"loss": "loss", "burst": "loss", "duplicate": "duplication", "tail": "tail", "reorder": "reorder"}
 """Field of the link conditions that each kind of fault sets."""
+STEP_S = 0.001
+"""Time [s] that a process which lags runs before it waits again: for its tick, too."""
 EXIT_S = 0.3
 """Time [s] sufficient for the last messages of a process that was requested to exit."""
 
@@ -68,7 +72,7 @@ class Faults:
         self.counts: Counter[str] = Counter()
         for fault in schedule.faults:
             simulation.at(fault.at, self._do, fault)
-        simulation.at(FAULTS_UNTIL_S, self.heal)
+        simulation.at(schedule.faults_until_s, self.heal)
 
     def _target(self, fault: ScheduledFault) -> int | None:
         """Return the id of the fault's target, or None if no such process is running."""
@@ -81,8 +85,9 @@ class Faults:
 
     def _do(self, fault: ScheduledFault) -> None:
         target = self._target(fault)
-        # The effects of a fault end at FAULTS_UNTIL_S at the latest: L1-L4 count from there.
-        simulation, lasts = self.simulation, min(self.simulation.now + fault.duration_s, FAULTS_UNTIL_S)
+        # The effects of a fault end with all faults at the latest: L1-L4 count from there.
+        simulation, until = self.simulation, self.schedule.faults_until_s
+        lasts = min(simulation.now + fault.duration_s, until)
         done = True
         match fault.kind:
             case "kill" if target is not None:
@@ -95,7 +100,7 @@ class Faults:
                 simulation.at(lasts, self._start_right, target, simulation.processes[target].member)
             case "exit" if target is not None:
                 simulation.exit(target)
-                simulation.at(min(lasts + EXIT_S, FAULTS_UNTIL_S), self._start, target)
+                simulation.at(min(lasts + EXIT_S, until), self._start, target)
             case "clock_step" if target is not None:
                 self._step_wall(fault, target, lasts)
             case "pause" if target is not None:
@@ -123,6 +128,12 @@ class Faults:
         """Inject a fault of the network; return True if it took effect."""
         simulation = self.simulation
         match fault.kind:
+            case "lag":
+                aimed_at = (target if i == LEADER else i for i in fault.targets)
+                late = [i for i in aimed_at if i is not None and i in simulation.processes]
+                for robot_id in late:
+                    self._step_late(robot_id, lasts, fault.value)
+                return bool(late)
             case "cut" | "cut_one_way" | "cut_pair":
                 pairs = self._pairs(fault, target)
                 simulation.part(pairs)
@@ -134,6 +145,21 @@ class Faults:
                 simulation.at(lasts, self._calm, field)
                 return True
         return False
+
+    def _step_late(self, target: int, until: float, lag_s: float) -> None:
+        """Let a process do nothing for up to `lag_s` [s], then all that has come meanwhile, again and again."""
+        simulation, process = self.simulation, self.simulation.processes[target]
+        if simulation.now >= until:
+            return
+        woken_at = min(simulation.now + simulation.random.uniform(0.0, lag_s), until)
+        if process.alive and not process.paused:
+            simulation.pause(target)
+            simulation.at(woken_at, self._wake, process)
+        simulation.at(woken_at + STEP_S, self._step_late, target, until, lag_s)
+
+    def _wake(self, process: Process | AgentProcess) -> None:
+        if self.simulation.processes[process.id] is process:
+            self.simulation.resume(process.id)
 
     def _pairs(self, fault: ScheduledFault, target: int | None) -> set[tuple[int, int]]:
         ids = set(self.simulation.ids)
@@ -251,11 +277,11 @@ def _play(schedule: Schedule, trace: Trace | None, simulate: Callable[[Schedule]
     traffic.begin(schedule.stops)
     simulation.listen([*checkers, traffic.observer])
     if isinstance(simulation, LeaseSimulation):
-        rosters = RosterCalls(simulation)
+        rosters = RosterCalls(simulation, schedule.faults_until_s)
         rosters.begin(schedule.rosters)
-        Tricks(simulation).begin(schedule.tricks)
+        Tricks(simulation, schedule.faults_until_s).begin(schedule.tricks)
     simulation.start_all()
-    simulation.run(DURATION_S)
+    simulation.run(schedule.duration_s)
     for checker in checkers:
         checker.over(simulation.now)
     violations = [v for checker in checkers for v in checker.violations]

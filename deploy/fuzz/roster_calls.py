@@ -17,8 +17,10 @@ REPEAT_S = 0.1
 class RosterCalls:
     """Calls of operators in one simulation; `begin` schedules them. `done` counts those that were carried out."""
 
-    def __init__(self, team: LeaseSimulation) -> None:
+    def __init__(self, team: LeaseSimulation, until_s: float = FAULTS_UNTIL_S) -> None:
+        """`until_s`: time [s] from which no call is repeated."""
         self._team = team
+        self._until_s = until_s
         self.done = 0
 
     def begin(self, calls: tuple[ScheduledFault, ...]) -> None:
@@ -33,7 +35,7 @@ class RosterCalls:
             if self._obeyed(process, call):
                 self.done += 1
                 return
-        if team.now + REPEAT_S < min(call.at + call.duration_s, FAULTS_UNTIL_S):
+        if team.now + REPEAT_S < min(call.at + call.duration_s, self._until_s):
             team.at(team.now + REPEAT_S, self._say, call)
 
     def _obeyed(self, process: Process, call: ScheduledFault) -> bool:

@@ -15,8 +15,10 @@ from lfa.protocol.messages.header import WIRE_VERSION
 class Tricks:
     """Tricks of one simulation; `begin` schedules them. `done` counts those that took effect."""
 
-    def __init__(self, team: LeaseSimulation) -> None:
+    def __init__(self, team: LeaseSimulation, until_s: float = FAULTS_UNTIL_S) -> None:
+        """`until_s`: time [s] at which the effects of all tricks end at the latest."""
         self._team = team
+        self._until_s = until_s
         self.done = 0
 
     def begin(self, tricks: tuple[ScheduledFault, ...]) -> None:
@@ -25,7 +27,7 @@ class Tricks:
             self._team.at(trick.at, self._do, trick)
 
     def _do(self, trick: ScheduledFault) -> None:
-        team, lasts = self._team, min(self._team.now + trick.duration_s, FAULTS_UNTIL_S)
+        team, lasts = self._team, min(self._team.now + trick.duration_s, self._until_s)
         if trick.kind == "blackout":
             self._blackout(trick, lasts)
         elif team.processes[trick.targets[0]].alive:

@@ -63,8 +63,16 @@ class Acceptor:
             return self.refusal(body.term, config, now)
         self.promised = body.term
         # E2: the voter counts from now, the holder from before it asked: delay can only shorten the holder's lease.
-        self.bond = Bond(body.term, body.holder, now + self._grant_s)
+        self.bond = Bond(body.term, body.holder, self.kept_until(body, now))
         return Grant(body.term, body.round, body.config.version, nonce=now)
+
+    def kept_until(self, body: Propose, now: float) -> float:
+        """Return the end [s] of the bond that `body` asks for; not before what its holder was promised already (E36).
+
+        The holder counts on the longest lease that its quorum has granted, also when it asks for a shorter one by now.
+        """
+        until = now + (min(body.grant_ms / 1000.0, self._grant_s) if body.grant_ms else self._grant_s)
+        return until if self.bond is None or self.bond.holder != body.holder else max(until, self.bond.expiry)
 
     def release(self, term: Term) -> bool:
         """Record that the holder of `term` has stopped; return True if that ended this voter's bond (E4)."""

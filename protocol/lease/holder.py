@@ -1,9 +1,9 @@
-"""State of a held term from its first PROPOSE: renewal rounds, acknowledgements, expiry (rule E2)."""
+"""State of a held term from its first PROPOSE: renewal rounds, acknowledgements, expiry (E2), length (E36)."""
 
 from __future__ import annotations
 
 from lfa.protocol.lease.quorum import is_quorum, quorum_time
-from lfa.protocol.lease.timing import Timing
+from lfa.protocol.lease.timing import Timing, lengths_of
 from lfa.protocol.messages.consensus import Config, Grant, Member, Propose, Term, Version
 from lfa.protocol.messages.header import WIRE_VERSION
 
@@ -13,6 +13,47 @@ RETRY_HEARTBEATS = 0.5
 """Time, in heartbeats, after which a round without a quorum's grants is followed by the next. A pair without witness
 needs both of two messages: at 20 % loss a third of its leaders lost six consecutive rounds, all rounds of one T_act,
 within 8 s (L5)."""
+RENEWALS_PER_LEASE = 3.0
+"""Least length of a lease in units of what a renewal takes: so five heartbeats remain, each of which may be lost."""
+NEVER = float("-inf")
+NO_ROUND = (NEVER, NEVER)
+CALM_S, CALM_S_MAX = 10.0, 160.0
+"""Time [s] in which a shorter lease must have been enough before it is asked for; it doubles each time that turns out
+to have been too early, for what keeps processes waiting comes and goes."""
+
+
+class LeaseLength:
+    """Which of the profile's leases a holder asks for: grown at once, shrunk after a calm time (E36)."""
+
+    def __init__(self, timing: Timing, now: float) -> None:
+        """Begin with the longest, for nothing is known yet."""
+        self._lengths = lengths_of(timing)
+        self._index = len(self._lengths) - 1
+        self._calm_s = CALM_S
+        self._calm_from = now
+
+    @property
+    def timing(self) -> Timing:
+        """Durations that go with the present length."""
+        return self._lengths[self._index]
+
+    @property
+    def grant_ms(self) -> int:
+        """Bond to ask for [ms]; 0 for `T_grant`."""
+        return 0 if self._index == len(self._lengths) - 1 else round(1000.0 * self.timing.grant_s)
+
+    def fit(self, took_s: float, now: float) -> None:
+        """Fit the length to a renewal that takes `took_s` [s] from when it was due, or more, by `now`."""
+        if len(self._lengths) == 1:
+            return
+        enough = (i for i, timing in enumerate(self._lengths) if timing.act_s >= RENEWALS_PER_LEASE * took_s)
+        index = next(enough, len(self._lengths) - 1)
+        if index > self._index:
+            self._index, self._calm_s = index, min(2.0 * self._calm_s, CALM_S_MAX)
+        if index >= self._index:
+            self._calm_from = now
+        elif now >= self._calm_from + self._calm_s:
+            self._index, self._calm_from = self._index - 1, now
 
 
 class Holder:
@@ -35,25 +76,41 @@ class Holder:
         self._fenced = fenced
         self._me = me
         self._timing = timing
+        self._length = LeaseLength(timing, now)
+        self._due_at: float | None = now
+        """Time [s] at which the renewal that no quorum has granted yet was due; None: none is under way."""
         self._round = 0
-        self._sent_at: dict[int, float] = {}
+        self._rounds: dict[int, tuple[float, float]] = {}
+        """Send time of each round, and the end of the lease that it asked for [s]."""
         self._acked: dict[Member, float] = {}
-        """Send time [s] of the newest round that each voter has granted."""
+        """Latest end [s] of a lease that each voter has granted."""
         self._accepted: dict[Member, Version] = {}
         """Version of the newest config that each voter has granted."""
 
+    @property
+    def timing(self) -> Timing:
+        """Durations that go with the lease asked for at present."""
+        return self._length.timing
+
     def next_propose(self, config: Config, now: float) -> Propose:
         """Return the PROPOSE of the next round; `now` is read before the message is sent."""
+        due_at = min(now, self.next_round_at) if self._due_at is None else self._due_at
+        self._length.fit(now - due_at, now)
         number, self._round = self._round, self._round + 1
-        self._sent_at[number] = now
-        self._sent_at.pop(number - ROUNDS_KEPT, None)
-        self.next_round_at = now + RETRY_HEARTBEATS * self._timing.heartbeat_s
+        until = now + self.timing.act_s
+        self._rounds[number] = now, until
+        self._rounds.pop(number - ROUNDS_KEPT, None)
+        longer = self.expiry is not None and self.expiry > until  # by the longer leases of earlier rounds: no hurry
+        self._due_at = None if longer else due_at
+        self.next_round_at = now + (1.0 if longer else RETRY_HEARTBEATS) * self.timing.heartbeat_s
         fenced = self._fenced if now - self.began_at < self._timing.grant_s else ()
-        return Propose(self.term, config, number, self._me, fenced, agreed=self._agreed, wire=WIRE_VERSION)
+        return Propose(
+            self.term, config, number, self._me, fenced, None, self._agreed, WIRE_VERSION, self._length.grant_ms
+        )
 
     def transferred(self, number: int, since: float) -> None:
         """Count round `number`, sent by the term's issuer, from `since` [s], a nonce of this process (E16)."""
-        self._sent_at[number] = since
+        self._rounds[number] = since, since + self._timing.act_s
         self._round = number + 1
 
     def granted(self, src: Member, grant: Grant, config: Config, now: float) -> bool:
@@ -62,20 +119,24 @@ class Holder:
         self.nonces[src] = grant.nonce
         if src not in self._accepted or grant.version > self._accepted[src]:
             self._accepted[src] = grant.version
-        sent_at = self._sent_at.get(grant.round)
-        if sent_at is None or sent_at <= self._acked.get(src, float("-inf")):
-            return False
-        self._acked[src] = sent_at
         # E2: the lease counts from the request. Counted from the grant it would outlive the voters' bonds by the
-        # delay of the answer, and two robots could lead (I1).
-        since = quorum_time(config, self._acked)
-        if since is None:
+        # delay of the answer, and two robots could lead (I1). E36: and it lasts as long as this round asked for.
+        _, until = self._rounds.get(grant.round, NO_ROUND)
+        if until <= self._acked.get(src, NEVER):
             return False
-        if since == self._sent_at.get(self._round - 1):  # the latest round has its quorum: the next may wait
-            self.next_round_at = since + self._timing.heartbeat_s
-        if self.expiry is not None and since + self._timing.act_s <= self.expiry:
+        self._acked[src] = until
+        granted_until = quorum_time(config, self._acked)
+        if granted_until is None:
             return False
-        self.expiry = since + self._timing.act_s
+        latest_at, latest_until = next(reversed(self._rounds.values()))
+        if granted_until >= latest_until:  # the latest round has its quorum: the next may wait
+            self.next_round_at = latest_at + self.timing.heartbeat_s
+        if self.expiry is not None and granted_until <= self.expiry:
+            return False
+        self.expiry = granted_until
+        if self._due_at is not None:
+            self._length.fit(now - self._due_at, now)
+            self._due_at = next((sent_at for sent_at, end in self._rounds.values() if end > granted_until), None)
         return True
 
     def committed(self, config: Config) -> bool:

@@ -151,6 +151,8 @@ class Propose(Struct, frozen=True, array_like=True, tag="propose"):
     """Digest of the sender's agreement (E25)."""
     wire: Count = UNSAID_WIRE
     """Version of the sender's messages (E35)."""
+    grant_ms: Count = 0
+    """Bond [ms] that is asked for in this round if it is shorter than `T_grant`; 0: `T_grant` (E36)."""
 
 
 class Grant(Struct, frozen=True, array_like=True, tag="grant"):

@@ -15,7 +15,7 @@ from lfa.protocol.errors import Refused
 from lfa.protocol.mission import Profile
 from lfa.protocol.transport.credentials import FOREIGN_BITS, Credentials
 
-LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000}
+LINK_LEASES_MS: dict[Profile, int] = {"fast": 500, "std": 1000, "wifi": 2000, "auto": 2000}
 """Silence [ms] after which a link counts as dead; radio has gaps of 0.7 s at 30 % loss (zenoh.md section 2)."""
 LINK_LEASE_MS = LINK_LEASES_MS["std"]
 QUEUE_BATCHES = dict.fromkeys(("real_time", "interactive_high", "data", "background"), 16)

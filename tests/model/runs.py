@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.model import lease_state, orders, register_state, roster
+from tests.model import lease_state, lengths, orders, register_state, roster
 from tests.model.checker import Model
 from tests.model.fleet_stop import fleet_stop
 from tests.model.fleet_stop.fleet_stop import FleetStop
 from tests.model.lease_core import LeaseCore
+from tests.model.lengths import LengthModel
 from tests.model.orders import OrderModel
 from tests.model.register import Register
 from tests.model.roster import RosterModel
@@ -122,6 +123,7 @@ RULES = (
     rosters(1),
     rosters(2),
     Run("orders of operators, 2 robots, 3 terms", lambda: OrderModel(3), short=True),
+    Run("lengths: 3 voters, leases of 1 and 3, 2 rounds", lambda: LengthModel(2, 4.0), short=True),
 )
 
 
@@ -148,6 +150,10 @@ def stop_mutant(mutant: str, robots: int, words: tuple[int, ...], gateways: int 
 
 def order_mutant(mutant: str) -> Run:
     return Run(orders.MUTANTS[mutant][0], lambda: OrderModel(3, mutant), True, mutant)
+
+
+def length_mutant(mutant: str) -> Run:
+    return Run(lengths.MUTANTS[mutant][0], lambda: LengthModel(2, 4.0, mutant), True, mutant)
 
 
 def roster_mutant(mutant: str) -> Run:
@@ -187,4 +193,6 @@ MUTANTS = (
     order_mutant("old_leader"),
     order_mutant("equal_versions"),
     order_mutant("forgets"),
+    length_mutant("shortened"),
+    length_mutant("asked_for_now"),
 )

@@ -107,7 +107,10 @@ class OneHolder(Checker):
 
 
 class OneBond(WithFences):
-    """Checker of I4: a bound voter grants to another holder only after expiry, release, hand-over or a fence."""
+    """Checker of I4: a bound voter grants to another holder only after expiry, release, hand-over or a fence.
+
+    A bond lasts as long as the longest of its holder's rounds asked for (E36).
+    """
 
     name = "I4"
 
@@ -117,9 +120,14 @@ class OneBond(WithFences):
         self._released: set[Term] = set()
         self._holder: dict[Term, Member] = {}
         self._gifts: set[tuple[Member, Member]] = set()
+        self._shorter_s: dict[tuple[Term, int], float] = {}
+        """How much shorter [s] than by `T_grant` a round asks its voters to be bound, on any clock."""
 
     def proposes(self, at: float, who: Member, propose: Propose) -> None:
         self._holder[propose.term] = propose.holder
+        if propose.grant_ms:
+            shorter_s = self.timing.grant_s - propose.grant_ms / 1000.0
+            self._shorter_s[propose.term, propose.round] = shorter_s / (1.0 - CLOCK_RATE_ERROR)
         if propose.holder != who:
             self._gifts.add((who, propose.holder))
 
@@ -137,7 +145,8 @@ class OneBond(WithFences):
         if not free and not fenced:
             bond = f"bound to {shown(term)} of {shown(other)}"
             self.broken(at, f"{shown(voter)} granted {shown(grant.term)} to {shown(holder)}, {bond}")
-        self._bond[voter] = (grant.term, holder, until)
+        until -= self._shorter_s.get((grant.term, grant.round), 0.0)
+        self._bond[voter] = (grant.term, holder, max(until, its_until) if other == holder else until)
 
 
 class OneChain(Checker):

@@ -50,7 +50,8 @@ def command(
         bool, typer.Option("--secure", help="Pass only what the rules in --keys allow; deny the rest.")
     ] = False,
     link: Annotated[
-        Literal["fast", "std", "wifi"], typer.Option(help="Profile: a silent link counts as dead after 0.5, 1 or 2 s.")
+        Literal["fast", "std", "wifi", "auto"],
+        typer.Option(help="Profile: a silent link counts as dead after 0.5, 1, 2 or 2 s."),
     ] = "std",
 ) -> int:
     """Run the router until SIGTERM or Ctrl-C; SIGHUP restarts it with the current keys and rules."""

@@ -89,7 +89,7 @@ class FleetFile(Struct, frozen=True, forbid_unknown_fields=True):
     team: int | None = None
     """Team size N, for a team 1..N instead of the scenario's."""
     profile: Profile | None = None
-    """Timing profile: `std` for wired links, `wifi` for radio. Default: the scenario's."""
+    """Timing profile: `std` for wired links, `wifi` for radio, `auto` for busy machines. Default: the scenario's."""
     world: str = ""
     """Machine of the simulated world. Default: the first."""
     witness: str = ""

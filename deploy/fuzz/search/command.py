@@ -20,6 +20,7 @@ from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
 from lfa.deploy.fuzz.schedules import KINDS
 from lfa.deploy.fuzz.search import systematic
 from lfa.deploy.fuzz.search.searches import (
+    Kind,
     Search,
     Tally,
     again,
@@ -58,6 +59,9 @@ def command(
     is_guided: Annotated[
         bool, typer.Option("--guided", help="Change schedules that made a lease do something new.")
     ] = False,
+    is_lagging: Annotated[
+        bool, typer.Option("--lagging", help="Teams with the profile auto, whose processes lag.")
+    ] = False,
     verbose: Annotated[
         bool, typer.Option("-v", "--verbose", help="With --seed: print the trace, one column per robot.")
     ] = False,
@@ -69,11 +73,14 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the totals as JSON.")] = False,
 ) -> int:
     """Search for fault schedules that violate an invariant of the lease protocol; exit with code 1 if one does."""
-    if is_systematic and is_guided:
-        raise Refused("--systematic with --guided: must be one of the two")
+    chosen_kinds = {"--systematic": is_systematic, "--guided": is_guided, "--lagging": is_lagging}
+    named = [option for option, is_chosen in chosen_kinds.items() if is_chosen]
+    if len(named) > 1:
+        raise Refused(f"{named[0]} with {named[1]}: must be one of the two")
     if whole and (is_systematic or is_guided):
         raise Refused("--whole: must go without --systematic and --guided, which play leases alone")
-    search = Search("systematic" if is_systematic else "guided" if is_guided else "drawn", whole)
+    kind: Kind = "systematic" if is_systematic else "guided" if is_guided else "lagging" if is_lagging else "drawn"
+    search = Search(kind, whole)
     if seed is not None and seeds is not None:
         raise Refused(f"--seed {seed} with --seeds {seeds}: must be one of the two")
     if verbose and (seed is None or as_json):
@@ -166,7 +173,8 @@ def _tell(tally: Tally, seeds: range, seconds: float, jobs: int, as_json: bool, 
             )
         )
     else:
-        print_visible(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in KINDS))
+        kinds = (*KINDS, "lag") if search.kind == "lagging" else KINDS
+        print_visible(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in kinds))
         for line in covered:
             print_visible(line)
         rate_text = f"{rate} a minute with {jobs} jobs"

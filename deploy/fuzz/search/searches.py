@@ -12,13 +12,13 @@ from msgspec import Struct, structs
 from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.fuzz.fault_injector import Played, play, play_whole
 from lfa.deploy.fuzz.network import Trace
-from lfa.deploy.fuzz.schedules import Schedule, draw, draw_whole, without
+from lfa.deploy.fuzz.schedules import Schedule, draw, draw_lagging, draw_whole, without
 from lfa.deploy.fuzz.search import guided, systematic
 from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 
 Player = Callable[[Schedule, Trace | None], Played]
 
-Kind = Literal["drawn", "systematic", "guided"]
+Kind = Literal["drawn", "lagging", "systematic", "guided"]
 
 
 class Search(Struct, frozen=True):
@@ -47,6 +47,8 @@ class Search(Struct, frozen=True):
             return next(played.schedule for _, played in guided.evolve(range(seed, seed + 1), self.player))
         if self.kind == "systematic":
             return systematic.schedule(seed)
+        if self.kind == "lagging":
+            return draw_lagging(seed)
         return draw_whole(seed) if self.whole else draw(seed)
 
     def played(self, seeds: range) -> Iterator[tuple[int, Played]]:

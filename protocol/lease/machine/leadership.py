@@ -31,10 +31,10 @@ def change_roster(m: LeaseMemory, roster: Roster, now: float) -> None:
     holder = m.holder
     assert holder is not None
     calm, own = m.calm, roster is m.config.roster
-    if own and calm.holds(m.config, holder, m.peers, m.left_out, m.timing, now):
+    if own and calm.holds(m.config, holder, m.peers, m.left_out, holder.timing, now):
         holder.said_hello.clear()
         return
-    newer = reshaped(m.config, holder, m.me, m.peers, m.left_out, m.policy, m.timing, now, roster)
+    newer = reshaped(m.config, holder, m.me, m.peers, m.left_out, m.policy, holder.timing, now, roster)
     if own and newer is m.config:
         calm.note(m.config, holder, m.me, m.peers, m.left_out)
     holder.said_hello.clear()

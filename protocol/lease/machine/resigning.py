@@ -117,7 +117,7 @@ def successor_of(m: LeaseMemory, holder: Holder, now: float) -> tuple[Member, fl
     for member in m.config.chain[1:]:
         nonce = holder.nonces.get(member)
         fit = m.election.may_lead(m.config, member.id) and member in m.config.voters and not m.peers.is_gone(member)
-        if fit and nonce is not None and not holder.silent(member, now, m.timing.chain_silence_s):
+        if fit and nonce is not None and not holder.silent(member, now, holder.timing.chain_silence_s):
             return member, nonce
     return None
 

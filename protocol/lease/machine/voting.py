@@ -90,7 +90,7 @@ def on_propose(m: LeaseMemory, src: Member, body: Propose, now: float) -> None:
     if answer is not None and body.holder == m.me:
         candidacy.take_over(m, body, answer, now)
     m.leader = body.holder.id
-    m.leader_until = now + m.timing.grant_s
+    m.leader_until = m.acceptor.kept_until(body, now)
     m.election.held(now)
     m.elect_after(m.leader_until)
 

@@ -22,7 +22,7 @@ SCENARIO = (
     (']',                                          None),
     ('[mission]',                                  None),
     ('robots = [1, 2, 3]',                         None),
-    ('profile = "slow"',                           "mission.profile = slow: must be one of fast, std, wifi"),
+    ('profile = "slow"',                           "mission.profile = slow: must be one of fast, std, wifi, auto"),
     ('can_lead = [4]',                             "mission.can_lead = [4]: must be a non-empty part of"),
     ('[mission.following]',                        None),
     ('controller = "pid"',                         "mission.following.controller = pid: must be one of"),

@@ -172,5 +172,9 @@ PLANTED: tuple[Bug, ...] = (
         "roster::test_e34_the_chain_closes_over_a_retired_robot_and_it_neither_votes_nor_returns"),
     Bug("rule E35", "messages of any version are read", team.any_version_is_read,
         "wire_versions::test_e35_a_version_further_off_is_refused_with_the_own_one", (2**53,)),
+    Bug("rule E36", "a shorter round shortens the bond", time.shorter_round_shortens_the_bond,
+        "lease_length::test_e36_a_shorter_round_shortens_no_bond"),
+    Bug("rule E36", "a lease as long as is asked for now", time.lease_as_long_as_is_asked_for_now,
+        "lease_length::test_e36_a_lease_grows_only_when_a_quorum_has_granted_the_longer_one"),
 )
 # fmt: on

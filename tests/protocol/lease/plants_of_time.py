@@ -34,7 +34,7 @@ def counted_from_the_grant(patch: pytest.MonkeyPatch) -> None:
     honest = Holder.granted
 
     def granted(self: Holder, src: Any, grant: Any, config: Config, now: float) -> bool:
-        self._sent_at[grant.round] = now
+        self._rounds[grant.round] = now, now + self.timing.act_s
         return honest(self, src, grant, config, now)
 
     patch.setattr(Holder, "granted", granted)
@@ -46,6 +46,24 @@ def bond_as_short_as_the_lease(patch: pytest.MonkeyPatch) -> None:
 
 def bond_of_half_the_lease(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Timing, "grant_s", property(lambda self: self.act_s / 2.0))
+
+
+def shorter_round_shortens_the_bond(patch: pytest.MonkeyPatch) -> None:
+    def kept_until(self: Acceptor, body: Propose, now: float) -> float:
+        return now + (body.grant_ms / 1000.0 or self._grant_s)
+
+    patch.setattr(Acceptor, "kept_until", kept_until)
+
+
+def lease_as_long_as_is_asked_for_now(patch: pytest.MonkeyPatch) -> None:
+    honest = Holder.granted
+
+    def granted(self: Holder, src: Any, grant: Any, config: Config, now: float) -> bool:
+        sent_at, _ = self._rounds[grant.round]
+        self._rounds[grant.round] = sent_at, sent_at + self.timing.act_s
+        return honest(self, src, grant, config, now)
+
+    patch.setattr(Holder, "granted", granted)
 
 
 def bond_ignored(patch: pytest.MonkeyPatch) -> None:

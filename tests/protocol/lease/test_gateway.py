@@ -201,7 +201,7 @@ def test_the_death_of_an_earlier_life_does_not_latch_a_later_one() -> None:
     assert not gateway.latched
 
 
-@pytest.mark.parametrize("profile", ["fast", "std", "wifi"])
+@pytest.mark.parametrize("profile", ["fast", "std", "wifi", "auto"])
 def test_e2_a_bond_outlives_lease_and_residual_motion_on_the_worst_clocks(profile: str) -> None:
     timing = timing_of(profile)  # type: ignore[arg-type]
     assert timing.grant_s / 1.001 >= (timing.act_s + timing.deadman_s) / 0.999

@@ -50,7 +50,7 @@ WRONG = {
     "world = 'c'": "world = c: must be one of the hosts: a, b",
     "witness = 'd'": "witness = d: must be one of the hosts: a, b",
     "fleet = 'My Fleet'": "fleet = My Fleet: must be small letters",
-    "profile = 'slow'": "profile = slow: must be one of fast, std, wifi",
+    "profile = 'slow'": "profile = slow: must be one of fast, std, wifi, auto",
     "set = ['world.beams=1']": "beams = 1",
     "robots.on = { 9 = 'a' }": "robots.on.9 = a: no such robot",
     "robots.on = { 1 = 'c' }": "robots.on.1 = c: must be one of the hosts: a, b",
