@@ -16,7 +16,7 @@ from lfa.protocol.mission import Mission
 MARGIN_M = 15.0
 """Margin [m] around start and goal: ground farther out is not mapped, and no route leads through it."""
 MAP_CELLS = 400
-PLAN_CELLS, STANDING_PLAN_CELLS = 160, 360
+PLAN_CELLS, STANDING_PLAN_CELLS = 160, 480
 """Budgets [cells] of one control step; planning has more while the robot stands for want of a route, and so computes no
 motion.
 """
