@@ -164,6 +164,7 @@ async def _talk(child: Any, stdin: bytes, into: BinaryIO | None, bytes_max: int)
     finally:
         for task in (giving, out, err):
             task.cancel()
+        await asyncio.wait((giving, out, err))  # nobody else may read an output while one of them still waits for it
     return out.result(), err.result()
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from lfa.deploy.fleet.host.end import ANSWER
 from lfa.deploy.fleet.plan.fleet_file import load
-from lfa.deploy.fleet.remote import journals
+from lfa.deploy.fleet.remote import journals, ssh
 from lfa.deploy.fleet.remote.ssh import Here, Unreachable
 
 
@@ -125,6 +125,13 @@ def test_a_machine_that_sends_without_end_is_cut_off(tmp_path: Path) -> None:
     with (tmp_path / "sent").open("wb") as file, pytest.raises(Unreachable, match="prints more than 1 MiB"):
         asyncio.run(Here().run(words, into=file, bytes_max=1 << 20))
     assert (tmp_path / "sent").stat().st_size <= 1 << 20
+
+
+def test_a_machine_that_prints_errors_without_end_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ssh, "OUTPUT_BYTES_MAX", 1 << 20)
+    words = (sys.executable, "-c", "import sys\nwhile True: sys.stderr.write('x' * 100000)")
+    with pytest.raises(Unreachable, match="prints more than 1 MiB"):
+        asyncio.run(Here().run(words))
 
 
 def test_what_processes_here_keep_is_copied(tmp_path: Path) -> None:
