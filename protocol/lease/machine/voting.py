@@ -7,6 +7,7 @@ from lfa.protocol.lease.machine import candidacy, resigning
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.membership import VOTERS_MAX, is_first
 from lfa.protocol.lease.quorum import electors
+from lfa.protocol.lease.timing import lengths_of
 from lfa.protocol.messages.consensus import (
     NO_TERM,
     Grant,
@@ -24,6 +25,8 @@ from lfa.protocol.messages.header import WIRE_VERSION
 from lfa.protocol.names import robot_name
 
 HELLO_HEARTBEATS = 3
+"""Pause between two HELLOs, in heartbeats of the shortest lease that a holder may ask for: its `t_chain` must hold
+five, and a follower does not know which lease it is (E36)."""
 PATIENCE, FIRST_PATIENCE = 2.0, 20.0
 """Heartbeats that a voter waits for the lease of the candidate that it promised a term to: usually, and in the first
 election."""
@@ -163,7 +166,7 @@ def note_later(m: LeaseMemory, incarnation: int) -> None:
 
 def say_hello(m: LeaseMemory, now: float) -> None:
     """Send HELLO if no grant binds this process or no leader's chain names it (E9)."""
-    pause_s = HELLO_HEARTBEATS * m.timing.heartbeat_s
+    pause_s = HELLO_HEARTBEATS * lengths_of(m.timing)[0].heartbeat_s
     on_time = now < m.hello_at + pause_s  # so that late ticks do not accumulate
     m.hello_at = (m.hello_at if on_time else now) + pause_s
     if m.is_out(now) and not m.pending_release.closing:
