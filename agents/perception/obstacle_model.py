@@ -50,7 +50,7 @@ class ObstacleModel:
         """
         self._scan.scan(scan, pose, now)
         places = [(mate.x, mate.y) for mate in mates]
-        self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now)
+        self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now, self._scan.reach_m)
 
     def update_ground(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
         """Update with a profile of the floor ahead, made at `pose`."""

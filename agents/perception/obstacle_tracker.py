@@ -164,10 +164,16 @@ class Tracker:
         """Obstacles of the newest scan with their points."""
 
     def update(
-        self, points_map: Sequence[Point], eye: Point, mates: Sequence[Point], mate_m: float, now: float
+        self,
+        points_map: Sequence[Point],
+        eye: Point,
+        mates: Sequence[Point],
+        mate_m: float,
+        now: float,
+        reach_m: float = SIGHT_M,
     ) -> None:
-        """Update with one scan's points in beam order, seen from `eye`; points within `mate_m` of a team-mate are left
-        out.
+        """Update with one scan's points in beam order, seen from `eye` up to `reach_m` [m]; points within `mate_m` of a
+        team-mate are left out.
         """
         self._seen = []
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
@@ -178,7 +184,7 @@ class Tracker:
             whole = len(clusters) == 1 or not any(_hidden(end, beside, eye) for end, beside in ends)
             if _extent(cluster) > (FLAT_WALL_M if _flat(cluster) else WALL_M):
                 self._seen.append((cluster, Feature("wall", x, y, radius_m, whole=whole)))
-            elif _at_the_edge(cluster, eye) or any(
+            elif _at_the_edge(cluster, eye, reach_m) or any(
                 hypot(x - mx, y - my) < mate_m or _touches(cluster, mx, my) for mx, my in mates
             ):
                 continue
@@ -265,8 +271,8 @@ def _clusters(points: Sequence[Point]) -> list[list[Point]]:
     return runs
 
 
-def _at_the_edge(cluster: Sequence[Point], eye: Point) -> bool:
-    return any(hypot(px - eye[0], py - eye[1]) > SIGHT_M - EDGE_M for px, py in (cluster[0], cluster[-1]))
+def _at_the_edge(cluster: Sequence[Point], eye: Point, reach_m: float) -> bool:
+    return any(hypot(px - eye[0], py - eye[1]) > reach_m - EDGE_M for px, py in (cluster[0], cluster[-1]))
 
 
 def _touches(cluster: Sequence[Point], x: float, y: float) -> bool:

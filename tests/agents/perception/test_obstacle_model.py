@@ -1,0 +1,38 @@
+"""What a robot makes of its scans: what moves among what stands."""
+
+from __future__ import annotations
+
+from math import cos, inf, pi, sin, sqrt
+
+import pytest
+
+from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.shared_obstacles import SharedObstacles
+from lfa.protocol.geometry import Pose2D
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.mission import Limits
+
+BEAMS = 360
+
+
+def scan_of_post(ahead_m: float, radius_m: float, range_max_m: float) -> LaserScan:
+    """Return the scan of a round post that stands ahead, by a scanner of that range."""
+    ranges = []
+    for n in range(BEAMS):
+        angle = -pi + 2.0 * pi * n / BEAMS
+        beside = ahead_m * sin(angle)
+        meets = cos(angle) > 0.0 and abs(beside) < radius_m
+        r = ahead_m * cos(angle) - sqrt(radius_m**2 - beside**2) if meets else inf
+        ranges.append(r if r < range_max_m else inf)
+    return LaserScan(Header("robot1", 1, 0, 0.0), -pi, 2.0 * pi / BEAMS, 0.05, range_max_m, tuple(ranges))
+
+
+@pytest.mark.parametrize("range_max_m", [2.5, 3.5, 8.0])
+def test_what_comes_into_the_range_of_a_scanner_by_and_by_does_not_move(range_max_m: float) -> None:
+    """Of a post at the end of the range a robot sees more with each step that it drives towards it."""
+    model = ObstacleModel(0.15, Limits(), SharedObstacles(lambda _now: ()))
+    for n in range(60):
+        here, now = Pose2D(0.02 * n, 0.0, 0.0), 0.1 * n
+        model.see(scan_of_post(min(range_max_m, 5.0) + 0.6 - here.x, 0.45, range_max_m), here, (), now)
+        assert model.moving(here, now) == [], now
