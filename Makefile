@@ -100,7 +100,8 @@ bench-table: $(STAMP)
 soak: $(STAMP)
 	$(BIN)/lfa bench soak --minutes $(or $(MINUTES),30)
 
-# A thousand drawn schedules of faults on leases and gateways, systematic and guided ones, teams that lag, and some on whole robots.
+# A thousand drawn schedules of faults on leases and gateways, systematic and guided ones, teams that lag, and some on
+# whole robots.
 fuzz: $(STAMP)
 	$(BIN)/lfa fuzz --seeds $(or $(SEEDS),1000) --jobs 2
 	$(BIN)/lfa fuzz --systematic --seeds 300 --jobs 2

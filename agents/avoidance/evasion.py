@@ -48,7 +48,7 @@ ESCAPES = (
     Evasion(Action.BACK, -0.25, -0.9, 1.5),
     Evasion(Action.BACK, -0.25, 0.9, 1.5),
 )
-"""More of them for what comes close: it may be faster than the others are, or behind."""
+"""Further evasions, of what comes close: it may be faster than those of `EVASIONS`, or behind."""
 SLOW = Evasion(Action.SLOW, 0.0)
 CARE = {Action.SLOW: 0, Action.WAIT: 1}
 """How much more an action does than to slow down; the others do most."""
@@ -69,10 +69,12 @@ def leads_to(feature: Feature, pose: Pose2D, twist: Twist) -> bool:
 
 
 def care_of(action: Action) -> int:
+    """Return how much an action does: 0 to slow down, 1 to wait, `MOST_CARE` else."""
     return CARE.get(action, MOST_CARE)
 
 
 def side_of(evasion: Evasion) -> float:
+    """Return 1.0 for a bend to the left, -1.0 else."""
     return 1.0 if evasion.omega_radps > 0.0 else -1.0
 
 

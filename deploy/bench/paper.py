@@ -141,6 +141,7 @@ def _row(name: str, found: Sequence[Finding]) -> PaperRow:
 
 
 def _over_bar(value: float, bar: str) -> float | None:
+    """Return the value divided by the number in `bar` ("< 0.02 m"), to four digits; None with a bar of 0."""
     _, number, *_ = bar.split()
     return None if float(number) == 0.0 else float(f"{value / float(number):.4g}")
 

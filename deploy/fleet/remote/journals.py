@@ -26,7 +26,7 @@ from lfa.protocol.errors import Refused
 PACKED_BYTES_MAX = 4 << 30
 """Maximum size [bytes] of what one machine sends; the operator's disk keeps twice that at most."""
 MEMBERS_MAX = 1024
-"""Maximum number of entries that one machine sends: processes are fewer than ten, each starts again at times."""
+"""Maximum number of entries that one machine sends: a journal of each start of each of some fifty processes."""
 PIECE_BYTES = 256 * 1024
 MARK_BYTES_MAX = 64 * 1024
 """Length [bytes] of the greeting and mark before the archive."""
