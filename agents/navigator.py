@@ -80,7 +80,7 @@ class Navigator:
         )
         self._lead_route = LeadRoute(self.leading, self._detour, self._obstacles, mission, self.hand_driving)
         self._own = OwnBehaviors(mission)
-        self._crossing = Crossing(mission.radius_m, mission.leading.cruise_mps, mission.limits.a_max_mps2)
+        self._crossing = Crossing(mission.radius_m, mission.leading.cruise_mps, mission.limits)
 
     @property
     def predecessor(self) -> Predecessor | None:

@@ -79,10 +79,12 @@ def side_of(evasion: Evasion) -> float:
 
 
 def kept_m(moving: Sequence[Feature], pose: Pose2D, evasion: Evasion, twist: Twist) -> float:
-    """Return the least distance [m] to what moves within `LOOK_S` of an evasion: its bend, then straight on."""
+    """Return the least distance [m] to what moves within `LOOK_S` of an evasion, done by `twist`: its bend, then
+    straight on.
+    """
     if not evasion.turn_rad:
         return min(closest_m(moving, pose, twist, LOOK_S), CLEARANCE_M)
-    bend_s = evasion.turn_rad / abs(evasion.omega_radps)
+    bend_s = evasion.turn_rad / abs(twist.angular_z)
     least = closest_m(moving, pose, twist, bend_s)
     later = [Feature(f.kind, *f.at(bend_s), f.radius_m, f.vx, f.vy) for f in moving]
     straight = Twist(twist.linear_x, 0.0)

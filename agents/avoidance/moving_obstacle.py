@@ -27,10 +27,13 @@ from lfa.agents.avoidance.evasion import (
     side_of,
 )
 from lfa.agents.avoidance.moving_points import AWAY_M
+from lfa.agents.avoidance.safety import within
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, in_base, slowed, wrap
+from lfa.protocol.mission import Limits
 
+LIMITS = Limits()
 SLOW_SHARE, CRUISE_MPS = 0.4, 0.5
 """Share of the cruise speed [m/s] that a slowed robot drives at most. A share of what it wants would be taken again in
 each step, since that grows from its last speed: it would crawl.
@@ -69,9 +72,9 @@ Mates = Callable[[Pose2D, float, float], Sequence[Feature]]
 class Crossing:
     """Give-way behaviour of one robot towards moving obstacles, for a bounded time."""
 
-    def __init__(self, radius_m: float = 0.15, cruise_mps: float = CRUISE_MPS, a_max_mps2: float = 1.0) -> None:
+    def __init__(self, radius_m: float = 0.15, cruise_mps: float = CRUISE_MPS, limits: Limits = LIMITS) -> None:
         self._radius_m = radius_m
-        self._a_max_mps2 = a_max_mps2
+        self._limits = limits
         self._slow_mps = SLOW_SHARE * cruise_mps
         self._evasion, self._heading, self._last = SLOW, 0.0, STILL
         self.decision: Decision | None = None
@@ -201,12 +204,12 @@ class Crossing:
     def _soon(self, pose: Pose2D, twist: Twist) -> Pose2D:
         """Return the pose after `CLOSE_S` of `twist`, which the drive reaches from its last speed step by step."""
         before = self._last.linear_x
-        lag_s = min(0.5 * abs(twist.linear_x - before) / self._a_max_mps2, CLOSE_S)
+        lag_s = min(0.5 * abs(twist.linear_x - before) / self._limits.a_max_mps2, CLOSE_S)
         return along_arc(along_arc(pose, Twist(before, twist.angular_z), lag_s), twist, CLOSE_S - lag_s)
 
     def _done(self, evasion: Evasion, wanted: Twist) -> Twist:
-        """Return the twist of an evasion where `wanted` is the motion without it."""
+        """Return the twist of an evasion, as the drive can do it, where `wanted` is the motion without it."""
         if evasion is SLOW:
             return slowed(wanted, self._slow_mps)
         v = max(wanted.linear_x, evasion.v_mps) if evasion.action is Action.AHEAD else evasion.v_mps
-        return Twist(v, evasion.omega_radps)
+        return Twist(*within(Twist(v, evasion.omega_radps), self._limits))

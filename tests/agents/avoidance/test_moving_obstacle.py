@@ -7,6 +7,7 @@ from lfa.agents.avoidance.moving_obstacle import HOLD_S, SLOW_SHARE, WAIT_S_MAX,
 from lfa.agents.avoidance.moving_points import before, shadow
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+from lfa.protocol.mission import Limits
 
 AHEAD = Twist(0.5, 0.0)
 
@@ -167,8 +168,8 @@ def test_what_is_faster_than_an_evasion_is_escaped_from_at_a_higher_speed() -> N
 def test_a_robot_at_speed_turns_away_from_what_comes_close_while_it_rolls_on() -> None:
     """What comes by on its left: from rest it backs off with its tail away from it, at speed its nose goes first."""
     comes = crosser(0.6, 0.4, -0.4, 0.0)
-    from_rest = Crossing(a_max_mps2=0.5).give_way(comes, Pose2D(), STILL, 0.0)
-    at_speed = Crossing(a_max_mps2=0.5).give_way(comes, Pose2D(), STILL, 0.0, last=Twist(0.6, 0.0))
+    from_rest = Crossing(limits=Limits(a_max_mps2=0.5)).give_way(comes, Pose2D(), STILL, 0.0)
+    at_speed = Crossing(limits=Limits(a_max_mps2=0.5)).give_way(comes, Pose2D(), STILL, 0.0, last=Twist(0.6, 0.0))
     assert at_speed.angular_z < 0.0 < from_rest.angular_z
 
 
@@ -182,3 +183,13 @@ def test_what_comes_fast_is_passed_on_one_side_although_its_direction_is_not_cer
         x -= 1.5 * 0.02
         turns.add(None if crossing.decision is None else crossing.decision.action)
     assert len(turns & {Action.LEFT, Action.RIGHT}) == 1, turns
+
+
+def test_evasions_are_compared_as_the_drive_can_do_them() -> None:
+    """It comes on from behind, to the left: a robot of 0.2 m/s cannot drive on in time, and turns off to the right."""
+    comes = crosser(-0.65, 0.1, 0.4, 0.0)
+    fast, slow = Crossing(), Crossing(limits=Limits(v_max_mps=0.2))
+    assert fast.give_way(comes, Pose2D(), STILL, 0.0).angular_z == 0.0
+    twist = slow.give_way(comes, Pose2D(), STILL, 0.0)
+    assert twist.angular_z < 0.0
+    assert twist.linear_x <= 0.2
