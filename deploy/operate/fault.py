@@ -48,7 +48,7 @@ def command(
             "for obstacle: x,y,radius; for goal: x,y; for formation: a side."
         ),
     ] = "",
-    more: Annotated[list[str] | None, typer.Argument(help="No more than one word belongs there.")] = None,
+    more: Annotated[list[str] | None, typer.Argument(help="Nothing: a target is one word, as 3,1,0.4.")] = None,
     fleet: FleetName = None,
     as_json: AsJson = False,
 ) -> int:
