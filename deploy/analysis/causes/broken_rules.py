@@ -51,6 +51,8 @@ class RuleWatch(Checker):
         """T_grant by E2, from the mission's durations alone."""
         self._granted: dict[Member, list[tuple[float, Term]]] = {}
         self._proposed: dict[Term, tuple[float, Member, Propose]] = {}
+        self._shorter_s: dict[Term, float] = {}
+        """Time [s] of the newest round of each term that asked for a shorter bond than T_grant (E36)."""
         self._promised: dict[Term, list[tuple[float, Member]]] = {}
         self._hinted: dict[tuple[Member, Member], float] = {}
         self._began: dict[Member, float] = {}
@@ -80,6 +82,8 @@ class RuleWatch(Checker):
 
     def proposes(self, at: float, who: Member, propose: Propose) -> None:
         self._proposed[propose.term] = at, who, propose
+        if propose.grant_ms:
+            self._shorter_s[propose.term] = at
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
         self._gateway_began[robot_id] = at
@@ -146,7 +150,7 @@ def _exclusive(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
 
 
 def _bond(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
-    """I4: a fence in vain, a token that vanished, or a grant in spite of the bond."""
+    """I4: a fence in vain, a token that vanished, a bond that was shortened, or a grant in spite of the bond."""
     two = watch.last_grants(violation.at)
     if two is None:
         return None
@@ -157,6 +161,9 @@ def _bond(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
     if hinted_s >= two.earlier_s:
         text = f"{called(two.voter)} saw the token of the lease's holder vanish, which proves nothing"
         return chain(violation, "E15 E3", *steps, CauseStep(hinted_s, text))
+    if two.earlier in watch._shorter_s:
+        text = f"a round of term {two.earlier.n} asked for a shorter bond, which shortens no longer one"
+        return chain(violation, "E36 E3", *steps, CauseStep(watch._shorter_s[two.earlier], text))
     return chain(violation, "E3", *steps)
 
 

@@ -213,3 +213,11 @@ def test_e36_lagging_schedules_find_a_bond_that_is_shortened(monkeypatch: pytest
     assert not play(draw_lagging(CUT_SHORT)).violations
     plants_of_time.shorter_round_shortens_the_bond(monkeypatch)
     assert {violation.name for violation in play(draw_lagging(CUT_SHORT)).violations} & {"I1", "I4"}
+
+
+def test_e36_a_report_of_a_bond_that_was_shortened_names_the_rule(monkeypatch: pytest.MonkeyPatch) -> None:
+    plants_of_time.shorter_round_shortens_the_bond(monkeypatch)
+    broken = play(draw_lagging(CUT_SHORT)).broken
+    assert broken is not None
+    assert broken.rules == ("E36", "E3")
+    assert "term 3 asked for a shorter bond" in " ".join(step.text for step in broken.steps)
