@@ -52,11 +52,11 @@ def test_by_hand_the_world_is_stopped_and_killed_and_a_robot_started_again(tmp_p
         run.wait_for("leader_command")
         fleet = f"straight-{run.launcher.pid}"
         for action, target in (("stop", "world"), ("continue", "world"), ("kill", "2"), ("restart", "2")):
-            assert fault(action, target, fleet) == 0
+            assert fault(action, target, fleet=fleet) == 0
         eventually(lambda: len(list((run.folder / "journal").glob("robot2-*.bin"))) == 2, "robot 2 has no second life")
         with pytest.raises(Refused, match="runs already"):
-            fault("restart", "2", fleet)
-        assert fault("kill", "world", fleet) == 0
+            fault("restart", "2", fleet=fleet)
+        assert fault("kill", "world", fleet=fleet) == 0
         run.wait_for("restarted")
         run.launcher.send_signal(signal.SIGTERM)
         run.launcher.wait(30.0)

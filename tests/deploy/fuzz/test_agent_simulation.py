@@ -28,8 +28,10 @@ def test_whole_agents_keep_every_invariant_and_every_kind_of_fault_takes_effect(
     assert seen == set(KINDS)
 
 
-def test_one_seed_is_one_run_under_any_hash_seed() -> None:
-    command = [sys.executable, "-c", "from lfa.deploy.cli import main; main()", "fuzz", "--whole", "--seed", "14", "-v"]
+@pytest.mark.parametrize("drawn", [[], ["--lagging"]])
+def test_one_seed_is_one_run_under_any_hash_seed(drawn: list[str]) -> None:
+    fuzz = [sys.executable, "-c", "from lfa.deploy.cli import main; main()", "fuzz", "--whole", *drawn]
+    command = [*fuzz, "--seed", "14", "-v"]
     told = [
         subprocess.run(command, env={**os.environ, "PYTHONHASHSEED": number}, capture_output=True, check=True).stdout
         for number in ("1", "2")
