@@ -69,14 +69,17 @@ def fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
 
 
 async def _fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
-    shares = parts(plan, "", "")
-    answers = await asyncio.gather(*(_of_machine(plan, name, shares[name], run) for name in plan.hosts))
+    shares, one_by_one = parts(plan, "", ""), asyncio.Lock()
+    answers = await asyncio.gather(*(_of_machine(plan, name, shares[name], run, one_by_one) for name in plan.hosts))
     wrong = [f"host {name}: {said}" for name, said in zip(plan.hosts, answers, strict=True) if isinstance(said, str)]
     return sum(answer for answer in answers if isinstance(answer, int)), wrong
 
 
-async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> int | str:
-    """Fetch the journals of one machine; return their number, or the failure."""
+async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path, one_by_one: asyncio.Lock) -> int | str:
+    """Fetch the journals of one machine; return their number, or the failure.
+
+    They are unpacked `one_by_one`: of two machines whose folder is not there yet, one could not rename its own to it.
+    """
     machine = plan.hosts[name]
     try:
         run.mkdir(parents=True, exist_ok=True)
@@ -89,7 +92,8 @@ async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path) -> 
                 await shell.close()
             if done.code != 0 or not _to_answer(packed):
                 return f"gives no journals: {done.last_line}"
-            return await asyncio.to_thread(unpack, packed, run)
+            async with one_by_one:
+                return await asyncio.to_thread(unpack, packed, run)
     except (Unreachable, Refused) as error:
         return str(error)
     except tarfile.TarError as error:

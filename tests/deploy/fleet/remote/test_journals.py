@@ -7,6 +7,7 @@ import io
 import subprocess
 import sys
 import tarfile
+import threading
 from contextlib import suppress
 from pathlib import Path
 
@@ -41,6 +42,29 @@ def test_the_journals_of_every_machine_of_a_fleet_file_come(tmp_path: Path) -> N
     file.write_text(f'scenario = "straight"\n[hosts.here]\nstate = "{_state(tmp_path)}"\n')
     assert journals.fetch(load(file), tmp_path / "run") == (1, [])
     assert (tmp_path / "run" / "journal" / "robot2-7.bin").read_bytes() == b"new"
+
+
+def test_the_journals_of_two_machines_are_unpacked_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two at once that find no folder of journals would both rename their own to it."""
+    both, met = threading.Barrier(2), list[bool]()
+
+    def unpack(packed: object, run: Path) -> int:
+        with suppress(threading.BrokenBarrierError):
+            both.wait(0.2)
+            met.append(True)
+        return 1
+
+    monkeypatch.setattr(journals, "unpack", unpack)
+    state = _state(tmp_path)
+    file = tmp_path / "fleet.toml"
+    file.write_text(
+        f'scenario = "straight"\n[hosts]\na = {{ address = "localhost", state = "{state}", router_port = 7661 }}\n'
+        f'b = {{ address = "127.0.0.1", state = "{state}", router_port = 7662 }}\n'
+    )
+    assert journals.fetch(load(file), tmp_path / "run") == (2, [])
+    assert met == []
 
 
 def test_a_machine_can_put_nothing_outside_of_the_folder(tmp_path: Path) -> None:
