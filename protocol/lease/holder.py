@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import structs
+
 from lfa.protocol.lease.quorum import is_quorum, quorum_time
 from lfa.protocol.lease.timing import Timing, lengths_of
 from lfa.protocol.messages.consensus import Config, Grant, Member, Propose, Term, Version
@@ -36,11 +38,6 @@ class LeaseLength:
     def timing(self) -> Timing:
         """Durations that go with the present length."""
         return self._lengths[self._index]
-
-    @property
-    def grant_ms(self) -> int:
-        """Bond to ask for [ms]; 0 for `T_grant`."""
-        return 0 if self._index == len(self._lengths) - 1 else round(1000.0 * self.timing.grant_s)
 
     def fit(self, took_s: float, now: float) -> None:
         """Fit the length to a renewal that takes `took_s` [s] from when it was due, or more, by `now`."""
@@ -82,6 +79,8 @@ class Holder:
         self._round = 0
         self._rounds: dict[int, tuple[float, float]] = {}
         """Send time of each round, and the end of the lease that it asked for [s]."""
+        self._until = NEVER
+        """Latest end [s] of a lease that a round has asked for."""
         self._acked: dict[Member, float] = {}
         """Latest end [s] of a lease that each voter has granted."""
         self._accepted: dict[Member, Version] = {}
@@ -97,20 +96,29 @@ class Holder:
         due_at = min(now, self.next_round_at) if self._due_at is None else self._due_at
         self._length.fit(now - due_at, now)
         number, self._round = self._round, self._round + 1
-        until = now + self.timing.act_s
+        ends_at = now + self.timing.act_s
+        # E36: no round asks for less than an earlier one. Voters that a config adds (E17) have granted none of those:
+        # by a shorter round they would be free to elect another while the lease lasts that others granted before them.
+        until = self._until = max(ends_at, self._until)
         self._rounds[number] = now, until
         self._rounds.pop(number - ROUNDS_KEPT, None)
-        longer = self.expiry is not None and self.expiry > until  # by the longer leases of earlier rounds: no hurry
+        longer = self.expiry is not None and self.expiry > ends_at  # by the longer leases of earlier rounds: no hurry
         self._due_at = None if longer else due_at
         self.next_round_at = now + (1.0 if longer else RETRY_HEARTBEATS) * self.timing.heartbeat_s
         fenced = self._fenced if now - self.began_at < self._timing.grant_s else ()
-        return Propose(
-            self.term, config, number, self._me, fenced, None, self._agreed, WIRE_VERSION, self._length.grant_ms
-        )
+        grant_ms = self._grant_ms(self.timing.act_s if until == ends_at else until - now)
+        return Propose(self.term, config, number, self._me, fenced, None, self._agreed, WIRE_VERSION, grant_ms)
+
+    def _grant_ms(self, act_s: float) -> int:
+        """Return the bond to ask for [ms] with a lease of `act_s` [s]; 0 for `T_grant`."""
+        if act_s >= self._timing.act_s:
+            return 0
+        return round(1000.0 * structs.replace(self._timing, act_s=act_s).grant_s)
 
     def transferred(self, number: int, since: float) -> None:
         """Count round `number`, sent by the term's issuer, from `since` [s], a nonce of this process (E16)."""
-        self._rounds[number] = since, since + self._timing.act_s
+        self._until = since + self._timing.act_s
+        self._rounds[number] = since, self._until
         self._round = number + 1
 
     def granted(self, src: Member, grant: Grant, config: Config, now: float) -> bool:

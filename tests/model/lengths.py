@@ -40,7 +40,6 @@ class Chosen:
 
     def __init__(self, index: int) -> None:
         self.timing = lengths_of(TIMING)[index]
-        self.grant_ms = 0 if index == LENGTHS[-1] else round(1000.0 * self.timing.grant_s)
 
     def fit(self, took_s: float, now: float) -> None:
         """Keep the length: the model asks for any at any time."""
@@ -137,6 +136,7 @@ def _holder(s: Leased) -> Holder:
     holder._length = Chosen(s.length)  # type: ignore[assignment]
     holder._round, holder.expiry = len(s.rounds), s.expiry
     holder._rounds = {number: (sent_at, end) for number, (sent_at, end, _) in enumerate(s.rounds)}
+    holder._until = max((end for _, end, _ in s.rounds), default=holder._until)
     holder._acked = {voter: end for voter, end in zip(VOTERS, s.acked, strict=True) if end is not None}
     return holder
 

@@ -55,6 +55,16 @@ def shorter_round_shortens_the_bond(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Acceptor, "kept_until", kept_until)
 
 
+def round_that_asks_for_less(patch: pytest.MonkeyPatch) -> None:
+    honest = Holder.next_propose
+
+    def next_propose(self: Holder, config: Config, now: float) -> Propose:
+        self._until = float("-inf")
+        return honest(self, config, now)
+
+    patch.setattr(Holder, "next_propose", next_propose)
+
+
 def lease_as_long_as_is_asked_for_now(patch: pytest.MonkeyPatch) -> None:
     honest = Holder.granted
 

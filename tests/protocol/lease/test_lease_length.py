@@ -15,6 +15,7 @@ from lfa.protocol.lease.timing import Timing, lengths_of, timing_of
 from lfa.protocol.messages.consensus import Config, Grant, Member, Propose, Role, Term, Version
 from lfa.protocol.mission import Profile
 from tests.protocol.lease import plants_of_time
+from tests.protocol.lease.test_roster import Operated
 from tests.rigs.lease_scenes import OLD, STD, A, B, Team, config_of
 
 AUTO = timing_of("auto")
@@ -74,13 +75,14 @@ def test_e36_a_new_holder_asks_for_the_longest_lease() -> None:
 
 
 def test_e36_after_each_calm_time_it_asks_for_the_next_shorter_lease() -> None:
-    holder, asked = Holder(ME, TERM, AUTO, 10.0, agreed=1), dict[int, float]()
+    holder, asked = Holder(ME, TERM, AUTO, 10.0, agreed=1), dict[float, float]()
     while holder.next_round_at < 10.0 + 3.0 * CALM_S:
         at = holder.next_round_at
-        asked.setdefault(renew(holder, at).grant_ms, at)
-    shorter = [round(1000.0 * timing.grant_s) for timing in (MIDDLE, SHORT)]
-    assert list(asked) == [0, *shorter]
-    assert [asked[grant_ms] for grant_ms in shorter] == pytest.approx([10.0 + CALM_S, 10.0 + 2.0 * CALM_S], abs=0.2)
+        renew(holder, at)
+        asked.setdefault(holder.timing.act_s, at)
+    assert list(asked) == [LONG.act_s, MIDDLE.act_s, SHORT.act_s]
+    shorter = (asked[MIDDLE.act_s], asked[SHORT.act_s])
+    assert shorter == pytest.approx((10.0 + CALM_S, 10.0 + 2.0 * CALM_S), abs=0.2)
 
 
 def test_e36_with_the_first_renewal_that_takes_a_third_of_it_a_longer_lease_is_asked_for() -> None:
@@ -209,13 +211,48 @@ def test_l6_while_it_keeps_time_a_silent_leader_is_replaced_within_the_bond_of_i
     assert team.safe()
 
 
+def retired_while_the_lease_shrinks() -> Operated:
+    """Return a team whose voters are others 0.3 s after its leader has begun to ask for less, cut off from these."""
+    team = Operated(12, profile="auto", led_by=10.0)
+    asks = team.lease_of(1)._memory.holder
+    while asks is not None and asks.timing is LONG:
+        team.run(team.now + 0.005)
+    since = team.now
+    for n, robot in enumerate((3, 4, 5, 6)):
+        team.run(since + 0.05 * n)
+        team.retire(robot)
+    team.run(since + 0.3)
+    old, new = (0, 1, 2), range(3, 13)
+    team.part({pair for a in old for b in new for pair in ((a, b), (b, a))})
+    return team
+
+
+def test_e36_voters_that_are_added_while_a_lease_shrinks_are_bound_until_it_ends() -> None:
+    """Of seven voters four have granted none of the longer rounds: alone they would be a quorum after a shorter one."""
+    team = retired_while_the_lease_shrinks()
+    assert team.lease_of(1).config.previous is None
+    assert team.voters() == {0, 1, 2, 7, 8, 9, 10}
+    team.run(team.now + 2.0)
+    assert team.leaders() == [7]
+    assert team.safe()
+
+
+def test_e36_voters_that_a_shorter_round_has_added_are_free_too_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    plants_of_time.round_that_asks_for_less(monkeypatch)
+    team = retired_while_the_lease_shrinks()
+    team.run(team.now + 2.0)
+    assert "I1" in {violation.name for checker in team.checkers for violation in checker.violations}
+
+
 def test_e36_lagging_schedules_find_a_bond_that_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not play(draw_lagging(CUT_SHORT)).violations
+    plants_of_time.round_that_asks_for_less(monkeypatch)
     plants_of_time.shorter_round_shortens_the_bond(monkeypatch)
     assert {violation.name for violation in play(draw_lagging(CUT_SHORT)).violations} & {"I1", "I4"}
 
 
 def test_e36_a_report_of_a_bond_that_was_shortened_names_the_rule(monkeypatch: pytest.MonkeyPatch) -> None:
+    plants_of_time.round_that_asks_for_less(monkeypatch)
     plants_of_time.shorter_round_shortens_the_bond(monkeypatch)
     broken = play(draw_lagging(CUT_SHORT)).broken
     assert broken is not None
