@@ -176,5 +176,7 @@ PLANTED: tuple[Bug, ...] = (
         "lease_length::test_e36_a_shorter_round_shortens_no_bond"),
     Bug("rule E36", "a lease as long as is asked for now", time.lease_as_long_as_is_asked_for_now,
         "lease_length::test_e36_a_lease_grows_only_when_a_quorum_has_granted_the_longer_one"),
+    Bug("rule E36", "a round asks for less than an earlier one", time.round_that_asks_for_less,
+        "lease_length::test_e36_voters_that_are_added_while_a_lease_shrinks_are_bound_until_it_ends"),
 )
 # fmt: on

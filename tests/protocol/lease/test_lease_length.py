@@ -237,13 +237,6 @@ def test_e36_voters_that_are_added_while_a_lease_shrinks_are_bound_until_it_ends
     assert team.safe()
 
 
-def test_e36_voters_that_a_shorter_round_has_added_are_free_too_early(monkeypatch: pytest.MonkeyPatch) -> None:
-    plants_of_time.round_that_asks_for_less(monkeypatch)
-    team = retired_while_the_lease_shrinks()
-    team.run(team.now + 2.0)
-    assert "I1" in {violation.name for checker in team.checkers for violation in checker.violations}
-
-
 def test_e36_lagging_schedules_find_a_bond_that_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not play(draw_lagging(CUT_SHORT)).violations
     plants_of_time.round_that_asks_for_less(monkeypatch)
