@@ -82,18 +82,18 @@ async def _of_machine(plan: FleetPlan, name: str, part: HostPlan, run: Path, one
     """
     machine = plan.hosts[name]
     try:
-        run.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=run) as packed:
-            shell = await reach(machine)
-            try:
+        shell = await reach(machine)
+        try:
+            run.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=run) as packed:
                 words = (python_of(machine), "-P", "-c", PACK, part.state)
                 done = await shell.run(words, into=packed, bytes_max=PACKED_BYTES_MAX)
-            finally:
-                await shell.close()
-            if done.code != 0 or not _to_answer(packed):
-                return f"gives no journals: {done.last_line}"
-            async with one_by_one:
-                return await asyncio.to_thread(unpack, packed, run)
+                if done.code != 0 or not _to_answer(packed):
+                    return f"gives no journals: {done.last_line}"
+                async with one_by_one:
+                    return await asyncio.to_thread(unpack, packed, run)
+        finally:
+            await shell.close()
     except (Unreachable, Refused) as error:
         return str(error)
     except tarfile.TarError as error:
