@@ -15,7 +15,7 @@ from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.fleet import HostStatus
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import REFUSED_OF, Event, PoseStamped, Status, Tracking
-from lfa.protocol.names import robot_id_of
+from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.topics import HOST_PREFIX
 
 M = TypeVar("M")
@@ -23,6 +23,8 @@ COUNT_MAX = 2.0**53
 """Greatest counter that is believed: any number may stand there."""
 FRESH_S = 1.0
 """Age [s] from which a pose is outdated: its robot counts as silent."""
+STATUS_S = 2.5
+"""Age [s] up to which a status counts, which comes once a second."""
 
 
 class Heard(NamedTuple, Generic[M]):
@@ -111,18 +113,25 @@ class FleetState:
         leader = self.leader(now)
         if leader is None:
             return ()
-        links = {
-            heard.message.predecessor: robot
-            for robot, heard in self.tracking.items()
-            if now - heard.at < FRESH_S and self._follows(robot)
-        }
+        links = {self._predecessor(robot, now): robot for robot in self.poses if self._follows(robot)}
         chain = [leader]
         while (following := links.get(chain[-1])) is not None and following not in chain:
             chain.append(following)
         return tuple(chain)
 
     def _follows(self, robot: int) -> bool:
-        return robot in self.poses and self.poses[robot].message.role is Role.FOLLOWER
+        return self.poses[robot].message.role is Role.FOLLOWER
+
+    def _predecessor(self, robot: int, now: float) -> int | None:
+        """Return the robot that a follower tracks, or has in front of it in the chain of its status: a robot that was
+        stopped before its first step behind a new predecessor has not tracked it yet.
+        """
+        tracking = self.tracking.get(robot)
+        if tracking is not None and now - tracking.at < FRESH_S:
+            return tracking.message.predecessor
+        status = self.status.get(robot_name(robot))
+        chain = () if status is None or now - status.at > STATUS_S else status.message.chain
+        return chain[chain.index(robot) - 1] if robot in chain[1:] else None
 
     def _role(self, robot: int, role: str, term: int) -> None:
         self.roles[robot] = role

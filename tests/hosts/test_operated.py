@@ -24,7 +24,7 @@ from tests.rigs.network_namespaces import PORT
 from tests.rigs.version_before import ROOT, python_with
 
 WHY_NOT = why_not()
-pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
+pytestmark = [pytest.mark.hosts, pytest.mark.long, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
 
 ROBOTS, SPARE = (1, 2, 3, 4, 5, 6), 9
 WORLD = "a"

@@ -16,7 +16,7 @@ from tests.rigs.machines import Machines, machines, why_not
 from tests.rigs.version_before import ROOT, code_before, python_with
 
 WHY_NOT = why_not()
-pytestmark = [pytest.mark.hosts, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
+pytestmark = [pytest.mark.hosts, pytest.mark.long, pytest.mark.skipif(WHY_NOT is not None, reason=str(WHY_NOT))]
 
 ROBOTS = (1, 2, 3, 4)
 TOP = 'scenario = "endless.toml"'

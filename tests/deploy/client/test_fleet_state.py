@@ -6,6 +6,7 @@ from math import inf, nan
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from lfa.deploy.client.fleet_state import FleetState
 from lfa.protocol.geometry import Pose2D, Twist
@@ -51,6 +52,14 @@ CHAIN = (_pose(1, Role.LEADER), _pose(2, Role.FOLLOWER), _pose(3, Role.FOLLOWER)
 def test_the_chain_goes_from_the_leader_to_each_that_follows_a_member() -> None:
     assert _state(*CHAIN).chain(0.5) == (1, 2, 3)
     assert _state(*CHAIN, _follows(2, 9)).chain(0.5) == (1,)
+
+
+def test_a_follower_that_was_stopped_before_its_first_step_is_in_the_chain_of_its_status() -> None:
+    said = structs.replace(_status(3), chain=(1, 2, 3))
+    assert _state(*CHAIN[:-1], said).chain(0.5) == (1, 2, 3)
+    assert _state(*CHAIN[:-1]).chain(0.5) == (1, 2)
+    assert _state(*CHAIN[:-1], _pose(3, Role.WAITING), said).chain(0.5) == (1, 2)
+    assert _state(*CHAIN, _follows(3, 9), said).chain(0.5) == (1, 2), "what it tracks counts first"
 
 
 def test_followers_in_a_ring_are_no_chain_without_end() -> None:
