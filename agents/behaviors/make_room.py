@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from math import atan2, hypot, inf, pi
 
 from lfa.agents.avoidance.decision import Action, Decision
-from lfa.agents.avoidance.safety import SKIN_M
 from lfa.agents.following.predecessor import Sighting
-from lfa.agents.perception.scan import Point, free_along
-from lfa.agents.recovery.back_up import BACK_MPS, ROOM_M, BackUp
+from lfa.agents.perception.scan import Point
+from lfa.agents.recovery.back_up import BEYOND_M, BackUp, back_to
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, in_base
 
 FACES_RAD, COMES_S = 0.8, 0.6
@@ -22,8 +21,9 @@ FACES_RAD, COMES_S = 0.8, 0.6
 and the time [s] for which it must."""
 TOUCHES_M = 0.15
 """Room [m] between both bodies below which it needs room whichever way it turns, but away."""
-GONE_S = 1.5
-"""Time [s] for which it must have turned away until its follower follows again."""
+GONE_S, HOLD_S = 1.5, 10.0
+"""Time [s] for which it must have turned away until its follower follows again, and for which this one stands while it
+neither comes nor has turned away: it looks for its way."""
 REVERSES_MPS = -0.02
 NEAR_BODIES, NEAR_M, CLEAR_M = 2.0, 0.8, 0.2
 """Distance within which it comes near: this number of bodies, and this room [m] between them; and the room [m] beyond
@@ -45,10 +45,12 @@ class MakeRoom:
         self._path = BackUp()
         self._comes_since: float | None = None
         self._came_at = -inf
+        self._made = False
+        """True from the first twist that makes room until the predecessor has gone."""
 
     def end(self) -> None:
         """Make no room any more: nobody comes, or the robot has another role."""
-        self._comes_since = None
+        self._comes_since, self._made = None, False
         self._path.end()
 
     def step(self, sighting: Sighting, points: Sequence[Point], pose: Pose2D, now: float) -> Twist | None:
@@ -58,7 +60,7 @@ class MakeRoom:
         if self._comes(sighting, pose):
             self._came_at = now
             self._comes_since = now if self._comes_since is None else self._comes_since
-        elif now - self._came_at >= (GONE_S if self._path.under_way else 0.0):
+        elif now - self._came_at >= self._patience_s(sighting, pose):
             self.end()
         came_s = 0.0 if self._comes_since is None else now - self._comes_since
         needed = COMES_S <= came_s < ROOM_S and self._is_narrow(sighting, points, pose)
@@ -69,12 +71,22 @@ class MakeRoom:
         if self._path.under_way and distance(sighting.pose, pose) > self._near_m + CLEAR_M:
             return STILL
         twist = self._path.step(points, pose, self._radius_m)
-        if twist is None and needed:  # its trail ends here: straight back
-            twist = Twist(-BACK_MPS, 0.0)
-            return twist if free_along(points, twist, self._radius_m + SKIN_M) > ROOM_M else STILL
-        if twist is None:
-            self._path.keep(pose)
-        return twist
+        if twist is None and needed:  # its trail ends here
+            twist = back_to(points, (-BEYOND_M, 0.0), self._radius_m)
+        if twist is not None:
+            self._made = True
+            return twist
+        if self._made and came_s < ROOM_S:
+            return STILL
+        self._path.keep(pose)
+        return None
+
+    def _patience_s(self, sighting: Sighting, pose: Pose2D) -> float:
+        """Return the time [s] for which this robot holds the room that it has made."""
+        if not self._made:
+            return 0.0
+        x, _ = in_base(sighting.pose, (pose.x, pose.y))
+        return GONE_S if x < 0.0 else HOLD_S
 
     def _comes(self, sighting: Sighting, pose: Pose2D) -> bool:
         """Return whether the predecessor is near and ahead, and faces this robot or reverses towards it."""

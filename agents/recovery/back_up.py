@@ -1,21 +1,36 @@
-"""Backing up: a robot that gave up a place drives back along its trail, as far as that is free, until it is out."""
+"""Backing up: a robot that gave up a place drives back along its trail, as far as that is free, until it is out.
+
+A narrow place bars the arc to its trail where the robot stands across it. It then turns its rear to the trail on the
+spot, which a round body always can.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from math import hypot
+from math import atan2, cos, hypot, pi, sin
 
 from lfa.agents.avoidance.safety import SKIN_M
 from lfa.agents.perception.scan import Point, free_along
-from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base
+from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base, wrap
 
 STEP_M, TRAIL_M = 0.1, 6.0
+LOOP_M = 0.2
+"""Distance [m] from a place of its trail within which the robot is there again."""
 OUT_M = 1.6
 """Distance [m] driven backwards after which the robot counts as free."""
 AHEAD_M = 0.4
 BACK_MPS = 0.2
 ROOM_M = 0.05
+TURN_PER_S, TURN_RADPS = 2.0, 0.8
+"""Turn rate [1/s] per angle of the rear off its way, and at most [rad/s]."""
+ALIGNED_RAD = 0.1
+"""Angle [rad] of the rear off its way below which a robot drives and does not turn."""
+ASIDE_RAD, ASIDE_STEP_RAD = 1.2, 0.15
+"""Largest angle off the direct way within which another one is looked for, and the step between two: enough to get
+round a corner; farther aside no way leads nearer."""
+BEYOND_M = 1.0
+"""Length [m] of the way back that is looked for where no trail is left."""
 
 
 class BackUp:
@@ -34,8 +49,13 @@ class BackUp:
 
     def keep(self, pose: Pose2D) -> None:
         """Extend the trail; call it in each control step without a back-up."""
-        if not self._trail or hypot(pose.x - self._trail[-1][0], pose.y - self._trail[-1][1]) >= STEP_M:
-            self._trail.append((pose.x, pose.y))
+        trail = self._trail
+        if trail and hypot(pose.x - trail[-1][0], pose.y - trail[-1][1]) < STEP_M:
+            return
+        been = next((n for n, (x, y) in enumerate(trail) if hypot(pose.x - x, pose.y - y) < LOOP_M), len(trail))
+        for _ in range(len(trail) - 1 - been):  # it is back where it was: the loop since then leads nowhere
+            trail.pop()
+        trail.append((pose.x, pose.y))
 
     def begin(self, pose: Pose2D) -> None:
         """Start backing up from `pose`."""
@@ -60,4 +80,30 @@ class BackUp:
         x, y = in_base(pose, self._trail[-1])
         reach = max(hypot(x, y), AHEAD_M)
         twist = Twist(-BACK_MPS, -BACK_MPS * 2.0 * y / (reach * reach))
-        return twist if free_along(points, twist, radius_m + SKIN_M) > ROOM_M else STILL
+        if x < 0.0 and free_along(points, twist, radius_m + SKIN_M) > ROOM_M:
+            return twist
+        return back_to(points, (x, y), radius_m)
+
+
+def back_to(points: Sequence[Point], target: Point, radius_m: float) -> Twist:
+    """Return the twist straight backwards on the way that ends nearest to `target` in `base_link`, or the turn of the
+    rear there; still where none leads nearer.
+    """
+    direct_rad, left_m = wrap(atan2(target[1], target[0]) - pi), hypot(*target)
+    reach_m, steps = left_m + radius_m + SKIN_M, round(ASIDE_RAD / ASIDE_STEP_RAD)
+    near = [(x, y) for x, y in points if x * x + y * y < reach_m * reach_m]
+    nearest_m = left_m - ROOM_M
+    off_rad: float | None = None
+    for n in sorted(range(-steps, steps + 1), key=abs):
+        aside_rad = n * ASIDE_STEP_RAD
+        c, s = cos(direct_rad + aside_rad), sin(direct_rad + aside_rad)
+        turned = [(c * x + s * y, c * y - s * x) for x, y in near]
+        free_m = free_along(turned, Twist(-1.0, 0.0), radius_m + SKIN_M, left_m)
+        end_m = hypot(left_m - free_m * cos(aside_rad), free_m * sin(aside_rad))
+        if free_m > ROOM_M and end_m < nearest_m:
+            nearest_m, off_rad = end_m, wrap(direct_rad + aside_rad)
+    if off_rad is None:
+        return STILL
+    if abs(off_rad) < ALIGNED_RAD:
+        return Twist(-BACK_MPS, 0.0)
+    return Twist(0.0, max(-TURN_RADPS, min(TURN_RADPS, TURN_PER_S * off_rad)))

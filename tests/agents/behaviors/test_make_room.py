@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from lfa.agents.behaviors.make_room import CLEAR_M, COMES_S, GONE_S, NEAR_M, ROOM_S, MakeRoom
+from lfa.agents.behaviors.make_room import CLEAR_M, COMES_S, GONE_S, HOLD_S, NEAR_M, ROOM_S, MakeRoom
 from lfa.agents.following.predecessor import Sighting
 from lfa.agents.formation.pose_history import PoseHistory
 from lfa.protocol.geometry import STILL, Pose2D, Twist
@@ -98,6 +98,14 @@ def test_once_the_predecessor_has_turned_away_for_a_while_it_follows_again() -> 
     away = seen(heading=0.0)
     assert place.room.step(away, place.points, AT, 1.7) is not None, "a turn that goes on"
     assert place.room.step(away, place.points, AT, 1.0 + COMES_S + GONE_S) is None
+
+
+def test_while_the_predecessor_looks_for_its_way_it_holds_the_room() -> None:
+    place = Place(walls(0.5, 0.5), came_m=0.2)
+    assert place.does(seen()) is not None
+    aside = seen(heading=pi - 1.2, twist=STILL)
+    assert place.room.step(aside, place.points, AT, 0.9 + COMES_S + HOLD_S) is not None
+    assert place.room.step(aside, place.points, AT, 1.1 + COMES_S + HOLD_S) is None
 
 
 def test_it_makes_room_for_a_bounded_time() -> None:

@@ -1,9 +1,11 @@
 """Backing out of a trap the way that the robot came."""
 
-from math import hypot
+from math import hypot, pi
 
-from lfa.agents.recovery.back_up import OUT_M, BackUp
-from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc
+import pytest
+
+from lfa.agents.recovery.back_up import OUT_M, BackUp, back_to
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, in_base
 
 DT = 0.02
 AHEAD = Twist(0.4, 0.2)
@@ -50,3 +52,57 @@ def test_walls_beside_the_way_do_not_hold_it() -> None:
     twist = back_up.step(BESIDE, Pose2D(2.9, 0.0, 0.0), 0.15)
     assert twist is not None
     assert twist.linear_x < 0.0
+
+
+RADIUS_M = 0.15
+CORRIDOR = [(0.03 * n, side * 0.34) for n in range(-10, 130) for side in (-1.0, 1.0)]
+CORNER = [(1.0, 0.34 + 0.03 * n) for n in range(40)] + [(0.03 * n, 0.34) for n in range(34)]
+"""Walls in `map`: of a corridor of 0.68 m, and the inner ones of a bend to the left out of one."""
+
+
+def backs_up(came: list[Pose2D], pose: Pose2D, walls: list[tuple[float, float]]) -> float:
+    """Let a robot that came over `came` back up from `pose` until it is out; return its least distance to `walls`."""
+    back_up, least_m = BackUp(), 9.0
+    for place in came:
+        back_up.keep(place)
+    back_up.begin(pose)
+    for _ in range(1500):
+        twist = back_up.step([in_base(pose, point) for point in walls], pose, RADIUS_M)
+        if twist is None:
+            return least_m
+        pose = along_arc(pose, twist, DT)
+        least_m = min(least_m, *(hypot(pose.x - x, pose.y - y) for x, y in walls))
+    raise AssertionError(f"it stands at {pose}")
+
+
+@pytest.mark.parametrize("heading", [0.6, -0.9, pi / 2, 2.4])
+def test_across_a_corridor_it_turns_its_rear_to_the_trail(heading: float) -> None:
+    came = [Pose2D(0.1 * n, 0.0, 0.0) for n in range(31)]
+    assert backs_up(came, Pose2D(3.0, -0.14, heading), CORRIDOR) > RADIUS_M
+
+
+def test_where_the_direct_way_to_its_trail_cuts_a_corner_it_backs_beside_it() -> None:
+    came = [Pose2D(0.1 * n, 0.05, 0.0) for n in range(12)] + [Pose2D(1.18, 0.15 + 0.1 * n, pi / 2) for n in range(4)]
+    assert backs_up(came, Pose2D(1.18, 0.43, 1.25), CORNER) > RADIUS_M
+
+
+def test_a_loop_of_its_trail_leads_nowhere() -> None:
+    back_up = BackUp()
+    for x in (*range(31), *range(30, 20, -1)):
+        back_up.keep(Pose2D(0.1 * x, 0.0, 0.0))
+    pose = Pose2D(2.0, 0.0, 0.0)
+    back_up.keep(pose)
+    back_up.begin(pose)
+    for _ in range(20):
+        twist = back_up.step([], pose, RADIUS_M)
+        assert twist is not None
+        assert twist.linear_x < 0.0, "it turns to where it went forth and back"
+        pose = along_arc(pose, twist, DT)
+
+
+@pytest.mark.parametrize("heading", [0.5, -0.5])
+def test_without_a_trail_the_rear_turns_to_where_most_room_is(heading: float) -> None:
+    pose = Pose2D(1.5, 0.0, heading)
+    twist = back_to([in_base(pose, point) for point in CORRIDOR], (-1.0, 0.0), RADIUS_M)
+    assert twist.linear_x == 0.0
+    assert twist.angular_z * heading < 0.0
