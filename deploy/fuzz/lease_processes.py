@@ -301,14 +301,20 @@ class Hosts(GatewaySimulation):
             self.command(process.id, self._drawn(process, term, holder, False, stamp))
 
     def _hear_gateway(self, process: Process) -> None:
-        """Tell the process the term and the agent that its robot's gateway knows, if connected (E23, E24)."""
+        """Tell the process the term and the agent that its robot's gateway knows, if connected (E23, E24).
+
+        A leader, which hears the term with the answers to its commands, is told of the agent alone.
+        """
         host = self.gateways.get(process.id)
-        if host is None or not host.alive or process.paused or process.lease.role is Role.LEADER:
+        if host is None or not host.alive or process.paused:
             return
         if (self.host_of_gateway(process.id), process.id) in self.cuts:
             return
         gateway, lease = host.gateway, process.lease
         lease.learn_incarnation(gateway.agent)
+        if lease.role is Role.LEADER:
+            self.carry_out(process, [])
+            return
         process.stop.hear_gateway(gateway.stop.known)
         self.carry_out(process, lease.gateway_term(gateway.term_max, process.clock.local(self.now), gateway.latched))
 
