@@ -49,14 +49,9 @@ MIXED_AT_S = 0.05
 LOST_SHARE, LOSSES = 0.3, ("restart", "cut", "pause")
 """Share of the stops of complete agents at whose moment the leader is lost, and how."""
 
-LED_S = ((0.0, 0.0), (10.0, 13.0), (20.0, 24.0))
-"""Time [s] for which a team that lags has run without a fault: so it asks for its longest lease, or for a shorter one,
-or is about to."""
 SETTLES_LATER_S = 5.0
-"""How much later [s] such a team has settled after its last fault: its t_remove is that of its longest lease."""
-LAGS_MAX = 6
-LAG_S = (0.02, 0.3)
-"""Longest step [s] of a process that lags: up to what the longest lease bears, and more than the shortest does."""
+"""How much later [s] a team with the profile `auto` has settled after its last fault: its t_remove is that of its
+longest lease."""
 
 LEADER = -1
 FIRST_AT_S = 1.5
@@ -198,47 +193,6 @@ def draw_whole(seed: int) -> Schedule:
         if call.kind == "stop" and random.random() < LOST_SHARE
     ]
     return structs.replace(schedule, faults=tuple(sorted([*schedule.faults, *lost], key=_when)))
-
-
-def draw_lagging(seed: int) -> Schedule:
-    """Draw the schedule of a seed for a team with the profile `auto`, whose processes lag, among its other faults."""
-    schedule, random = draw(seed), Random(f"lag-{seed}")
-    ids, led_s = (0, *range(1, schedule.robots + 1)), random.uniform(*random.choice(LED_S))
-    lags = [
-        ScheduledFault(
-            random.uniform(WARM_UP_S, FAULTS_UNTIL_S),
-            "lag",
-            random.choice((ids, ids, tuple(i for i in ids if random.random() < 0.5), (LEADER,))),
-            random.uniform(0.2, FAULTS_UNTIL_S),
-            random.uniform(*LAG_S),
-        )
-        for _ in range(random.randint(1, LAGS_MAX))
-    ]
-    lost = [
-        ScheduledFault(
-            lag.at + random.uniform(0.0, 0.6),
-            random.choice(("cut", "cut_one_way", "pause")),
-            (LEADER,),
-            random.uniform(0.3, 2.0),
-        )
-        for lag in lags
-    ]
-    kept = [fault for fault in schedule.faults if random.random() < random.choice((0.0, 0.3, 1.0))]
-    return structs.replace(
-        schedule,
-        profile="auto",
-        led_s=led_s,
-        faults=_later(
-            tuple(sorted([*kept, *lags, *random.sample(lost, random.randint(0, len(lost)))], key=_when)), led_s
-        ),
-        stops=_later(schedule.stops, led_s),
-        rosters=_later(schedule.rosters, led_s),
-        tricks=_later(schedule.tricks, led_s),
-    )
-
-
-def _later(faults: tuple[ScheduledFault, ...], by_s: float) -> tuple[ScheduledFault, ...]:
-    return tuple(structs.replace(fault, at=fault.at + by_s) for fault in faults)
 
 
 def _calm(schedule: Schedule) -> Schedule:

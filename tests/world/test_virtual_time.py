@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import inf
 from random import Random
 
 from lfa.world.virtual_time import SERIES_MIN, VirtualTime
@@ -41,31 +43,32 @@ class Calls(VirtualTime):
             self.schedule(self._random.choice((1, 2, SERIES_MIN, 3 * SERIES_MIN)))
 
 
-def test_a_series_of_calls_runs_as_the_same_calls_scheduled_one_by_one() -> None:
+def one_by_one_and_in_series(until_s: float, lost_after_s: float = inf) -> Iterator[tuple[Calls, Calls]]:
+    """Yield the same calls scheduled one by one and as a series, and run until a time [s].
+
+    Of those scheduled at the beginning the ones after `lost_after_s` [s] are dropped.
+    """
     for seed in range(20):
-        alone, together = Calls(False, seed), Calls(True, seed)
-        for calls in (alone, together):
+        pair = Calls(False, seed), Calls(True, seed)
+        for calls in pair:
             calls.schedule(40)
-            calls.run(100.0)
+            calls.lose(lost_after_s, (calls.note,))
+            calls.run(until_s)
+        yield pair
+
+
+def test_a_series_of_calls_runs_as_the_same_calls_scheduled_one_by_one() -> None:
+    for alone, together in one_by_one_and_in_series(100.0):
         assert together.made == alone.made
         assert len(together.made) == together.scheduled > 40
 
 
 def test_what_is_planned_of_a_series_is_as_one_by_one() -> None:
-    for seed in range(20):
-        alone, together = Calls(False, seed), Calls(True, seed)
-        for calls in (alone, together):
-            calls.schedule(40)
-            calls.run(0.5)
+    for alone, together in one_by_one_and_in_series(0.5):
         assert together.foreseen == alone.foreseen
 
 
 def test_what_is_lost_of_a_series_is_as_one_by_one() -> None:
-    for seed in range(20):
-        alone, together = Calls(False, seed), Calls(True, seed)
-        for calls in (alone, together):
-            calls.schedule(40)
-            calls.lose(NEAR_S, (calls.note,))
-            calls.run(100.0)
+    for alone, together in one_by_one_and_in_series(100.0, lost_after_s=NEAR_S):
         assert together.made == alone.made
         assert len(together.made) < together.scheduled

@@ -1,1 +1,1 @@
-"""Searches for schedules that violate an invariant: drawn, systematic and guided ones, and their command."""
+"""Searches for schedules that violate an invariant: drawn, lagging, systematic and guided ones, and their command."""

@@ -12,8 +12,9 @@ from msgspec import Struct, structs
 from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.fuzz.fault_injector import Played, play, play_whole
 from lfa.deploy.fuzz.network import Trace
-from lfa.deploy.fuzz.schedules import Schedule, draw, draw_lagging, draw_whole, without
+from lfa.deploy.fuzz.schedules import Schedule, draw, draw_whole, without
 from lfa.deploy.fuzz.search import guided, systematic
+from lfa.deploy.fuzz.search.lagging import draw_lagging
 from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 
 Player = Callable[[Schedule, Trace | None], Played]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfa.deploy.fuzz.fault_injector import play
-from lfa.deploy.fuzz.schedules import draw_lagging
+from lfa.deploy.fuzz.search.lagging import draw_lagging
 
 TOLD_BY_ITS_GATEWAY_ALONE = 55
 """Seed in which all start anew at once, one with a clock set back, and this one leads before it hears its gateway."""

@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from lfa.deploy.fuzz.fault_injector import play
-from lfa.deploy.fuzz.schedules import draw_lagging
+from lfa.deploy.fuzz.search.lagging import draw_lagging
 from lfa.protocol.lease.acceptor import Acceptor
 from lfa.protocol.lease.holder import CALM_S, RENEWALS_PER_LEASE, Holder, LeaseLength
 from lfa.protocol.lease.timing import Timing, lengths_of, timing_of
