@@ -208,7 +208,8 @@ class Navigator:
         if role is not Role.WAITING:
             wanted = self._own.step(BehaviorInput(now, role, pose, self._last, wanted, still, moving))
             wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving, self._last)
-            wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now)
+            by_law = not (self._follow_slot.catches_up or self._back_out.under_way)
+            wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now, by_law=by_law)
         self._back_out.keep(pose)
         self._watch(role, pose, wanted, now)
         self._last = self.limits.brake(wanted, self._last, points, moving, pose, dt)

@@ -32,10 +32,13 @@ class CommandLimits:
         self._estimator = estimator
         self._obstacles = obstacles
 
-    def slow(self, wanted: Twist, role: Role, pose: Pose2D, now: float) -> Twist:
-        """Return `wanted`, slowed towards team-mates that no controller keeps a distance to, and by old inputs."""
+    def slow(self, wanted: Twist, role: Role, pose: Pose2D, now: float, *, by_law: bool) -> Twist:
+        """Return `wanted`, slowed towards team-mates that no controller keeps a distance to, and by old inputs.
+
+        `by_law`: the robot moves by a follower's law, and not on a way of its own.
+        """
         limits, radius_m = self._mission.limits, self._mission.radius_m
-        strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now)
+        strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now, by_law=by_law)
         wanted = sharing(wanted, strangers, radius_m, limits)
         usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else limits.v_max_mps
         wanted = slowed(self._scan_age.limited(wanted, now), self._scan_age.speed_max_mps(usual_mps))

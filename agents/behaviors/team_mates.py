@@ -8,7 +8,7 @@ from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point
 from lfa.agents.team_state import TeamState
-from lfa.protocol.geometry import Pose2D
+from lfa.protocol.geometry import Pose2D, in_base
 
 
 class TeamMates:
@@ -36,13 +36,17 @@ class TeamMates:
         sighting = None if self.predecessor is None else self.predecessor.at(now)
         return near if sighting is None else [*near, sighting.pose]
 
-    def strangers(self, pose: Pose2D, within_m: float, now: float) -> list[Point]:
-        """Return those that this robot does not follow, in `base_link`: no controller keeps a distance to them.
+    def strangers(self, pose: Pose2D, within_m: float, now: float, *, by_law: bool = True) -> list[Point]:
+        """Return those to which no controller keeps a distance, in `base_link`: all but the one that this robot follows
+        `by_law`. On a way of its own (back to its slot, out of a trap) the law does not keep that distance either.
 
         None within `within_m` is left out; others may be.
         """
         ahead = None if self.predecessor is None else self.predecessor.robot
-        c, s, mates = cos(pose.theta), sin(pose.theta), []
+        c, s, mates = cos(pose.theta), sin(pose.theta), list[Point]()
+        if self.predecessor is not None and not by_law:
+            sighting = self.predecessor.at(now)
+            mates += [] if sighting is None else [in_base(pose, (sighting.pose.x, sighting.pose.y))]
         for robot, place in self._team.near(self._others(), pose, within_m, now):
             if robot != ahead:
                 dx, dy = place.x - pose.x, place.y - pose.y

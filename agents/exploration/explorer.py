@@ -95,10 +95,10 @@ class Explore:
         """Return whether the map shows room for the body at `point`, or nothing yet."""
         return self.planner is None or self.planner.free(point)
 
-    def bar(self, place: Point, now: float) -> None:
-        """Plan no route through `place` in `map` for a while: the body does not fit there."""
+    def bar(self, place: Point, now: float, *, mate: bool = False) -> None:
+        """Plan no route through `place` in `map` for a while: the body does not fit there, or beside a `mate`."""
         if self.planner is not None:
-            self.planner.bar(place, now)
+            self.planner.bar(place, now, mate=mate)
 
     def _begin(self, pose: Pose2D) -> None:
         leading = self._mission.leading

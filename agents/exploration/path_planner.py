@@ -32,8 +32,9 @@ RETRY_S = 1.0
 """Time [s] between two searches that find nothing."""
 ROOMY = 60
 """Cost of a step up to which a robot has room to spare."""
-BARRED_M, BARRED_S = 0.15, 60.0
-"""Radius [m] around a place where the body did not fit, and time [s] for which no route leads through it."""
+BARRED_M, BARRED_S, MATE_BARRED_S = 0.15, 60.0, 10.0
+"""Radius [m] around a place where the body did not fit, and the time [s] for which no route leads through it; less
+where a team-mate stood there, which goes on."""
 BARRED_AGAIN = 1
 """Number of times that such places are tried once more, where no way is left without them, until the goal counts as
 walled in: noise may have barred a gap that the body passes."""
@@ -103,9 +104,9 @@ class Planner:
         cell = self._grid.cell(*point)
         return cell is None or 0 < self._prices[self._grid.near[cell]] <= ROOMY
 
-    def bar(self, place: Point, now: float) -> None:
-        """Lead no route through `place` for `BARRED_S`, and drop the present one."""
-        self._barred.append((place, now + BARRED_S))
+    def bar(self, place: Point, now: float, *, mate: bool = False) -> None:
+        """Lead no route through `place` for a while, and drop the present one. `mate`: a team-mate stands there."""
+        self._barred.append((place, now + (MATE_BARRED_S if mate else BARRED_S)))
         self.forget()
 
     def forget(self) -> None:

@@ -82,7 +82,7 @@ class PlannedWay:
             waits = self._mate_blocks(points, pose, wanted, turn_radps)
             if now - self._blocked[0] >= (ROOM_S if waits else BLOCKED_S):
                 self._blocked = None
-                self.explore.bar(self.lead.point(self._radius_m), now)
+                self.explore.bar(self.lead.point(self._radius_m), now, mate=waits)
             elif waits:
                 return STILL
         return twist

@@ -9,7 +9,7 @@ import pytest
 
 from lfa.agents.exploration.costmap import FREE, TIGHT_M, prices_of
 from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, OCCUPIED, REACH, Grid, Point
-from lfa.agents.exploration.path_planner import BARRED_AGAIN, Planner
+from lfa.agents.exploration.path_planner import BARRED_AGAIN, MATE_BARRED_S, Planner
 from lfa.protocol.geometry import Pose2D, wrap
 
 RADIUS_M = 0.15
@@ -188,3 +188,14 @@ def test_a_gap_in_which_the_body_did_not_fit_is_tried_again_where_it_is_the_only
     plan(planner, (2.0, 3.0), at=9.0)
     assert planner.route == ()
     assert planner.unreachable is not None
+
+
+def test_ground_on_which_a_team_mate_stood_is_planned_through_again_once_it_may_have_gone() -> None:
+    gap = (5.05, 3.05)
+    planner = Planner(ground((4.9, -2.0, 5.1, 2.9), (4.9, 3.2, 5.1, 9.0)), (8.0, 3.0), RADIUS_M)
+    for n in range(BARRED_AGAIN + 1):
+        planner.bar(gap, float(n), mate=True)
+        plan(planner, (2.0, 3.0), at=float(n))
+    assert planner.route == ()
+    plan(planner, (2.0, 3.0), at=BARRED_AGAIN + MATE_BARRED_S)
+    assert planner.route
