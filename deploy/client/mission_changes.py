@@ -48,8 +48,9 @@ def along(points: Points, walls: Walls) -> Change:
             if any(_distance(point, wall) < mission.radius_m for wall in walls):
                 right = f"must be {mission.radius_m:g} m clear of it"
                 raise Refused(f"goal ({point[0]:g}, {point[1]:g}): in a wall, {right}")
-        if parted((mission.leading.route_m[0], *points), walls, mission.radius_m):
-            x, y = points[-1]
+        missed = parted((mission.leading.route_m[0], *points), walls, mission.radius_m)
+        if missed is not None:
+            x, y = missed
             raise Refused(f"goal ({x:g}, {y:g}): outside of the map or walled off, must be reachable from the route")
         return changed
 

@@ -47,8 +47,14 @@ def _goal(scenario: Scenario) -> Iterator[Mistake]:
     start = f"the start of robot {mission.robots[0]} at ({first.x:.2f}, {first.y:.2f})"
     value = f"... [{goal[0]:g}, {goal[1]:g}]"
     yield from _covered(scenario, goal, f"the goal at ({goal[0]:.2f}, {goal[1]:.2f})")
-    if parted(((first.x, first.y), *route), scenario.world.walls_m, mission.radius_m):
+    missed = None
+    if not any(_in_wall(scenario, place) for place in ((first.x, first.y), goal)):  # of which a line is said already
+        missed = parted(((first.x, first.y), *route), scenario.world.walls_m, mission.radius_m)
+    if missed == goal:
         yield wrong("mission.leading.route_m", value, f"a goal that can be reached, walls part it from {start}")
+    elif missed is not None:
+        where = f"mission.leading.route_m[{route.index(missed)}]"
+        yield wrong(where, list(missed), f"a way-point that can be reached, walls part it from {start}")
     for n, box in enumerate(mission.leading.keepout_m):
         if _within(goal, box):
             yield wrong("mission.leading.route_m", value, f"a goal outside of the keep-out box {list(box)}")
@@ -71,9 +77,14 @@ def _covered(scenario: Scenario, place: Point, whose: str) -> Iterator[Mistake]:
         patch = patch_of(feature)
         if patch.gap_m(*place) < radius_m:
             yield wrong(f"world.{key}", f"at {[patch.x, patch.y]}", right)
-    for n, (x1, y1, x2, y2) in enumerate(scenario.world.walls_m):
-        if to_segment(place, (x1, y1), (x2, y2)) < radius_m:
-            yield wrong(f"world.walls_m[{n}]", [x1, y1, x2, y2], right)
+    for n, wall in enumerate(scenario.world.walls_m):
+        if to_segment(place, wall[:2], wall[2:]) < radius_m:
+            yield wrong(f"world.walls_m[{n}]", list(wall), right)
+
+
+def _in_wall(scenario: Scenario, place: Point) -> bool:
+    radius_m = scenario.mission.radius_m
+    return any(to_segment(place, wall[:2], wall[2:]) < radius_m for wall in scenario.world.walls_m)
 
 
 PLACES = (
