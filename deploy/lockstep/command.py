@@ -13,7 +13,7 @@ from lfa.deploy.lockstep.run import run as lockstep_run
 from lfa.deploy.lockstep.stepping import Pace, pace_of
 from lfa.deploy.own_code import Behavior, Controller, Sensor
 from lfa.deploy.run import launch
-from lfa.deploy.run.command import Run, ScenarioRequest, run_requested
+from lfa.deploy.run.command import Run, request_of, run_requested
 from lfa.deploy.run.finish import Ended
 from lfa.deploy.run.machine_size import fitted
 from lfa.deploy.run.options import (
@@ -64,23 +64,7 @@ def command(
     """Run a scenario as processes; return the exit code. Raises Refused."""
     if not lockstep and (pause or speed is not None or step is not None):
         raise Refused("--speed, --pause and --step: must go with --lockstep, in real time nothing waits for a process")
-    request = ScenarioRequest(
-        scenario=scenario,
-        seed=seed,
-        overrides=overrides,
-        controller=controller,
-        behavior=behavior,
-        sensor=sensor,
-        robots=robots,
-        fault=fault,
-        out=out,
-        map_from=map_from,
-        figures=figures,
-        record=record,
-        junit=junit,
-        verbose=verbose,
-        as_json=as_json,
-    )
+    request = request_of(locals())
     if lockstep:
         return run_requested(request, _in_lockstep(pace_of(speed, pause, step)))
     return run_requested(request, launch.run, fitted)

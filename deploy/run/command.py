@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from msgspec import Struct
 
@@ -39,6 +39,11 @@ class ScenarioRequest(Struct, frozen=True, kw_only=True):
     junit: Path | None
     verbose: bool
     as_json: bool
+
+
+def request_of(options: Mapping[str, Any]) -> ScenarioRequest:
+    """Return the request among the options of a command, which have the names of its fields."""
+    return ScenarioRequest(**{name: options[name] for name in ScenarioRequest.__struct_fields__})
 
 
 def run_requested(request: ScenarioRequest, run: Run, fit: Fit | None = None) -> int:

@@ -12,7 +12,7 @@ from lfa.deploy.campaign.sweep.plan import plan_of
 from lfa.deploy.campaign.sweep.short_form import plan_file
 from lfa.deploy.own_code import Behavior, Controller, Sensor, with_own_code
 from lfa.deploy.run import simulate
-from lfa.deploy.run.command import ScenarioRequest, run_requested
+from lfa.deploy.run.command import request_of, run_requested
 from lfa.deploy.run.options import (
     AsJson,
     Faults,
@@ -56,24 +56,7 @@ def command(
     if seeds is None:
         if jobs != 1 or shard is not None:
             raise Refused("--jobs and --shard: must go with --seeds, for many runs")
-        request = ScenarioRequest(
-            scenario=scenario,
-            seed=seed,
-            overrides=overrides,
-            controller=controller,
-            behavior=behavior,
-            sensor=sensor,
-            robots=robots,
-            fault=fault,
-            out=out,
-            map_from=map_from,
-            figures=figures,
-            record=record,
-            junit=junit,
-            verbose=verbose,
-            as_json=as_json,
-        )
-        return run_requested(request, simulate.run)
+        return run_requested(request_of(locals()), simulate.run)
     if seed is not None or map_from is not None or junit is not None:
         raise Refused(f"--seeds {seeds}: must go without --seed, --map-from and --junit")
     share = WHOLE if shard is None else parse_shard(shard)
