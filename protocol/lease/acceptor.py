@@ -21,7 +21,10 @@ class Bond(Struct, frozen=True):
 
 
 class Acceptor:
+    """Voter of one process: it grants no term below `promised`, and none up to `released`, ever again."""
+
     def __init__(self, floor: Term, grant_s: float, now: float) -> None:
+        """Start at `now` [s] without memory: silent for `T_grant`, while an earlier life may be bound."""
         self.promised = floor
         self.released = Term()
         self.bond: Bond | None = None

@@ -18,6 +18,8 @@ PAUSE_GROWTH = 1.5
 
 
 class Candidate:
+    """One attempt to get a lease: phase 1 until `holder` is set, then phase 2."""
+
     def __init__(self, term: Term, timing: Timing, now: float, forget: tuple[Member, ...] = ()) -> None:
         """Start a candidacy; `forget`: incarnations that an operator declared dead for this attempt (E20)."""
         self.term = term
@@ -84,6 +86,7 @@ class Candidate:
 
     @property
     def fenced_terms(self) -> tuple[Term, ...]:
+        """Terms that gateways have confirmed to refuse, sorted; voters bound under them are free (E3)."""
         return tuple(sorted(grantee.term for grantee in self._fenced if grantee.term != NO_TERM))
 
     def refused(self, src: Member, config: Config, ended: Callable[[Member], bool]) -> bool:

@@ -35,6 +35,8 @@ class BecomeLeader(Struct, frozen=True):
 
 
 class LeaseExtended(Struct, frozen=True):
+    """Notice that a quorum granted `term` anew, until `expiry`, the own monotonic time [s]."""
+
     term: Term
     expiry: float
 

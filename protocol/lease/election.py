@@ -17,6 +17,8 @@ FORGET_GRANTS = 3
 
 
 class Election:
+    """Turn of one process to stand for election, and what the mission lets it do without a quorum."""
+
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float) -> None:
         self.me = me
         self.all_member_ids = all_member_ids(mission)
@@ -49,6 +51,7 @@ class Election:
         return known and robot_id not in config.roster.retired
 
     def rank(self, config: Config, robot_id: int, peers: FailureDetector) -> int:
+        """Return the number of robots that stand before this one (E6)."""
         return rank(config, robot_id, lambda other: not self.may_lead(config, other.id) or peers.is_gone(other))
 
     def after(self, at: float, config: Config, peers: FailureDetector) -> None:
@@ -75,9 +78,11 @@ class Election:
         self._quorum_lost_from = now + self._quorum_loss_s
 
     def forget(self, lost: tuple[Member, ...], now: float) -> None:
+        """Take an operator's declaration that the incarnations `lost` are dead; it ends by itself (E20)."""
         self._forget, self.forget_until = lost, now + FORGET_GRANTS * self._timing.grant_s
 
     def forgotten(self, now: float) -> tuple[Member, ...]:
+        """Return the incarnations that are declared dead at `now` [s]."""
         return self._forget if now < self.forget_until else ()
 
     def without_quorum(

@@ -13,6 +13,8 @@ IDS_MAX = 1024
 
 
 class FailureDetector:
+    """What one process has noticed of all others: their messages, and tokens that appeared or vanished."""
+
     def __init__(self, me: Member, heartbeat_s: float) -> None:
         self._newest: dict[int, int] = {me.id: me.incarnation}
         """Newest incarnation heard, by id."""
@@ -46,6 +48,7 @@ class FailureDetector:
                 self._return(src.id)
 
     def appeared(self, id: int, incarnation: int) -> None:
+        """Record the token of an incarnation; unless it is an earlier one, its id is no longer gone."""
         if self._is_one_too_many(id):
             return
         self._tokens[id] = incarnation
@@ -53,6 +56,7 @@ class FailureDetector:
             self._return(id)
 
     def vanished(self, id: int, incarnation: int, now: float) -> None:
+        """Record at `now` [s] that a token vanished: this incarnation and all earlier ones of its id are gone."""
         if self._is_one_too_many(id):
             return
         if self._tokens.get(id) == incarnation:

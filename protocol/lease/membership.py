@@ -36,6 +36,7 @@ def is_first(config: Config) -> bool:
 
 
 def ids(chain: tuple[Member, ...]) -> tuple[int, ...]:
+    """Return the ids of a chain, in order."""
     return tuple([member.id for member in chain])  # called at every control step: a generator takes twice as long
 
 

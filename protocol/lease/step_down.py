@@ -11,6 +11,8 @@ SLOWEST = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
 
 
 class PendingRelease:
+    """A lease that is given up, from the last command as leader until RELEASE or the transfer proposal is sent."""
+
     def __init__(self, deadman_s: float) -> None:
         self.closing = False
         """True if the process has been asked to end."""
@@ -29,6 +31,7 @@ class PendingRelease:
         return self.commanded_at + self._deadman_s * SLOWEST
 
     def begin(self, term: Term, now: float) -> None:
+        """Give up `term` at `now` [s]."""
         self.unreleased, self.release_at = term, max(now, self.at_rest_at)
 
     def end(self) -> tuple[Term | None, Propose | None]:

@@ -22,6 +22,8 @@ When = Callable[[LeaseMemory, float], float]
 
 
 class Deadline(NamedTuple):
+    """One thing that a process does when its time comes: the event that it fires, and when."""
+
     event: LeaseEvent
     due: When
     """Time [s] from which a tick fires the event, given the memory and the time of the next tick."""

@@ -25,6 +25,8 @@ def gateway_of(robot_id: int) -> str:
 
 
 class LeaseMemory:
+    """All that one process knows of leases: as voter, candidate and leader, of its peers, and what it has to send."""
+
     def __init__(self, me: Member, mission: Mission, timing: Timing, now: float, floor: int) -> None:
         self.me = me
         self.timing = timing
@@ -69,6 +71,7 @@ class LeaseMemory:
     # --- effects -------------------------------------------------------------------------------------------------
 
     def send(self, to: str, body: LeaseBody) -> None:
+        """Collect a message to `to`, an address as in `Send.to`."""
         self.effects.append(Send(to, body))
 
     def refuse(self, src: Member, term: Term, now: float) -> None:

@@ -121,6 +121,24 @@ def test_e36_each_growth_doubles_the_calm_time() -> None:
     assert calms == [CALM_S, 2.0 * CALM_S, 4.0 * CALM_S]
 
 
+def test_e36_a_renewal_that_needs_the_present_lease_begins_the_calm_time_anew() -> None:
+    length = LeaseLength(AUTO, 0.0)
+    length.fit(LONG.act_s / RENEWALS_PER_LEASE, 0.9 * CALM_S)
+    length.fit(0.0, 1.8 * CALM_S)
+    assert length.timing is LONG
+    length.fit(0.0, 1.9 * CALM_S)
+    assert length.timing is MIDDLE
+
+
+def test_e36_a_renewal_that_takes_longer_than_any_lease_bears_asks_for_the_longest() -> None:
+    length = LeaseLength(AUTO, 0.0)
+    length.fit(0.0, CALM_S)
+    length.fit(0.0, 2.0 * CALM_S)
+    assert length.timing is SHORT
+    length.fit(2.0 * LONG.act_s, 2.0 * CALM_S)
+    assert length.timing is LONG
+
+
 def test_e36_a_lease_grows_only_when_a_quorum_has_granted_the_longer_one() -> None:
     holder, at = settled()
     short = holder.next_propose(CONFIG, at)
