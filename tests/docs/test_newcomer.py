@@ -1,4 +1,7 @@
-"""Five questions of a newcomer, answered by following the pages' own links from README.md, two clicks at most."""
+"""Questions of a newcomer, answered by following the pages' own links from README.md, two clicks at most.
+
+Five of them are asked as they stand; where a number or a part is in the question, all others of its kind are asked too.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,12 @@ from tests.test_imports import ROOT
 from tests.test_paper_map import names_of
 
 CLICKS_MAX = 2
+EQUATIONS = range(1, 34)
+NUMBERED = {"E": 36, "I": 16, "L": 7, "S": 6}
+"""How many rules, invariants, bounds and stuck conditions there are, by their letter."""
+ADDED = ("message", "decision", "motion", "rule of the lease", "scenario", "bench", "command", "fault", "sensor")
+LOST = ("a follower dies", "a gateway restarts", "the witness dies", "the router dies", "the operator's machine dies")
+"""What `what happens when` may be asked of, besides the leader."""
 
 
 def reached() -> dict[Path, int]:
@@ -61,11 +70,18 @@ def test_the_first_page_has_a_row_for_the_question(question: str) -> None:
 
 
 def test_where_is_equation_29() -> None:
-    page, text = line_with("(28)-(29)")
+    page, text = line_with("| (28), (29) |")
     assert page.name == "PAPER.md"
     (code, *_) = named(text)
     assert code == (ROOT / "agents" / "formation" / "kinematics.py", "error_rates")
     assert "eq. 28 to 31" in code[0].read_text()
+
+
+@pytest.mark.parametrize("number", EQUATIONS)
+def test_where_is_an_equation(number: int) -> None:
+    page, text = line_with("| (", f"({number})", ".py:")
+    assert page.name == "PAPER.md"
+    assert named(text)
 
 
 def test_which_file_decides_left_or_right() -> None:
@@ -83,6 +99,18 @@ def test_what_happens_when_the_leader_dies() -> None:
     assert all(word in text for word in ("the next in the chain stands", "`T_grant`", "`lfa bench failover`"))
 
 
+@pytest.mark.parametrize("lost", LOST)
+def test_what_happens_when_something_else_is_lost(lost: str) -> None:
+    page, _ = line_with(f"| {lost}")
+    assert page == ROOT / "protocol" / "LEASE.md"
+
+
+@pytest.mark.parametrize("thing", ADDED)
+def test_how_do_i_add_something_else(thing: str) -> None:
+    page, _ = line_with(f"## Add a {thing}")
+    assert page == ROOT / "CONTRIBUTING.md"
+
+
 def test_how_do_i_add_a_sensor() -> None:
     page, _ = line_with("# A sensor of your own")
     assert page == ROOT / "world" / "SCENARIO.md"
@@ -98,3 +126,19 @@ def test_what_does_e15_mean() -> None:
     assert "A vanished token is a liveliness event and proves nothing" in text
     for path in re.findall(r"`(\w+\.py)`", text):
         assert list((ROOT / "protocol" / "lease").rglob(path)), f"{path}, where the rule is said to be"
+
+
+@pytest.mark.parametrize("rule", [f"{letter}{n}" for letter, last in NUMBERED.items() for n in range(1, last + 1)])
+def test_what_does_a_number_mean(rule: str) -> None:
+    page, text = line_with(f"| {rule} |")
+    assert page == ROOT / ("agents/CONTROL.md" if rule.startswith("S") else "protocol/README.md")
+    assert len(text) > len(f"| {rule} | |") + 10
+
+
+@pytest.mark.parametrize("letter", NUMBERED)
+def test_every_number_that_the_code_cites_is_asked_for(letter: str) -> None:
+    from tests.test_citations import files
+
+    words = re.compile(rf"(?<![\w.])(?:rule |\(){letter}(\d+)\b")
+    cited = {int(number) for path in files(".py") for number in words.findall(path.read_text())}
+    assert max(cited) <= NUMBERED[letter]

@@ -11,11 +11,29 @@ from pathlib import Path
 
 import pytest
 
+from tests.docs.test_newcomer import ADDED, EQUATIONS, LOST
 from tests.test_citations import files
 from tests.test_imports import PACKAGES, ROOT
 
 SITE = ROOT / os.environ.get("LFA_SITE", "build/no-site")
 pytestmark = pytest.mark.skipif(not SITE.is_dir(), reason="make docs builds the site and runs this")
+
+RULES = {
+    rule: re.sub(r"[`*]", "", text).strip()
+    for page in ("protocol/README.md", "agents/CONTROL.md")
+    for rule, text in re.findall(r"^\| ([EILS]\d+) \| ([^|]{,40})", (ROOT / page).read_text(), re.MULTILINE)
+}
+"""How the text of each numbered rule, invariant, bound and stuck condition begins, as the site shows it."""
+
+WORDS = {
+    word: re.sub(r"[`*]", "", text).strip()
+    for word, text in re.findall(
+        r"^\| ([a-z ]+) \| ([^|]{,30})",
+        (ROOT / "protocol/README.md").read_text().partition("| word |")[2],
+        re.MULTILINE,
+    )
+}
+"""How the glossary explains each word."""
 
 #   question                                      words for the search       what the best results must say
 QUESTIONS = (
@@ -24,8 +42,15 @@ QUESTIONS = (
     ("what happens when the leader dies",         "leader dies",             "next in the chain"),
     ("how do I add a sensor",                     "add a sensor",            "protocol/topics.py"),
     ("what does E15 mean",                        "E15",                     "proves nothing"),
+    *((f"where is equation ({n})",                f"equation ({n})",         ".py:") for n in EQUATIONS),
+    *((f"how do I add a {thing}",                 f"add a {thing}",          f"Add a {thing}") for thing in ADDED),
+    *((f"what happens when {lost}",               lost,                      lost) for lost in LOST),
+    *((f"what does {rule} say",                   rule,                      text) for rule, text in RULES.items()),
+    *((f"what is a {word}",                       word,                      text) for word, text in WORDS.items()),
 )  # fmt: skip
 RESULTS = 5
+TITLE = 10.0
+"""How much more a word in a title counts than one in a text; the site's own search counts it a thousand times."""
 
 
 @cache
@@ -45,7 +70,8 @@ def results(words: str) -> list[tuple[str, str, str, float]]:
         if not all(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", f"{title} {text}") for word in wanted):
             return 0.0
         share = sum(text.count(word) for word in wanted) / (10.0 + len(text.split()))
-        return doc[3] * (share + sum(word in title for word in wanted) + (words.lower() in text))
+        named = sum(title.split().count(word) for word in wanted) / (1.0 + len(title.split()))
+        return doc[3] * (share + TITLE * named + (words.lower() in text))
 
     return sorted((doc for doc in index() if rank(doc) > 0.0), key=rank, reverse=True)[:RESULTS]
 
