@@ -223,9 +223,13 @@ class _Launch:
                     self._publish_event("died", robot=robot_id, how=how)
         if len(self._progress.gone) == len(self._robots) and not self._faults.pending:
             raise _Aborted("no agent is left")
-        starts = not self._time.known or self._processes.restarting
+        # While the last of many robots start, a busy machine keeps the world waiting for seconds.
+        starts = not self._time.known or self._processes.restarting or not self._all_heard()
         if clock.now() > self._heard_at + (START_S_MAX if starts else SILENCE_S_MAX):
             raise _Aborted("nothing is heard of the world")
+
+    def _all_heard(self) -> bool:
+        return all(robot_name(robot) in self._state.status for robot in self._robots)
 
     def _revives(self, name: str, view: Progress) -> bool:
         """Return True while a failed process is restarted by the scenario's policy."""

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from lfa.protocol.mission import Mission
+from lfa.protocol.mission import Mission, Profile
 from lfa.protocol.output import write_line
 from lfa.world.description.load import Scenario
 
@@ -22,9 +22,13 @@ ROBOT_CORES, STEP_CORES = 0.018, 0.0019
 """Share of a core for each robot, and for each of its control steps a second; with its part of world, router and
 recorder."""
 USUAL_SHARE, PATIENT_SHARE = 0.75, 0.95
-"""Share of the machine that a run may take: the rest is what keeps processes in time. The profile `wifi` bears three
-times the lateness of the others."""
-SLOW_HZ, SLOW_PROFILE, FEW_BEAMS = 20.0, "wifi", 90
+"""Share of the machine that a run may take: the rest is what keeps processes in time. The profiles `wifi` and `auto`
+bear three times the lateness of the others, or more."""
+PATIENT = frozenset({"wifi", "auto"})
+SLOW_HZ, FEW_BEAMS = 20.0, 90
+SLOW_PROFILE: Profile = "auto"
+"""Profile of a team that nearly fills its machine: it bears twice what `wifi` does while all start at once, and follows
+a lost leader sooner once its processes keep time, where `wifi` waits for 1 s whatever happens."""
 _QUOTA = Path("/sys/fs/cgroup/cpu.max")
 
 
@@ -40,7 +44,7 @@ def cores() -> float:
 
 def carried(mission: Mission, on_cores: float) -> int:
     """Return how many robots with the rates of `mission` a machine with so many cores carries; at least 1."""
-    share = PATIENT_SHARE if mission.profile == SLOW_PROFILE else USUAL_SHARE
+    share = PATIENT_SHARE if mission.profile in PATIENT else USUAL_SHARE
     each = ROBOT_CORES + STEP_CORES * mission.control_hz
     return max(1, int((share * on_cores - TEAM_CORES) / each))
 

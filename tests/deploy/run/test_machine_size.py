@@ -24,7 +24,7 @@ def test_a_team_that_the_machine_carries_runs_as_written(robots: int) -> None:
 @pytest.mark.parametrize("robots", [16, 30])
 def test_a_larger_team_runs_at_lower_rates_and_the_line_says_how_many_fit(robots: int) -> None:
     fit, text = fit_to(team(robots), NOTHING, 2.0)
-    assert (fit.mission.control_hz, fit.mission.profile, fit.world.lidar.beams) == (SLOW_HZ, "wifi", FEW_BEAMS)
+    assert (fit.mission.control_hz, fit.mission.profile, fit.world.lidar.beams) == (SLOW_HZ, "auto", FEW_BEAMS)
     assert fit.mission.robots == team(robots).mission.robots
     assert "carries 12 robots at 50 Hz, 32 with control at 20 Hz" in text
     assert f"{robots} robots run so" in text
@@ -46,8 +46,9 @@ def test_more_robots_than_the_machine_carries_at_any_rate_are_told_of() -> None:
     assert "60 robots will be late" in text
 
 
-def test_rates_that_are_low_already_stay_as_they_are() -> None:
-    scenario = team(30, "mission.control_hz=20", "mission.profile=wifi", "world.lidar.beams=16")
+@pytest.mark.parametrize("profile", ["wifi", "auto"])
+def test_rates_that_are_low_already_stay_as_they_are(profile: str) -> None:
+    scenario = team(30, "mission.control_hz=20", f"mission.profile={profile}", "world.lidar.beams=16")
     assert fit_to(scenario, NOTHING, 2.0) == (scenario, "")
 
 
