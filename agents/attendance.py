@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfa.agents.team_state import ROW_S_MAX, TeamState
+from lfa.agents.team_state import TeamState
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.lease.membership import team_of
 from lfa.protocol.messages.consensus import Role
@@ -10,8 +10,8 @@ from lfa.protocol.names import robot_name
 
 HELLO_S_MAX = 3.0
 """Age [s] of a HELLO beyond which its sender is not heard: outside of the chain it is sent eight times a second."""
-ROW_S_LACKING = 2.0 * ROW_S_MAX
-"""Age [s] of a table row beyond which its sender is not heard, in teams of any size."""
+LACKING_SHARE = 2.0
+"""Age of a table row beyond which its sender is not heard, in units of the age up to which it counts."""
 OUTSIDE_S = 2.0
 """Time [s] outside of the chain after which a robot is told of: joining it takes less."""
 UNHEARD = "no HELLO is heard of it"
@@ -46,7 +46,8 @@ class Attendance:
         self.lacks_messages = unheard or self._misses_rows(chain, team, now)
 
     def _misses_rows(self, chain: tuple[int, ...], team: TeamState, now: float) -> bool:
-        return any(team.row_age(robot, now) > ROW_S_LACKING for robot in chain if robot != self._id)
+        lacking_s = LACKING_SHARE * team.report_s_max
+        return any(team.row_age(robot, now) > lacking_s for robot in chain if robot != self._id)
 
     def text(self) -> str:
         """Return who is outside and why, in words; empty if nobody is."""
@@ -55,7 +56,7 @@ class Attendance:
 
 def _is_there(robot: int, lease: Lease, team: TeamState, now: float) -> bool:
     """Return True if anything shows that `robot` runs: its token, its table row, its HELLO."""
-    return is_heard(robot, lease, now) or team.row_age(robot, now) <= ROW_S_MAX
+    return is_heard(robot, lease, now) or team.row_age(robot, now) <= team.report_s_max
 
 
 def is_heard(robot: int, lease: Lease, now: float) -> bool:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
@@ -104,7 +106,7 @@ class Navigator:
     def change(self, mission: Mission, route: int, now: float) -> None:
         """Go on with a mission that an operator has changed; `route`: version of the order that gave its route."""
         new_route = route != self._team.route
-        self._mission = mission
+        self._mission = mission = replace(mission, control_hz=self._mission.control_hz)
         self.leading = Leadership(mission, self.formation, self._team)
         self._begin_roles(mission)
         if new_route:
@@ -114,6 +116,12 @@ class Navigator:
             # On a new route nothing has been driven yet, whatever the odometer says.
             self.leading.begin(known[0], 0.0 if new_route else self.estimator.odometer_m, now)
             self._stuck_monitor.begin(leading=True)
+
+    def pace(self, control_hz: float) -> None:
+        """Go on with `drive` called `control_hz` [Hz] times a second."""
+        self._mission = replace(self._mission, control_hz=control_hz)
+        self._detour.period_s = self._mission.control_period_s
+        self.leading.pace(self._mission)
 
     @property
     def pose_lost(self) -> bool:

@@ -17,6 +17,7 @@ from lfa.agents.chain_place import ChainPlace
 from lfa.agents.command_publisher import CommandPublisher
 from lfa.agents.input_watch import InputWatch, RefusalWatch
 from lfa.agents.leading.formation_commands import FormationCommands
+from lfa.agents.load.control_rate import ControlRate
 from lfa.agents.navigator import Navigator
 from lfa.agents.orders.roster_orders import JOIN, RETIRE, RosterOrders
 from lfa.agents.orders.roster_orders import QUESTION as ROSTER
@@ -25,7 +26,7 @@ from lfa.agents.orders.team_orders import QUESTION, TeamOrders
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
 from lfa.agents.team_messages import TeamMessages
-from lfa.agents.team_state import TeamState, sensors_s_max
+from lfa.agents.team_state import TeamState, report_s_max, sensors_s_max
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL
@@ -78,7 +79,7 @@ class RobotCore:
         """True once an exit was requested, or others know a later incarnation (E23)."""
         self._id = robot_id
         self._outbox = outbox
-        self._team = TeamState(sensors_s_max(mission))
+        self._team = TeamState(sensors_s_max(mission), report_s_max(len(mission.robots)))
         self.navigator = Navigator(robot_id, mission, self._team)
         me = Member(robot_id, outbox.incarnation)
         timing = timing_for(mission)
@@ -95,6 +96,7 @@ class RobotCore:
         self._stuck_policy = StuckPolicy(robot_id, mission, outbox, self._team)
         self._input_watch = InputWatch(outbox, self.navigator, self.lease.grant_s)
         self._refusal_watch = RefusalWatch(outbox)
+        self._control_rate = ControlRate(mission, timing.deadman_s)
         self._period_s = mission.control_period_s
         self._next_control = now
         self._arrived = False
@@ -168,11 +170,13 @@ class RobotCore:
             case OrderNote():
                 self._take_order(message, now)
             case Vitals():
+                self._fit_rates(message.loop_lag_s, now)
                 self._attendance.update(lease, self._team, now)
                 self._refusal_watch.update(message.refused, lease.term, now)
                 stopped = self._stop_listener.text() if lease.chain else ""
                 held = stopped or self._roster_orders.text() or self._attendance.text()
                 held = held or self._refusal_watch.text(now)
+                held = ", ".join(filter(None, (held, self._control_rate.text())))
                 gateway = self._input_watch.text()
                 self._reports.status(message, navigator, self._team, lease, self._role(), held, gateway, now)
             case Stop():
@@ -357,6 +361,15 @@ class RobotCore:
         if role is Role.LEADER and not self._arrived and navigator.arrived(pose, command):
             self._arrived = True
             self._event("goal", now, {"x": round(pose.x, 4), "y": round(pose.y, 4)}, lease.term)
+
+    def _fit_rates(self, lag_s: float, now: float) -> None:
+        """Step less often, and publish fewer rows, while the machine keeps this robot late by `lag_s` [s] and more."""
+        rate = self._control_rate
+        if rate.update(lag_s, now):
+            self._period_s, self._reports.table_s = 1.0 / rate.control_hz, rate.table_s
+            self.navigator.pace(rate.control_hz)
+            rates = {"control_hz": rate.control_hz, "table_hz": round(1.0 / rate.table_s, 3)}
+            self._event("rate", now, {"late": rate.is_low, **rates})
 
     def _control_without_pose(self, role: Role, now: float) -> None:
         """Run one control step of a robot that has no pose: it brakes, and tells its team that it has none."""

@@ -21,6 +21,11 @@ SENSORS_PERIODS_MIN = 3
 """Least number of control periods after which the own odometry counts as lost: as many as the deadman's."""
 ROW_S_MIN = 0.05
 ROW_S_MAX, SENSORS_S_MAX = TOPIC["table"].timeout_s or 0.0, TOPIC["sensors"].timeout_s or 0.0
+TABLE_S = 0.5
+TABLE_ROBOTS_FULL_RATE = 16
+"""Number of robots up to which table rows keep their full rate. Larger teams publish their rows less often, because the
+table's traffic grows with the square of their number."""
+ROW_SPARE_S = 0.5 * ROW_S_MAX
 GOES_ON_S = 0.6
 """Time [s] after its last row for which a robot's motion is extrapolated."""
 ROUNDING_M = 1e-6
@@ -31,7 +36,9 @@ AROUND_M = 2.0
 class TeamState:
     """Latest values, each fresh or stale by the topic table; the own sensors are fresh for `sensors_s_max` [s]."""
 
-    def __init__(self, sensors_s_max: float = SENSORS_S_MAX) -> None:
+    def __init__(self, sensors_s_max: float = SENSORS_S_MAX, report_s_max: float = ROW_S_MAX) -> None:
+        """`report_s_max`: age [s] up to which it counts what a row says besides its place."""
+        self.report_s_max = report_s_max
         self._sensors_s_max = sensors_s_max
         self.sensors: Sensors | None = None
         self.sensors_at = -1.0
@@ -146,21 +153,34 @@ class TeamState:
     def stuck(self, robot: int, now: float) -> bool:
         """Return whether `robot` reports that it is stuck; a stale report does not count."""
         known = self._table.get(robot)
-        return known is not None and known[0].stuck and now - known[1] <= ROW_S_MAX
+        return known is not None and known[0].stuck and now - known[1] <= self.report_s_max
 
     def placeless(self, robot: int, now: float) -> bool:
         """Return whether `robot` reports that it has no pose; a stale report does not count."""
         known = self._table.get(robot)
-        return known is not None and not known[0].placed and now - known[1] <= ROW_S_MAX
+        return known is not None and not known[0].placed and now - known[1] <= self.report_s_max
 
     def can_lead(self, robot: int, now: float) -> bool:
         """Return whether `robot` reports a pose, and is not stuck."""
-        return self.pose_of(robot, now) is not None and not self.stuck(robot, now)
+        known = self._table.get(robot)
+        return known is not None and known[0].placed and not known[0].stuck and now - known[1] <= self.report_s_max
 
     def delays(self, robots: tuple[int, ...], now: float) -> tuple[Delay, ...]:
         """Return the least (receive - send) of these robots' rows, for their half of a round trip (control.md 3.3)."""
         clocks = [(robot, self._clocks.get(robot)) for robot in robots]
         return tuple(Delay(robot, clock.least(now)) for robot, clock in clocks if clock is not None and clock.known)
+
+
+def table_s(robots: int) -> float:
+    """Return the time [s] between two rows of one robot in a team of that size."""
+    return TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
+
+
+def report_s_max(robots: int) -> float:
+    """Return the age [s] up to which a row counts in a team of that size, but for its place: until well after the next
+    one is due. A place that old is another one; but a team of 200 would count as unheard between its rows.
+    """
+    return max(ROW_S_MAX, table_s(robots) + ROW_SPARE_S)
 
 
 def sensors_s_max(mission: Mission) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Decision
+from lfa.agents.load.lateness import Lateness
 from lfa.agents.navigator import Navigator
-from lfa.agents.team_state import TeamState
+from lfa.agents.team_state import TeamState, table_s
 from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.lease.machine.lease import Lease
 from lfa.protocol.messages.consensus import NO_TERM, Role, Term
@@ -32,39 +32,7 @@ TRACKING_EVERY = 2
 PLAN_EVERY = 10
 ROUTE_POINTS_MAX = 200
 OBSTACLE_S = 0.5
-TABLE_S = 0.5
-TABLE_ROBOTS_FULL_RATE = 16
-"""Number of robots up to which table rows keep their full rate. Larger teams publish their rows less often, because the
-table's traffic grows with the square of their number."""
 FAR_M = 99.0
-LATE_SECONDS = 3
-"""Number of seconds in a row in each of which the loop must have been late for a robot to say so: a single pause of the
-machine is no overload."""
-
-
-class Lateness:
-    """Whether the own loop keeps being so late that commands grow too old: its machine runs more than it can."""
-
-    def __init__(self, late_s: float) -> None:
-        """`late_s`: lateness [s] that is too much."""
-        self._late_s = late_s
-        self._lags_s: deque[float] = deque(maxlen=LATE_SECONDS)
-        self.worst_s = 0.0
-        """Largest lateness [s] of the last `LATE_SECONDS` seconds, while the loop is late; 0 otherwise."""
-
-    def update(self, lag_s: float) -> bool:
-        """Take the largest lateness [s] of one second; return True if the loop has become late, or no longer is."""
-        was_late = self.worst_s > 0.0
-        self._lags_s.append(lag_s)
-        if len(self._lags_s) == LATE_SECONDS and min(self._lags_s) > self._late_s:
-            self.worst_s = max(self._lags_s)
-        elif max(self._lags_s) <= self._late_s:
-            self.worst_s = 0.0
-        return was_late != (self.worst_s > 0.0)
-
-    def text(self) -> str:
-        """Return how late the loop is, in words; empty while it keeps time."""
-        return f"late: by up to {1000.0 * self.worst_s:.0f} ms, the machine is too busy" if self.worst_s > 0.0 else ""
 
 
 class Reports:
@@ -73,7 +41,8 @@ class Reports:
     def __init__(self, outbox: Outbox, robots: int, late_s: float) -> None:
         """`robots`: size of the team; `late_s`: lateness [s] of the own loop that is too much."""
         self._outbox = outbox
-        self._table_s = TABLE_S * max(1.0, robots / TABLE_ROBOTS_FULL_RATE)
+        self.table_s = table_s(robots)
+        """Time [s] between two rows of the table."""
         self._next_table = 0.0
         self._next_obstacle = 0.0
         self._steps = 0
@@ -120,7 +89,7 @@ class Reports:
     ) -> None:
         if now < self._next_table:
             return
-        self._next_table = now + self._table_s
+        self._next_table = now + self.table_s
         at, odometer_m, stuck = pose or Pose2D(), navigator.estimator.odometer_m, navigator.stuck is not None
         header, delays = self._outbox.header("table", now), team.delays(near, now)
         row = TableRow(

@@ -33,7 +33,7 @@ ORDER = (
     "agents/config", "agents/formation", "agents/localization", "agents/perception", "agents/team_state",
     "agents/avoidance", "agents/recovery", "agents/exploration", "agents/following", "agents/controllers",
     "agents/leading", "agents/behaviors", "agents/navigator", "agents/stuck_policy", "agents/team_messages",
-    "agents/telemetry", "agents/attendance", "agents/input_watch", "agents/chain_place", "agents/orders",
+    "agents/load", "agents/telemetry", "agents/attendance", "agents/input_watch", "agents/chain_place", "agents/orders",
     "agents/command_publisher", "agents/subscriptions", "agents/robot_core", "agents/agent", "agents/cli",
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",

@@ -59,6 +59,11 @@ class _SimulatedNode:
         self.paused = False
         self.links = Links()
         self.waiting: list[tuple[str, Message | Local, bytes]] = []
+        self.lag_s = 0.0
+        """Largest lateness [s] of a tick since the last vital signs: that of one which was due while it was paused."""
+        self.paused_at = 0.0
+        self.owes_vitals = False
+        """True if vital signs were due while it was paused: they follow when it goes on."""
         self.stop_by: float | None = None
 
 
@@ -129,12 +134,15 @@ class Simulator(VirtualTime):
 
     def pause(self, name: str) -> None:
         """Simulate SIGSTOP: the process does nothing, and its messages are queued."""
-        self._processes[name].paused = True
+        process = self._processes[name]
+        process.paused, process.paused_at = True, self.now
 
     def resume(self, name: str, *, shuffled: bool = False) -> None:
         """Simulate SIGCONT: deliver the queued messages at once; of state topics only the newest, as a real inbox."""
         process = self._processes[name]
         process.paused = False
+        due_at = max(process.clock.true(process.node.next_deadline()), process.paused_at)
+        process.lag_s = max(process.lag_s, self.now - due_at)
         waiting, process.waiting = process.waiting, []
         if shuffled:
             self._random.shuffle(waiting)
@@ -145,6 +153,8 @@ class Simulator(VirtualTime):
                 continue
             self._give(process, key, message, payload)
         self._tick(process, process.node.next_deadline())
+        if process.owes_vitals:
+            self._tell_vitals(process)
 
     def terminate(self, name: str) -> None:
         """Simulate SIGTERM: the node gets Stop and may send for up to `FINISH_S_MAX` before it leaves."""
@@ -263,9 +273,14 @@ class Simulator(VirtualTime):
 
     def _vitals(self, process: _SimulatedNode) -> None:
         if not process.gone:
+            process.owes_vitals = process.paused
             if not process.paused:
-                self._give(process, "", Vitals(0.0, 0, process.host.undecodable, 0.0, 0.0), b"")
+                self._tell_vitals(process)
             self.at(self.now + VITALS_S, self._vitals, process)
+
+    def _tell_vitals(self, process: _SimulatedNode) -> None:
+        lag_s, process.lag_s, process.owes_vitals = process.lag_s, 0.0, False
+        self._give(process, "", Vitals(lag_s, 0, process.host.undecodable, 0.0, 0.0), b"")
 
     # --- between nodes ------------------------------------------------------------------------------------------
 

@@ -64,7 +64,7 @@ class Detour:
         """Create a detour; `steer` is called each `period_s`."""
         self._radius_m = radius_m
         self._limits = limits
-        self._period_s = period_s
+        self.period_s = period_s
         self.omega_max_radps = limits.omega_max_radps
         """Maximum turn rate [rad/s]; a leader's is lower than its drive allows, since its followers' slots swing with
         it."""
@@ -160,7 +160,7 @@ class Detour:
             case Action.CREEP:
                 bearing = 0.0
                 twist = Twist(CREEP_MPS, 0.0) if free_m > CREEP_FREE_M else STILL
-                self._crept_s += self._period_s
+                self._crept_s += self.period_s
             case _:
                 action = Action.BLOCKED
         if action is Action.BLOCKED:

@@ -109,6 +109,13 @@ class Leadership:
         """True while the leader stands until its team catches up."""
         return self._waiting_since is not None and not self.waited_out
 
+    def pace(self, mission: Mission) -> None:
+        """Go on at the control rate of `mission`, which differs in nothing else."""
+        self._mission = mission
+        self.lead.period_s = mission.control_period_s
+        if self._way is not None:
+            self._way.lead.period_s = mission.control_period_s
+
     def begin(self, pose: Pose2D, driven_m: float, now: float) -> None:
         """Start leading at `pose`, from the progress that the team has made; `driven_m` is the own odometer."""
         self._waiting_since, self.waited_out = None, False

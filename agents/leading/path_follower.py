@@ -45,7 +45,7 @@ class PathFollower(RouteTracker):
         super().__init__(leading, radius_m)
         self.slots_swing = slots_swing
         self._limits = limits
-        self._period_s = period_s
+        self.period_s = period_s
         self._straight_mps, self._ramp_mps = 0.0, 0.0
         """Speeds [m/s] that the last step allowed straight ahead, and by the acceleration."""
         self._look_ahead_m = PLANNED_LOOK_AHEAD_M if self._planned else LOOK_AHEAD_M
@@ -97,7 +97,7 @@ class PathFollower(RouteTracker):
         )
         # The acceleration's limit is last: a share of it would be taken again in each following step.
         self._straight_mps = v
-        self._ramp_mps = abs(twist.linear_x) + self._leading.acceleration_mps2 * self._period_s
+        self._ramp_mps = abs(twist.linear_x) + self._leading.acceleration_mps2 * self.period_s
         v = min(_share(bearing) * v if self._planned else v, self._ramp_mps)
         if ends and near_end and abs(bearing) > pi / 2 and straight < 2.0 * self._leading.goal_tolerance_m:
             return Twist(-min(v, 0.1), 0.0) if abs(bearing) > 0.8 * pi else self._turn(bearing, slots)

@@ -90,8 +90,14 @@ def overload(events: Sequence[Line]) -> Overload | None:
         if lag_s > 0.0 and isinstance(line["robot"], int):
             name = robot_name(line["robot"])
             late_s[name] = max(late_s.get(name, 0.0), lag_s)
-    found = stood_still_s > STILL_S_MAX or late_s
-    return Overload(stood_still_s=round(stood_still_s, 3), late_s=late_s) if found else None
+    slow_hz: dict[str, float] = {}
+    for line in event_log.of_kind(events, "rate"):
+        hz = _number(line.get("control_hz"))
+        if line.get("late") is True and hz > 0.0 and isinstance(line["robot"], int):
+            name = robot_name(line["robot"])
+            slow_hz[name] = min(slow_hz.get(name, hz), hz)
+    found = stood_still_s > STILL_S_MAX or late_s or slow_hz
+    return Overload(stood_still_s=round(stood_still_s, 3), late_s=late_s, slow_hz=slow_hz) if found else None
 
 
 def _number(said: object) -> float:

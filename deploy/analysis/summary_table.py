@@ -67,7 +67,12 @@ def _overloaded(overload: Overload) -> str:
     signs = [f"the world stood still for {overload.stood_still_s:.2f} s"] if overload.stood_still_s > 0.0 else []
     if overload.late_s:
         worst = max(overload.late_s, key=overload.late_s.__getitem__)
-        signs.append(f"{len(overload.late_s)} robots were late, {worst} by {overload.late_s[worst]:.2f} s")
+        who = "1 robot was" if len(overload.late_s) == 1 else f"{len(overload.late_s)} robots were"
+        signs.append(f"{who} late, {worst} by {overload.late_s[worst]:.2f} s")
+    if overload.slow_hz:
+        slowest = min(overload.slow_hz, key=overload.slow_hz.__getitem__)
+        who = "1 robot" if len(overload.slow_hz) == 1 else f"{len(overload.slow_hz)} robots"
+        signs.append(f"{who} stepped less often, {slowest} at {overload.slow_hz[slowest]:.3g} Hz")
     return f"this machine did not keep up: {'; '.join(signs)}"
 
 

@@ -31,7 +31,7 @@ TF_APART_NS = TF_NS * 3 // 4
 """Least time [ns] between two messages of transforms, should odometry come faster than 50 Hz."""
 OBSTACLES_MAX = 64
 ROBOTS_MAX = 256
-WARNINGS = frozenset({"contact", "stuck", "slowed", "late", "refused", "input", "left_out", "fault"})
+WARNINGS = frozenset({"contact", "stuck", "slowed", "late", "rate", "refused", "input", "left_out", "fault"})
 ERRORS = frozenset({"failed", "died"})
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from lfa.agents.attendance import OUTSIDE_S, ROW_S_LACKING, UNHEARD, Attendance
-from lfa.agents.team_state import TeamState
+from lfa.agents.attendance import LACKING_SHARE, OUTSIDE_S, UNHEARD, Attendance
+from lfa.agents.team_state import ROW_S_MAX, TeamState, report_s_max, table_s
 from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 from lfa.deploy.fuzz.schedules import FAIR, Schedule
 from lfa.protocol.messages.consensus import Role
@@ -68,5 +68,23 @@ def test_e27_a_robot_that_hears_no_row_of_its_chain_lacks_messages(team: AgentSi
     _rows(1)(state, now)
     attendance.update(team.lease_of(2), state, now)
     assert not attendance.lacks_messages
-    attendance.update(team.lease_of(2), state, now + ROW_S_LACKING + 0.1)
+    attendance.update(team.lease_of(2), state, now + LACKING_SHARE * state.report_s_max + 0.1)
     assert attendance.lacks_messages
+
+
+@pytest.mark.parametrize("robots", [16, 96, 200, 1000])
+def test_e27_no_robot_of_a_large_team_lacks_messages_between_two_rows(team: AgentSimulation, robots: int) -> None:
+    attendance, state = Attendance(2, (1, 2, 3)), TeamState(report_s_max=report_s_max(robots))
+    now = team.processes[2].clock.local(team.now)
+    _rows(1)(state, now)
+    attendance.update(team.lease_of(2), state, now + table_s(robots) + 1.0)
+    assert not attendance.lacks_messages
+
+
+@pytest.mark.parametrize("robots", [16, 200, 1000])
+def test_what_a_row_says_counts_until_the_next_one_is_due_and_its_place_for_three_seconds(robots: int) -> None:
+    state = TeamState(report_s_max=report_s_max(robots))
+    _rows(2)(state, 10.0)
+    due_at = 10.0 + table_s(robots)
+    assert state.can_lead(2, due_at + 1.0)
+    assert state.pose_of(2, 10.0 + 1.1 * ROW_S_MAX) is None

@@ -11,6 +11,7 @@ import pytest
 
 from lfa.deploy.analysis.summarize import LEFT_BEHIND_M, _left_behind, _robot, overload, summarize, summary_of
 from lfa.deploy.analysis.summary import RobotSummary, Summary
+from lfa.deploy.analysis.summary_table import text
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.deploy.recording.outcome import Verdict
 from lfa.deploy.recording.run_folder import About
@@ -265,3 +266,26 @@ def test_a_machine_falls_behind_by_standing_still_alone_or_by_late_robots_alone(
     assert late is not None and (late.stood_still_s, late.late_s) == (0.0, {"robot2": 0.2})
     assert stood is not None and (stood.stood_still_s, stood.late_s) == (5.123, {})
     assert overload([line("late", lag_s=0.2, robot="world"), line("late", lag_s=0.0)]) is None
+
+
+def test_who_stepped_less_often_is_summed_up_by_its_lowest_rate() -> None:
+    events = [
+        line("rate", late=True, control_hz=25.0),
+        line("rate", late=True, control_hz=12.5),
+        line("rate", late=False, control_hz=50.0),
+        line("rate", late=True, control_hz="none"),
+    ]
+    found = overload(events)
+    assert found is not None and found.slow_hz == {"robot2": 12.5}
+    assert overload([line("rate", late=False, control_hz=50.0)]) is None
+
+
+def test_a_machine_that_does_not_keep_up_is_one_line_of_the_end_and_no_failure() -> None:
+    events = [line("late", lag_s=0.2), line("slowed", stood_still_s=1.0), line("rate", late=True, control_hz=12.5)]
+    summary = _summed(_chain(1, 2, 3, number=1), *events)
+    [told] = [row for row in text(summary, None).splitlines() if "did not keep up" in row]
+    assert told == (
+        "  this machine did not keep up: the world stood still for 1.00 s; 1 robot was late, robot2 by 0.20 s; "
+        "1 robot stepped less often, robot2 at 12.5 Hz"
+    )
+    assert summary.outcome == "goal_reached" and summary.exit_code == 0
