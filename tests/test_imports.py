@@ -48,7 +48,7 @@ ORDER = (
     "deploy/analysis/causes", "deploy/metrics", "deploy/operate", "deploy/ros", "deploy/ros/bridge",
     "deploy/view/picture", "deploy/view/figures", "deploy/view/report", "deploy/view/rerun", "deploy/view/terminal",
     "deploy/robot", "deploy/run", "deploy/lockstep", "deploy/learn", "deploy/simulate", "deploy/examples",
-    "deploy/fuzz", "deploy/fuzz/search", "deploy/fleet/plan", "deploy/config",
+    "deploy/fuzz", "deploy/fuzz/fleet_stop", "deploy/fuzz/search", "deploy/fleet/plan", "deploy/config",
     "deploy/fleet/security", "deploy/fleet/engine", "deploy/fleet/host", "deploy/fleet/remote", "deploy/fleet/export",
     "deploy/fleet", "deploy/web", "deploy/bench/harness",
     "deploy/campaign/sweep", "deploy/campaign/merge", "deploy/campaign/engines", "deploy/campaign/commands",

@@ -17,20 +17,20 @@ from lfa.deploy.analysis.verification.liveness import AFTER_FAULTS
 from lfa.deploy.analysis.verification.safety import SAFETY
 from lfa.deploy.analysis.verification.words_kept import WORDS_KEPT
 from lfa.deploy.client.stop_call import StopOutcome
-from lfa.deploy.fuzz.held_messages import MessageHolder
 from lfa.deploy.fuzz.lease_processes import Process
 from lfa.deploy.fuzz.lease_simulation import LeaseSimulation
+from lfa.deploy.fuzz.link_faults import LinkFaults, target_of
 from lfa.deploy.fuzz.network import Trace
 from lfa.deploy.fuzz.roster_calls import RosterCalls
-from lfa.deploy.fuzz.schedules import LEADER, Schedule, ScheduledFault
+from lfa.deploy.fuzz.schedules import FIRST_AT_S, LEADER, Schedule, ScheduledFault
 from lfa.deploy.fuzz.stops import StopQuestions, StopTraffic
 from lfa.deploy.fuzz.tricks import Tricks
 from lfa.protocol.lease.membership import team_of
 from lfa.protocol.lease.quorum import is_quorum
-from lfa.protocol.messages.consensus import Member
+from lfa.protocol.messages.consensus import LeaseBody, Member
 from lfa.protocol.mission import Mission
 from lfa.protocol.names import WITNESS_ID
-from lfa.protocol.transport.link_model import Radio
+from lfa.world.virtual_time import VirtualTime
 
 if TYPE_CHECKING:
     from lfa.deploy.fuzz.agent_processes import AgentProcess
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
 Simulation = Union["LeaseSimulation", "AgentSimulation"]
 """Simulation that executes a schedule: leases only, or complete agents."""
-RADIO_FIELDS = {"loss": "loss", "burst": "loss", "duplicate": "duplication", "tail": "tail", "reorder": "reorder"}
-"""Field of the link conditions that each kind of fault sets."""
 STEP_S = 0.001
 """Time [s] that a process which lags runs before it waits again: for its tick, too."""
 EXIT_S = 0.3
@@ -54,11 +52,28 @@ class Played(Struct):
     counts: Counter[str]
     """Number of faults that took effect, by kind."""
     elections: int
-    simulation: Simulation
+    simulation: Simulation | VirtualTime
     stops: list[tuple[float, float, StopOutcome]]
     """Results of the operators' calls that have ended, with the times [s] of their begin and end."""
     broken: BrokenRule | None = None
     """Rule that the first violation to show one shows to be broken, with its chain of causes; None: none does."""
+
+
+class MessageHolder:
+    """Filter of a network: counts the messages of leases from the first fault on, and disturbs those of a schedule."""
+
+    def __init__(self, network: VirtualTime, schedule: Schedule) -> None:
+        self._network = network
+        self._from_s = schedule.faults[0].at if schedule.faults else FIRST_AT_S
+        self._held = {held.number: held.by_s for held in schedule.held}
+        self._number = -1
+
+    def __call__(self, _src: int, _to: int, _body: LeaseBody) -> float | None:
+        """Return how much longer [s] the next message takes; None: it is lost."""
+        if self._network.now < self._from_s:
+            return 0.0
+        self._number += 1
+        return self._held.get(self._number, 0.0)
 
 
 class Faults:
@@ -67,24 +82,14 @@ class Faults:
     def __init__(self, simulation: Simulation, schedule: Schedule) -> None:
         self.simulation = simulation
         self.schedule = schedule
-        self._radio = schedule.radio
-        """Link conditions to which a fault of the links returns."""
+        self._links = LinkFaults(simulation, schedule.radio)
         self.counts: Counter[str] = Counter()
         for fault in schedule.faults:
             simulation.at(fault.at, self._do, fault)
         simulation.at(schedule.faults_until_s, self.heal)
 
-    def _target(self, fault: ScheduledFault) -> int | None:
-        """Return the id of the fault's target, or None if no such process is running."""
-        target = fault.targets[0] if fault.targets else WITNESS_ID
-        if target == LEADER:
-            leaders = self.simulation.leaders()
-            return leaders[0] if leaders else None
-        process = self.simulation.processes.get(target)
-        return target if process is not None and process.alive else None
-
     def _do(self, fault: ScheduledFault) -> None:
-        target = self._target(fault)
+        target = target_of(self.simulation, fault)
         # The effects of a fault end with all faults at the latest: L1-L4 count from there.
         simulation, until = self.simulation, self.schedule.faults_until_s
         lasts = min(simulation.now + fault.duration_s, until)
@@ -134,17 +139,7 @@ class Faults:
                 for robot_id in late:
                     self._step_late(robot_id, lasts, fault.value)
                 return bool(late)
-            case "cut" | "cut_one_way" | "cut_pair":
-                pairs = self._pairs(fault, target)
-                simulation.part(pairs)
-                simulation.at(lasts, simulation.heal_partition, pairs)
-                return bool(pairs)
-            case kind if kind in RADIO_FIELDS:
-                field = RADIO_FIELDS[kind]
-                simulation.link_model.radio = _with(simulation.link_model.radio, field, fault.value)
-                simulation.at(lasts, self._calm, field)
-                return True
-        return False
+        return self._links.disturb(fault, target, lasts)
 
     def _step_late(self, target: int, until: float, lag_s: float) -> None:
         """Let a process do nothing for up to `lag_s` [s], then all that has come meanwhile, again and again."""
@@ -160,19 +155,6 @@ class Faults:
     def _wake(self, process: Process | AgentProcess) -> None:
         if self.simulation.processes[process.id] is process:
             self.simulation.resume(process.id)
-
-    def _pairs(self, fault: ScheduledFault, target: int | None) -> set[tuple[int, int]]:
-        ids = set(self.simulation.ids)
-        if fault.kind == "cut_pair":
-            other = fault.targets[1]
-            return set() if target is None or target == other else {(target, other), (other, target)}
-        side = {i for i in (target if i == LEADER else i for i in fault.targets) if i is not None} & ids
-        there = {(a, b) for a in side for b in ids - side}
-        return there if fault.kind == "cut_one_way" else there | {(b, a) for a, b in there}
-
-    def _calm(self, field: str) -> None:
-        link_model = self.simulation.link_model
-        link_model.radio = _with(link_model.radio, field, getattr(self._radio, field))
 
     def _start(self, target: int) -> None:
         if not self.simulation.processes[target].alive:
@@ -210,10 +192,7 @@ class Faults:
         """
         simulation = self.simulation
         simulation.heal()
-        self._radio = simulation.link_model.radio = structs.replace(
-            simulation.link_model.radio, loss=0.0, duplication=0.0, tail=0.0, reorder=0.0
-        )
-        simulation.lose_late(self._radio.prompt_s)
+        simulation.lose_late(self._links.calm_all().prompt_s)
         for robot_id in simulation.robots:
             self._start_gateway(robot_id)
         for target in list(simulation.processes):
@@ -299,7 +278,3 @@ def _checkers(schedule: Schedule) -> list[type[Checker]]:
     if schedule.is_single:
         kinds.append(NextInChain)
     return kinds
-
-
-def _with(radio: Radio, field: str, value: float) -> Radio:
-    return structs.replace(radio, **{field: value})

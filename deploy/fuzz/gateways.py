@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from msgspec import Struct
@@ -43,7 +44,7 @@ class GatewaySimulation(Network):
         gateways_at: int | None,
         timing: Timing,
         rates: dict[int, float],
-        gateway_type: type[Gateway],
+        gateway_type: Callable[..., Gateway],
     ) -> None:
         """Create the network without gateway. `rates` are clock rates by id, a gateway's by minus the id; default 1."""
         super().__init__(seed, ids, radio, gateways_at)

@@ -68,6 +68,8 @@ class Process:
         self.leaving = False
         """True after a request to exit, while the process sends its last messages."""
         self.commanding = False
+        self.met: set[Member] = set()
+        """Senders whose messages it was given."""
         self.inbox: list[tuple[Call, tuple[Any, ...]]] = []
         """Calls of the lease kept during a pause: method and arguments without the time."""
         self.wakes_at = NEVER
@@ -104,6 +106,10 @@ class Hosts(GatewaySimulation):
         if process is not None and process.alive and not process.paused:
             process.stop.order(order)
 
+    def _tell_stop_of_gateway(self, process: Process, known: StopKnowledge) -> None:
+        process.stop.hear_gateway(known)
+        self._report(Checker.told_of_stop, self.now, process.member, process.id)
+
     # --- inputs ------------------------------------------------------------------------------------------------
 
     def deliver(self, process: Process, method: Call, arguments: tuple[Any, ...]) -> None:
@@ -115,6 +121,9 @@ class Hosts(GatewaySimulation):
 
     def take(self, process: Process, method: Call, arguments: tuple[Any, ...]) -> None:
         """Call a method of the lease at its local time, and execute the effects."""
+        if type(arguments[0]) is Member and arguments[0] not in process.met:
+            process.met.add(arguments[0])
+            self._report(Checker.meets, self.now, process.member, arguments[0])
         self.carry_out(process, method(*arguments, process.clock.local(self.now)))
 
     def observed(self, who: Member, observed: Observed) -> None:
@@ -278,7 +287,7 @@ class Hosts(GatewaySimulation):
         if stamp is None or not lease.may_command(local):
             return
         gateway = self.gateways[process.id].gateway
-        process.stop.hear_gateway(gateway.stop.known)
+        self._tell_stop_of_gateway(process, gateway.stop.known)
         self.carry_out(process, lease.gateway_term(gateway.term_max, local, gateway.latched))
         if not lease.may_command(local):
             return
@@ -315,7 +324,7 @@ class Hosts(GatewaySimulation):
         if lease.role is Role.LEADER:
             self.carry_out(process, [])
             return
-        process.stop.hear_gateway(gateway.stop.known)
+        self._tell_stop_of_gateway(process, gateway.stop.known)
         self.carry_out(process, lease.gateway_term(gateway.term_max, process.clock.local(self.now), gateway.latched))
 
     def _drawn(self, process: Process, term: Term, holder: int, as_leader: bool, stamp: GatewayStamp) -> CmdVel:

@@ -98,6 +98,8 @@ class Schedule(Struct, frozen=True):
     tricks: tuple[ScheduledFault, ...] = ()
     """`blackout` of all processes and of the gateways of some robots, on clocks set wrong by `value` [s]; terms
     `made_up`; a command that echoes a time `ahead` by `value` [s]; a process that speaks another `version`."""
+    operator_timeout_s: float | None = None
+    """Silence [s] of all operators after which the team stands (E31); `stops` then has calls to `watch`, too."""
     led_s: float = 0.0
     """How much later [s] than usual the faults are over."""
 
@@ -156,7 +158,7 @@ def draw(seed: int) -> Schedule:
     ids = tuple(range(1, robots + 1))
     kinds = [kind for kind in KINDS if random.random() < 0.4 and (witness or kind != "witness")] or ["kill"]
     share = random.random()
-    radio = _radio(random)
+    radio = link_conditions(random)
     spares, rosters = _rosters(Random(f"roster-{seed}"), ids)
     tricks = _tricks(Random(f"trick-{seed}"), ids)
     faults = [draw_fault(random, kinds, ids + spares) for _ in range(_count(random, FAULTS_MEAN))]
@@ -170,7 +172,7 @@ def draw(seed: int) -> Schedule:
         witness=witness,
         profile=random.choices(("std", "fast", "wifi"), (0.7, 0.15, 0.15))[0],
         gateways_at_world=witness and random.random() < 0.5,
-        rates={i: _rate(random) for i in (*ids, 0, *(-i for i in ids))},
+        rates={i: clock_rate(random) for i in (*ids, 0, *(-i for i in ids))},
         faults=tuple(sorted(faults, key=_when)),
         radio=radio,
         stops=draw_stops(Random(f"operator-{seed}"), ids),
@@ -270,12 +272,13 @@ def _when(fault: ScheduledFault) -> float:
     return fault.at
 
 
-def _rate(random: Random) -> float:
+def clock_rate(random: Random) -> float:
     """Return a clock rate; two in three are the fastest or slowest allowed."""
     return 1.0 + CLOCK_RATE_ERROR * random.choice((-1.0, 1.0, random.uniform(-1.0, 1.0)))
 
 
-def _radio(random: Random) -> Radio:
+def link_conditions(random: Random) -> Radio:
+    """Draw link conditions between processes of different robots."""
     prompt_s = random.choice((0.002, 0.002, 0.005, 0.02))
     loss = random.choice((0.0, 0.0, 0.0, 0.05, 0.2))
     duplication = random.choice((0.0, 0.0, 0.05, 0.3))

@@ -6,18 +6,17 @@ come late, twice, or again long after; operators sit at a host, and share its cu
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
 from typing import Any, Protocol
 
 from lfa.deploy.analysis.verification.checker import Arguments, Checker
 from lfa.deploy.client.stop_call import StopCall, StopOutcome
 from lfa.deploy.fuzz.gateways import RunningGateway
-from lfa.deploy.fuzz.lease_processes import Hosts, Process
 from lfa.deploy.fuzz.partition import place
 from lfa.deploy.fuzz.schedules import ScheduledFault
 from lfa.protocol.errors import Refused
-from lfa.protocol.fleet_stop.memory import ASK_S
+from lfa.protocol.fleet_stop.memory import ASK_S, StopMemory
 from lfa.protocol.geometry import STILL
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import Member
@@ -26,9 +25,48 @@ from lfa.protocol.messages.robot import CmdVel
 from lfa.protocol.messages.stop import NO_STOP, StopKnowledge, StopOrder, StopState, StopWord
 from lfa.protocol.topics import OPERATOR_NAME
 from lfa.protocol.transport.link_model import LinkModel
+from lfa.world.virtual_time import LocalClock
 
 STEP_S = 0.01
 LOCAL_S = 0.0003
+WATCH_S = 0.25
+"""Time [s] between two orders without a word of an operator who watches."""
+
+
+class AskingAgent(Protocol):
+    """Process of a robot's agent that may have to ask the others what holds (E30)."""
+
+    @property
+    def id(self) -> int: ...
+
+    @property
+    def member(self) -> Member: ...
+
+    @property
+    def stop(self) -> StopMemory: ...
+
+    @property
+    def clock(self) -> LocalClock: ...
+
+    @property
+    def alive(self) -> bool: ...
+
+    @property
+    def paused(self) -> bool: ...
+
+
+class AskingTeam(Protocol):
+    """Simulation with the newest process of each robot's agent."""
+
+    @property
+    def now(self) -> float: ...
+
+    @property
+    def processes(self) -> Mapping[int, AskingAgent]: ...
+
+    def at(self, time: float, what: Callable[..., None], *arguments: Any) -> None: ...
+
+    def report(self, fact: Callable[[Checker, *Arguments], None], *arguments: *Arguments) -> None: ...
 
 
 class StoppedTeam(Protocol):
@@ -98,6 +136,8 @@ class StopTraffic:
         for number, call in enumerate(calls, start=1):
             if call.kind == "replay":
                 self._team.at(call.at, self._replay, call.targets[0])
+            elif call.kind == "watch":
+                self._team.at(call.at, self._watch, call.targets[0], number, 1, call.at + call.duration_s)
             else:
                 self._team.at(call.at, self._call, call.kind == "stop", call.targets[0], number)
 
@@ -116,16 +156,26 @@ class StopTraffic:
             return
         if said is not None:
             order = StopOrder(Header(OPERATOR_NAME, number, seq, now), said.word, said.gateways)
-            self._said.append(order)
             if said.word is not None and not said.word.stand:
                 self._team.report(Checker.resume_said, now, said.word)
-            for robot in self._robots:
-                self._send(order, robot, host, call)
+            self._say(order, host, call)
         outcome = call.outcome(now)
         if outcome is None:
             self._team.at(now + STEP_S, self._step, call, host, number, seq + 1, begun)
         else:
             self.outcomes.append((begun, now, outcome))
+
+    def _watch(self, host: int, number: int, seq: int, until: float) -> None:
+        """Show that an operator is there, until true time `until` [s], as `lfa watch` does."""
+        now = self._team.now
+        self._say(StopOrder(Header(OPERATOR_NAME, number, seq, now), None), host, None)
+        if now + WATCH_S <= until:
+            self._team.at(now + WATCH_S, self._watch, host, number, seq + 1, until)
+
+    def _say(self, order: StopOrder, host: int, call: StopCall | None) -> None:
+        self._said.append(order)
+        for robot in self._robots:
+            self._send(order, robot, host, call)
 
     def _send(self, order: StopOrder, robot: int, host: int, call: StopCall | None) -> None:
         for delay_s in self.links.delays(host, self._team.host_of_gateway(robot)):
@@ -227,7 +277,7 @@ class _Observer(Checker):
 class StopQuestions:
     """Questions of processes that do not know enough of the fleet stop (E30); complete agents ask by themselves."""
 
-    def __init__(self, team: Hosts, robots: tuple[int, ...], links: StopLinks) -> None:
+    def __init__(self, team: AskingTeam, robots: tuple[int, ...], links: StopLinks) -> None:
         self._team = team
         self._robots = robots
         self._links = links
@@ -239,7 +289,7 @@ class StopQuestions:
             if process.id in self._robots and process.alive and not process.paused:
                 self._ask(process)
 
-    def _ask(self, process: Process) -> None:
+    def _ask(self, process: AskingAgent) -> None:
         """Let the agent of `process` ask the others, if it is due (E30)."""
         if not process.stop.ask_due(process.clock.local(self._team.now)):
             return
@@ -257,3 +307,4 @@ class StopQuestions:
         process = self._team.processes[asker.id]
         if process.member == asker and process.alive and not process.paused:
             process.stop.hear_agent(robot, known)
+            self._team.report(Checker.told_of_stop, self._team.now, asker, robot)

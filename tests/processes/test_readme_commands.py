@@ -44,7 +44,7 @@ ELSEWHERE = {
     "lfa teleop": "tests/deploy/operate/test_orders_team.py",
     "lfa forget 3": "tests/protocol/lease/test_forget.py",
     **dict.fromkeys(("lfa join 7", "lfa retire 3"), "tests/processes/test_roster.py"),
-    "lfa fuzz [--whole] [--lagging]": "tests/deploy/fuzz/test_agent_simulation.py",
+    "lfa fuzz [--whole] [--lagging] [--stops]": "tests/deploy/fuzz/test_agent_simulation.py",
     "lfa map RUN --out DIR": "tests/deploy/scenarios/test_explore.py",
     "lfa view RUN": "tests/deploy/view/rerun/test_view.py",
     "lfa view": "tests/deploy/view/test_bad_input.py",

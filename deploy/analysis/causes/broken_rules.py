@@ -244,6 +244,7 @@ _OF_WORDS: tuple[tuple[str, str], ...] = (
     ("which knows a stop", "E28"),
     ("which knows an older resume", "E29"),
     ("by its agent alone", "E30"),
+    ("no operator has said anything new", "E31"),
 )
 """Rules of the invariants I12 to I16, which see a broken rule at once: by what they say."""
 

@@ -114,6 +114,12 @@ class Checker:
     def obeys(self, at: float, robot_id: int, cmd: CmdVel, age: float) -> None:
         """Record that the gateway of `robot_id` accepted `cmd`, whose stamp is `age` [s] old by the gateway's clock."""
 
+    def told_of_stop(self, at: float, agent: Member, by: int) -> None:
+        """Record that `agent` was told of the fleet stop by its own gateway or by the agent of robot `by`.
+
+        Not of complete agents, and not of recorded ones.
+        """
+
     def stop_acknowledged(self, at: float, robot_id: int, word: StopWord) -> None:
         """Record that the gateway of `robot_id` acknowledged a stop that its agent knows too (E28, E30)."""
 
@@ -125,6 +131,9 @@ class Checker:
 
     def turns(self, at: float, robot_id: int, word: StopWord) -> None:
         """Record that wheels of `robot_id` turn, by the twist that its gateway lets through, which knows `word`."""
+
+    def meets(self, at: float, who: Member, other: Member) -> None:
+        """Record that `who` was given the first message of `other` (simulations of leases only)."""
 
     def hinted(self, at: float, who: Member, about: Member) -> None:
         """Record that `who` saw the token of `about` appear or vanish, true or false (E15)."""

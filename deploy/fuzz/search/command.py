@@ -17,7 +17,6 @@ import typer
 
 from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.campaign.shard import WHOLE, Shard, parse_shard
-from lfa.deploy.fuzz.schedules import KINDS
 from lfa.deploy.fuzz.search import systematic
 from lfa.deploy.fuzz.search.searches import (
     Kind,
@@ -45,6 +44,12 @@ FAILURES_SHOWN_MAX = 5
 TELL_EVERY_S = 10.0
 TRACES = Path("runs/fuzz")
 DRAWN = Search()
+OPTIONS: dict[str, Kind] = {
+    "--systematic": "systematic",
+    "--guided": "guided",
+    "--lagging": "lagging",
+    "--stops": "stops",
+}
 
 
 def command(
@@ -62,6 +67,9 @@ def command(
     is_lagging: Annotated[
         bool, typer.Option("--lagging", help="Teams with the profile auto, whose processes lag.")
     ] = False,
+    is_stops: Annotated[
+        bool, typer.Option("--stops", help="The fleet stop alone: gateways, agents and operators, without leases.")
+    ] = False,
     verbose: Annotated[
         bool, typer.Option("-v", "--verbose", help="With --seed: print the trace, one column per robot.")
     ] = False,
@@ -73,13 +81,13 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the totals as JSON.")] = False,
 ) -> int:
     """Search for fault schedules that violate an invariant of the lease protocol; exit with code 1 if one does."""
-    chosen_kinds = {"--systematic": is_systematic, "--guided": is_guided, "--lagging": is_lagging}
+    chosen_kinds = {"--systematic": is_systematic, "--guided": is_guided, "--lagging": is_lagging, "--stops": is_stops}
     named = [option for option, is_chosen in chosen_kinds.items() if is_chosen]
     if len(named) > 1:
         raise Refused(f"{named[0]} with {named[1]}: must be one of the two")
-    if whole and (is_systematic or is_guided):
-        raise Refused("--whole: must go without --systematic and --guided, which play leases alone")
-    kind: Kind = "systematic" if is_systematic else "guided" if is_guided else "lagging" if is_lagging else "drawn"
+    if whole and (is_systematic or is_guided or is_stops):
+        raise Refused(f"--whole: must go without {named[0]}, which plays no whole robots")
+    kind: Kind = next((kind for option, kind in OPTIONS.items() if option in named), "drawn")
     search = Search(kind, whole)
     if seed is not None and seeds is not None:
         raise Refused(f"--seed {seed} with --seeds {seeds}: must be one of the two")
@@ -158,8 +166,8 @@ def _hunt(seeds: range, jobs: int, as_json: bool, search: Search) -> int:
 
 def _tell(tally: Tally, seeds: range, seconds: float, jobs: int, as_json: bool, search: Search) -> int:
     """Print the result of a search over `seeds` and return its exit code."""
-    claimed = len(seeds) >= KINDS_CLAIM_SEEDS and search.kind == "drawn"
-    missing = [kind for kind in KINDS if kind not in tally.faults] if claimed else []
+    claimed = len(seeds) >= KINDS_CLAIM_SEEDS and search.kind in ("drawn", "stops")
+    missing = [kind for kind in search.kinds if kind not in tally.faults] if claimed else []
     covered = systematic.covered(seeds) if search.kind == "systematic" else []
     if missing:
         print_visible(f"faults that never took effect: {', '.join(missing)}", file=sys.stderr)
@@ -173,8 +181,7 @@ def _tell(tally: Tally, seeds: range, seconds: float, jobs: int, as_json: bool, 
             )
         )
     else:
-        kinds = (*KINDS, "lag") if search.kind == "lagging" else KINDS
-        print_visible(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in kinds))
+        print_visible(" ".join(f"{kind}={tally.faults.get(kind, 0)}" for kind in search.kinds))
         for line in covered:
             print_visible(line)
         rate_text = f"{rate} a minute with {jobs} jobs"

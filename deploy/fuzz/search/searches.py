@@ -11,31 +11,39 @@ from msgspec import Struct, structs
 
 from lfa.deploy.analysis.causes.broken_rules import lines as chain_lines
 from lfa.deploy.fuzz.fault_injector import Played, play, play_whole
+from lfa.deploy.fuzz.fleet_stop.stop_play import play_stops
+from lfa.deploy.fuzz.fleet_stop.stop_schedules import KINDS as STOP_KINDS
+from lfa.deploy.fuzz.fleet_stop.stop_schedules import draw_stop_schedule
 from lfa.deploy.fuzz.network import Trace
-from lfa.deploy.fuzz.schedules import Schedule, draw, draw_whole, without
+from lfa.deploy.fuzz.schedules import KINDS, Schedule, draw, draw_whole, without
 from lfa.deploy.fuzz.search import guided, systematic
 from lfa.deploy.fuzz.search.lagging import draw_lagging
 from lfa.deploy.fuzz.search.trace_text import columns, describe, said
 
 Player = Callable[[Schedule, Trace | None], Played]
 
-Kind = Literal["drawn", "lagging", "systematic", "guided"]
+Kind = Literal["drawn", "lagging", "systematic", "guided", "stops"]
 
 
 class Search(Struct, frozen=True):
-    """Schedules that a search plays, each by its seed: on leases alone, or `whole` on complete agents."""
+    """Schedules that a search plays, each by its seed: on leases alone, on the fleet stop, or `whole` on agents."""
 
     kind: Kind = "drawn"
     whole: bool = False
 
     @property
     def player(self) -> Player:
-        return play_whole if self.whole else play
+        return play_stops if self.kind == "stops" else play_whole if self.whole else play
 
     @property
     def chunk(self) -> int:
         """Number of seeds per task of a worker process; a guided search goes by islands."""
-        return guided.ISLAND if self.kind == "guided" else 4 if self.whole else 50
+        return guided.ISLAND if self.kind == "guided" else 4 if self.whole else 500 if self.kind == "stops" else 50
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of fault that its schedules may have."""
+        return STOP_KINDS if self.kind == "stops" else (*KINDS, "lag") if self.kind == "lagging" else KINDS
 
     @property
     def options(self) -> str:
@@ -50,6 +58,8 @@ class Search(Struct, frozen=True):
             return systematic.schedule(seed)
         if self.kind == "lagging":
             return draw_lagging(seed)
+        if self.kind == "stops":
+            return draw_stop_schedule(seed)
         return draw_whole(seed) if self.whole else draw(seed)
 
     def played(self, seeds: range) -> Iterator[tuple[int, Played]]:
@@ -96,11 +106,11 @@ def tally_of_seed(seed: int, played: Played) -> Tally:
 def shrink(schedule: Schedule, name: str, player: Player = play) -> Schedule:
     """Return a schedule with fewer faults that still violates invariant `name`.
 
-    Halves of the faults are left out first, then quarters, and so on down to single faults; then delayed messages, and
-    tricks.
+    Halves of the faults are left out first, then quarters, and so on down to single faults; then delayed messages,
+    tricks, and of the fleet stop alone calls of operators.
     """
     schedule = _fewer_faults(schedule, name, player)
-    for field in ("held", "tricks"):
+    for field in ("held", "tricks", *(["stops"] if player is play_stops else [])):
         for one in getattr(schedule, field):
             tried = structs.replace(schedule, **{field: tuple(o for o in getattr(schedule, field) if o != one)})
             if any(v.name == name for v in player(tried, None).violations):

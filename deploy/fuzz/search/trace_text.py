@@ -27,6 +27,8 @@ def describe(schedule: Schedule) -> str:
     """Return a schedule as text: the link conditions in one line, then one line for each fault."""
     radio = schedule.radio
     head = f"{schedule.robots} robots, witness {schedule.witness}, {schedule.profile}, delay <= {radio.prompt_s:g} s"
+    if schedule.operator_timeout_s is not None:
+        head += f", stands {schedule.operator_timeout_s:.3f} s after its operator's last order"
     lines = [f"{head}, loss {radio.loss}, duplicate {radio.duplication}, tail {radio.tail}"]
     for fault in schedule.faults:
         targets = ", ".join("leader" if t < 0 else str(t) for t in fault.targets)
@@ -37,6 +39,8 @@ def describe(schedule: Schedule) -> str:
     for call in schedule.rosters:
         place = f" for {call.value:.0f}" if call.value else ""
         lines.append(f"{call.at * 1000.0:8.1f}  {call.kind} {call.targets[0]}{place} (within {call.duration_s:.3f} s)")
+    for call in schedule.stops:
+        lines.append(f"{call.at * 1000.0:8.1f}  operator at {call.targets[0]}: {call.kind} ({call.duration_s:.3f} s)")
     for held in schedule.held:
         late = "is lost" if held.by_s is None else f"comes {held.by_s:g} s late"
         lines.append(f"message {held.number} from the first fault on {late}")
