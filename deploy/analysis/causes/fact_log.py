@@ -84,6 +84,10 @@ class FactLog(Checker):
         self.asked: list[Asked] = []
         self.called_superseded: list[tuple[float, Member, int]] = []
         """Who told an incarnation that there is a later one, and the number of that one."""
+        self.met: dict[Member, dict[Member, float]] = defaultdict(dict)
+        """Time [s] of the first message of each other incarnation that a process was given."""
+        self.agreed: dict[Member, int] = {}
+        """Digest of what each process holds to be agreed; of one that speaks another version it tells nothing."""
         self.configs: dict[Member, tuple[float, Config]] = {}
         """Newest config of each process."""
         self.strangers: list[tuple[float, Member, Member]] = []
@@ -115,6 +119,15 @@ class FactLog(Checker):
     def lives(self, at: float, who: Member) -> None:
         self.began[who] = self.heard_s[who] = at
         self.ended.pop(who, None)
+
+    def holds(self, at: float, who: Member, agreed: int) -> None:
+        self.agreed[who] = agreed
+
+    def speaks(self, at: float, who: Member) -> None:
+        self.agreed.pop(who, None)
+
+    def meets(self, at: float, who: Member, other: Member) -> None:
+        self.met[who][other] = at
 
     def ends(self, at: float, who: Member) -> None:
         self.ended.setdefault(who, at)

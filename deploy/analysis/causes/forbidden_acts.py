@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 
 from lfa.deploy.analysis.causes.fact_log import BrokenRule, CauseStep, FactLog, called, chain
 from lfa.deploy.analysis.verification.checker import LONG_AGO, Violation
@@ -87,6 +88,38 @@ def proposed_without_quorum(log: FactLog, violation: Violation) -> BrokenRule | 
     return None
 
 
+def counts_a_replaced_life(log: FactLog, violation: Violation) -> BrokenRule | None:
+    """E18: an incarnation of which a candidate has heard a later one makes no unanimous start."""
+    for term, proposals in log.proposed.items():
+        at, who, propose = proposals[0]
+        if propose.holder != who or (who.id, who.incarnation) != (term.issuer, term.incarnation):
+            continue  # handed over (E16)
+        known = next((asked.known for asked in reversed(log.asked) if asked.term == term and asked.at_s <= at), None)
+        for voter in sorted(set(propose.config.voters) - set(() if known is None else known.voters)):
+            met_s = _later_met_s(log, who, voter)
+            if met_s < at:
+                heard = CauseStep(
+                    met_s, f"{called(who)} heard a later incarnation of {called(voter)} than {voter.incarnation}"
+                )
+                text = f"it proposed term {term.n} with {voter.incarnation} as a voter, which grants nothing any more"
+                return chain(violation, "E18", heard, CauseStep(at, text))
+    return None
+
+
+def _later_met_s(log: FactLog, who: Member, voter: Member) -> float:
+    """Return the time [s] at which `who` first heard a later incarnation of `voter` that agrees with it; else inf."""
+    return min(
+        (
+            at
+            for other, at in log.met[who].items()
+            if other.id == voter.id
+            and is_later(other.incarnation, voter.incarnation)
+            and log.agreed.get(other) == log.agreed.get(who)
+        ),
+        default=inf,
+    )
+
+
 def stands_and_may_not(log: FactLog, violation: Violation) -> BrokenRule | None:
     """E33, E34: nobody stands whom its own config does not admit, or retires."""
     for asked in log.asked:
@@ -133,6 +166,7 @@ AGAINST: tuple[Finder, ...] = (
     wrong_clock,
     unasked_lease,
     proposed_without_quorum,
+    counts_a_replaced_life,
     stands_and_may_not,
     stranger_in_chain,
     wrongly_superseded,
