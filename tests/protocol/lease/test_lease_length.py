@@ -160,6 +160,14 @@ def test_e36_a_shorter_round_ends_no_lease_early() -> None:
     assert before is not None and before <= (holder.expiry or 0.0)
 
 
+def test_e36_while_a_lease_shrinks_a_round_binds_its_voters_until_an_earlier_one_ends_and_no_longer() -> None:
+    holder, sent_at = Holder(ME, TERM, AUTO, 10.0, agreed=1), [10.0]
+    while holder.timing is LONG:
+        sent_at.append(holder.next_round_at)
+        asked = renew(holder, sent_at[-1])
+    assert sent_at[-1] + asked.grant_ms / 1000.0 == pytest.approx(sent_at[-2] + AUTO.grant_s, abs=0.01)
+
+
 def test_e36_a_voter_is_bound_for_as_long_as_it_was_told() -> None:
     voter = Acceptor(Term(), AUTO.grant_s, 0.0)
     voter.propose(A, propose(A, 602), OLD, 10.0)
