@@ -50,7 +50,8 @@ class ObstacleModel:
         """
         self._scan.scan(scan, pose, now)
         places = [(mate.x, mate.y) for mate in mates]
-        self._tracker.update(self._scan.points_map, (pose.x, pose.y), places, MATE_M, now, self._scan.reach_m)
+        seen, eye = self._scan, (pose.x, pose.y)
+        self._tracker.update(seen.points_map, eye, places, MATE_M, now, seen.reach_m, seen.step_rad)
 
     def update_ground(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
         """Update with a profile of the floor ahead, made at `pose`."""

@@ -10,6 +10,8 @@ from typing import Literal
 from msgspec import Struct
 
 from lfa.agents.perception.scan import SIGHT_M, Point
+from lfa.agents.perception.scan_view import ScanView
+from lfa.agents.perception.wall_ends import MOVING_EDGE_M, WallEnds
 
 Kind = Literal["stationary", "moving", "wall"]
 
@@ -51,9 +53,6 @@ HIDDEN_RAD = 0.09
 """Angle [rad] within which a nearer obstacle may hide an end; neighbouring beams of a scan of 180 are less than half of
 this apart."""
 TRACKS_MAX = 64
-BEHIND_M, BESIDE_RAD = 0.1, 0.02
-"""Distance [m] behind a place, and angle [rad] beside it (half the beams' of a scan of 180), in which a scan must show
-nothing nearer for the place to count as seen free."""
 PROOFS_MIN = 2
 """Number of ends, of the two now and the two before, that must be in places seen free: one may be a grazing beam."""
 
@@ -75,25 +74,6 @@ class Feature(Struct, frozen=True, gc=False):
         return self.x + self.vx * later_s, self.y + self.vy * later_s
 
 
-class _View(Struct, frozen=True, gc=False):
-    """Scan in `map`: where it was seen from, and what it showed."""
-
-    eye: Point
-    points: Sequence[Point]
-
-    def shows_free(self, place: Point) -> bool:
-        """Return whether the scan looked through `place`: at what is behind it, or at nothing in its direction."""
-        px, py = place[0] - self.eye[0], place[1] - self.eye[1]
-        far_m = hypot(px, py)
-        for x, y in self.points:
-            qx, qy = x - self.eye[0], y - self.eye[1]
-            if (q_m := hypot(qx, qy)) > far_m + BEHIND_M:
-                continue
-            if px * qx + py * qy > 0.0 and abs(px * qy - py * qx) < BESIDE_RAD * far_m * q_m:
-                return False
-        return True
-
-
 class _Track(Struct):
     x: float
     y: float
@@ -101,7 +81,7 @@ class _Track(Struct):
     seen_at: float
     ends: tuple[Point, Point]
     """First and last point."""
-    anchors: list[tuple[float, tuple[Point, ...], _View]]
+    anchors: list[tuple[float, tuple[Point, ...], ScanView]]
     """Time, centre and ends at intervals, and the scan that showed them, the newest last."""
     vx: float = 0.0
     vy: float = 0.0
@@ -112,7 +92,7 @@ class _Track(Struct):
     def places(self) -> tuple[Point, ...]:
         return ((self.x, self.y), *self.ends)
 
-    def has_moved(self, view: _View) -> bool:
+    def has_moved(self, view: ScanView) -> bool:
         """Return whether all of it has moved, as `view` shows it now; an end stays when it comes out from behind an
         obstacle or seems to join one.
 
@@ -128,7 +108,7 @@ class _Track(Struct):
             return False
         return self.moves or self._has_left(before, seen, view)
 
-    def _has_left(self, before: tuple[Point, ...], seen: _View, view: _View) -> bool:
+    def _has_left(self, before: tuple[Point, ...], seen: ScanView, view: ScanView) -> bool:
         """Return whether two ends prove that it has left `before`, of what `seen` showed then and `view` shows now.
 
         What stands seems to move as well when a robot that passes by sees other parts of it. But only what moves has
@@ -136,7 +116,7 @@ class _Track(Struct):
         """
         return sum(map(seen.shows_free, self.ends)) + sum(map(view.shows_free, before[1:])) >= PROOFS_MIN
 
-    def slow_velocity(self, view: _View) -> Point | None:
+    def slow_velocity(self, view: ScanView) -> Point | None:
         """Return the mean velocity of all of it over the anchors, when it creeps in one direction; None otherwise.
         `view` is the newest scan.
         """
@@ -162,6 +142,8 @@ class Tracker:
         self._tracks: list[_Track] = []
         self._seen: list[tuple[list[Point], Feature | _Track]] = []
         """Obstacles of the newest scan with their points."""
+        self._wall_ends = WallEnds()
+        self._seen_at = 0.0
 
     def update(
         self,
@@ -171,13 +153,14 @@ class Tracker:
         mate_m: float,
         now: float,
         reach_m: float = SIGHT_M,
+        step_rad: float = 0.0,
     ) -> None:
-        """Update with one scan's points in beam order, seen from `eye` up to `reach_m` [m]; points within `mate_m` of a
-        team-mate are left out.
+        """Update with one scan's points in beam order, seen from `eye` up to `reach_m` [m], `step_rad` [rad] between
+        two beams; points within `mate_m` of a team-mate are left out.
         """
-        self._seen = []
+        self._seen, self._seen_at = [], now
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
-        clusters, view = _clusters(points_map), _View(eye, points_map)
+        clusters, view = _clusters(points_map), ScanView(eye, points_map, reach_m, step_rad)
         for n, cluster in enumerate(clusters):
             x, y, radius_m = _circle(cluster, eye)
             ends = (cluster[0], clusters[n - 1][-1]), (cluster[-1], clusters[(n + 1) % len(clusters)][0])
@@ -195,6 +178,8 @@ class Tracker:
                 track = self._follow((x, y, radius_m), (cluster[0], cluster[-1]), view, now)
                 if track is not None:
                     self._seen.append((cluster, track))
+        walls = [points for points, thing in self._seen if isinstance(thing, Feature) and thing.kind == "wall"]
+        self._wall_ends.update(walls, view, mates, mate_m, now)
 
     def nearest(self, x: float, y: float, now: float) -> tuple[Feature, float] | None:
         """Return the obstacle of the newest scan nearest to (x, y) in `map`, and its distance [m]; None if there is
@@ -218,14 +203,23 @@ class Tracker:
 
     def features(self, now: float) -> list[Feature]:
         """Return all obstacles as of `now`."""
-        walls = [thing for _, thing in self._seen if isinstance(thing, Feature)]
+        walls = [thing for _, thing in self._seen if isinstance(thing, Feature)] + self._edges(now)
         return walls + [_feature(track, now) for track in self._tracks if now - track.seen_at <= FORGET_S]
 
     def moving(self, now: float) -> list[Feature]:
-        return [_feature(t, now) for t in self._tracks if t.moves and now - t.seen_at <= FORGET_S]
+        return [_feature(t, now) for t in self._tracks if t.moves and now - t.seen_at <= FORGET_S] + self._edges(now)
+
+    def _edges(self, now: float) -> list[Feature]:
+        """Return the ends of walls that moved in the newest scan."""
+        later_s = now - self._seen_at
+        return [
+            Feature("moving", x + vx * later_s, y + vy * later_s, MOVING_EDGE_M, vx, vy)
+            for (x, y), (vx, vy) in self._wall_ends.moving
+            if later_s <= FORGET_S
+        ]
 
     def _follow(
-        self, circle: tuple[float, float, float], ends: tuple[Point, Point], view: _View, now: float
+        self, circle: tuple[float, float, float], ends: tuple[Point, Point], view: ScanView, now: float
     ) -> _Track | None:
         x, y, radius_m = circle
         best, best_m = None, inf

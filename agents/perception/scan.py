@@ -28,12 +28,14 @@ class Surroundings:
         self.seen_at: float | None = None
         self.reach_m = SIGHT_M
         """Range [m] up to which that scan has points: the scanner's own, if it is less than `SIGHT_M`."""
+        self.step_rad = 0.0
+        """Angle [rad] between two of its beams."""
 
     def scan(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
         """Update with a scan made at `pose_map`. Out-of-range and bad readings give no points (REP-117)."""
         x, y, angle, step = pose_map.x, pose_map.y, pose_map.theta + scan.angle_min, scan.angle_increment
         low, high = max(scan.range_min_m, READING_M_MIN), min(SIGHT_M, scan.range_max_m)
-        self.reach_m = high
+        self.reach_m, self.step_rad = high, abs(step)
         self._points_map = [
             (x + r * cos(angle + i * step), y + r * sin(angle + i * step))
             for i, r in enumerate(scan.ranges_m)

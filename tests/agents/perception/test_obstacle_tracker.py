@@ -100,10 +100,11 @@ def test_what_is_wide_is_a_wall() -> None:
 
 
 def test_a_piece_of_wall_that_comes_into_sight_is_a_wall_and_does_not_move() -> None:
-    tracker = Tracker()
+    tracker, reach_m = Tracker(), 1.6
     for n in range(30):
-        piece = [(1.5, -0.25 + 0.05 * k) for k in range(11 + n // 3)]
-        tracker.update(piece, (0.0, 0.0), [], 0.5, 0.1 * n)
+        eye = 1.4 + 0.04 * n, 0.0
+        piece = [(3.0, y) for y in (0.05 * k for k in range(-40, 41)) if hypot(3.0 - eye[0], y) < reach_m]
+        tracker.update(piece, eye, [], 0.5, 0.1 * n, reach_m)
     assert [feature.kind for feature in tracker.features(2.9)] == ["wall"]
 
 

@@ -1,0 +1,84 @@
+"""What moves at the end of a wall is told; walls that a robot drives past, with few beams as well, do not move."""
+
+from __future__ import annotations
+
+from math import cos, inf, pi, sin
+
+import pytest
+
+from lfa.agents.perception.obstacle_tracker import Tracker
+from lfa.agents.perception.scan import SIGHT_M, Point
+
+Segment = tuple[float, float, float, float]
+
+MOUTH: tuple[Segment, ...] = ((3.0, 0.34, 6.0, 0.34), (3.0, -0.34, 6.0, -0.34), (3.0, 0.34, 3.0, 5.0),
+                              (3.0, -0.34, 3.0, -5.0))  # fmt: skip
+"""A corridor that opens out of a wall."""
+
+
+def range_of(segment: Segment, eye: Point, angle: float) -> float:
+    """The range [m] at which a beam meets a wall; inf where it does not."""
+    (ax, ay, bx, by), (x, y) = segment, eye
+    c, s = cos(angle), sin(angle)
+    across = c * (by - ay) - s * (bx - ax)
+    if abs(across) < 1e-9:
+        return inf
+    along = ((ax - x) * (by - ay) - (ay - y) * (bx - ax)) / across
+    share = ((ax - x) * s - (ay - y) * c) / across
+    return along if along > 0.0 and 0.0 <= share <= 1.0 else inf
+
+
+def scan(walls: tuple[Segment, ...], eye: Point, beams: int) -> list[Point]:
+    points = []
+    for n in range(beams):
+        angle = -pi + n * 2.0 * pi / beams
+        r = min(range_of(wall, eye, angle) for wall in walls)
+        if r < SIGHT_M:
+            points.append((eye[0] + r * cos(angle), eye[1] + r * sin(angle)))
+    return points
+
+
+def look(tracker: Tracker, walls: tuple[Segment, ...], eye: Point, n: int, beams: int = 180) -> None:
+    """The `n`-th of ten scans a second."""
+    tracker.update(scan(walls, eye, beams), eye, [], 0.5, 0.1 * n, step_rad=2.0 * pi / beams)
+
+
+@pytest.mark.parametrize("mps", [0.3, 0.42, 0.8])
+def test_a_door_that_slides_out_of_a_wall_is_told_before_it_has_come_forty_centimetres(mps: float) -> None:
+    tracker, n = Tracker(), 0
+    while tracker.moving(0.1 * n) == []:
+        n += 1
+        end_y = -0.6 + mps * 0.1 * max(0, n - 10)
+        look(tracker, ((1.2, -4.0, 1.2, -0.6), (1.1, -4.0, 1.1, end_y)), (0.4, 0.0), n)
+        assert end_y < -0.2
+    [edge] = tracker.moving(0.1 * n)
+    assert abs(edge.x - 1.1) < 0.15
+    assert edge.vy > 0.4 * mps
+
+
+@pytest.mark.parametrize("beams", [60, 90, 180])
+@pytest.mark.parametrize("step_m", [0.04, -0.03])
+def test_a_wall_with_a_mouth_that_a_robot_drives_to_or_from_does_not_move(beams: int, step_m: float) -> None:
+    tracker = Tracker()
+    for n in range(60):
+        eye = (1.5 if step_m > 0.0 else 4.0) + step_m * n, 0.05 * sin(n / 5.0)
+        look(tracker, MOUTH, eye, n, beams)
+        assert tracker.moving(0.1 * n) == [], f"seen from {eye}"
+
+
+@pytest.mark.parametrize("beams", [60, 180])
+def test_the_end_of_a_wall_that_a_robot_drives_past_does_not_move(beams: int) -> None:
+    tracker = Tracker()
+    for n in range(60):
+        look(tracker, ((2.0, -0.5, 2.0, -4.0), (2.0, 0.7, 5.0, 0.7)), (0.06 * n, 0.0), n, beams)
+        assert tracker.moving(0.1 * n) == [], f"from {0.06 * n:.2f} m"
+
+
+def test_a_team_mate_that_drives_on_beside_a_wall_is_no_door() -> None:
+    tracker = Tracker()
+    for n in range(30):
+        y = -0.7 + 0.03 * n
+        body = (1.1, y - 0.1, 1.1, y + 0.1)
+        points = scan(((1.2, -4.0, 1.2, -0.6), body), (0.4, 0.0), 180)
+        tracker.update(points, (0.4, 0.0), [(1.2, y)], 0.5, 0.1 * n, step_rad=pi / 90)
+        assert tracker.moving(0.1 * n) == []
