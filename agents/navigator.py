@@ -220,7 +220,7 @@ class Navigator:
             wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now, by_law=by_law)
         self._back_out.keep(pose)
         self._watch(role, pose, wanted, now)
-        self._last = self.limits.brake(wanted, self._last, points, moving, pose, dt)
+        self._last = self.limits.brake(wanted, self._last, points, moving, pose, dt, now)
         self.follower.overridden(self._last)
         if role is Role.LEADER:
             progress = self.lead.progress(pose, self._last)

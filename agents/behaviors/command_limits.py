@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from msgspec.structs import replace
+
 from lfa.agents.avoidance.moving_points import before
 from lfa.agents.avoidance.safety import safe, sharing, sharing_reach_m
 from lfa.agents.behaviors.team_mates import TeamMates
@@ -18,6 +20,8 @@ from lfa.protocol.mission import Mission
 
 BEFORE_S = 0.5
 """Time [s] ahead for which the robot brakes before what comes towards it."""
+MATES_M = 1.5
+"""Distance [m] up to which team-mates are looked at: twice a body's width, and the way of both in that time."""
 
 
 class CommandLimits:
@@ -54,9 +58,20 @@ class CommandLimits:
         return "scan" if self._scan_age.lost(now) else None
 
     def brake(
-        self, wanted: Twist, last: Twist, points: list[Point], moving: Sequence[Feature], pose: Pose2D, dt: float
+        self,
+        wanted: Twist,
+        last: Twist,
+        points: list[Point],
+        moving: Sequence[Feature],
+        pose: Pose2D,
+        dt: float,
+        now: float,
     ) -> Twist:
-        """Return `wanted` within the drive's limits, and slow enough to stop before all that is seen or doubtful."""
-        met = before(moving, pose, BEFORE_S, wanted.linear_x)
+        """Return `wanted` within the drive's limits, and slow enough to stop before all that is seen or doubtful, and
+        before where team-mates drive to: a scan shows where they were.
+        """
+        mates = self._mates.moving(pose, MATES_M, now) if wanted.linear_x else []
+        bodies = [replace(mate, radius_m=self._mission.radius_m) for mate in mates]
+        met = before([*moving, *bodies], pose, BEFORE_S, wanted.linear_x)
         braked_for = points + self._obstacles.ground.doubtful(pose) + met
         return safe(wanted, last, braked_for, self._mission.radius_m, self._mission.limits, dt)
