@@ -69,6 +69,12 @@ def test_e36_each_length_survives_lost_rounds_and_its_bond_outlives_it(length: T
     assert length.act_s < length.chain_silence_s < length.remove_silence_s > length.grant_s
 
 
+@pytest.mark.parametrize("length", [SHORT, MIDDLE], ids=lambda length: f"{length.act_s:g} s")
+def test_e36_silences_of_a_shorter_lease_are_as_many_leases_as_those_of_the_longest(length: Timing) -> None:
+    silences = (length.chain_silence_s / length.act_s, length.remove_silence_s / length.act_s)
+    assert silences == pytest.approx((LONG.chain_silence_s / LONG.act_s, LONG.remove_silence_s / LONG.act_s))
+
+
 def test_e36_a_new_holder_asks_for_the_longest_lease() -> None:
     holder = Holder(ME, TERM, AUTO, 10.0, agreed=1)
     assert (renew(holder, 10.0).grant_ms, holder.expiry) == (0, 10.0 + AUTO.act_s)
