@@ -105,6 +105,8 @@ def environment(
         from lfa.deploy.learn.team_environment import TeamEnvironment
     except ModuleNotFoundError as error:
         raise Refused(f"an environment needs {error.name}: install with: pip install 'lfa[learn]'") from None
+    if not (commanded is None or isinstance(commanded, Sequence)):
+        raise Refused(f"commanded={commanded!r}: must be a list of robots, of {list(chosen.mission.robots)}")
     ids = chosen.mission.robots if commanded is None else tuple(commanded)
     return TeamEnvironment(chosen, ids, parse_all(chosen.mission, chosen.faults, faults), step_s)
 

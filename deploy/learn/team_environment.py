@@ -42,8 +42,8 @@ class TeamEnvironment(ParallelEnv[str, Observation, Action]):
         if strangers or not commanded or len(set(commanded)) < len(commanded):
             right = f"must be some of robots {list(scenario.mission.robots)}, each once"
             raise Refused(f"commanded={list(commanded)}: {right}")
-        if not (isfinite(step_s) and step_s > 0.0):
-            raise Refused(f"step_s={step_s}: must be a finite time [s] above 0")
+        if not (isinstance(step_s, int | float) and isfinite(step_s) and step_s > 0.0):
+            raise Refused(f"step_s={step_s!r}: must be a finite time [s] above 0")
         limits = scenario.mission.limits
         low = np.array([-limits.v_reverse_max_mps, -limits.omega_max_radps], np.float32)
         high = np.array([limits.v_max_mps, limits.omega_max_radps], np.float32)

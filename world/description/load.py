@@ -245,6 +245,8 @@ def _holds(table: Any, part: str | int) -> bool:
 
 def _renumber(document: dict[str, Any], robots: int) -> None:
     """Set the team to ids 1..N; a longer list of starts is cut, a shorter one is refused later. Raises Refused."""
+    if not isinstance(robots, int) or isinstance(robots, bool):  # from a script: the command line gives whole numbers
+        raise Refused(f"robots={robots!r}: must be a whole number, the size of the team")
     if robots > ROBOTS_MAX:  # before a list of that length is built
         raise Refused(f"--robots {robots}: mission.robots = {robots} ids: must be at most {ROBOTS_MAX} ids")
     mission, world = document.setdefault("mission", {}), document.get("world", {})

@@ -27,6 +27,8 @@ class TwoGrants(Struct, frozen=True):
     earlier: Term
     later_s: float
     later: Term
+    bound_s: float
+    """Time [s] from the earlier grant for which it bound the voter: what its holder's rounds had asked for (E36)."""
 
     def steps(self) -> tuple[CauseStep, CauseStep]:
         who = called(self.voter)
@@ -49,7 +51,10 @@ class RuleWatch(Checker):
         """Facts of the leases; a checker of the schedule too. For what falls long after a rule was broken."""
         self._bond_s = (timing.act_s + timing.deadman_s) * (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
         """T_grant by E2, from the mission's durations alone."""
-        self._granted: dict[Member, list[tuple[float, Term]]] = {}
+        self._granted: dict[Member, list[tuple[float, Term, float]]] = {}
+        """Grants of each voter: time [s], term, and the end [s] of the bond by the rounds that it has granted."""
+        self._asked_s: dict[tuple[Term, int], float] = {}
+        """Bond [s] that a round has asked for, where that is shorter than T_grant (E36)."""
         self._proposed: dict[Term, tuple[float, Member, Propose]] = {}
         self._shorter_s: dict[Term, float] = {}
         """Time [s] of the newest round of each term that asked for a shorter bond than T_grant (E36)."""
@@ -75,7 +80,11 @@ class RuleWatch(Checker):
         self._hinted[who, about] = at
 
     def grants(self, at: float, voter: Member, grant: Grant, until: float) -> None:
-        self._granted.setdefault(voter, []).append((at, grant.term))
+        own = self._granted.setdefault(voter, [])
+        bond_s = min(self._bond_s, self._asked_s.get((grant.term, grant.round), self._bond_s))
+        ends_s = at + bond_s * (1.0 - CLOCK_RATE_ERROR)
+        same_holder = own and self._holder_of(own[-1][1]) == self._holder_of(grant.term)
+        own.append((at, grant.term, max(ends_s, own[-1][2]) if same_holder else ends_s))
 
     def promises(self, at: float, who: Member, promise: Promise) -> None:
         self._promised.setdefault(promise.term, []).append((at, who))
@@ -84,6 +93,7 @@ class RuleWatch(Checker):
         self._proposed[propose.term] = at, who, propose
         if propose.grant_ms:
             self._shorter_s[propose.term] = at
+            self._asked_s[propose.term, propose.round] = propose.grant_ms / 1000.0
 
     def gateway_starts(self, at: float, robot_id: int, shut_until: float) -> None:
         self._gateway_began[robot_id] = at
@@ -105,22 +115,25 @@ class RuleWatch(Checker):
     def last_grants(self, before_s: float) -> TwoGrants | None:
         """Return the last two grants of different terms of the voter of the newest grant up to a time."""
         latest = max(
-            self._granted.items(), key=lambda item: max((t for t, _ in item[1] if t <= before_s), default=-1.0)
+            self._granted.items(), key=lambda item: max((t for t, _, _ in item[1] if t <= before_s), default=-1.0)
         )
         voter, grants = latest
-        at, term = grants[-1]
+        at, term, _ = grants[-1]
         earlier = [one for one in grants if one[1] != term]
-        return TwoGrants(voter, *earlier[-1], at, term) if earlier else None
+        return _two(voter, earlier[-1], at, term) if earlier else None
 
     def overlapping(self, before_s: float) -> TwoGrants | None:
-        """Return the newest two grants of one voter, within T_grant, of terms of different holders."""
+        """Return the newest two grants of one voter, the later within the bond of the earlier, of different holders."""
         found = []
         for voter, grants in self._granted.items():
-            for (first_s, first), (at, term) in pairwise(grants):
-                apart = at - first_s < self._bond_s * (1.0 - CLOCK_RATE_ERROR) and first != term and at <= before_s
-                if apart and self._proposed[first][2].holder != self._proposed[term][2].holder:
-                    found.append(TwoGrants(voter, first_s, first, at, term))
+            for earlier, (at, term, _) in pairwise(grants):
+                bound = at <= before_s and at < earlier[2]
+                if bound and self._holder_of(earlier[1]) != self._holder_of(term):
+                    found.append(_two(voter, earlier, at, term))
         return max(found, key=lambda two: two.later_s, default=None)
+
+    def _holder_of(self, term: Term) -> Member:
+        return self._proposed[term][2].holder
 
     def asked_before(self, term: Term) -> Term | None:
         """Return a lower term of the same candidate that was promised and never proposed."""
@@ -135,17 +148,22 @@ class RuleWatch(Checker):
         return None
 
 
+def _two(voter: Member, earlier: tuple[float, Term, float], at: float, term: Term) -> TwoGrants:
+    earlier_s, first, ends_s = earlier
+    return TwoGrants(voter, earlier_s, first, at, term, ends_s - earlier_s)
+
+
 def _always(rule: str, text: str) -> Callable[[RuleWatch, Violation], BrokenRule | None]:
     """Return the rule of an invariant that only one rule keeps, with what it demands."""
     return lambda watch, violation: chain(violation, rule, CauseStep(violation.at, text))
 
 
 def _exclusive(watch: RuleWatch, violation: Violation) -> BrokenRule | None:
-    """I1: some voter has granted both leases within T_grant."""
+    """I1: some voter has granted both leases, the later within its bond to the earlier."""
     two = watch.overlapping(violation.at)
     if two is None:
         return None
-    text = f"a bond outlives its lease: it lasts {watch._bond_s:.3f} s"
+    text = f"a bond outlives its lease: it lasts {two.bound_s:.3f} s"
     return chain(violation, "E2", *two.steps(), CauseStep(two.later_s, text))
 
 

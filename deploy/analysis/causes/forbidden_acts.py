@@ -10,7 +10,7 @@ from lfa.deploy.analysis.verification.checker import LONG_AGO, Violation
 from lfa.protocol.incarnations import is_later
 from lfa.protocol.lease.membership import team_of
 from lfa.protocol.lease.timing import CLOCK_RATE_ERROR
-from lfa.protocol.messages.consensus import Config, Member, Term
+from lfa.protocol.messages.consensus import Config, Member, Propose, Term
 from lfa.protocol.names import WITNESS_ID
 
 Finder = Callable[[FactLog, Violation], BrokenRule | None]
@@ -38,37 +38,50 @@ def wrong_clock(log: FactLog, violation: Violation) -> BrokenRule | None:
 
 
 def unasked_lease(log: FactLog, violation: Violation) -> BrokenRule | None:
-    """E2: a lease lasts T_act from the sending of a round that a quorum has granted, and not longer."""
+    """E2: a lease lasts T_act from the sending of a round that a quorum has granted, and not longer; or as long as
+    that round has asked for (E36).
+    """
     for lease in log.leases:
-        asked_s = _asked_and_granted_s(log, lease.who, lease.term, lease.at_s)
+        asked_s = _granted_s(log, lease.who, lease.term, lease.at_s, lambda at, _: at)
         if asked_s is None:
             voters = sorted({voter.id for at, voter, _ in log.granted[lease.term] if at <= lease.at_s})
             text = f"{called(lease.who)} leads under term {lease.term.n}, which only {voters} have granted"
             return chain(violation, "E2", CauseStep(lease.at_s, text))
-        lasts_s = log.timing.act_s / (1.0 - CLOCK_RATE_ERROR)
-        if lease.until_s > asked_s + lasts_s + ROUNDING_S:
+        until_s = _granted_s(log, lease.who, lease.term, lease.at_s, lambda at, propose: at + _lasts_s(log, propose))
+        if until_s is not None and lease.until_s > until_s + ROUNDING_S:
             asked = CauseStep(asked_s, f"{called(lease.who)} asked for the round that a quorum granted last")
             text = f"it leads until {lease.until_s:.4f} s, {lease.until_s - asked_s:.3f} s after it asked"
             return chain(violation, "E2", asked, CauseStep(lease.at_s, text))
     return None
 
 
-def _asked_and_granted_s(log: FactLog, who: Member, term: Term, until_s: float) -> float | None:
-    """Return the latest time [s] by which half of a config's voters had been asked and then granted; None: there is
-    none. The holder counts as one that grants.
+def _lasts_s(log: FactLog, propose: Propose) -> float:
+    """Return the longest lease [s, true time] that goes with the bond which a round asks for."""
+    act_s = log.timing.act_s
+    if propose.grant_ms:
+        slowest = (1.0 + CLOCK_RATE_ERROR) / (1.0 - CLOCK_RATE_ERROR)
+        act_s = min(act_s, propose.grant_ms / 1000.0 / slowest - log.timing.deadman_s)
+    return act_s / (1.0 - CLOCK_RATE_ERROR)
+
+
+def _granted_s(
+    log: FactLog, who: Member, term: Term, until_s: float, of_round: Callable[[float, Propose], float]
+) -> float | None:
+    """Return the latest time [s] that half of a config's voters have granted by `until_s`, of the times that `of_round`
+    has for a round and its sending; None: there is none. The holder counts as one that grants.
     """
-    sent = [(at, propose.round) for at, _, propose in log.proposed[term]]
-    voted = {who: until_s}
+    sent = [(at, propose.round, of_round(at, propose)) for at, _, propose in log.proposed[term]]
+    voted = {who: float("inf")}
     for at, voter, number in log.granted[term]:
         if at <= until_s and voter != who:
-            asked_s = max((t for t, one in sent if one == number and t <= at), default=LONG_AGO)
-            voted[voter] = max(voted.get(voter, LONG_AGO), asked_s)
+            granted_s = max((value for t, one, value in sent if one == number and t <= at), default=LONG_AGO)
+            voted[voter] = max(voted.get(voter, LONG_AGO), granted_s)
     configs = {propose.config.version: propose.config for at, _, propose in log.proposed[term] if at <= until_s}
-    times = [_half_asked_s(config, voted) for config in configs.values()]
+    times = [_half_s(config, voted) for config in configs.values()]
     return max((time for time in times if time > LONG_AGO), default=None)
 
 
-def _half_asked_s(config: Config, voted: dict[Member, float]) -> float:
+def _half_s(config: Config, voted: dict[Member, float]) -> float:
     newest_first = sorted((voted.get(voter, LONG_AGO) for voter in config.voters), reverse=True)
     return newest_first[(len(newest_first) - 1) // 2] if newest_first else LONG_AGO
 

@@ -62,7 +62,7 @@ def command(
     if seeds is not None and seeds < 1:
         raise Refused(f"--seeds {seeds}: must be at least 1")
     if minutes is not None and not 0.0 < minutes < float("inf"):
-        raise Refused(f"--minutes {minutes}: must be above 0")
+        raise Refused(f"--minutes {minutes:g}: must be a finite number above 0")
     code: int = run(as_json, **given)
     return code
 

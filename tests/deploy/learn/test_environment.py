@@ -83,6 +83,11 @@ def test_at_the_time_limit_it_is_truncated_and_a_further_step_says_what_to_do() 
         ({"commanded": [9]}, r"commanded=\[9\]: must be some of robots \[1, 2, 3, 4\]"),
         ({"commanded": [2, 2]}, r"commanded=\[2, 2\]: must be some of robots \[1, 2, 3, 4\], each once"),
         ({"commanded": []}, r"commanded=\[\]: must be some of robots"),
+        ({"robots": [1, 2]}, r"robots=\[1, 2\]: must be a whole number, the size of the team"),
+        ({"robots": 1e9}, r"robots=1000000000.0: must be a whole number"),
+        ({"robots": 2000}, r"--robots 2000: mission.robots = 2000 ids: must be at most 1000 ids"),
+        ({"commanded": 2}, r"commanded=2: must be a list of robots, of \[1, 2, 3, 4\]"),
+        ({"step_s": "fast"}, r"step_s='fast': must be a finite time"),
         ({"step_s": 0.0}, r"step_s=0.0: must be a finite time \[s\] above 0"),
     ],
 )
