@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import cos, pi, sin
 
 import pytest
 
-from lfa.agents.behaviors.make_room import CLEAR_M, COMES_S, GONE_S, HOLD_S, NEAR_M, ROOM_S, MakeRoom
+from lfa.agents.behaviors.make_room import (
+    BESIDE_M,
+    CLEAR_M,
+    COMES_S,
+    GONE_S,
+    HOLD_S,
+    NEAR_M,
+    PASSES_M,
+    ROOM_S,
+    MakeRoom,
+)
 from lfa.agents.following.predecessor import Sighting
 from lfa.agents.formation.pose_history import PoseHistory
 from lfa.protocol.geometry import STILL, Pose2D, Twist
@@ -21,9 +31,9 @@ def walls(left_m: float, right_m: float) -> list[tuple[float, float]]:
     return [(0.1 * n, y) for n in range(-20, 21) for y in (left_m, -right_m)]
 
 
-def seen(x: float = 2.9, heading: float = pi, twist: Twist = COMES) -> Sighting:
-    """The predecessor at (`x`, 0) in `map`."""
-    return Sighting(1, 0, Pose2D(x, 0.0, heading), twist, 0.0, 0.0, 0.0, PoseHistory(1.0))
+def seen(x: float = 2.9, heading: float = pi, twist: Twist = COMES, y: float = 0.0) -> Sighting:
+    """The predecessor at (`x`, `y`) in `map`."""
+    return Sighting(1, 0, Pose2D(x, y, heading), twist, 0.0, 0.0, 0.0, PoseHistory(1.0))
 
 
 class Place:
@@ -65,8 +75,55 @@ def test_one_that_touches_it_needs_room_although_it_faces_aside() -> None:
     assert twist.linear_x < 0.0
 
 
-def test_where_a_body_passes_beside_it_nobody_goes_back() -> None:
-    assert Place(walls(0.5, 1.0)).does(seen()) is None
+PASS_M = 3.0 * RADIUS_M + PASSES_M
+"""Room [m] beside the middle of this robot in which a body passes."""
+FURTHER_ON = [(x, y) for x, y in walls(0.5, 0.5) if abs(x) > BESIDE_M]
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        pytest.param(walls(0.5, PASS_M + 0.02), id="at its right"),
+        pytest.param(walls(PASS_M + 0.02, 0.5), id="at its left"),
+        pytest.param([point for point in walls(0.5, 0.5) if point[1] < 0.0], id="where there is no other wall"),
+        pytest.param(FURTHER_ON, id="before and behind the narrow place"),
+    ],
+)
+def test_where_a_body_passes_beside_it_nobody_goes_back(points: list[tuple[float, float]]) -> None:
+    assert Place(points).does(seen()) is None
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        pytest.param(walls(PASS_M - 0.02, PASS_M - 0.02), id="a little too narrow"),
+        pytest.param([*walls(0.5, 0.5), *walls(2.0, 2.0)], id="with room behind its walls"),
+    ],
+)
+def test_where_no_body_passes_it_goes_back(points: list[tuple[float, float]]) -> None:
+    twist = Place(points).does(seen())
+    assert twist is not None
+    assert twist.linear_x < 0.0
+
+
+def test_the_predecessors_own_body_is_no_wall() -> None:
+    right = [point for point in walls(0.5, 0.5) if point[1] < 0.0]
+    assert Place([*right, (0.4, 0.42)]).does(seen(x=2.5, y=0.2)) is None
+
+
+def test_it_backs_along_the_bend_on_which_it_came() -> None:
+    points, room = walls(0.5, 0.5), MakeRoom(RADIUS_M)
+    for back in (0.1 * n for n in range(15, -1, -1)):
+        at = Pose2D(AT.x - 1.5 * sin(back / 1.5), 1.5 * (1.0 - cos(back / 1.5)), -back / 1.5)
+        assert room.step(seen(9.0, 0.0), points, at, 0.0) is None
+    assert room.step(seen(), points, AT, 1.0) is None
+    twist = room.step(seen(), points, AT, 1.0 + COMES_S)
+    assert twist is not None
+    assert twist.angular_z < -0.05
+
+
+def test_a_predecessor_that_comes_at_the_first_sight_has_to_come_for_a_while_too() -> None:
+    assert MakeRoom(RADIUS_M).step(seen(), walls(0.5, 0.5), AT, 0.0) is None
 
 
 @pytest.mark.parametrize(
@@ -76,6 +133,7 @@ def test_where_a_body_passes_beside_it_nobody_goes_back() -> None:
         pytest.param(seen(heading=pi / 2), id="it turns off"),
         pytest.param(seen(twist=Twist(-0.2, 0.0)), id="it reverses away"),
         pytest.param(seen(x=1.1, heading=0.0), id="it comes from behind"),
+        pytest.param(seen(x=2.55, heading=0.0, twist=STILL), id="it touches, and faces away"),
         pytest.param(seen(x=2.0 + 2.0 * RADIUS_M + NEAR_M + 0.01), id="it is far away"),
     ],
 )
@@ -88,8 +146,9 @@ def test_it_stands_where_something_is_behind_it_and_once_there_is_room() -> None
     assert place.does(seen()) == STILL
     place = Place(walls(0.5, 0.5))
     assert place.does(seen()) != STILL
-    far = seen(x=2.0 + 2.0 * RADIUS_M + NEAR_M + CLEAR_M + 0.01)
-    assert place.room.step(far, place.points, AT, 2.0) == STILL
+    near_m = 2.0 * RADIUS_M + NEAR_M + CLEAR_M
+    assert place.room.step(seen(x=2.0 + near_m - 0.01), place.points, AT, 2.0) != STILL
+    assert place.room.step(seen(x=2.0 + near_m + 0.01), place.points, AT, 2.0) == STILL
 
 
 def test_once_the_predecessor_has_turned_away_for_a_while_it_follows_again() -> None:

@@ -1,10 +1,10 @@
 """Backing out of a trap the way that the robot came."""
 
-from math import hypot, pi
+from math import cos, hypot, pi, sin
 
 import pytest
 
-from lfa.agents.recovery.back_up import OUT_M, BackUp, back_to
+from lfa.agents.recovery.back_up import BACK_MPS, OUT_M, TURN_PER_S, TURN_RADPS, BackUp, back_to
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, in_base
 
 DT = 0.02
@@ -42,6 +42,24 @@ def test_it_waits_while_somebody_stands_behind() -> None:
     for _ in range(50):
         assert back_up.step([(-0.20, 0.0)], pose, 0.15) == STILL
     assert back_up.under_way
+
+
+def test_who_has_given_up_backing_drives_on_and_remembers_the_trap() -> None:
+    back_up, pose = driven_in()
+    back_up.end()
+    assert not back_up.under_way
+    assert back_up.step([], pose, 0.15) is None
+    assert back_up.trap == (pose.x, pose.y)
+
+
+def test_it_backs_on_the_arc_that_leads_through_its_trail() -> None:
+    back_up, pose = BackUp(), Pose2D(1.0, 0.0, 0.0)
+    back_up.keep(Pose2D(0.0, 0.2, 0.0))
+    back_up.begin(pose)
+    twist = back_up.step([], pose, 0.15)
+    assert twist is not None
+    way = [along_arc(pose, twist, 0.02 * n) for n in range(300)]
+    assert min(hypot(at.x, at.y - 0.2) for at in way) < 0.005
 
 
 def test_walls_beside_the_way_do_not_hold_it() -> None:
@@ -86,11 +104,12 @@ def test_where_the_direct_way_to_its_trail_cuts_a_corner_it_backs_beside_it() ->
     assert backs_up(came, Pose2D(1.18, 0.43, 1.25), CORNER) > RADIUS_M
 
 
-def test_a_loop_of_its_trail_leads_nowhere() -> None:
+@pytest.mark.parametrize("y", [0.0, 1.0])
+def test_a_loop_of_its_trail_leads_nowhere(y: float) -> None:
     back_up = BackUp()
     for x in (*range(31), *range(30, 20, -1)):
-        back_up.keep(Pose2D(0.1 * x, 0.0, 0.0))
-    pose = Pose2D(2.0, 0.0, 0.0)
+        back_up.keep(Pose2D(0.1 * x, y, 0.0))
+    pose = Pose2D(2.0, y, 0.0)
     back_up.keep(pose)
     back_up.begin(pose)
     for _ in range(20):
@@ -106,3 +125,20 @@ def test_without_a_trail_the_rear_turns_to_where_most_room_is(heading: float) ->
     twist = back_to([in_base(pose, point) for point in CORRIDOR], (-1.0, 0.0), RADIUS_M)
     assert twist.linear_x == 0.0
     assert twist.angular_z * heading < 0.0
+
+
+def test_with_its_rear_on_the_way_it_drives_backwards() -> None:
+    assert back_to([], (-1.0, 0.0), RADIUS_M) == Twist(-BACK_MPS, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("off_rad", "rate_radps"), [(0.2, 0.2 * TURN_PER_S), (-0.2, -0.2 * TURN_PER_S), (1.0, TURN_RADPS)]
+)
+def test_the_rear_turns_the_faster_the_farther_it_is_off_the_way(off_rad: float, rate_radps: float) -> None:
+    twist = back_to([], (-cos(off_rad), -sin(off_rad)), RADIUS_M)
+    assert twist.linear_x == 0.0
+    assert twist.angular_z == pytest.approx(rate_radps)
+
+
+def test_what_bars_the_far_end_of_the_way_is_passed_too() -> None:
+    assert back_to([(-1.5, 0.0)], (-2.0, 0.0), RADIUS_M).linear_x == 0.0
