@@ -1,11 +1,12 @@
 """A learned controller from a model file (ONNX): what a follower measures goes in, the twist that it wants comes out.
 
 The follower treats it as any controller: the drive's limits, stale data, avoidance and the braking before obstacles
-stay in force behind it. A model is data: the file names no code, and its bytes alone are read.
+stay in force behind it. A model is data: the file names no code, its bytes alone are read, and its memory is bounded.
 """
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from math import cos, sin
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 from lfa.agents.config import Gains
 from lfa.agents.following.controller import Reference
+from lfa.agents.following.onnx_bounds import beyond_bounds
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_bytes
 from lfa.protocol.geometry import Pose2D, Twist, wrap
@@ -28,6 +30,8 @@ FLOATS, LINE_MAX = "tensor(float)", 120
 """Type of a model's input and output, and the greatest length of what the runtime says of an error."""
 OUTPUTS = 2
 """Number of values that a model answers: forward speed [m/s] and yaw rate [rad/s]."""
+ARENA_BYTES_MAX = 128 << 20
+"""Maximum memory [bytes] of all tensors of a process's models; what asks for more raises, as a failing controller."""
 
 
 class OnnxModel:
@@ -46,17 +50,27 @@ class OnnxModel:
             raise Refused(f"{where}: {error.strerror}, {right}") from None
         except DamagedFile as error:
             raise Refused(f"{where}: {error}, {right}") from None
+        self._numpy = numpy
+        wrong = beyond_bounds(content) or self._opened(runtime, content)
+        if wrong:
+            raise Refused(f"{where}: {wrong}, {right}")
+
+    def _opened(self, runtime: Any, content: bytes) -> str:
+        """Open a session, and return what a model has otherwise than a controller needs; empty if nothing."""
+        _bound_memory(runtime)
         options = runtime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 4
-        self._numpy = numpy
+        options.add_session_config_entry("session.use_env_allocators", "1")
+        # What is computed beforehand is outside the bounded memory.
+        options.graph_optimization_level = runtime.GraphOptimizationLevel.ORT_DISABLE_ALL
         try:
             self._session: Any = runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-            wrong = self._misfit()
+            return self._misfit()[:LINE_MAX]
         except Exception as error:  # noqa: BLE001 - the runtime's errors have no class in common
-            wrong = " ".join(str(error).split()).rpartition(" : ")[2][:LINE_MAX].rstrip(".")
-        if wrong:
-            raise Refused(f"{where}: {wrong}, {right}")
+            if "Available memory of" in str(error):
+                return f"needs more than {ARENA_BYTES_MAX >> 20} MiB of memory"
+            return " ".join(str(error).split()).rpartition(" : ")[2][:LINE_MAX].rstrip(".")
 
     def _misfit(self) -> str:
         """Return what a model has otherwise than a controller needs; empty if nothing, once it has answered."""
@@ -80,6 +94,13 @@ class OnnxModel:
         """Return the first row that the model answers to `values`, in the order of `FIELDS`."""
         given = self._numpy.array([values], self._numpy.float32)
         return self._session.run(None, {self._name: given})[0][0]
+
+
+@cache
+def _bound_memory(runtime: Any) -> None:
+    """Give the models of this process one memory of ARENA_BYTES_MAX, once."""
+    info = runtime.OrtMemoryInfo("Cpu", runtime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, runtime.OrtMemType.DEFAULT)
+    runtime.create_and_register_allocator(info, runtime.OrtArenaCfg({"max_mem": ARENA_BYTES_MAX}))
 
 
 class OnnxPolicy:
