@@ -53,6 +53,12 @@ def command(
     return 0
 
 
+def _incarnation(path: Path) -> int:
+    """Return the incarnation in the name of a journal, 0 for a name that no process gives."""
+    number = path.stem.split("-")[1]
+    return int(number) if number.isascii() and number.isdecimal() else 0
+
+
 def map_of(run: Path, robot: int | None = None) -> Map:
     """Return the map of `robot`, by default of the last leader, at the end of the run.
 
@@ -60,7 +66,7 @@ def map_of(run: Path, robot: int | None = None) -> Map:
     """
     leader_terms = event_log.leader_terms(event_log.lines(run))
     robot = robot if robot is not None else leader_terms[-1].robot_id if leader_terms else 1
-    paths = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=lambda path: int(path.stem.split("-")[1]))
+    paths = sorted((run / JOURNALS).glob(f"{robot_name(robot)}-*.bin"), key=_incarnation)
     if not paths:
         raise Refused(f"{run}: no journal of {robot_name(robot)}: must be a run folder with that robot in it")
     try:

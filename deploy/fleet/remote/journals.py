@@ -1,9 +1,13 @@
-"""Collection of a fleet's journals in one folder, from this machine's processes or over ssh from all machines."""
+"""Collection of a fleet's journals in one folder, from this machine's processes or over ssh from all machines.
+
+Two journals of one name, as of a robot that ran on two machines, are both kept: the second as `robot2-7-2.bin`.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import io
+import itertools
 import os
 import re
 import shutil
@@ -59,8 +63,29 @@ def copy(folders: set[Path], run: Path) -> int:
     if journals:
         with whole_folder(run / JOURNALS) as fresh:
             for path in journals:
-                shutil.copyfile(path, fresh / path.name)
+                shutil.copyfile(path, _place(path, fresh, run / JOURNALS))
     return len(journals)
+
+
+def _place(journal: Path, fresh: Path, kept: Path) -> Path:
+    """Return where in `fresh`, whose entries will be moved to `kept`, a journal goes: to a name of its own there.
+
+    An earlier or a later state of the same journal is in its place.
+    """
+    for n in itertools.count(1):
+        name = journal.name if n == 1 else f"{journal.stem}-{n}.bin"
+        if all(_same_start(journal, there / name) for there in (fresh, kept) if (there / name).exists()):
+            return fresh / name
+    raise AssertionError("count ends")
+
+
+def _same_start(one: Path, other: Path) -> bool:
+    """Return True if of two files one is the beginning of the other: journals only grow."""
+    with one.open("rb") as a, other.open("rb") as b:
+        while (x := a.read(PIECE_BYTES)) and (y := b.read(PIECE_BYTES)):
+            if not x.startswith(y) and not y.startswith(x):
+                return False
+    return True
 
 
 def fetch(plan: FleetPlan, run: Path) -> tuple[int, list[str]]:
@@ -122,6 +147,7 @@ def unpack(packed: bytes | BinaryIO, run: Path) -> int:
         for _ in range(MEMBERS_MAX):
             header = source.read(tarfile.BLOCKSIZE)
             if header == bytes(tarfile.BLOCKSIZE):
+                _give_places(fresh, run / JOURNALS)
                 return count
             member = tarfile.TarInfo.frombuf(header, "utf-8", "replace")
             if member.size < 0 or member.type == tarfile.GNUTYPE_SPARSE:
@@ -131,6 +157,17 @@ def unpack(packed: bytes | BinaryIO, run: Path) -> int:
             _copy(source, member.size, fresh / name if wanted else Path(os.devnull))
             count += wanted
         raise tarfile.ReadError(f"more than {MEMBERS_MAX} entries")
+
+
+def _give_places(fresh: Path, kept: Path) -> None:
+    """Rename journals in `fresh` that have the name of another one in `kept`, and drop what is there in a later state."""
+    for path in sorted(fresh.iterdir()):
+        place = _place(path, fresh, kept)
+        there = kept / place.name
+        if there.exists() and there.stat().st_size > path.stat().st_size:
+            path.unlink()
+        elif place != path:
+            path.rename(place)
 
 
 def _copy(source: BinaryIO, size: int, to: Path) -> None:

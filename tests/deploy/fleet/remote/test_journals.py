@@ -67,6 +67,40 @@ def test_the_journals_of_two_machines_are_unpacked_one_after_the_other(
     assert met == []
 
 
+def _sent(**contents: bytes) -> bytes:
+    sent = io.BytesIO()
+    with tarfile.open(fileobj=sent, mode="w") as files:
+        for name, content in contents.items():
+            member = tarfile.TarInfo(f"{name.replace('_', '-')}.bin")
+            member.size = len(content)
+            files.addfile(member, io.BytesIO(content))
+    return sent.getvalue()
+
+
+def _kept(run: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted((run / "journal").iterdir())}
+
+
+def test_journals_of_one_name_from_two_machines_are_both_kept(tmp_path: Path) -> None:
+    assert journals.unpack(_sent(robot2_7=b"machine a"), tmp_path) == 1
+    assert journals.unpack(_sent(robot2_7=b"Machine b", robot3_1=b"x"), tmp_path) == 2
+    assert _kept(tmp_path) == {"robot2-7-2.bin": b"Machine b", "robot2-7.bin": b"machine a", "robot3-1.bin": b"x"}
+
+
+def test_a_journal_that_is_fetched_again_stands_once_in_its_latest_state(tmp_path: Path) -> None:
+    for state in (b"machine a", b"machine a, later", b"machine a", b"Machine b", b"Machine b, later", b"machine"):
+        journals.unpack(_sent(robot2_7=state), tmp_path)
+    assert _kept(tmp_path) == {"robot2-7-2.bin": b"Machine b, later", "robot2-7.bin": b"machine a, later"}
+
+
+def test_journals_of_one_name_in_two_folders_of_this_machine_are_both_copied(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "robot2-7.bin").write_text(name)
+    assert journals.copy({tmp_path / "a", tmp_path / "b"}, tmp_path) == 2
+    assert _kept(tmp_path) == {"robot2-7-2.bin": b"b", "robot2-7.bin": b"a"}
+
+
 def test_a_machine_can_put_nothing_outside_of_the_folder(tmp_path: Path) -> None:
     sent = io.BytesIO()
     with tarfile.open(fileobj=sent, mode="w") as files:
