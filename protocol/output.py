@@ -77,7 +77,9 @@ def replace_file(path: Path, data: bytes, writer: str = "new") -> str:
     """
     fresh = path.with_name(f"{path.name}.{writer}")
     try:
-        fresh.write_bytes(data)
+        fresh.unlink(missing_ok=True)  # of a writer that was killed, or a link of another user's
+        with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666), "wb") as file:
+            file.write(data)
         fresh.replace(path)
     except OSError as error:
         with suppress(OSError):
@@ -90,12 +92,12 @@ class AppendedFile:
     """File that grows by whole pieces: a piece that the file system takes in part only is cut off again."""
 
     def __init__(self, path: Path, *, fresh: bool = False) -> None:
-        """Open the file, with `fresh` an empty one. Raises OSError."""
+        """Open the file, with `fresh` an empty one. Raises OSError, also for a link or a pipe in its place."""
         self.path = path
         self.error = ""
         """Reason of the last failure; empty: none."""
-        flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC | (os.O_TRUNC if fresh else 0)
-        self._file: int | None = os.open(path, flags, 0o644)
+        flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+        self._file: int | None = os.open(path, flags | (os.O_TRUNC if fresh else 0), 0o644)
         self.size = os.fstat(self._file).st_size
         """Size [bytes] of the whole pieces."""
 

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from lfa.protocol.output import AppendedFile, replace_file, write_line
 from tests.rigs.small_disk import fill, read_only, small_disk
 from tests.test_imports import ROOT
@@ -90,3 +92,16 @@ def test_a_file_is_replaced_whole_or_stays_as_it_was(tmp_path: Path) -> None:
         with read_only(disk):
             assert replace_file(path, b"third") == "Read-only file system"
         assert path.read_bytes() == b"first"
+
+
+def test_a_link_or_a_pipe_that_another_user_has_put_in_place_is_neither_followed_nor_waited_for(tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_bytes(b"theirs")
+    (tmp_path / "state.json.new").symlink_to(victim)
+    assert replace_file(tmp_path / "state.json", b"ours") == ""
+    assert (victim.read_bytes(), (tmp_path / "state.json").read_bytes()) == (b"theirs", b"ours")
+    (tmp_path / "link").symlink_to(victim)
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("link", "pipe"):
+        with pytest.raises(OSError, match=r"Too many levels of symbolic links|No such device or address"):
+            AppendedFile(tmp_path / name)
