@@ -30,6 +30,8 @@ INSTALL = (
 
 Arguments: name of the wheel, extras such as `[world]` or none, options of pip."""
 NEEDED = "import msgspec, typer, zenoh"
+MAKE_VENV = ("python3", "-I", "-m", "venv")
+"""Command that makes a virtual environment, with any Python 3, whatever modules lie in a home folder."""
 
 
 def pack() -> tuple[str, bytes]:
@@ -60,7 +62,7 @@ async def install(shell: Shell, machine: Machine, wanted: str) -> None:
     """Install this `lfa` on a machine; create its virtual environment if it is missing. Raises Refused."""
     python = python_of(machine)
     if machine.venv and (await shell.run((python, "-c", ""))).code != 0:
-        await _must(shell, ("python3", "-m", "venv", machine.venv), f"venv = {machine.venv}")
+        await _must(shell, (*MAKE_VENV, machine.venv), f"venv = {machine.venv}")
     await probe(shell, python)
     name, data = pack()
     pip = (python, "-P", "-c", INSTALL, name)

@@ -88,6 +88,13 @@ def test_a_wheel_is_installed_from_a_new_folder_that_is_gone_afterwards(
     assert list(shared.iterdir()) == []
 
 
+def test_a_virtual_environment_is_made_whatever_lies_in_the_home_folder(home: Path, tmp_path: Path) -> None:
+    (home / "venv.py").write_text("raise SystemExit('the module of another')")
+    done = asyncio.run(Here().run((*wheel.MAKE_VENV, "--without-pip", str(tmp_path / "made"))))
+    assert (done.code, done.err) == (0, b"")
+    assert (tmp_path / "made" / "bin" / "python").exists()
+
+
 def test_routers_of_machines_with_ipv6_addresses_listen_in_ipv6(tmp_path: Path) -> None:
     file = tmp_path / "fleet.toml"
     text = 'scenario = "straight"\n[hosts.a]\naddress = "fd00:77::2"\n[hosts.b]\naddress = "10.0.0.3"\n'
