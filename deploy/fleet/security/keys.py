@@ -114,7 +114,7 @@ def make(folder: Path, plan: KeyPlan, days: float = DAYS, ca_cert: Path | None =
     unsigned: Sequence[str] = ()
     try:
         used = folder.exists() and any(folder.iterdir())
-        with nullcontext(folder) if used else whole_folder(folder) as place:
+        with nullcontext(folder) if used else whole_folder(folder, 0o700) as place:
             private_folder(place)
             if ca_cert is not None:
                 write_private(place / CA_FILE, ca_cert.read_bytes())
@@ -168,11 +168,16 @@ def revoke(folder: Path, names: Sequence[str]) -> list[str]:
 
 
 def kept_on(folder: Path, machine: str) -> list[str]:
-    """Return the members whose keys are on `machine`: what is to be revoked when it is lost. Raises Refused."""
-    plan = load(folder).plan
-    if machine not in plan.hosts:
-        raise Refused(f"--machine {machine}: must be one of {', '.join(plan.hosts)}")
-    return plan.kept_at(machine)
+    """Return the members whose keys are on `machine`, or were: what is to be revoked when it is lost. Raises Refused.
+
+    A robot that has moved leaves a copy, of which nobody can say that it was deleted.
+    """
+    registry = load(folder)
+    plan, laid = registry.plan, {host for hosts in registry.laid.values() for host in hosts}
+    if machine not in laid | plan.hosts.keys():
+        raise Refused(f"--machine {machine}: must be one of {', '.join(sorted(laid | plan.hosts.keys()))}")
+    here = plan.kept_at(machine)
+    return here + [name for name in plan.places if machine in registry.laid.get(name, ()) and name not in here]
 
 
 def show(folder: Path, now_ms: int) -> list[Shown]:

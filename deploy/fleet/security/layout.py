@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -35,11 +36,11 @@ def lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str])
     Raises OSError, and Unsigned after writing the requests for an outside authority.
     """
     issued = folder / ISSUED
-    for inner in (issued, folder / HOSTS):
+    for inner in (folder, issued, folder / HOSTS):
         private_folder(inner)
     write_private(issued / CA_FILE, (folder / CA_FILE).read_bytes())
     fresh = {name: name for name in registry.members() if name not in registry.revoked}
-    registry = structs.replace(registry, common_names=fresh | registry.common_names)
+    registry = structs.replace(registry, common_names=fresh | registry.common_names).with_places()
     if registry.outside:
         _await_signatures(folder, registry, renew)
     ca = None if registry.outside else authority.load(folder / CA_FILE, folder / CA_KEY)
@@ -55,6 +56,11 @@ def lay_out(folder: Path, registry: Registry, days: float, renew: Sequence[str])
             authority.issue(stem, ca, common, addresses, days)
             made.append(name)
         _password(stem.with_name(f"{name}.password"), common)
+    for name in registry.common_names.keys() - set(registry.members()):
+        _remove(issued / name)
+    for left in (folder / HOSTS).iterdir():
+        if left.name not in registry.plan.hosts and left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left)
     for host in registry.plan.hosts:
         _lay_out_host(folder, registry, host)
     write_private(folder / REGISTRY, msgspec.json.format(msgspec.json.encode(registry), indent=1))

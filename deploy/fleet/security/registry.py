@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from lfa.deploy.fleet.security.access_rules import KeyPlan
 from lfa.protocol.errors import Refused
@@ -24,9 +24,18 @@ class Registry(Struct, frozen=True):
     """True: an outside authority signs, whose key is not here."""
     revoked: dict[str, int] = {}
     """Number of revocations of each member."""
+    laid: dict[str, tuple[str, ...]] = {}
+    """Machines on which the keys of an admitted member lie, or lay under its present common name."""
 
     def members(self) -> list[str]:
         return list(self.plan.places)
+
+    def with_places(self) -> Registry:
+        """Return the registry with the machines of the plan among those where keys were laid."""
+        now = {name: host for host in self.plan.hosts for name in self.plan.kept_at(host)}
+        known = {name: self.laid.get(name, ()) for name in self.common_names}
+        laid = {name: tuple(sorted({*at, now[name]} if name in now else at)) for name, at in known.items()}
+        return structs.replace(self, laid={name: at for name, at in laid.items() if at})
 
 
 def load(folder: Path) -> Registry:
