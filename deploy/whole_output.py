@@ -15,8 +15,8 @@ from pathlib import Path
 
 
 @contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
-    """Yield a fresh folder, whose entries are in the folder `path` when the block ends without an error.
+def whole_folder(path: Path, mode: int = 0o777) -> Iterator[Path]:
+    """Yield a fresh folder of `mode`, whose entries are in the folder `path` when the block ends without an error.
 
     A missing `path` is made, with its parents; entries of the same name are replaced. After an error `path` and its
     parents are as they were. Raises OSError, which names `path`.
@@ -26,7 +26,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
     whole = False
     try:
         with _named(path):
-            fresh.mkdir(parents=True)
+            fresh.parent.mkdir(parents=True, exist_ok=True)
+            fresh.mkdir(mode)
             yield fresh
             if path.exists():
                 for entry in sorted(fresh.iterdir()):

@@ -7,6 +7,7 @@ certificates itself; a secret is never stored in a value that could be printed.
 from __future__ import annotations
 
 import binascii
+import os
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,7 +21,7 @@ from lfa.protocol.file_reading import DamagedFile, read_bytes, read_text
 CA_FILE = "ca.pem"
 ACCESS_FILE = "access.json"
 USERS_FILE = "users"
-FOREIGN_BITS = 0o077
+FOREIGN_BITS, OTHERS_WRITE = 0o077, 0o022
 CERTIFICATE_BYTES_MAX = 64 * 1024
 PASSWORD_BYTES_MAX = 4096
 _BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
@@ -60,6 +61,7 @@ def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
     certificate, key, password = (folder / f"{name}.{kind}" for kind in ("pem", "key", "password"))
     for path in (folder / CA_FILE, certificate):
         check_valid(path, wall_ms)
+    check_own(folder / CA_FILE)
     for path in (key, password) if password.exists() else (key,):
         check_private(path)
     found = Credentials(name, folder / CA_FILE, certificate, key, password if password.exists() else None)
@@ -74,13 +76,31 @@ def credentials(folder: Path, name: str, wall_ms: int) -> Credentials:
 
 
 def check_private(path: Path) -> None:
-    """Raise Refused if the file at `path` is missing, or if others than the owner may access it."""
-    try:
-        mode = path.stat().st_mode
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}, must be a file that `lfa keys` made") from None
+    """Raise Refused if the file at `path` is missing, of another user, or if others may access it."""
+    mode = _mode_of_own(path)
     if mode & FOREIGN_BITS:
         raise Refused(f"{path}: others may read it (mode {mode & 0o777:04o}), must be 0600")
+
+
+def check_own(path: Path) -> None:
+    """Raise Refused if the file at `path` is missing, of another user, or if others may write to it.
+
+    An authority or rules put in place of a fleet's own decide whom its processes trust.
+    """
+    mode = _mode_of_own(path)
+    if mode & OTHERS_WRITE:
+        raise Refused(f"{path}: others may write to it (mode {mode & 0o777:04o}), must be 0600")
+
+
+def _mode_of_own(path: Path) -> int:
+    """Return the mode of a file. Raises Refused if it is missing, or neither this user's nor the administrator's."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}, must be a file that `lfa keys` made") from None
+    if found.st_uid not in (os.geteuid(), 0):
+        raise Refused(f"{path}: of user {found.st_uid}, must be your own file")
+    return found.st_mode
 
 
 def check_valid(path: Path, wall_ms: int) -> None:

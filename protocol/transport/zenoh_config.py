@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,10 @@ def check_default(endpoint: str) -> None:
     if path is None or usual not in endpoint.split(","):
         return
     try:
+        with suppress(FileExistsError):  # made here, before another user makes it while this process waits for a router
+            path.parent.mkdir(mode=0o700)
         found = path.parent.lstat()
-    except OSError:  # there is none: no router has started
+    except OSError:  # there is no place for one
         return
     mode = stat.S_IMODE(found.st_mode)
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or mode & FOREIGN_BITS:

@@ -13,7 +13,7 @@ import zenoh
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.file_reading import DamagedFile, read_json
-from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_private
+from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, Credentials, check_own, check_private
 from lfa.protocol.transport.endpoints import check_endpoints
 from lfa.protocol.transport.tls_door import FAILED_S, LISTENERS, TlsDoor
 from lfa.protocol.transport.zenoh_config import (
@@ -124,6 +124,7 @@ def _guard(credentials: Credentials) -> dict[str, Any]:
     folder = credentials.certificate.parent
     users, access = folder / USERS_FILE, folder / ACCESS_FILE
     check_private(users)
+    check_own(access)
     try:
         rules = read_json(access, dict[str, Any])
     except (OSError, DamagedFile) as error:

@@ -25,7 +25,7 @@ from msgspec import Struct
 from lfa.deploy.fleet.host.end import STOP_S, end, engine_of, print_answer, refuse_left, wait_gone
 from lfa.deploy.fleet.host.ledger import GUARDIAN, Ledger, end_orphans, living, sweep
 from lfa.deploy.fleet.host.router import LISTENS
-from lfa.deploy.fleet.host.start_check import POLL_S, Found, check, family
+from lfa.deploy.fleet.host.start_check import POLL_S, Found, check, check_place, family
 from lfa.deploy.fleet.host.units_host import start_units, stop_units
 from lfa.deploy.fleet.plan import host_plan
 from lfa.deploy.fleet.plan.host_plan import HostPlan
@@ -52,6 +52,7 @@ def start(part: HostPlan) -> Found:
     orphans = end_orphans(part.folder)
     try:
         part.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        check_place(part)  # as it is now: somebody may have been faster
         part.run_folder.mkdir(exist_ok=True, mode=0o700)
         (part.run_folder / SCENARIO).write_text(part.scenario, encoding="utf-8")
         path = part.folder / host_plan.PART

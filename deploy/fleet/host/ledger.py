@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import suppress
@@ -37,9 +38,13 @@ class Ledger(Struct, frozen=True):
 
 
 def ledger(folder: Path) -> Ledger | None:
-    """Return what the supervisor of that folder wrote last, None without a readable file."""
+    """Return what the supervisor of that folder wrote last, None without a readable file of this user.
+
+    Another user's could name any process as one to be ended.
+    """
+    path = folder / LEDGER
     try:
-        return read_json(folder / LEDGER, Ledger)
+        return read_json(path, Ledger) if path.stat().st_uid == os.geteuid() else None
     except (OSError, DamagedFile):
         return None
 

@@ -6,7 +6,9 @@ import contextlib
 import os
 import shutil
 import socket
+import stat
 from importlib.metadata import version
+from pathlib import Path
 
 import msgspec
 from msgspec import Struct
@@ -19,7 +21,7 @@ from lfa.deploy.process.identity import identify
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.topics import HOST_PREFIX
-from lfa.protocol.transport.credentials import check_valid
+from lfa.protocol.transport.credentials import OTHERS_WRITE, check_valid
 from lfa.protocol.transport.zenoh_config import answers, socket_path
 from lfa.protocol.transport.zenoh_router import UNIX_PATH_BYTES_MAX
 
@@ -27,7 +29,6 @@ POLL_S = 0.02
 BACK_S = 4.0
 """Longest time [s] until a supervisor that its guardian starts again runs."""
 FREE_MIB_MIN = 64
-OTHERS_WRITE = 0o022
 
 
 class Found(Struct, frozen=True):
@@ -60,7 +61,7 @@ def check(part: HostPlan) -> Found:
         raise Refused(f"state = {part.state}: too long for a socket in it: at most {UNIX_PATH_BYTES_MAX} bytes")
     if path.exists() and answers(part.socket) and not _left(part):
         raise Refused(f"{path}: a router that this fleet did not start answers there: end it, or give another state")
-    _check_place(part)
+    check_place(part)
     if part.engine != "own":
         check_units(part)
     if part.port:
@@ -98,8 +99,8 @@ def _running(found: Found, running: Ledger, own: HostPlan) -> Found:
     return msgspec.structs.replace(found, run=running.run, digest=running.digest, router=there, certificate=expired)
 
 
-def _check_place(part: HostPlan) -> None:
-    """Raise Refused unless the nearest existing folder is writable and has FREE_MIB_MIN free."""
+def check_place(part: HostPlan) -> None:
+    """Raise Refused unless the nearest existing folder is writable, has FREE_MIB_MIN free, and is nobody else's."""
     place = part.folder
     while not place.exists():
         place = place.parent
@@ -107,11 +108,22 @@ def _check_place(part: HostPlan) -> None:
     if place == part.folder and (found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE):
         right = "must be your own folder that nobody else can write to, or a new one"
         raise Refused(f"state = {part.state}: of user {found.st_uid}, mode {found.st_mode & 0o7777:04o}: {right}")
+    _check_above(part, place)
     if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
         raise Refused(f"state = {part.state}: {place} cannot be written to")
     free_mib = shutil.disk_usage(place).free >> 20
     if free_mib < FREE_MIB_MIN:
         raise Refused(f"state = {part.state}: {free_mib} MiB are free there: must be at least {FREE_MIB_MIN}")
+
+
+def _check_above(part: HostPlan, place: Path) -> None:
+    """Raise Refused if another user could put a folder of theirs in the place of one on the way to `place`."""
+    for above in place.resolve().parents if place == part.folder else (place.resolve(), *place.resolve().parents):
+        found = above.stat()
+        free = found.st_mode & stat.S_IWOTH and not found.st_mode & stat.S_ISVTX
+        if free or found.st_uid not in (os.geteuid(), 0):
+            is_ = f"{above} is of user {found.st_uid}, mode {stat.S_IMODE(found.st_mode):04o}"
+            raise Refused(f"state = {part.state}: {is_}: must be in a folder in which nobody else can rename it")
 
 
 def _check_port(part: HostPlan) -> None:

@@ -160,7 +160,7 @@ def unpack(packed: bytes | BinaryIO, run: Path) -> int:
 
 
 def _give_places(fresh: Path, kept: Path) -> None:
-    """Rename journals in `fresh` that have the name of another one in `kept`, and drop what is there in a later state."""
+    """Rename journals in `fresh` with the name of another one in `kept`; drop those that are there in a later state."""
     for path in sorted(fresh.iterdir()):
         place = _place(path, fresh, kept)
         there = kept / place.name

@@ -55,6 +55,14 @@ def test_the_folder_of_a_router_is_made_for_its_user_alone(tmp_path: Path, monke
     assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
 
 
+def test_whoever_waits_for_a_router_makes_its_folder_before_another_user_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "new"))
+    assert not answers(default_endpoint())
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
+
+
 def test_an_endpoint_that_is_named_is_the_users_business(tmp_path: Path) -> None:
     tmp_path.chmod(0o777)
     check_default(f"unixsock-stream/{tmp_path}/router.sock")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import stat
 from collections.abc import Callable, Sequence
@@ -21,6 +22,7 @@ from lfa.deploy.fleet.security.follow_rights import followable
 from lfa.deploy.fleet.security.private_files import ISSUED
 from lfa.deploy.robot.base import SimulatedBase
 from lfa.deploy.robot.driver import Driver
+from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.node import Node
@@ -28,7 +30,7 @@ from lfa.protocol.runtime.namesakes import said_by
 from lfa.protocol.topics import TOPICS, Topic, matches
 from lfa.protocol.transport.credentials import ACCESS_FILE, USERS_FILE, check_valid, credentials, validity
 from lfa.protocol.transport.spelling import respelled
-from lfa.protocol.transport.zenoh_router import check_listen
+from lfa.protocol.transport.zenoh_router import check_listen, open_router
 from lfa.protocol.witness import Witness
 from tests.rigs.lfa_runs import lfa
 
@@ -187,6 +189,25 @@ def test_what_lay_on_a_lost_machine_is_revoked_at_once_and_nothing_else(tmp_path
         keys.kept_on(folder, "c")
 
 
+def test_what_lay_on_a_lost_machine_before_it_moved_is_revoked_too(tmp_path: Path) -> None:
+    folder = tmp_path / "k"
+    keys.make(folder, plan())
+    keys.make(folder, plan(places={"robot2": ["a"]}))
+    assert "robot2" in keys.kept_on(folder, "b")
+    keys.revoke(folder, keys.kept_on(folder, "b"))
+    keys.rotate(folder, ["robot2"])
+    assert "robot2" not in keys.kept_on(folder, "b"), "its keys under the new common name never lay there"
+    assert "robot2" in keys.kept_on(folder, "a")
+
+
+def test_a_machine_that_left_the_plan_can_be_revoked_and_its_folder_is_gone(tmp_path: Path) -> None:
+    folder = tmp_path / "k"
+    keys.make(folder, plan())
+    keys.make(folder, keys.spread("f", {"a": ("10.0.0.1",)}, range(1, 4)))
+    assert not (folder / "hosts" / "b").exists() and not list((folder / ISSUED).glob("*-b.*"))
+    assert keys.kept_on(folder, "b") == ["robot2"]
+
+
 def test_everything_secret_is_for_the_owner_only(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
@@ -284,6 +305,62 @@ def test_a_key_that_others_may_read_is_refused(tmp_path: Path) -> None:
     (home / "robot1.key").chmod(0o640)
     with pytest.raises(Refused, match=r"0640.*must be 0600"):
         credentials(home, "robot1", now_ms)
+
+
+def _of_nobody(path: Path) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("giving a file to another user needs root")
+    os.chown(path, 65534, 65534)
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil", "says"),
+    [
+        ("ca.pem", _of_nobody, "of user 65534, must be your own file"),
+        ("ca.pem", lambda path: path.chmod(0o666), "others may write to it (mode 0666), must be 0600"),
+        ("ca.pem", lambda path: path.chmod(0o620), "others may write to it (mode 0620), must be 0600"),
+        ("robot1.key", _of_nobody, "of user 65534, must be your own file"),
+        ("robot1.password", _of_nobody, "of user 65534, must be your own file"),
+    ],
+)
+def test_files_that_another_user_could_have_put_there_are_refused(
+    name: str, spoil: Callable[[Path], None], says: str, tmp_path: Path
+) -> None:
+    keys.make(tmp_path / "k", plan())
+    here = registry.folder_of(tmp_path / "k", "a")
+    credentials(here, "robot1", clock.wall_ms())
+    spoil(here / name)
+    with pytest.raises(Refused, match=re.escape(f"{here / name}: {says}")):
+        credentials(here, "robot1", clock.wall_ms())
+
+
+def test_rules_that_others_may_write_are_refused_by_a_secure_router(tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan())
+    here = registry.folder_of(tmp_path / "k", "a")
+    (here / ACCESS_FILE).chmod(0o666)
+    with pytest.raises(Refused, match=r"access.json: others may write to it \(mode 0666\)"):
+        open_router(["tls/127.0.0.1:0"], credentials=credentials(here, "host-a", clock.wall_ms()), secure=True)
+
+
+@pytest.mark.parametrize("inner", ["", "issued", "hosts", "hosts/a"])
+def test_keys_are_not_written_into_a_folder_of_another_user(inner: str, tmp_path: Path) -> None:
+    keys.make(tmp_path / "k", plan())
+    _of_nobody(tmp_path / "k" / inner)
+    with pytest.raises(Refused, match="of user 65534: must be your own folder, or a new one"):
+        keys.rotate(tmp_path / "k")
+    with pytest.raises(Refused, match="of user 65534: must be your own folder, or a new one"):
+        keys.make(tmp_path / "k", plan())
+
+
+def test_keys_are_not_written_through_a_link_that_another_user_has_set(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "k").symlink_to("mine")
+    keys.make(tmp_path / "k", plan())
+    if os.geteuid() != 0:
+        pytest.skip("giving a link to another user needs root")
+    os.lchown(tmp_path / "k", 65534, 65534)
+    with pytest.raises(Refused, match="of user 65534: must be your own folder, or a new one"):
+        keys.make(tmp_path / "k", plan())
 
 
 @pytest.mark.parametrize("kind", ["pem", "password"])
