@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from lfa.deploy.client.fleet_state import FRESH_S, FleetState
 from lfa.deploy.client.roster.roster_call import state_in
 from lfa.protocol.incarnations import drawn_at, is_later
@@ -9,17 +11,22 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event, PoseStamped
 from lfa.protocol.names import robot_id_of, robot_name
 
+TOLD_S = 2.0
+"""Time [s] in which a leader tells who is in the team; until then a robot that has ended may have retired."""
 GIVEN_UP = ("failed", "refused", "ended")
 
 
 class Health:
     """Health monitor: `see` takes in messages, `missing` and `lost` return what is wrong."""
 
-    def __init__(self, robots: tuple[int, ...], hosts: tuple[str, ...]) -> None:
-        """`robots` are those of the mission: the team, until a leader tells who has joined and who has retired."""
+    def __init__(self, robots: tuple[int, ...], hosts: tuple[str, ...], *, starts: bool = False) -> None:
+        """`robots` are those of the mission: the team, until a leader tells who has joined and who has retired.
+
+        `starts`: no process of the fleet ran before, so that nobody has.
+        """
         self._named = frozenset(map(robot_name, robots))
         self._robots = robots
-        self.team_told = False
+        self.team_told = starts
         self._hosts = hosts
         self._state = FleetState()
         self._namesakes: dict[int, float] = {}
@@ -40,11 +47,13 @@ class Health:
         if isinstance(message, Event) and (told := state_in(message)) is not None and told.accepted:
             self._robots, self.team_told = told.team, True
 
-    def lost(self) -> list[str]:
+    def lost(self, watched_s: float = inf) -> list[str]:
         """Return a line for each process that has ended and will not be restarted, with the cause.
 
-        A robot that has retired may end.
+        A robot that has retired may end: nothing is returned until it is known who has, or watched for TOLD_S.
         """
+        if not self.team_told and watched_s <= TOLD_S:
+            return []
         retired = self._named - set(map(robot_name, self._robots))
         return [
             f"host {host}: {report.ended or report.name}"

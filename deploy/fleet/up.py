@@ -35,8 +35,6 @@ from lfa.protocol.errors import Refused
 POLL_S = 0.05
 ASK_S = 0.2
 """Time [s] between questions to the leader who is in the team: spares may have joined, and robots retired."""
-TOLD_S = 2.0
-"""Time [s] in which a leader tells it; until then a robot that has ended may be one that has retired."""
 HEALTHY_S = 0.3
 """Duration [s] for which the fleet must be healthy without interruption."""
 
@@ -113,7 +111,8 @@ async def bring_up(plan: FleetPlan, interrupts: Interrupts, *, may_install: bool
             tell(f"host {name}: {started[name].note}")
         if fleet.wrong:
             raise NotUp(fleet.lines(), 1)
-        return await asyncio.to_thread(await_health, plan, fleet.parts, interrupts, wait_s)
+        starts = len(fresh) == len(plan.hosts)
+        return await asyncio.to_thread(await_health, plan, fleet.parts, interrupts, wait_s, starts=starts)
     except NotUp as not_up:
         lines = await _take_down(fleet, locals().get("fresh", []))
         raise NotUp([*not_up.lines, *lines], not_up.code) from None
@@ -151,13 +150,18 @@ def _join_those_that_run(
         fleet.parts = parts(plan, run, digest, keys)
 
 
-def await_health(plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float) -> dict[str, Any]:
-    """Observe the fleet until it has been healthy for HEALTHY_S; return its chain and hosts. Raises NotUp."""
+def await_health(
+    plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Interrupts, wait_s: float, *, starts: bool = False
+) -> dict[str, Any]:
+    """Observe the fleet until it has been healthy for HEALTHY_S; return its chain and hosts. Raises NotUp.
+
+    `starts`: no machine ran a part of it before.
+    """
     own = next((part for part in fleet_view.here() if part.fleet == plan.name), None)
     endpoints = [own.socket] if own is not None else []
     endpoints += [end for part in shares.values() for end in part.others[:1]]
     seen = Seen(plan.name, ",".join(dict.fromkeys(endpoints)), tuple(plan.hosts), own, plan, store(plan) / ISSUED)
-    health = Health(plan.scenario.mission.robots, tuple(plan.hosts))
+    health = Health(plan.scenario.mission.robots, tuple(plan.hosts), starts=starts)
     began, well_since, shown = clock.now(), None, ""
     ask_at = began
     try:
@@ -169,8 +173,8 @@ def await_health(plan: FleetPlan, shares: dict[str, HostPlan], interrupts: Inter
                 if now >= ask_at:
                     ask_at = now + ASK_S
                     view.ask(QUESTION)
-                lost, missing = health.lost(), health.missing(now)
-                if lost and (health.team_told or now - began > TOLD_S):
+                lost, missing = health.lost(now - began), health.missing(now)
+                if lost:
                     raise NotUp(lost, 1)
                 if interrupts.signal is not None:
                     raise NotUp([f"ended by {interrupts.signal.name}"], 128 + interrupts.signal)

@@ -94,6 +94,13 @@ def test_what_is_given_up_will_not_come() -> None:
     assert health.lost() == ["host a: robot1 ended (exit code 2): lfa-agent: robot1 already runs"]
 
 
+def test_a_robot_that_ended_may_have_retired_until_a_leader_tells_who_has() -> None:
+    for health, told in ((Health((1,), ("a",)), False), (Health((1,), ("a",), starts=True), True)):
+        health.see(0.2, _host(state="refused", ended="robot1 ended"))
+        assert bool(health.lost(0.2)) == told, "in a fleet that starts nobody has retired"
+        assert health.lost(2.1) == ["host a: robot1 ended"]
+
+
 def test_e34_a_retired_robot_is_missed_by_nobody_and_may_end() -> None:
     health = _whole()
     health.see(0.1, _tracking(2, 9))
