@@ -66,6 +66,7 @@ async def _upgrade(plan: FleetPlan, interrupts: Interrupts, wait_s: float, done:
     try:
         await fleet.reach()
         found, wires = await fleet.check(may_install=False), await fleet.wires()
+        await fleet.check_installs()
         lines = fleet.lines() or refusals(plan.name, found, wires, digest)
         started = {} if lines else await fleet.started_as()
         lines = lines or fleet.lines() or differing(started)

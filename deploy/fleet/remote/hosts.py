@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import sys
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 import msgspec
@@ -15,7 +14,7 @@ from lfa.deploy.fleet.host.start_check import Found
 from lfa.deploy.fleet.plan.fleet_file import Engine, FleetPlan, Machine
 from lfa.deploy.fleet.plan.host_plan import PART, HostPlan
 from lfa.deploy.fleet.remote.ssh import Shell, Unreachable, probe, python_of, reach
-from lfa.deploy.fleet.remote.wheel import install
+from lfa.deploy.fleet.remote.wheel import install, replaced
 from lfa.deploy.process.restart_policy import REFUSED_CODE
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -119,13 +118,20 @@ class FleetHosts:
         await self._each(self._shells, one)
         return answers
 
+    async def check_installs(self) -> None:
+        """Check that an installation of `lfa` on each reached machine replaces nobody's editable one."""
+
+        async def one(name: str) -> None:
+            await replaced(self._shells[name], self._plan.hosts[name])
+
+        await self._each(self._shells, one)
+
     async def renew(self, name: str) -> None:
         """Install this `lfa` on one machine, unless it uses the same, and start its part again with it."""
 
         async def one(name: str) -> None:
             shell, machine, part = self._shells[name], self._plan.hosts[name], self.parts[name]
-            if not machine.local or python_of(machine) != sys.executable:
-                await install(shell, machine, part.version)
+            await install(shell, machine, part.version)
             await ask(shell, machine, "stop", part)
             await ask(shell, machine, "start", part)
 
