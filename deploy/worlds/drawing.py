@@ -33,6 +33,8 @@ class WorldDrawing(Struct):
     """Number of robots in the file; None: it has none."""
     radius_m: float | None = None
     """Radius [m] of its robots."""
+    bounds_m: tuple[float, float, float, float] | None = None
+    """Box x1, y1, x2, y2 [m] of a grid of cells, beyond which there is nothing; None: a world goes on around it."""
     skipped: list[str] = field(default_factory=list)
     """What a scenario cannot hold, a few words each."""
 

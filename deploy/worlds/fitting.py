@@ -34,15 +34,15 @@ TIME_LIMIT_S, SLOWNESS = 60.0, 4.0
 def scenario_text(drawing: WorldDrawing, robots: int | None, start: Point | None, goal: Point | None) -> str:
     """Return the scenario as TOML. Raises Refused where no way leads from start to goal."""
     start, goal = start or drawing.start, goal or drawing.goal
+    _check_inside(drawing, "start", start)
+    _check_inside(drawing, "goal", goal)
     radius_m = drawing.radius_m or RADIUS_M
     separation_m = max(SEPARATION_M, 2.0 * radius_m + GAP_M)
     team = robots or drawing.robots or ROBOTS
     drawn = grid_of(drawing.walls, drawing.obstacles, [p for p in (start, goal) if p is not None], CELL_M, CELLS_MAX)
-    way = _way(drawn, radius_m, start, goal)
-    if goal is not None:
-        way[-1] = goal
+    way = _way(drawn, _beyond(drawn, drawing), radius_m, (start, goal), team * separation_m)
     starts, route = _laid(way, team, separation_m)
-    length_m = sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(way))
+    length_m = _length_m(way)
     lines = [
         f"title = {toml_value(drawing.name)}",
         f"time_limit_s = {TIME_LIMIT_S + round(SLOWNESS * length_m / CRUISE_MPS):g}",
@@ -67,19 +67,53 @@ def _obstacle(obstacle: Obstacle) -> str:
     return f"\n[[world.obstacles]]\ncenter_m = {toml_value(list(obstacle.center_m))}\n{shape}"
 
 
-def _way(drawn: Map, radius_m: float, start: Point | None, goal: Point | None) -> list[Point]:
-    """Return the corners of a way with as much room beside it as there is. Raises Refused."""
-    refused = Refused("")
+def _check_inside(drawing: WorldDrawing, what: str, point: Point | None) -> None:
+    """Raise Refused for a start or goal outside of a map."""
+    if point is None or drawing.bounds_m is None:
+        return
+    x1, y1, x2, y2 = drawing.bounds_m
+    if not (x1 <= point[0] <= x2 and y1 <= point[1] <= y2):
+        right = f"must be from {x1:g}, {y1:g} to {x2:g}, {y2:g}"
+        raise Refused(f"{what} ({point[0]:g}, {point[1]:g}): outside of the map, {right}")
+
+
+def _beyond(drawn: Map, drawing: WorldDrawing) -> Taken:
+    """Return the cells beyond the bounds of a world, where it has any."""
+    beyond = np.zeros(drawn.cells.shape, dtype=bool)
+    if drawing.bounds_m is not None:
+        (low_row, low_column), (high_row, high_column) = (
+            (int((y - drawn.origin[1]) / drawn.resolution_m), int((x - drawn.origin[0]) / drawn.resolution_m))
+            for x, y in (drawing.bounds_m[:2], drawing.bounds_m[2:])
+        )
+        beyond[:] = True
+        beyond[low_row : high_row + 1, low_column : high_column + 1] = False
+    return beyond
+
+
+def _way(
+    drawn: Map, beyond: Taken, radius_m: float, ends: tuple[Point | None, Point | None], long_m: float
+) -> list[Point]:
+    """Return the corners of a way with as much room beside it as there is, none of them `beyond`, and `long_m` [m] long
+    where there is one. Raises Refused.
+    """
+    refused, short = Refused(""), None
+    start, goal = ends
     for clearance_m in CLEARANCES_M:
-        taken = widened(drawn, radius_m + clearance_m)
+        taken = widened(drawn, radius_m + clearance_m) | beyond
         try:
             cells = _cells(drawn, taken, start, goal)
         except Refused as error:
             refused = error
             continue
         points = [center_of(drawn, cell) for cell in _straightened(taken, cells)]
-        return [start or points[0], *points[1:]]
-    raise refused
+        way = [start or points[0], *points[1:]]
+        way[-1] = goal or way[-1]
+        if _length_m(way) >= long_m:
+            return way
+        short = short or way
+    if short is None:
+        raise refused
+    return short
 
 
 def _cells(drawn: Map, taken: Taken, start: Point | None, goal: Point | None) -> list[Cell]:
@@ -148,7 +182,7 @@ def _laid(way: list[Point], team: int, separation_m: float) -> tuple[list[tuple[
     Raises Refused for a way that is too short.
     """
     long = (team - 1) * separation_m
-    length_m = sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(way))
+    length_m = _length_m(way)
     if length_m < long + separation_m:
         raise Refused(f"a way of {length_m:.1f} m is too short for {team} robots, {separation_m:g} m apart: --robots 1")
     starts = [_along(way, long - n * separation_m) for n in range(team)]
@@ -158,6 +192,10 @@ def _laid(way: list[Point], team: int, separation_m: float) -> tuple[list[tuple[
         if gone > long + 1e-9:
             route.append(b)
     return starts, route
+
+
+def _length_m(way: list[Point]) -> float:
+    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(way))
 
 
 def _along(way: list[Point], at_m: float) -> tuple[float, float, float]:

@@ -42,6 +42,8 @@ def add_cells(drawn: Map, drawing: WorldDrawing) -> None:
     rows, columns = drawn.cells.shape
     high, wide = rows * drawn.resolution_m, columns * drawn.resolution_m
     rim = [drawn.to_map(x, y) for x, y in ((0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high), (0.0, 0.0))]
+    xs, ys = [x for x, _ in rim], [y for _, y in rim]
+    drawing.bounds_m = min(xs), min(ys), max(xs), max(ys)
     for x1, y1, x2, y2 in maps.walls(drawn):
         drawing.add_line([(x1, y1), (x2, y2)])
     if not bool(np.all(drawn.occupied[[0, -1], :])) or not bool(np.all(drawn.occupied[:, [0, -1]])):

@@ -93,6 +93,21 @@ def test_a_movingai_map_is_the_outline_of_what_blocks_the_first_row_on_top(tmp_p
     assert {(0.5, 0.5, 5.5, 0.5), (0.5, 3.5, 5.5, 3.5)} <= walls
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"start": "100,2"}, r"start \(100, 2\): outside of the map, must be from 0, 0 to"),
+        ({"goal": "-5,1"}, r"goal \(-5, 1\): outside of the map"),
+        ({"unit_m": 0.1}, "no room for a robot is in it"),
+    ],
+)
+def test_beyond_the_cells_of_a_map_there_is_no_ground(
+    tmp_path: Path, options: dict[str, str | float], said: str
+) -> None:
+    with pytest.raises(Refused, match=said):
+        scenario_of(tmp_path, written(tmp_path, "w.map", MOVINGAI), **options)
+
+
 def test_an_sdf_world_has_what_a_robot_on_the_floor_meets(tmp_path: Path) -> None:
     drawing = read(tmp_path, "w.sdf")
     crate, post = drawing.obstacles
