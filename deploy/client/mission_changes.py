@@ -59,8 +59,10 @@ def along(points: Points, walls: Walls) -> Change:
 
 def to_goal(x: float, y: float, theta_deg: float | None) -> Points:
     """Return the way-points to a goal [m, degrees]. Raises Refused for numbers that are none."""
-    if not all(map(isfinite, (x, y, theta_deg or 0.0))):
+    if not all(map(isfinite, (x, y))):
         raise Refused(f"goal ({x:g}, {y:g}): must be finite numbers [m]")
+    if not isfinite(theta_deg or 0.0):
+        raise Refused(f"goal ({x:g}, {y:g}), heading {theta_deg:g}: must be a finite number [degrees]")
     if theta_deg is None:
         return ((x, y),)
     theta = radians(theta_deg)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, nan
 from typing import Annotated, get_args
 
 import msgspec
@@ -21,6 +21,7 @@ IN_LEADING = ("motion", "cruise_mps", "acceleration_mps2", "goal_tolerance_m", "
 IN_FORMATION = ("separation_m", "angle_rad", "side")
 CHOICES: dict[str, tuple[str, ...]] = {"motion": get_args(Motion), "side": get_args(Side)}
 """Values that are words; all others are numbers."""
+Value = str | float
 
 
 def command(
@@ -37,44 +38,48 @@ def command(
 
 def to_values(values: list[str]) -> Change:
     """Return the change to these values, each `key=value`. Raises Refused for a key that cannot change."""
-    pairs: dict[str, str] = {}
+    pairs: dict[str, Value] = {}
     for value in values:
-        key, text = _pair(value)
+        key, wanted = _pair(value)
         if key in pairs:
             raise Refused(f"set {value}: {key} is given twice, must be given once")
-        pairs[key] = text
+        pairs[key] = wanted
 
     def change(mission: Mission, _first: Mission) -> Mission:
         leading = {**msgspec.to_builtins(mission.leading), **_part(pairs, IN_LEADING)}
         formation = {**msgspec.to_builtins(mission.formation), **_part(pairs, IN_FORMATION)}
         changed = structs.replace(
             mission,
-            leading=msgspec.convert(leading, Leading, strict=False),
-            formation=msgspec.convert(formation, FormationSpec, strict=False),
+            leading=msgspec.convert(leading, Leading),
+            formation=msgspec.convert(formation, FormationSpec),
         )
         return check_mission(changed)
 
     return change if pairs else unchanged
 
 
-def _pair(value: str) -> tuple[str, str]:
+def _pair(value: str) -> tuple[str, Value]:
     key, equals, text = value.partition("=")
     key = key.removeprefix("mission.").removeprefix("leading.").removeprefix("formation.")
     if not equals or key not in (*IN_LEADING, *IN_FORMATION):
         raise Refused(f"set {value}: must be key=value with one of {', '.join((*IN_LEADING, *IN_FORMATION))}")
     if key in CHOICES and text not in CHOICES[key]:
         raise Refused(f"set {value}: must be one of {', '.join(CHOICES[key])}")
-    if key not in CHOICES and not _is_number(text):
+    if key in CHOICES:
+        return key, text
+    number = _number(text)
+    if not isfinite(number):
         raise Refused(f"set {value}: must be a number")
-    return key, text
+    return key, number
 
 
-def _is_number(text: str) -> bool:
+def _number(text: str) -> float:
+    """Return the number in `text`, nan if it is none: what Python reads (`.5`, `+1`), and a mission's file may not."""
     try:
-        return isfinite(float(text))
+        return float(text)
     except ValueError:
-        return False
+        return nan
 
 
-def _part(pairs: dict[str, str], keys: tuple[str, ...]) -> dict[str, str]:
+def _part(pairs: dict[str, Value], keys: tuple[str, ...]) -> dict[str, Value]:
     return {key: text for key, text in pairs.items() if key in keys}

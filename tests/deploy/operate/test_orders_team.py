@@ -24,6 +24,7 @@ from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.orders import OrderNote
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import Event
+from lfa.protocol.mission import Leading, Mission
 from lfa.protocol.transport.message_bus import send
 
 DRIVING_S = 4.0
@@ -175,6 +176,8 @@ def test_a_goal_in_or_behind_a_wall_is_refused_in_one_line(point: tuple[float, f
 def test_a_goal_that_is_no_number_is_refused() -> None:
     with pytest.raises(Refused, match="must be finite"):
         to_goal(float("nan"), 1.0, None)
+    with pytest.raises(Refused, match="heading inf: must be a finite number"):
+        to_goal(3.0, 1.0, float("inf"))
 
 
 def test_a_goal_out_of_reach_is_refused_and_one_farther_along_a_route_is_not() -> None:
@@ -201,6 +204,12 @@ def test_values_that_are_none_are_refused_in_one_line(values: list[str], line: s
     with pytest.raises(Refused) as refused:
         to_values(values)
     assert str(refused.value).startswith(line)
+
+
+@pytest.mark.parametrize("text", [".5", "+0.5", "5e-1", "0.5_0", "\N{ARABIC-INDIC DIGIT ZERO}.5"])
+def test_a_value_is_what_python_reads_as_a_number(text: str) -> None:
+    mission = Mission((1, 2, 3), leading=Leading(route_m=((1.0, 0.0),)))
+    assert to_values([f"cruise_mps={text}"])(mission, mission).leading.cruise_mps == 0.5
 
 
 @pytest.mark.parametrize("text", ["nan 3", "1e400 3", "3", "1 2 3", "x y"])
