@@ -136,34 +136,36 @@ class Net:
 @contextmanager
 def team_on_hosts() -> Iterator[tuple[Team, Net]]:
     """Start four robots, each on its own host, and the world on another."""
-    with Net(ROBOTS + 1) as net, Team(endless(ROBOTS), _table) as team:
+    with Net(ROBOTS + 1) as net, Team(endless(ROBOTS), table_on_hosts) as team:
         yield team, net
 
 
-def _table(usual: Sequence[ProcessSpec], sockets: Path) -> list[ProcessSpec]:
+def table_on_hosts(usual: Sequence[ProcessSpec], sockets: Path, robots: int = ROBOTS) -> list[ProcessSpec]:
     """Return one router per host and the processes of each host.
 
     The observer session uses the unix socket of the world's router.
     """
-    rows = [_router(host, sockets) for host in range(ROBOTS + 1)]
+    rows = [_router(host, sockets) for host in range(robots + 1)]
     for row in usual:
         host = WORLD_HOST if row.name == WORLD_NAME else robot_id_of(row.name)
         if row.name not in (ROUTER_NAME, RECORDER_NAME) and host is not None:
             told = tuple(
-                _socket(host, sockets) if word == _socket(WORLD_HOST, sockets) else word for word in row.arguments
+                host_socket(host, sockets) if word == host_socket(WORLD_HOST, sockets) else word
+                for word in row.arguments
             )
             rows.append(ProcessSpec(row.name, told, restart_args=row.restart_args, command_prefix=_enter(host)))
     return rows
 
 
 def _router(host: int, sockets: Path) -> ProcessSpec:
-    listen = ("--listen", _socket(host, sockets), "--listen", f"tcp/{_ip(host)}:{PORT}")
+    listen = ("--listen", host_socket(host, sockets), "--listen", f"tcp/{_ip(host)}:{PORT}")
     others = (word for far in range(host) for word in ("--connect", f"tcp/{_ip(far)}:{PORT}"))
     name = ROUTER_NAME if host == WORLD_HOST else f"{ROUTER_NAME}{host}"
     return ProcessSpec(name, ("lfa.deploy.fleet.host.router", *listen, *others), command_prefix=_enter(host))
 
 
-def _socket(host: int, sockets: Path) -> str:
+def host_socket(host: int, sockets: Path) -> str:
+    """Return the endpoint of a host's router for processes of that host."""
     return f"unixsock-stream/{sockets / ('router.sock' if host == WORLD_HOST else f'router{host}.sock')}"
 
 
