@@ -156,6 +156,12 @@ def scenario_of_fleet(fleet: FleetAddress) -> Scenario | None:
     return None if known is None else known[0]
 
 
+def _seen_from(pid: int, named: str) -> str:
+    """Return the scenario named on a process's command line: a relative path begins where that process runs."""
+    there = Path(f"/proc/{pid}/cwd") / named
+    return str(there) if there.is_file() else named
+
+
 def world_of_fleet(fleet: FleetAddress) -> tuple[Scenario, int] | None:
     """Return scenario and seed of the fleet's world, if that is one of this user's processes here; else None."""
     for identity in own_processes():
@@ -170,7 +176,9 @@ def world_of_fleet(fleet: FleetAddress) -> tuple[Scenario, int] | None:
         overrides += [word.removeprefix("--set=") for word in words if word.startswith("--set=")]
         seed = whole_number(option(words, "--seed", "0")) or 0
         try:
-            return draw(load(named, overrides, whole_number(option(words, "--robots", ""))), seed), seed
+            return draw(
+                load(_seen_from(identity.pid, named), overrides, whole_number(option(words, "--robots", ""))), seed
+            ), seed
         except (Refused, ValueError):
             return None
     return None

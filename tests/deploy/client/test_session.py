@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from lfa.deploy.client import session
 from lfa.deploy.client.discovery import Running
-from lfa.deploy.client.session import find
+from lfa.deploy.client.session import FleetAddress, find, scenario_of_fleet
 from lfa.deploy.fleet.host.router import default_endpoints
 from lfa.deploy.process.identity import Identity
 from lfa.protocol.errors import Refused
 from lfa.protocol.transport.zenoh_config import default_endpoint
+from lfa.world.description.load import SCENARIOS
 
 MINE, OTHER, THIRD = "unixsock-stream//tmp/mine", "tcp/127.0.0.1:7999", "tcp/far:7450"
 OWN, NEXT = "unixsock-stream//tmp/worlds", "tls/10.0.0.2:7447"
@@ -82,3 +86,15 @@ def test_the_router_of_another_user_does_not_stop_ones_own(capsys: pytest.Captur
         assert default_endpoints(shared) == [default_endpoint()]
         assert f"{shared} is taken" in capsys.readouterr().err
     assert default_endpoints(shared) == [default_endpoint(), shared]
+
+
+def test_the_walls_of_a_fleet_are_known_wherever_a_command_is_said(tmp_path: Path) -> None:
+    """Its world names its scenario from the folder in which it was started; the command runs in another one."""
+    shutil.copy(SCENARIOS / "paper_path1.toml", tmp_path / "mine.toml")
+    waits = [sys.executable, "-c", "input()", "lfa-world", "mine.toml", "--fleet", tmp_path.name]
+    with subprocess.Popen(waits, cwd=tmp_path, stdin=subprocess.PIPE, text=True) as world:
+        try:
+            scenario = scenario_of_fleet(FleetAddress(tmp_path.name, MINE, ()))
+        finally:
+            world.communicate("\n")
+    assert scenario is not None and scenario.world.walls_m
