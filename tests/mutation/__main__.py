@@ -34,11 +34,14 @@ SHARE_MIN = 0.9
 KINDS = "not processes and not hosts and not campaign and not wheel"
 OPTIONS = ("-q", "-p", "no:cacheprovider", "-p", "no:faulthandler", "--tb=no", "--hypothesis-seed=1", "-m", KINDS)
 FURTHER = {
+    "agents/following": ("tests/agents/controllers",),
+    "agents/perception": ("tests/agents/avoidance/test_ground_crossing.py",),
     "world/physics": ("tests/world",),
     "world/sensors": ("tests/world",),
     "deploy/analysis/verification": ("tests/deploy/fuzz", "tests/protocol/lease/test_planted.py"),
 }
-"""Tests outside a file's room with claims about it: those of the whole world; planted bugs that invariants show."""
+"""Tests outside a file's room with claims about it: of controllers as plug-ins, of ground that is crossed, of the whole
+world; planted bugs that invariants show."""
 
 
 def tests_of(file: Path) -> list[str]:
