@@ -44,7 +44,9 @@ class CommandLimits:
         limits, radius_m = self._mission.limits, self._mission.radius_m
         strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now, by_law=by_law)
         wanted = sharing(wanted, strangers, radius_m, limits)
-        usual_mps = self._mission.leading.cruise_mps if role is Role.LEADER else limits.v_max_mps
+        # A leader drives at its cruise speed, but may flee from what moves faster than that.
+        cruise_mps = max(self._mission.leading.cruise_mps, abs(wanted.linear_x))
+        usual_mps = cruise_mps if role is Role.LEADER else limits.v_max_mps
         wanted = slowed(self._scan_age.limited(wanted, now), self._scan_age.speed_max_mps(usual_mps))
         return self._estimator.limited(wanted)
 

@@ -6,7 +6,7 @@ from math import cos
 
 import msgspec
 
-from lfa.agents.config import Gains, check_gains
+from lfa.agents.config import DEFAULT, Gains, check_gains
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.plugin import make_controller
 from lfa.agents.following.predecessor import DEAD_RECKONING_FOLLOWERS_MAX, Predecessor
@@ -16,13 +16,20 @@ from lfa.protocol.mission import Mission
 
 FILTER_SHARE = 0.6
 """L_chi as a share of k |cos phi|: above the 0.5 from which no wave across the path grows (5.3)."""
+GUARDED_M, SLOT_ROOM_M = 0.15, 0.1
+"""Room [m] between two bodies that the collision guard keeps, and the distance [m] by which a follower may be nearer
+than its slot at least, where k^d leaves less room."""
 
 
 def gains_of(mission: Mission) -> Gains:
-    """Return the mission's gains. Raise `Refused` for an unknown name or a broken rule."""
-    following = mission.following
+    """Return the mission's gains. Raise `Refused` for an unknown name or a broken rule.
+
+    The collision guard keeps `GUARDED_M` between two bodies, but lets a follower come `SLOT_ROOM_M` nearer than k^d.
+    """
+    following, wide_m = mission.following, 2.0 * mission.radius_m + GUARDED_M
+    d_min_m = max(DEFAULT.d_min_m, min(wide_m, mission.formation.separation_m - SLOT_ROOM_M))
     try:
-        gains = msgspec.convert(following.gains, Gains)
+        gains = msgspec.convert({"d_min_m": d_min_m, **following.gains}, Gains)
     except msgspec.ValidationError as error:
         names = ", ".join(Gains.__struct_fields__)
         raise Refused(f"mission.following.gains: {error}; the names are {names}") from None

@@ -9,9 +9,9 @@ from typing import Literal
 
 from msgspec import Struct
 
+from lfa.agents.perception.moving_surface import SurfaceWatch
 from lfa.agents.perception.scan import SIGHT_M, Point
 from lfa.agents.perception.scan_view import ScanView
-from lfa.agents.perception.wall_ends import MOVING_EDGE_M, WallEnds
 
 Kind = Literal["stationary", "moving", "wall"]
 
@@ -43,6 +43,8 @@ SLOW_MPS, SLOW_M, SLOW_S, ANCHORS_MAX = 0.02, 0.1, 3.0, 7
 the minimum time [s] of that, and the number of anchors that are kept for it."""
 SLOW_RADII = 0.6
 """Way that a slow motion must have come, in radii of the obstacle: as a robot drives round it, another part is seen."""
+TURNS_S = 2.0
+"""Time [s] after its last motion for which what has moved counts as moving: it turns round, or makes a short stop."""
 STEADY_SHARE = 0.25
 """Least speed between two anchors, as a share of the mean: a pose that is corrected is no motion."""
 EDGE_M = 0.1
@@ -86,6 +88,8 @@ class _Track(Struct):
     vx: float = 0.0
     vy: float = 0.0
     moves: bool = False
+    moved_at: float = -inf
+    """Time [s] at which it was last seen to move."""
     slow: Point | None = None
     """Mean velocity [m/s] of a motion that is too slow for the filter; None for another."""
 
@@ -142,7 +146,7 @@ class Tracker:
         self._tracks: list[_Track] = []
         self._seen: list[tuple[list[Point], Feature | _Track]] = []
         """Obstacles of the newest scan with their points."""
-        self._wall_ends = WallEnds()
+        self._surfaces = SurfaceWatch()
         self._seen_at = 0.0
 
     def update(
@@ -179,7 +183,7 @@ class Tracker:
                 if track is not None:
                     self._seen.append((cluster, track))
         walls = [points for points, thing in self._seen if isinstance(thing, Feature) and thing.kind == "wall"]
-        self._wall_ends.update(walls, view, mates, mate_m, now)
+        self._surfaces.update(walls, view, mates, mate_m, now)
 
     def nearest(self, x: float, y: float, now: float) -> tuple[Feature, float] | None:
         """Return the obstacle of the newest scan nearest to (x, y) in `map`, and its distance [m]; None if there is
@@ -203,18 +207,18 @@ class Tracker:
 
     def features(self, now: float) -> list[Feature]:
         """Return all obstacles as of `now`."""
-        walls = [thing for _, thing in self._seen if isinstance(thing, Feature)] + self._edges(now)
+        walls = [thing for _, thing in self._seen if isinstance(thing, Feature)] + self._at_walls(now)
         return walls + [_feature(track, now) for track in self._tracks if now - track.seen_at <= FORGET_S]
 
     def moving(self, now: float) -> list[Feature]:
-        return [_feature(t, now) for t in self._tracks if t.moves and now - t.seen_at <= FORGET_S] + self._edges(now)
+        return [_feature(t, now) for t in self._tracks if t.moves and now - t.seen_at <= FORGET_S] + self._at_walls(now)
 
-    def _edges(self, now: float) -> list[Feature]:
-        """Return the ends of walls that moved in the newest scan."""
+    def _at_walls(self, now: float) -> list[Feature]:
+        """Return what moves at walls in the newest scan."""
         later_s = now - self._seen_at
         return [
-            Feature("moving", x + vx * later_s, y + vy * later_s, MOVING_EDGE_M, vx, vy)
-            for (x, y), (vx, vy) in self._wall_ends.moving
+            Feature("moving", f.x + f.vx * later_s, f.y + f.vy * later_s, f.radius_m, f.vx, f.vy)
+            for f in self._surfaces.moving
             if later_s <= FORGET_S
         ]
 
@@ -243,7 +247,9 @@ class Tracker:
             best.anchors = [*best.anchors[1 - ANCHORS_MAX :], (now, best.places(), view)]
         moved = best.has_moved(view)
         best.slow = None if moved else best.slow_velocity(view)
-        best.moves = moved or best.slow is not None
+        if moved or best.slow is not None:
+            best.moved_at = now
+        best.moves = now - best.moved_at <= TURNS_S
         return best
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
-
-from msgspec import Struct
+from functools import cached_property
+from math import atan2, hypot, pi
 
 from lfa.agents.perception.scan import Point
 
@@ -16,25 +15,39 @@ BESIDE_STEPS, BESIDE_RAD = 1.05, 0.02
 the place count (along a wall the one beyond it looks past it), and this much [rad] at least."""
 
 
-class ScanView(Struct, frozen=True, gc=False):
+class ScanView:
     """Scan in `map`: where it was seen from, what it showed, its range [m], and the angle [rad] between its beams."""
 
-    eye: Point
-    points: Sequence[Point]
-    reach_m: float
-    step_rad: float
+    def __init__(self, eye: Point, points: Sequence[Point], reach_m: float, step_rad: float) -> None:
+        self.eye = eye
+        self.points = points
+        self._reach_m = reach_m
+        self._beside_rad = max(BESIDE_RAD, BESIDE_STEPS * step_rad)
+
+    @cached_property
+    def _sectors(self) -> dict[int, list[tuple[Point, float]]]:
+        """Points relative to the eye with their distances [m], by direction in steps of `_beside_rad`."""
+        sectors: dict[int, list[tuple[Point, float]]] = {}
+        (x, y), width = self.eye, self._beside_rad
+        for px, py in self.points:
+            dx, dy = px - x, py - y
+            sectors.setdefault(int((atan2(dy, dx) + pi) / width), []).append(((dx, dy), hypot(dx, dy)))
+        return sectors
 
     def shows_free(self, place: Point) -> bool:
         """Return whether the scan looked through `place`: at what is behind it, or at nothing in its direction."""
         px, py = place[0] - self.eye[0], place[1] - self.eye[1]
-        far_m = hypot(px, py)
-        if far_m > self.reach_m - BEHIND_M:
+        far_m, width, sectors = hypot(px, py), self._beside_rad, self._sectors
+        if far_m > self._reach_m - BEHIND_M:
             return False
-        beside = max(BESIDE_RAD, BESIDE_STEPS * self.step_rad) * far_m
-        for x, y in self.points:
-            qx, qy = x - self.eye[0], y - self.eye[1]
-            if (q_m := hypot(qx, qy)) > far_m + BEHIND_M:
-                continue
-            if px * qx + py * qy > 0.0 and abs(px * qy - py * qx) < beside * q_m:
-                return False
+        sector, last = int((atan2(py, px) + pi) / width), int(2.0 * pi / width)
+        around = {sector - 1, sector, sector + 1}
+        if sector <= 1 or sector >= last - 1:  # the last sector is a part of one, and next to the first
+            around |= {0, 1, last - 1, last}
+        for one in around:
+            for (qx, qy), q_m in sectors.get(one, ()):
+                if q_m > far_m + BEHIND_M:
+                    continue
+                if px * qx + py * qy > 0.0 and abs(px * qy - py * qx) < width * far_m * q_m:
+                    return False
         return True

@@ -1,4 +1,4 @@
-"""Limits of a command: before where team-mates drive to, a robot brakes as before what stands."""
+"""Limits of a command: a robot brakes before where team-mates drive to, and may flee faster than it cruises."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import TableRow
-from lfa.protocol.mission import Mission
+from lfa.protocol.mission import Leading, Mission
 
 AHEAD = Twist(0.21, 0.0)
 
@@ -44,3 +44,11 @@ def test_a_robot_is_not_braked_for_a_team_mate_that_does_not_come_in_its_way(
     mate: tuple[float, float], velocity: tuple[float, float]
 ) -> None:
     assert speed_beside(mate, velocity) == AHEAD.linear_x
+
+
+def test_a_leader_flees_from_what_moves_faster_than_it_cruises() -> None:
+    mission, team = Mission(leading=Leading(route_m=((0.0, 0.0), (9.0, 0.0)), cruise_mps=0.4)), TeamState()
+    obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
+    limits = CommandLimits(mission, TeamMates(1, team), ScanAge(), Estimator(), obstacles)
+    flees = Twist(0.7, 0.3)
+    assert limits.slow(flees, Role.LEADER, Pose2D(), 0.0, by_law=False) == flees

@@ -1,4 +1,4 @@
-"""Followers by mission: how far the formation's heading is filtered, by the length of the chain."""
+"""Followers by mission: how far the formation's heading is filtered, and which distance the collision guard keeps."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from lfa.agents.following.factory import heading_filter_of
+from lfa.agents.following.factory import gains_of, heading_filter_of
 from lfa.protocol.mission import Following, FormationSpec, Mission
 
 
@@ -32,3 +32,19 @@ def test_a_chain_of_more_than_three_followers_is_not_rigid(
 def test_on_a_trace_there_is_nothing_to_filter() -> None:
     mission = Mission(robots=tuple(range(1, 13)), following=Following(trace=True))
     assert heading_filter_of(mission) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "separation_m", "d_min_m"),
+    [(0.15, 1.2, 0.45), (0.25, 0.8, 0.65), (0.333, 0.8, 0.7), (0.15, 0.5, 0.45)],
+)
+def test_the_collision_guard_keeps_bodies_apart_and_lets_each_follower_into_its_slot(
+    radius_m: float, separation_m: float, d_min_m: float
+) -> None:
+    mission = Mission(robots=(1, 2), radius_m=radius_m, formation=FormationSpec(separation_m))
+    assert gains_of(mission).d_min_m == pytest.approx(d_min_m)
+
+
+def test_gains_that_a_mission_names_hold_as_they_are() -> None:
+    mission = Mission(robots=(1, 2), radius_m=0.4, following=Following(gains={"d_min_m": 0.3}))
+    assert gains_of(mission).d_min_m == 0.3

@@ -57,7 +57,7 @@ def test_among_posts_that_hide_each_other_nothing_moves(seed: int) -> None:
     posts = [(chance.uniform(0.0, 8.0), chance.choice([-1, 1]) * chance.uniform(0.5, 2.2), 0.1) for _ in range(30)]
     for n in range(80):
         eye = 0.1 * n, 0.1 * sin(n / 6.0)
-        tracker.update(scan_among(posts, eye), eye, [], 0.5, 0.1 * n)
+        tracker.update(scan_among(posts, eye), eye, [], 0.5, 0.1 * n, step_rad=pi / 90)
         assert tracker.moving(0.1 * n) == [], f"after {0.1 * n:.1f} s"
 
 
@@ -75,6 +75,14 @@ def test_what_comes_fast_is_told_before_it_has_come_a_metre(speed: float) -> Non
     positions = [(4.5 - speed * 0.1 * n, 0.0) for n in range(scans)]
     [feature] = seen(positions, [(0.0, 0.0)] * scans).moving(0.1 * (scans - 1))
     assert feature.vx < -0.5 * speed
+
+
+def test_what_paces_to_and_fro_moves_while_it_turns_round_too() -> None:
+    tracker = Tracker()
+    for n in range(160):
+        y = abs((0.03 * n + 0.7) % 2.8 - 1.4) - 0.7
+        tracker.update(arc(1.5, y, 0.25, (0.0, 0.0)), (0.0, 0.0), [], 0.5, 0.1 * n)
+        assert n < 20 or tracker.moving(0.1 * n), f"after {0.1 * n:.1f} s, at {y:.2f} m"
 
 
 @pytest.mark.parametrize("speed", [0.03, 0.05, 0.1])

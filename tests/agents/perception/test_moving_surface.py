@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import cos, inf, pi, sin
+from itertools import pairwise
+from math import cos, hypot, inf, pi, sin
 
 import pytest
 
@@ -82,3 +83,17 @@ def test_a_team_mate_that_drives_on_beside_a_wall_is_no_door() -> None:
         points = scan(((1.2, -4.0, 1.2, -0.6), body), (0.4, 0.0), 180)
         tracker.update(points, (0.4, 0.0), [(1.2, y)], 0.5, 0.1 * n, step_rad=pi / 90)
         assert tracker.moving(0.1 * n) == []
+
+
+@pytest.mark.parametrize("mps", [0.3, 0.6])
+def test_a_thing_that_leaves_a_wall_is_told_before_it_has_come_half_a_metre(mps: float) -> None:
+    tracker, n = Tracker(), 0
+    while not (moving := tracker.moving(0.1 * n)):
+        n += 1
+        y = -0.7 + mps * 0.1 * max(0, n - 10)
+        sides = [(1.4 + 0.25 * cos(k * pi / 8), y + 0.25 * sin(k * pi / 8)) for k in range(17)]
+        look(tracker, ((-3.0, -1.0, 5.0, -1.0), *((*a, *b) for a, b in pairwise(sides))), (0.4, 0.0), n)
+        assert y < -0.2
+    [thing] = moving
+    assert hypot(thing.x - 1.4, thing.y - y) < 0.3
+    assert thing.vy > 0.4 * mps
