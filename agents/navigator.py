@@ -33,7 +33,7 @@ from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.own_readings import OwnReadings
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
-from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, StuckMonitor
+from lfa.agents.recovery.stuck_detector import NEVER_PLACED_S, POSE_LOST_S, SCAN_LOST, WANTED_MPS, StuckMonitor
 from lfa.agents.team_state import TeamState, sensors_s_max
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.messages.consensus import Role
@@ -212,14 +212,15 @@ class Navigator:
             if self._back_out.under_way:
                 wanted = self._back_out.step(points, pose, wanted, self._last, now)
         else:
-            wanted = STILL
+            wanted = meant = STILL
         if role is not Role.WAITING:
             wanted = self._own.step(BehaviorInput(now, role, pose, self._last, wanted, still, moving))
             wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving, self._last)
+            wanted = meant = self._ground_crossing.cross(wanted, now)
             by_law = not (self._follow_slot.catches_up or self._back_out.under_way)
-            wanted = self.limits.slow(self._ground_crossing.cross(wanted, now), role, pose, now, by_law=by_law)
+            wanted = self.limits.slow(wanted, role, pose, now, by_law=by_law)
         self._back_out.keep(pose)
-        self._watch(role, pose, wanted, now)
+        self._watch(role, pose, meant, wanted, now)
         self._last = self.limits.brake(wanted, self._last, points, moving, pose, dt, now)
         self.follower.overridden(self._last)
         if role is Role.LEADER:
@@ -247,14 +248,17 @@ class Navigator:
         elif role is Role.FOLLOWER:
             self.follower.rejoin(pose, twist)
 
-    def _watch(self, role: Role, pose: Pose2D, wanted: Twist, now: float) -> None:
-        """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team."""
+    def _watch(self, role: Role, pose: Pose2D, meant: Twist, wanted: Twist, now: float) -> None:
+        """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team. `meant` is
+        `wanted` without the limits.
+        """
         waits = role is Role.LEADER and self.leading.waiting
         if role is Role.WAITING or waits or self._lead_route.by_hand or self.arrived(pose, self._last):
             self._stuck_monitor.rest(pose, now)
             return
         action, moving = (None, False) if (said := self.decision) is None else (said.action, said.kind == "moving")
-        leads = role is Role.LEADER and self.leading.under_way
+        held = role is Role.FOLLOWER and abs(meant.linear_x) >= WANTED_MPS > abs(wanted.linear_x)
+        leads = held or (role is Role.LEADER and self.leading.under_way)
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
         planned = self.leading.rounding or self._follow_slot.catches_up
         self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not planned, moving=moving)

@@ -11,8 +11,12 @@ from lfa.agents.perception.obstacle_model import ObstacleModel
 from lfa.agents.perception.scan import Point
 from lfa.agents.recovery.back_up import BackUp
 from lfa.agents.recovery.stuck_detector import StuckMonitor
-from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.mission import Mission
+
+STANDS_S, STANDS_S_MAX = 10.0, 80.0
+"""Time [s] for which a robot stands whose way back is barred; then it gives backing out up, and tries to follow. Each
+time it doubles, up to a maximum."""
 
 
 class BackOut:
@@ -27,6 +31,9 @@ class BackOut:
         self._obstacles = obstacles
         self._stuck = stuck
         self._path = BackUp()
+        self._stands_since: float | None = None
+        """Time [s] since which the way back is barred; None while it is not."""
+        self._patience_s = STANDS_S
 
     @property
     def under_way(self) -> bool:
@@ -36,6 +43,7 @@ class BackOut:
         """Start backing out of the place in which the robot is stuck."""
         if self._stuck.reason is not None and not self._path.under_way:
             self._path.begin(pose)
+            self._stands_since = None
             self._stuck.backing_out = True
 
     def keep(self, pose: Pose2D) -> None:
@@ -44,16 +52,25 @@ class BackOut:
             self._path.keep(pose)
 
     def step(self, points: list[Point], pose: Pose2D, wanted: Twist, last: Twist, now: float) -> Twist:
-        """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out."""
+        """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out, or has stood
+        too long before what bars its way back: ahead there may be one now.
+        """
         twist = self._path.step(points, pose, self._mission.radius_m)
-        if twist is not None:
+        if twist != STILL:
+            self._stands_since = None
+        elif self._stands_since is None:
+            self._stands_since = now
+        gives_up = self._stands_since is not None and now - self._stands_since >= self._patience_s
+        if twist is not None and not gives_up:
             action = Action.BACK if twist.linear_x else Action.BLOCKED
             self._detour.decision = Decision(action, inf, pi, "wall", "out of a trap")
             return twist
         self._stuck.out()
         self._detour.decision = None
         self._follower.rejoin(pose, last)
-        if self._path.trap is not None:
+        self._path.end()
+        self._patience_s = min(2.0 * self._patience_s, STANDS_S_MAX) if gives_up else STANDS_S
+        if self._path.trap is not None and not gives_up:
             self.bar(self._path.trap, now)
         return wanted
 

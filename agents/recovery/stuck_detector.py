@@ -10,8 +10,8 @@ from lfa.protocol.geometry import Pose2D, Twist, distance
 
 STILL_S, STILL_M = 3.0, 0.10
 STANDS_S = 20.0
-"""Maximum time [s] that a leader with a target stands, whatever keeps its command small: longer than it waits for its
-team or for a moving obstacle."""
+"""Maximum time [s] that a leader with a target stands, whatever keeps its command small, and that team-mates hold a
+follower: longer than a leader waits for its team or for a moving obstacle."""
 WANTED_MPS = 0.05
 BLOCKED_S = 1.5
 TURNS, TURNS_S = 3, 10.0
@@ -64,7 +64,8 @@ class StuckMonitor:
         moving: bool = False,
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
-        move. Without `again`, coming back (S3) does not count now: a planned way does. `moving`: what is avoided moves.
+        move, or a follower that would and that only limits hold, such as a team-mate before it. Without `again`, coming
+        back (S3) does not count now: a planned way does. `moving`: what is avoided moves.
         """
         if self.backing_out:
             return

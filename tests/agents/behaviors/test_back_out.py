@@ -1,0 +1,67 @@
+"""A robot that backs out of a place stands no longer before what bars its way back than a stated time."""
+
+from __future__ import annotations
+
+from lfa.agents.avoidance.decision import Action
+from lfa.agents.avoidance.detour import Detour
+from lfa.agents.behaviors.back_out import STANDS_S, STANDS_S_MAX, BackOut
+from lfa.agents.following.factory import follower_of
+from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.recovery.stuck_detector import StuckMonitor
+from lfa.agents.team_state import TeamState
+from lfa.protocol.geometry import STILL, Pose2D, Twist
+from lfa.protocol.mission import Mission
+
+MISSION = Mission(robots=(1, 2))
+BEHIND = [(-0.18, 0.05 * n) for n in range(-6, 7)] + [(-0.1, 0.18), (-0.1, -0.18), (0.0, 0.19), (0.0, -0.19)]
+"""Points in `base_link` that leave no way back, whichever way the rear turns."""
+AHEAD = Twist(0.3, 0.0)
+HERE = Pose2D(2.0)
+
+
+class Stuck:
+    """A follower that came 2 m straight on, and backs out since `now`."""
+
+    def __init__(self) -> None:
+        self.monitor, self.now, self.came_m = StuckMonitor(), 0.0, 0.0
+        detour, team = Detour(MISSION.radius_m, MISSION.limits), TeamState()
+        model = ObstacleModel(MISSION.radius_m, MISSION.limits, team.obstacles)
+        self.out = BackOut(MISSION, follower_of(MISSION), detour, model, self.monitor)
+        self.model = model
+        for n in range(21):
+            self.out.keep(Pose2D(0.1 * n))
+        self.begin()
+
+    def begin(self) -> None:
+        while self.monitor.reason is None:
+            self.monitor.watch(HERE, STILL, Action.BLOCKED, None, self.now, leads=False)
+            self.now += 0.1
+        self.out.begin(HERE)
+
+    def stands_s(self) -> float:
+        """How long it stands until it does what its role wants again."""
+        began = self.now
+        while self.out.step(BEHIND, HERE, AHEAD, STILL, self.now) == STILL:
+            self.now += 0.1
+            assert self.now - began < 2.0 * STANDS_S_MAX
+        return self.now - began
+
+
+def test_it_follows_again_after_a_time_in_which_its_way_back_stays_barred() -> None:
+    stuck = Stuck()
+    assert abs(stuck.stands_s() - STANDS_S) < 0.2
+    assert (stuck.out.under_way, stuck.monitor.reason) == (False, None)
+
+
+def test_the_place_that_it_could_not_leave_is_not_barred_to_it() -> None:
+    stuck = Stuck()
+    stuck.stands_s()
+    assert stuck.model.points(HERE) == []
+
+
+def test_each_time_in_one_place_it_stands_twice_as_long_up_to_a_maximum() -> None:
+    stuck, stood = Stuck(), []
+    for _ in range(5):
+        stood.append(round(stuck.stands_s()))
+        stuck.begin()
+    assert stood == [10, 20, 40, 80, 80]
