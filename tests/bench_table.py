@@ -31,7 +31,8 @@ BOTTLENECKS = {
     "agent*/*": "the scheduler: more processes are ready than cores",
     "latency/*pose to accepted command*": "two hops through the router, each with two wake-ups of its threads, and the "
     "control step itself",
-    "latency/kill of the leader/*": "the wake-up of the successor and its round of promises through the router",
+    "latency/kill of the leader/*": "a third passes until the vanished token is heard, the rest in four exchanges "
+    "through the router: promises, fence, grants, command",
     "lockstep/*": "the agents' own steps and codec, as in `lfa sim`; then two wake-ups for each of some 270 "
     "grants a second",
     "router/*delivered*": "publishers that are not scheduled in time: state topics are dropped when a link is full",

@@ -8,7 +8,7 @@ a lease and its bond is the same formula for each length, and `lease_core.py` ha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 import pytest
@@ -155,10 +155,18 @@ def _bound(s: Leased, v: int, propose: Propose) -> tuple[float | None, ...]:
     return tuple(voter.bond.expiry if i == v and voter.bond is not None else end for i, end in enumerate(s.bonds))
 
 
-def _wrong(before: Leased, s: Leased) -> str | None:
-    for v, (earlier, end) in enumerate(zip(before.bonds, s.bonds, strict=True)):
-        if earlier is not None and before.now < earlier and (end is None or end < earlier):
+def ends_early(now: float, before: Sequence[float | None], bonds: Sequence[float | None]) -> str | None:
+    """Return what breaks KEPT; None if nothing: whoever was bound before is so for as long, or longer."""
+    for v, (earlier, end) in enumerate(zip(before, bonds, strict=True)):
+        if earlier is not None and now < earlier and (end is None or end < earlier):
             return f"KEPT: voter {v + 1} was bound until {earlier:g}, and is until {end}"
+    return None
+
+
+def _wrong(before: Leased, s: Leased) -> str | None:
+    kept = ends_early(before.now, before.bonds, s.bonds)
+    if kept is not None:
+        return kept
     free = [v for v, end in enumerate(s.bonds) if end is None or end <= s.now]
     if s.expiry is not None and s.now < s.expiry and 2 * len(free) > len(VOTERS):
         return f"FREE: the lease lasts until {s.expiry:g}, and of its voters {len(free)} are free at {s.now:g}"

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.model import lease_state, lengths, orders, register_state, roster
+from tests.model import joining, lease_state, lengths, orders, register_state, roster
 from tests.model.checker import Model
 from tests.model.fleet_stop import fleet_stop
 from tests.model.fleet_stop.fleet_stop import FleetStop
+from tests.model.joining import JoinModel
 from tests.model.lease_core import LeaseCore
 from tests.model.lengths import LengthModel
 from tests.model.orders import OrderModel
@@ -124,6 +125,7 @@ RULES = (
     rosters(2),
     Run("orders of operators, 2 robots, 3 terms", lambda: OrderModel(3), short=True),
     Run("lengths: 3 voters, leases of 1 and 3, 2 rounds", lambda: LengthModel(2, 4.0), short=True),
+    Run("lengths: one of 3 voters changes, leases of 1 and 3, 3 rounds", lambda: JoinModel(3, 2.0), short=False),
 )
 
 
@@ -154,6 +156,10 @@ def order_mutant(mutant: str) -> Run:
 
 def length_mutant(mutant: str) -> Run:
     return Run(lengths.MUTANTS[mutant][0], lambda: LengthModel(2, 4.0, mutant), True, mutant)
+
+
+def joining_mutant(mutant: str) -> Run:
+    return Run(joining.MUTANTS[mutant][0], lambda: JoinModel(3, 2.0, mutant), True, mutant)
 
 
 def roster_mutant(mutant: str) -> Run:
@@ -195,4 +201,5 @@ MUTANTS = (
     order_mutant("forgets"),
     length_mutant("shortened"),
     length_mutant("asked_for_now"),
+    joining_mutant("asks_for_less"),
 )

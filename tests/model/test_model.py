@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.model import lease_state, lengths, orders, refinement, register_state, roster
+from tests.model import joining, lease_state, lengths, orders, refinement, register_state, roster
 from tests.model.__main__ import report
 from tests.model.checker import explore, in_columns
 from tests.model.fleet_stop import fleet_stop, stop_refinement
@@ -36,6 +36,7 @@ def test_every_mutant_is_planted() -> None:
         *roster.MUTANTS,
         *orders.MUTANTS,
         *lengths.MUTANTS,
+        *joining.MUTANTS,
     }
 
 
