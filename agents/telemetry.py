@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lfa.agents.avoidance.decision import Decision
-from lfa.agents.load.lateness import Lateness
 from lfa.agents.navigator import Navigator
 from lfa.agents.team_state import TeamState, table_s
 from lfa.protocol.geometry import Pose2D, Twist
@@ -24,6 +23,7 @@ from lfa.protocol.messages.team import (
 from lfa.protocol.names import robot_name
 from lfa.protocol.node import Vitals
 from lfa.protocol.outbox import Outbox
+from lfa.protocol.runtime.lateness import Lateness
 
 if TYPE_CHECKING:
     from lfa.agents.exploration.explorer import Explore  # a map and a planner: memory that only explorers need

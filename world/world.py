@@ -12,16 +12,18 @@ from math import inf
 
 import msgspec
 
-from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.geometry import Twist
 from lfa.protocol.lease.gateway import Gateway
+from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.consensus import Fence, LeaseNote, Term
 from lfa.protocol.messages.robot import CmdVel, Localization, Sensors
 from lfa.protocol.messages.simulation import Clock, TrueObstacle, TrueRobot, Truth
 from lfa.protocol.messages.stop import StopOrder
 from lfa.protocol.messages.team import Ask, MissionNote, OperatorNote
 from lfa.protocol.names import robot_name
-from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop
+from lfa.protocol.node import Envelope, PeerDown, PeerUp, Received, RouterLost, Stop, Vitals
 from lfa.protocol.outbox import Outbox
+from lfa.protocol.runtime.lateness import Lateness
 from lfa.protocol.topics import TOPIC, TRUTH_OWNER, WORLD_NAME, address, alive_key, key
 from lfa.world.added_obstacles import AddedObstacles
 from lfa.world.description.placement import with_spares
@@ -74,6 +76,9 @@ class World:
         self._driven: dict[int, Twist] = {}
         """Twist last reported by each real robot, by its index."""
         self._cut_off = False
+        mission = scenario.mission
+        # Later than that, what robots echo of their odometry is too old for their gateways.
+        self._lateness = Lateness(timing_for(mission).deadman_s - mission.control_period_s)
         self._added = AddedObstacles(scenario, () if memory is None else memory.added)
         self._time = TimeGrid(scenario.world.physics_hz, 0 if memory is None else memory.step, start_at)
         self._remembered = {} if memory is None else {robot.id: robot for robot in memory.robots}
@@ -112,10 +117,8 @@ class World:
                 return self._fence(received.key, fence, now)
             case StopOrder():
                 return [robot.order(message, now) for _, robot in self._simulated if not robot.hangs("driver")]
-            case Sensors(twist=twist):
-                self._hear_real(received.key, None, twist)
-            case Localization(pose_map=pose):
-                self._hear_real(received.key, pose, None)
+            case Sensors() | Localization():
+                self._hear_real(received.key, message)
             case Ask(what="mission"):
                 return [self._mission(now)]
             case PeerUp(name=name, incarnation=incarnation) if name in self._place:
@@ -129,6 +132,8 @@ class World:
                 return self._set_down(arguments, now)
             case RouterLost():
                 self._cut_off = True
+            case Vitals(loop_lag_s=lag_s):
+                return self._hear_lag(lag_s, now)
             case Stop():
                 self.finished = True
         return []
@@ -214,15 +219,15 @@ class World:
             self._sensors.set_down(obstacle)
         return [self._event("obstacle", None, data | {"t": self._time.time_of(now)}, now)]
 
-    def _hear_real(self, at_key: str, pose: Pose2D | None, twist: Twist | None) -> None:
+    def _hear_real(self, at_key: str, message: Sensors | Localization) -> None:
         where = address(at_key)
         place = self._real.get(where.owner) if where is not None else None
         if place is None:
             return
-        if twist is not None:
-            self._driven[place] = twist
-        if pose is not None:
-            self._bodies.place(place, pose)
+        if isinstance(message, Sensors):
+            self._driven[place] = message.twist
+        else:
+            self._bodies.place(place, message.pose_map)
 
     def _move(self, now: float) -> list[Touch]:
         wanted = [robot.twist(now) for robot in self._robots]
@@ -265,6 +270,13 @@ class World:
     def _mission(self, now: float) -> Envelope:
         note = MissionNote(self._outbox.header("mission", now), self._announced)
         return self._outbox.envelope("mission", note)
+
+    def _hear_lag(self, lag_s: float, now: float) -> list[Envelope]:
+        """Take how late [s] the own loop was in one second; tell when it has become late, or no longer is."""
+        if not self._lateness.update(lag_s):
+            return []
+        worst_s = self._lateness.worst_s
+        return [self._event("late", None, {"late": worst_s > 0.0, "lag_s": round(worst_s, 3)}, now)]
 
     def _event(self, kind: str, term: Term | None, data: dict[str, object], stamp: float) -> Envelope:
         return self._outbox.event_envelope(kind, stamp, term, data)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from lfa.agents.following.factory import gains_of
-from lfa.agents.load.lateness import LATE_SECONDS
 from lfa.agents.team_state import ROW_SPARE_S, table_s
 from lfa.protocol.errors import Refused
 from lfa.protocol.mission import CONTROL_HZ_MIN, Mission
+from lfa.protocol.runtime.lateness import LATE_SECONDS
 
 LATE_SHARE = 0.25
 """Share of the deadman by which a loop must be late, in each of `LATE_SECONDS` seconds, to step less often."""

@@ -87,8 +87,8 @@ def overload(events: Sequence[Line]) -> Overload | None:
     late_s: dict[str, float] = {}
     for line in event_log.of_kind(events, "late"):
         lag_s = _number(line.get("lag_s"))
-        if lag_s > 0.0 and isinstance(line["robot"], int):
-            name = robot_name(line["robot"])
+        name = robot_name(line["robot"]) if isinstance(line["robot"], int) else line.get("from")
+        if lag_s > 0.0 and isinstance(name, str):
             late_s[name] = max(late_s.get(name, 0.0), lag_s)
     slow_hz: dict[str, float] = {}
     for line in event_log.of_kind(events, "rate"):

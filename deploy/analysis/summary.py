@@ -60,7 +60,7 @@ class Overload(Struct, kw_only=True):
     stood_still_s: float
     """Time [s] for which the world's time stood still, because its process came too late."""
     late_s: dict[str, float]
-    """Largest lateness [s] of each robot's loop that was late for seconds, by the robot's name."""
+    """Largest lateness [s] of each robot's loop, or the world's, that was late for seconds, by its name."""
     slow_hz: dict[str, float] = {}
     """Lowest control rate [Hz] of each robot that stepped less often, for its machine kept it late."""
 

@@ -13,6 +13,7 @@ from lfa.deploy.analysis.summary import Overload, RobotSummary, Summary
 from lfa.deploy.analysis.tracking_errors import SETTLED_M
 from lfa.deploy.client.term_count import TermCount
 from lfa.deploy.recording.recorder import RECORDING
+from lfa.protocol.topics import WORLD_NAME
 
 HEADINGS = (
     "robot",
@@ -65,10 +66,13 @@ def _lasted(summary: Summary) -> str:
 def _overloaded(overload: Overload) -> str:
     """Return in one line that the machine did not keep up, and by how much."""
     signs = [f"the world stood still for {overload.stood_still_s:.2f} s"] if overload.stood_still_s > 0.0 else []
-    if overload.late_s:
-        worst = max(overload.late_s, key=overload.late_s.__getitem__)
-        who = "1 robot was" if len(overload.late_s) == 1 else f"{len(overload.late_s)} robots were"
-        signs.append(f"{who} late, {worst} by {overload.late_s[worst]:.2f} s")
+    robots = {name: late_s for name, late_s in overload.late_s.items() if name != WORLD_NAME}
+    if WORLD_NAME in overload.late_s:
+        signs.append(f"the world was late by {overload.late_s[WORLD_NAME]:.2f} s")
+    if robots:
+        worst = max(robots, key=robots.__getitem__)
+        who = "1 robot was" if len(robots) == 1 else f"{len(robots)} robots were"
+        signs.append(f"{who} late, {worst} by {robots[worst]:.2f} s")
     if overload.slow_hz:
         slowest = min(overload.slow_hz, key=overload.slow_hz.__getitem__)
         who = "1 robot" if len(overload.slow_hz) == 1 else f"{len(overload.slow_hz)} robots"

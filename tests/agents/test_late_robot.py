@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from lfa.agents.load.control_rate import CALM_S, LATE_SHARE, ControlRate
-from lfa.agents.load.lateness import LATE_SECONDS
 from lfa.agents.team_state import ROW_S_MAX, table_s
 from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 from lfa.deploy.fuzz.schedules import FAIR, Schedule
@@ -13,6 +12,7 @@ from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.team import Event, Level, PoseStamped, Status
 from lfa.protocol.mission import CONTROL_HZ_MIN, Following, Mission, Profile
+from lfa.protocol.runtime.lateness import LATE_SECONDS
 
 STEP_S = 0.001
 LAG_S, AGES_S = 0.12, 0.25

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfa.agents.load.lateness import LATE_SECONDS, Lateness
+from lfa.protocol.runtime.lateness import LATE_SECONDS, Lateness
 
 TOO_MUCH_S = 0.04
 

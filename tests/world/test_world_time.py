@@ -11,6 +11,8 @@ import pytest
 from lfa.protocol.geometry import Twist, along_arc, distance
 from lfa.protocol.messages.robot import GroundProfile, LaserScan, Sensors
 from lfa.protocol.messages.simulation import Clock, Truth
+from lfa.protocol.node import Vitals
+from lfa.protocol.runtime.lateness import LATE_SECONDS
 from lfa.world.description.load import load
 from lfa.world.time_grid import CATCH_UP_STEPS_MAX
 from lfa.world.world import World
@@ -80,3 +82,11 @@ def test_without_a_start_the_worlds_time_begins_with_its_first_tick() -> None:
     clocks = of(world.tick(77.7), Clock)
     assert [clock.time_s for clock in clocks] == [0.0]
     assert world.next_deadline() == pytest.approx(77.71)
+
+
+def test_a_world_that_is_late_for_seconds_says_so_once_and_that_it_keeps_time_again() -> None:
+    rig = Rig()
+    rig.run(0.1)
+    lags_s = (*[0.3] * (LATE_SECONDS + 2), *[0.0] * (LATE_SECONDS + 2))
+    told = [event for lag_s in lags_s for event in events(rig.hear("", Vitals(lag_s, 0, 0, 0.0, 0.0)), "late")]
+    assert [(event.data["late"], event.data["lag_s"]) for event in told] == [(True, 0.3), (False, 0.0)]

@@ -280,6 +280,12 @@ def test_who_stepped_less_often_is_summed_up_by_its_lowest_rate() -> None:
     assert overload([line("rate", late=False, control_hz=50.0)]) is None
 
 
+def test_a_world_that_was_late_is_named_beside_the_robots() -> None:
+    late = [{**line("late", lag_s=0.4), "robot": None, "from": "world"}, line("late", lag_s=0.2)]
+    told = text(_summed(*late), None)
+    assert "this machine did not keep up: the world was late by 0.40 s; 1 robot was late, robot2 by 0.20 s" in told
+
+
 def test_a_machine_that_does_not_keep_up_is_one_line_of_the_end_and_no_failure() -> None:
     events = [line("late", lag_s=0.2), line("slowed", stood_still_s=1.0), line("rate", late=True, control_hz=12.5)]
     summary = _summed(_chain(1, 2, 3, number=1), *events)
