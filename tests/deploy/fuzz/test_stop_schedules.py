@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
+from msgspec import structs
 
 from lfa.deploy.analysis.verification.fleet_stop import LatchKept
+from lfa.deploy.client.stop_call import ANSWER_S
 from lfa.deploy.fuzz.fleet_stop.stop_play import play_stops
-from lfa.deploy.fuzz.fleet_stop.stop_schedules import KINDS, draw_stop_schedule
+from lfa.deploy.fuzz.fleet_stop.stop_schedules import FAULTS_UNTIL_S, KINDS, draw_stop_schedule
+from lfa.deploy.fuzz.schedules import ScheduledFault
 from lfa.deploy.fuzz.search.command import command
 from lfa.deploy.fuzz.search.searches import Search, shrink
 from lfa.protocol.errors import Refused
@@ -59,6 +62,17 @@ def test_schedules_have_teams_that_need_an_operator_and_robots_that_reboot_alone
         if any(fault.kind == "cut" and (fault.at, fault.targets) in reboots for fault in one.faults):
             return
     pytest.fail("no robot reboots while it is cut off")
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_after_the_last_fault_a_stop_reaches_every_robot_and_a_resume_lets_every_robot_go(seed: int) -> None:
+    """Earlier calls are over by then: one that goes on would say its own word again."""
+    schedule = draw_stop_schedule(seed)
+    earlier = tuple(call for call in schedule.stops if call.at < FAULTS_UNTIL_S - ANSWER_S)
+    last = (ScheduledFault(1.55, "stop", (1,)), ScheduledFault(1.9, "resume", (1,)))
+    played = play_stops(structs.replace(schedule, stops=(*earlier, *last)))
+    outcomes = [outcome for _, _, outcome in played.stops[-2:]]
+    assert [(outcome.complete, len(outcome.done)) for outcome in outcomes] == [(True, schedule.robots)] * 2
 
 
 @pytest.mark.parametrize("bug", OF_THE_STOP, ids=lambda bug: bug.what)
