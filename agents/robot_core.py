@@ -6,6 +6,7 @@ moment. A robot that becomes leader commands at once.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -25,7 +26,7 @@ from lfa.agents.orders.stop_listener import StopListener
 from lfa.agents.orders.team_orders import QUESTION, TeamOrders
 from lfa.agents.stuck_policy import StuckPolicy
 from lfa.agents.subscriptions import with_mission
-from lfa.agents.team_messages import TeamMessages
+from lfa.agents.team_messages import TeamMessage, TeamMessages
 from lfa.agents.team_state import TeamState, report_s_max, sensors_s_max
 from lfa.agents.telemetry import Reports
 from lfa.protocol.errors import Refused
@@ -45,7 +46,6 @@ from lfa.protocol.node import PeerDown, PeerUp, Stop, Vitals
 from lfa.protocol.outbox import Outbox
 from lfa.protocol.topics import OPERATOR_NAME
 
-HardwareMessage = Sensors | Localization | LaserScan | GroundProfile | SensorReading
 EASE_PERIODS = 2.0
 """Lease time left, in control periods, beyond which a grant may wait for the next control step: each voter of a round
 would wake the leader."""
@@ -102,6 +102,16 @@ class RobotCore:
         self._arrived = False
         self._spec = mission.formation
         self._pending_release = False
+        self._often: dict[type, Callable[[Any, float], object]] = {
+            Sensors: self._hear_sensors,
+            Localization: self.navigator.estimator.localization,
+            LaserScan: self.navigator.see,
+            GroundProfile: self.navigator.update_ground,
+            SensorReading: self.navigator.own_readings.update,
+            LeaseNote: self._hear_lease,
+            **dict.fromkeys((PoseStamped, TableRow, ObstacleNote, FormationNote), self._hear_robot),
+        }
+        """What hears the messages of which there are hundreds a second: one look-up, where each `case` is a test."""
         self._asks = not self._stop_listener.memory.certain
         self.interests = with_mission(outbox.fleet, outbox.name, None, asks=self._asks)
         self._event("mission", now, {"version": mission.version, "robots": list(mission.robots)})
@@ -144,19 +154,33 @@ class RobotCore:
 
     def receive(self, message: object, now: float) -> None:
         """Process a message or a local event."""
+        self._often.get(type(message), self._receive_seldom)(message, now)
+
+    def _hear_lease(self, note: LeaseNote, now: float) -> None:
+        source = robot_id_of(note.header.sender)
+        if source is not None:
+            self._apply(self.lease.receive(Member(source, note.header.incarnation), note.body, now), now)
+            self.leaves = self._pending_release or self.lease.superseded_by is not None
+
+    def _hear_robot(self, message: TeamMessage, now: float) -> None:
+        robot = robot_id_of(message.header.sender)
+        if robot is not None and robot != self._id:
+            self._team_messages.hear(robot, message, now)
+
+    def _hear_sensors(self, sensors: Sensors, now: float) -> None:
+        lease = self.lease
+        if self._input_watch.fits(sensors, lease.term, now):
+            self._team.hear_sensors(sensors, now)
+            self._stop_listener.hear_sensors(sensors)
+            self.navigator.estimator.sensors(sensors, now)
+            self._apply(lease.gateway_term(sensors.term_max, now, sensors.latched), now)
+            lease.learn_incarnation(sensors.agent)
+            self.leaves = self._pending_release or lease.superseded_by is not None
+
+    def _receive_seldom(self, message: object, now: float) -> None:
+        """Process a message that is not in the table `_often`."""
         lease, navigator = self.lease, self.navigator
         match message:
-            case Sensors() | Localization() | LaserScan() | GroundProfile() | SensorReading():
-                self._hear_hardware(message, now)
-            case LeaseNote():
-                source = robot_id_of(message.header.sender)
-                if source is not None:
-                    self._apply(lease.receive(Member(source, message.header.incarnation), message.body, now), now)
-                    self.leaves = self._pending_release or lease.superseded_by is not None
-            case PoseStamped() | TableRow() | ObstacleNote() | FormationNote():
-                robot = robot_id_of(message.header.sender)
-                if robot is not None and robot != self._id:
-                    self._team_messages.hear(robot, message, now)
             case PeerUp() | PeerDown():
                 peer = robot_id_of(message.name)
                 if peer is not None:
@@ -181,26 +205,6 @@ class RobotCore:
                 self._reports.status(message, navigator, self._team, lease, self._role(), held, gateway, now)
             case Stop():
                 self._stop(now)
-
-    def _hear_hardware(self, message: HardwareMessage, now: float) -> None:
-        """Update the state from a message of the robot's own hardware."""
-        lease, navigator = self.lease, self.navigator
-        match message:
-            case Sensors() if self._input_watch.fits(message, lease.term, now):
-                self._team.hear_sensors(message, now)
-                self._stop_listener.hear_sensors(message)
-                navigator.estimator.sensors(message, now)
-                self._apply(lease.gateway_term(message.term_max, now, message.latched), now)
-                lease.learn_incarnation(message.agent)
-                self.leaves = self._pending_release or lease.superseded_by is not None
-            case Localization():
-                navigator.estimator.localization(message, now)
-            case LaserScan():
-                navigator.see(message, now)
-            case GroundProfile():
-                navigator.update_ground(message, now)
-            case SensorReading():
-                navigator.own_readings.update(message, now)
 
     def _obey(self, note: OperatorNote, now: float) -> None:
         """Obey an operator's command. Only the leader changes the formation, or hands the lease to the next in the

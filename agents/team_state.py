@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import ceil, inf
 
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.perception.shared_obstacles import SharedObstacles
@@ -52,8 +52,8 @@ class TeamState:
         """Velocity in `map`, from one row to the next."""
         self._reach: dict[int, tuple[float, float, float, float]] = {}
         """Place [m] of each robot's last row, and how far [m] along x and y its extrapolation may take it."""
-        self._around: _Vicinity | None = None
-        """Robots around this one; None while that has to be found anew."""
+        self._around: dict[float, _Vicinity] = {}
+        """Robots around this one by the distance [m] asked for, whole metres and more; none that must be found anew."""
         self._clocks: dict[int, ClockOffset] = {}
         self.obstacles = SharedObstacles(self.poses)
         """Moving obstacles that other robots reported."""
@@ -98,8 +98,9 @@ class TeamState:
         self._table[robot] = (row, at)
         vx, vy = self._velocity[robot]
         reach = self._reach[robot] = row.x, row.y, GOES_ON_S * abs(vx), GOES_ON_S * abs(vy)
-        if self._around is not None and robot not in self._around.robots and self._around.may_hold(reach):
-            self._around = None
+        for wide_m, around in list(self._around.items()):
+            if robot not in around.robots and around.may_hold(reach):
+                del self._around[wide_m]
         self._clocks[robot].heard(row.header.stamp, at)
 
     def fresh_sensors(self, now: float) -> Sensors | None:
@@ -124,9 +125,10 @@ class TeamState:
 
         Called at each control step: in a team of a hundred nearly all are passed over by the place in their last row.
         """
-        x, y, reach, around = pose.x, pose.y, self._reach, self._around
+        x, y, reach, wide_m = pose.x, pose.y, self._reach, ceil(within_m) + AROUND_M
+        around = self._around.get(wide_m)
         if around is None or around.of is not robots or not around.covers(x, y, within_m):
-            around = self._around = self._look_around(robots, x, y, within_m)
+            around = self._around[wide_m] = self._look_around(robots, x, y, wide_m)
         nearby = [
             robot
             for robot in around.robots
@@ -134,9 +136,8 @@ class TeamState:
         ]
         return [(robot, place) for robot in nearby if (place := self.pose_of(robot, now)) is not None]
 
-    def _look_around(self, robots: Sequence[int], x: float, y: float, within_m: float) -> _Vicinity:
-        """Return those of `robots` that are around (x, y) [m], for as long as the robot stays there."""
-        wide_m = max(within_m, 0.0 if self._around is None else self._around.within_m - AROUND_M) + AROUND_M
+    def _look_around(self, robots: Sequence[int], x: float, y: float, wide_m: float) -> _Vicinity:
+        """Return those of `robots` that are within `wide_m` of (x, y) [m], for as long as the robot stays there."""
         around = _Vicinity(robots, x, y, wide_m)
         around.robots = [one for one in robots if one in self._reach and around.may_hold(self._reach[one])]
         return around

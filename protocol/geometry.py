@@ -9,6 +9,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 TAU = 2.0 * pi
+Point = tuple[float, float]
 NUMBER_MAX = 1e9
 Number = Annotated[float, Meta(ge=-NUMBER_MAX, le=NUMBER_MAX)]
 """Number that a core computes with, bounded by NUMBER_MAX: decoding rejects larger ones, so that sums stay finite."""
@@ -80,6 +81,17 @@ def along_arc(pose: Pose2D, twist: Twist, duration_s: float) -> Pose2D:
     return Pose2D(pose.x + chord * cos(middle), pose.y + chord * sin(middle), pi if theta == -pi else theta)
 
 
+def places_along(pose: Pose2D, twist: Twist, durations_s: Sequence[float]) -> list[Point]:
+    """Return the positions of `along_arc` after each of `durations_s`, to the last bit, in one call."""
+    x, y, theta, v, omega = pose.x, pose.y, pose.theta, twist.linear_x, twist.angular_z
+    places = []
+    for duration_s in durations_s:
+        half = 0.5 * (omega * duration_s)
+        chord = v * duration_s * (sin(half) / half if not -1e-6 <= half <= 1e-6 else 1.0 - half * half / 6.0)
+        places.append((x + chord * cos(theta + half), y + chord * sin(theta + half)))
+    return places
+
+
 def part_of_arc(step: Pose2D, part: float) -> Pose2D:
     """Return the first `part` (0 to 1) of `step`, a motion with constant twist (end pose in the frame of the start)."""
     rest = 0.5 * (part - 1.0) * step.theta
@@ -101,9 +113,6 @@ def distance(a: Pose2D, b: Pose2D) -> float:
 def bearing(origin: Pose2D, target: Pose2D) -> float:
     """Return the direction [rad] from `origin` to `target`, in the frame of both."""
     return atan2(target.y - origin.y, target.x - origin.x)
-
-
-Point = tuple[float, float]
 
 
 def in_base(pose: Pose2D, point: Point) -> Point:

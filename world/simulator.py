@@ -38,7 +38,6 @@ from lfa.world.virtual_time import LocalClock, VirtualTime
 
 LOCAL_DELAY_S = 0.0003  # a robot and its own hardware: one hop over a unix socket
 HINT_DELAY_S = (0.001, 0.005)  # after a kill the process's token vanishes within this [s] (zenoh.md section 2)
-LOCAL_DELAYS_S = (LOCAL_DELAY_S,)
 VITALS_S = 1.0
 FINISH_S_MAX = 1.0
 
@@ -294,15 +293,17 @@ class Simulator(VirtualTime):
             tap(self.now, key, payload, message)
         now, give, delays = self.now, self._give, self.link_model.delays
         sent_from, receivers = self._routes.of(key)
-        echoes = key.split("/", 4)[3] not in NO_ECHO
+        if key.split("/", 4)[3] in NO_ECHO:
+            receivers = [one for one in receivers if one[0] is not sender]
+        if self.deaf:
+            name = sender.node.name
+            receivers = [one for one in receivers if (one[0].node.name, name) not in self.deaf]
         calls: list[tuple[float, Callable[..., None], tuple[Any, ...]]] = []
         for process, place in receivers:
-            if process is sender and not echoes:
+            if sent_from is None or place == sent_from:
+                calls.append((now + LOCAL_DELAY_S, give, (process, key, message, payload)))
                 continue
-            if self.deaf and (process.node.name, sender.node.name) in self.deaf:
-                continue
-            delays_s = LOCAL_DELAYS_S if sent_from is None or place == sent_from else delays(sent_from, place)
-            for delay_s in delays_s:
+            for delay_s in delays(sent_from, place):
                 calls.append((now + delay_s, give, (process, key, message, payload)))
         self.at_each(calls)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import hypot, inf
 
 from msgspec import Struct
@@ -10,7 +11,7 @@ from msgspec import Struct
 from lfa.agents.avoidance.decision import Action
 from lfa.agents.avoidance.moving_points import ASIDE_SHARE
 from lfa.agents.perception.obstacle_tracker import Feature
-from lfa.protocol.geometry import Pose2D, Twist, along_arc, in_base
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, in_base, places_along
 
 CLEARANCE_M = 0.6
 """Least distance [m] from the robot's centre to the surface of a moving obstacle; less within the horizon is a
@@ -100,13 +101,19 @@ def closest_m(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: f
     least = inf
     if not moving:
         return least
-    times = [n * STEP_S for n in range(1, round(within_s / STEP_S) + 1)]
-    way = [(later, along_arc(pose, twist, later)) for later in times]
+    times = _times(round(within_s / STEP_S))
+    way = list(zip(times, places_along(pose, twist, times), strict=True))
     for feature in moving:
         x, y, vx, vy, radius_m = feature.x, feature.y, feature.vx, feature.vy, feature.radius_m
         first = hypot(x - pose.x, y - pose.y)
-        for later, there in way:
-            apart = hypot(x + vx * later - there.x, y + vy * later - there.y)
+        for later, (there_x, there_y) in way:
+            apart = hypot(x + vx * later - there_x, y + vy * later - there_y)
             if apart < first and apart - radius_m < least:
                 least = apart - radius_m
     return least
+
+
+@lru_cache(maxsize=64)  # bounded: a bend may take any time
+def _times(steps: int) -> tuple[float, ...]:
+    """Return the times [s] at which a motion is looked at."""
+    return tuple(n * STEP_S for n in range(1, steps + 1))

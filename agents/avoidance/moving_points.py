@@ -42,8 +42,10 @@ def before(moving: Sequence[Feature], pose: Pose2D, within_s: float, v_mps: floa
 
     The robot wants to drive at `v_mps` [m/s]. For what comes from the side it does not brake: at rest it would be met.
     """
+    points: list[Point] = []
+    if not moving:
+        return points
     c, s = cos(pose.theta), sin(pose.theta)
-    points = []
     for feature in moving:
         x, y = feature.at(within_s)
         dx, dy = x - pose.x, y - pose.y

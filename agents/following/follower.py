@@ -105,6 +105,8 @@ class Follower:
         self._last = STILL
         self._error_m = 0.0
         self._state = State.HOLD
+        self._readout: Readout | None = None
+        """Readout of the last step, once it was asked for."""
         self.own_readings: Mapping[str, OwnReading] = {}
         """Newest readings of the robot's own sensors, which the controller gets."""
         self.refused = 0
@@ -124,6 +126,7 @@ class Follower:
 
         Without a sighting, or with one older than `dead_reckoning_max_s`: brake along the path and hold.
         """
+        self._readout = None
         if not DT_MIN_S <= dt <= DT_MAX_S:
             self.refused += 1
             dt = DT_MAX_S if dt > DT_MAX_S else DT_MIN_S
@@ -175,9 +178,11 @@ class Follower:
 
     @property
     def readout(self) -> Readout:
-        m = self._motion
-        slot_map = Pose2D(m.x, m.y, self._heading)
-        return Readout(slot_map, m.chi, self._heading, self._error_m, m.separation_m, wrap(m.phi), self._state)
+        if self._readout is None:
+            m, slot_map = self._motion, Pose2D(self._motion.x, self._motion.y, self._heading)
+            parts = m.chi, self._heading, self._error_m, m.separation_m, wrap(m.phi), self._state
+            self._readout = Readout(slot_map, *parts)
+        return self._readout
 
     def _fresh(self, sighting: Sighting) -> bool:
         if not plausible(sighting.pose, sighting.twist):

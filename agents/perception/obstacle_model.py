@@ -10,7 +10,7 @@ from math import cos, hypot, inf, sin
 
 from lfa.agents.perception.ground_map import GroundMap
 from lfa.agents.perception.obstacle import BlockingObstacle
-from lfa.agents.perception.obstacle_tracker import Feature, Tracker
+from lfa.agents.perception.obstacle_tracker import WALL_M, Feature, Tracker
 from lfa.agents.perception.scan import SIGHT_M, Point, Surroundings
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D, Twist, along_arc
@@ -23,9 +23,9 @@ TRAP_M = 0.8
 MATE_M = 0.6
 """Distance [m] to a team-mate's expected position below which an obstacle is that team-mate: table rows are half a
 second old."""
-MATES_M = 2.0 * SIGHT_M + MATE_M + 0.1
+MATES_M = SIGHT_M + 0.5 * WALL_M + MATE_M + 0.1
 """Distance [m] beyond which no team-mate matters to a scan: an obstacle's centre is at most half its width behind the
-nearest of its points."""
+nearest of its points, and what is wider than `WALL_M` is a wall in any case."""
 OWN_M = 0.15
 """Distance [m] to the surface of a moving obstacle below which a scan point belongs to it."""
 NEAR_M = 0.3

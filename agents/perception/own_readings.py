@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 from msgspec import Struct
 
@@ -10,6 +11,10 @@ from lfa.protocol.messages.robot import SensorReading
 
 SENSORS_MAX = 64
 """Largest number of sensors whose readings are kept; those of further ones are dropped."""
+
+
+NONE: Mapping[str, OwnReading] = MappingProxyType({})
+"""Readings of a robot without sensors of a user's own."""
 
 
 class OwnReading(Struct, frozen=True, gc=False):
@@ -32,4 +37,6 @@ class OwnReadings:
 
     def at(self, now: float) -> Mapping[str, OwnReading]:
         """Return the newest readings with their ages at `now` [s]."""
+        if not self._newest:
+            return NONE
         return {name: OwnReading(reading.values, now - came) for name, (reading, came) in self._newest.items()}

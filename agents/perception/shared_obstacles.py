@@ -42,6 +42,8 @@ class SharedObstacles:
 
         `seen_near(x, y, within_m)` returns whether this robot's scan shows anything near (x, y) in `map`.
         """
+        if not self._reports:
+            return seen
         known = list(seen)
         for note, at in self._reports.values():
             vx, vy = note.twist_map

@@ -49,13 +49,13 @@ class BackUp:
 
     def keep(self, pose: Pose2D) -> None:
         """Extend the trail; call it in each control step without a back-up."""
-        trail = self._trail
-        if trail and hypot(pose.x - trail[-1][0], pose.y - trail[-1][1]) < STEP_M:
+        trail, x, y = self._trail, pose.x, pose.y
+        if trail and hypot(x - trail[-1][0], y - trail[-1][1]) < STEP_M:
             return
-        been = next((n for n, (x, y) in enumerate(trail) if hypot(pose.x - x, pose.y - y) < LOOP_M), len(trail))
-        for _ in range(len(trail) - 1 - been):  # it is back where it was: the loop since then leads nowhere
+        near = [n for n, (px, py) in enumerate(trail) if -LOOP_M < x - px < LOOP_M and hypot(x - px, y - py) < LOOP_M]
+        for _ in range(len(trail) - 1 - near[0] if near else 0):  # back where it was: the loop since then leads nowhere
             trail.pop()
-        trail.append((pose.x, pose.y))
+        trail.append((x, y))
 
     def begin(self, pose: Pose2D) -> None:
         """Start backing up from `pose`."""

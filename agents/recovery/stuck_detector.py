@@ -91,7 +91,7 @@ class StuckMonitor:
 
     def find_pose(self) -> None:
         """Update in the first control step with a pose."""
-        if self.pose_lost:
+        if self.reason is not None and self.pose_lost:
             self.reason = None
 
     @property

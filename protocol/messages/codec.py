@@ -101,7 +101,8 @@ def decode(payload: bytes, expected: type) -> Message:
         raise BadMessage(str(error)) from None
     if type(message) is not expected:
         raise BadMessage(f"{type(message).__name__} where {expected.__name__} belongs")
-    if expected in _FITS and not _FITS[expected](message):
+    fits = _FITS.get(expected)
+    if fits is not None and not fits(message):
         raise BadMessage(f"{type(message).__name__} whose parts do not fit together")
     return message
 

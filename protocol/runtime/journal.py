@@ -8,6 +8,7 @@ process does not lose them.
 from __future__ import annotations
 
 import errno
+import struct
 import sys
 import zlib
 from collections.abc import Iterator, Sequence
@@ -50,6 +51,7 @@ class JournalEntry(Struct, frozen=True, array_like=True, gc=False):
 
 Call = tuple[str, float, str, bytes, Sequence[tuple[str, bytes]]]
 """A call of a node: kind, time [s], key and payload as in a `JournalEntry`, and the messages that it sent."""
+_length = struct.Struct("<I").pack
 _encode = msgspec.msgpack.Encoder().encode
 _entry_decoder = msgspec.msgpack.Decoder(JournalEntry)
 _heading_decoder = msgspec.msgpack.Decoder(Heading)
@@ -98,11 +100,11 @@ class Journal:
     def _take_in(self, calls: Sequence[Call]) -> None:
         """Encode added calls."""
         if self._file is not None:
-            pending = self._pending
+            parts: list[bytes] = []
             for kind, at, key, payload, sent in calls:
                 body = _encode((kind, at, key, payload, digest(sent) if sent else 0))  # as a `JournalEntry`
-                pending += len(body).to_bytes(4, "little")
-                pending += body
+                parts += _length(len(body)), body
+            self._pending += b"".join(parts)
 
     def _take_in_all(self) -> None:
         if self._calls:

@@ -5,7 +5,7 @@ from math import cos, isclose, pi, sin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, distance, inverse, wrap
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, distance, inverse, places_along, wrap
 
 angle = st.floats(-50.0, 50.0)
 place = st.floats(-100.0, 100.0)
@@ -32,6 +32,12 @@ def test_between_undoes_compose(a: Pose2D, b: Pose2D) -> None:
 @given(poses)
 def test_a_pose_and_its_inverse_are_the_identity(a: Pose2D) -> None:
     assert near(compose(a, inverse(a)), Pose2D(), 1e-7)
+
+
+@given(poses, twists, st.lists(st.floats(0.0, 6.0), max_size=9))
+def test_places_along_an_arc_are_those_of_its_poses_to_the_last_bit(a: Pose2D, twist: Twist, at: list[float]) -> None:
+    poses_there = [along_arc(a, twist, later) for later in at]
+    assert places_along(a, twist, at) == [(there.x, there.y) for there in poses_there]
 
 
 @given(poses, twists, st.floats(0.001, 1.0))

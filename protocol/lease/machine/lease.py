@@ -82,6 +82,7 @@ class Lease:
         """
         self._memory = LeaseMemory(me, mission, timing, now, floor)
         self._observer = observer
+        self._grant_s = timing.grant_s
         self._chain_of, self._chain = self._memory.config, ids(self._memory.config.chain)
         self._deadline_for: float | None = None
         self._deadline = NEVER
@@ -106,7 +107,7 @@ class Lease:
     @property
     def grant_s(self) -> float:
         """`T_grant` [s] that this process and its team count on (E25)."""
-        return self._memory.timing.grant_s
+        return self._grant_s
 
     @property
     def leader(self) -> int | None:

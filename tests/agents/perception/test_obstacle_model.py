@@ -6,7 +6,7 @@ from math import cos, inf, pi, sin, sqrt
 
 import pytest
 
-from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.header import Header
@@ -36,3 +36,19 @@ def test_what_comes_into_the_range_of_a_scanner_by_and_by_does_not_move(range_ma
         here, now = Pose2D(0.02 * n, 0.0, 0.0), 0.1 * n
         model.see(scan_of_post(min(range_max_m, 5.0) + 0.6 - here.x, 0.45, range_max_m), here, (), now)
         assert model.moving(here, now) == [], now
+
+
+@pytest.mark.parametrize("ahead_m", [4.0, 5.0, 5.2, 5.4])
+@pytest.mark.parametrize("radius_m", [0.1, 0.3, 0.49])
+@pytest.mark.parametrize("bearing", [-0.1, 0.0, 0.1])
+def test_a_team_mate_beyond_the_distance_asked_for_changes_nothing_of_what_a_scan_shows(
+    ahead_m: float, radius_m: float, bearing: float
+) -> None:
+    """So a robot need not ask where those are that drive farther off."""
+    mate = Pose2D(MATES_M * cos(bearing), MATES_M * sin(bearing), 0.0)
+    shown = []
+    for mates in ((), (mate,)):
+        model = ObstacleModel(0.15, Limits(), SharedObstacles(lambda _now: ()))
+        model.see(scan_of_post(ahead_m, radius_m, 8.0), Pose2D(), mates, 1.0)
+        shown.append([model.nearest(Pose2D(), kind, 1.0) for kind in ("stationary", "wall")])
+    assert shown[0] == shown[1]
