@@ -161,7 +161,7 @@ def rules(plan: KeyPlan, host: str, common_names: dict[str, str]) -> dict[str, A
     allowed = [
         _rule("learn", "egress", LEARN, [everything]),
         _rule("ask", "ingress", ASK, [everything]),
-        _rule("see", "ingress", SEE, [everything]),
+        _rule("see", "ingress", SEE, [f"lfa/{plan.fleet}/*/alive/*"]),
     ]
     subjects: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []

@@ -113,6 +113,16 @@ def test_every_rule_is_for_somebody_and_every_subject_has_rules() -> None:
     assert guard["enabled"] and guard["default_permission"] == "deny"
 
 
+def test_whatever_a_member_declares_at_its_router_is_of_listed_keys_and_answers_no_queries() -> None:
+    guard = rules(plan(), "a", {name: name for name in (*plan().places, "host-a", "host-b")})["access_control"]
+    inwards = [rule for rule in guard["rules"] if "ingress" in rule["flows"]]
+    assert not [rule for rule in inwards if "declare_queryable" in rule["messages"]]
+    seen = [rule["key_exprs"] for rule in inwards if "declare_liveliness_subscriber" in rule["messages"]]
+    assert seen == [["lfa/f/*/alive/*"]]
+    said = {key for rule in inwards if "liveliness_token" in rule["messages"] for key in rule["key_exprs"]}
+    assert {key.split("/")[2] for key in said if "/alive/" in key} <= {*plan().places, "witness"}
+
+
 WITHIN = plan(drivers=[3], places={name: ["a"] for name in ("robot1", "robot3", "driver3", "witness", "world")})
 NODES: dict[str, Callable[[], Node]] = {
     "robot1": lambda: Agent(1, 9, "f", 0),
