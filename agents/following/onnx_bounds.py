@@ -13,17 +13,21 @@ STRUCTURE_BYTES_MAX = 1 << 20
 """Maximum length [bytes] of a model without its weights."""
 DEPTH_MAX = 32
 """Maximum depth of graphs in nodes of graphs."""
-MODEL, GRAPH, NODE, ATTRIBUTE, TENSOR, FUNCTION, TRAINING = range(7)
+MODEL, GRAPH, NODE, ATTRIBUTE, TENSOR, TRAINING = range(6)
 NESTED = {
-    MODEL: {7: GRAPH, 20: TRAINING, 25: FUNCTION},
+    MODEL: {7: GRAPH, 20: TRAINING},
     TRAINING: {1: GRAPH, 2: GRAPH},
     GRAPH: {1: NODE, 5: TENSOR},
-    FUNCTION: {7: NODE, 11: ATTRIBUTE},
     NODE: {5: ATTRIBUTE},
     ATTRIBUTE: {5: TENSOR, 6: GRAPH, 10: TENSOR, 11: GRAPH},
 }
 """Fields of a message that are messages themselves, by their numbers in onnx.proto."""
-SPARSE = {GRAPH: (15,), ATTRIBUTE: (22, 23)}
+REFUSED = {
+    MODEL: {25: "has functions of its own, which may stand for any number of nodes (onnx.inliner takes them out)"},
+    GRAPH: {15: "has sparse tensors"},
+    ATTRIBUTE: {22: "has sparse tensors", 23: "has sparse tensors"},
+}
+"""Fields of a few bytes that stand for any amount, by their numbers in onnx.proto, and what a model with them has."""
 WEIGHTS = (4, 5, 7, 9, 10, 11)
 """Fields of a tensor that hold its elements; of a kilobyte there the runtime makes at most eight."""
 EXTERNAL_DATA, DATA_LOCATION, OP_TYPE = 13, 14, 4
@@ -56,23 +60,27 @@ class _Walk:
 
     def __init__(self, content: bytes) -> None:
         self._content = content
-        self._count = 0
+        self._count = self._graphs = 0
         self.weights = 0
 
     def message(self, kind: int, at: int, end: int, depth: int) -> None:
         """Walk through a message of `kind` from `at` to `end`. Raises _Unbounded, and IndexError where it is cut."""
         if depth == 0:
             raise _Unbounded(f"has graphs more than {DEPTH_MAX // 3} deep in each other")
-        nested, sparse = NESTED.get(kind, {}), SPARSE.get(kind, ())
+        nested, refused = NESTED.get(kind, {}), REFUSED.get(kind, {})
+        graphs, operators = self._graphs, set[bytes]()
+        self._graphs += kind == GRAPH
         for number, wire, start, stop in self._fields(at, end):
-            if number in sparse:
-                raise _Unbounded("has sparse tensors")
+            if number in refused:
+                raise _Unbounded(refused[number])
             if kind == TENSOR:
                 self._tensor(number, wire, start, stop)
             elif wire == BYTES and number in nested:
                 self.message(nested[number], start, stop, depth - 1)
-            elif kind == NODE and number == OP_TYPE and self._content[start:stop] == b"Loop":
-                raise _Unbounded("repeats a part without a bound (Loop)")
+            elif kind == NODE and number == OP_TYPE:
+                operators.add(self._content[start:stop])
+        if kind == NODE and self._graphs > graphs and operators != {b"If"}:  # Loop, Scan, SequenceMap, BeamSearch
+            raise _Unbounded("may repeat a part without a bound (a node with a graph in it that is no If)")
 
     def _tensor(self, number: int, wire: int, start: int, stop: int) -> None:
         if number in (EXTERNAL_DATA, DATA_LOCATION) and (wire == BYTES or self._content[start:stop] != b"\0"):

@@ -54,6 +54,42 @@ def _repeated() -> bytes:
     return _model(helper.make_node("Loop", ["often", ""], [], body=body), tensors=(often,)).SerializeToString()
 
 
+def _scanned() -> bytes:
+    """Return a model that goes through as many zeros as fit into the memory, and for each through as many again."""
+    value, zero = helper.make_tensor_value_info, helper.make_tensor("zero", TensorProto.FLOAT, [1], [0.0])
+
+    def scan(start: str, end: str, body: GraphProto) -> list[NodeProto]:
+        zeros = helper.make_node("ConstantOfShape", ["shape"], [f"zeros_{end}"], value=zero)
+        return [zeros, helper.make_node("Scan", [start, f"zeros_{end}"], [end], num_scan_inputs=1, body=body)]
+
+    def graph(nodes: list[NodeProto], name: str) -> GraphProto:
+        inputs = [value(f"{name}_in", TensorProto.FLOAT, [1]), value(f"{name}_n", TensorProto.FLOAT, [])]
+        return helper.make_graph(nodes, name, inputs, [value(f"{name}_out", TensorProto.FLOAT, [1])])
+
+    inner = graph([helper.make_node("Neg", ["inner_in"], ["inner_out"])], "inner")
+    outer = graph(scan("outer_in", "outer_out", inner), "outer")
+    shape = numpy_helper.from_array(np.array([10_000], np.int64), "shape")
+    start = numpy_helper.from_array(np.zeros(1, np.float32), "start")
+    return _model(*scan("start", "end", outer), tensors=(shape, start)).SerializeToString()
+
+
+def _doubled() -> bytes:
+    """Return a model of functions that each call the one before twice: a million nodes and more without functions."""
+    opset, own = helper.make_opsetid("", 17), helper.make_opsetid("own", 1)
+    made = _model(helper.make_node("f20", ["seen"], ["other"], domain="own"))
+    made.opset_import.append(own)
+    made.functions.append(
+        helper.make_function("own", "f0", ["x"], ["y"], [helper.make_node("Neg", ["x"], ["y"])], [opset])
+    )
+    for n in range(1, 21):
+        calls = [
+            helper.make_node(f"f{n - 1}", ["x"], ["between"], domain="own"),
+            helper.make_node(f"f{n - 1}", ["between"], ["y"], domain="own"),
+        ]
+        made.functions.append(helper.make_function("own", f"f{n}", ["x"], ["y"], calls, [opset, own]))
+    return made.SerializeToString()
+
+
 def _wide() -> bytes:
     """Return a model of a few bytes that fills a gigabyte with zeros."""
     shape = numpy_helper.from_array(np.array([1 << 28], np.int64), "shape")
@@ -93,7 +129,9 @@ def _sparse() -> bytes:
     ("made", "says"),
     [
         (_outside, "has weights in another file"),
-        (_repeated, "repeats a part without a bound (Loop)"),
+        (_repeated, "may repeat a part without a bound (a node with a graph in it that is no If)"),
+        (_scanned, "may repeat a part without a bound (a node with a graph in it that is no If)"),
+        (_doubled, "has functions of its own, which may stand for any number of nodes (onnx.inliner takes them out)"),
         (_wide, "needs more than 128 MiB of memory"),
         (_product_of_vectors, "needs more than 128 MiB of memory"),
         (_empty_nodes, f"has more than {FIELDS_MAX} fields beside its weights"),
@@ -117,6 +155,12 @@ def test_a_model_beyond_its_bounds_is_refused_in_one_line_before_it_takes_memory
 def test_a_model_of_16_mib_of_weights_is_within_its_bounds() -> None:
     weights = numpy_helper.from_array(np.zeros(1 << 22, np.float32), "more")
     assert beyond_bounds(_model(tensors=(weights,)).SerializeToString()) == ""
+
+
+def test_a_choice_between_two_graphs_is_within_its_bounds() -> None:
+    one = helper.make_graph([helper.make_node("Identity", ["seen"], ["chosen"])], "one", [], [])
+    choice = helper.make_node("If", ["go"], ["end"], then_branch=one, else_branch=one)
+    assert beyond_bounds(_model(choice).SerializeToString()) == ""
 
 
 @pytest.mark.parametrize("end", [b"\x3a", b"\x3a\x05\x0a", b"\x3b", b"\x08" + b"\xff" * 11])
