@@ -46,7 +46,10 @@ class TeamMates:
         c, s, mates = cos(pose.theta), sin(pose.theta), list[Point]()
         if self.predecessor is not None and not by_law:
             sighting = self.predecessor.at(now)
-            mates += [] if sighting is None else [in_base(pose, (sighting.pose.x, sighting.pose.y))]
+            if sighting is None:  # since it was made its predecessor, no pose has come: its row tells where it is
+                ahead = None
+            else:
+                mates.append(in_base(pose, (sighting.pose.x, sighting.pose.y)))
         for robot, place in self._team.near(self._others(), pose, within_m, now):
             if robot != ahead:
                 dx, dy = place.x - pose.x, place.y - pose.y

@@ -34,3 +34,11 @@ def test_the_predecessor_is_a_stranger_too_on_a_way_on_which_the_law_keeps_no_di
         mates.predecessor.heard(PoseStamped(header, 1.5, 0.0, 0.0, 0.0, STILL, 0.0, Role.LEADER, NO_TERM), at)
     assert mates.strangers(Pose2D(0.5), 2.0, 0.04) == []
     assert mates.strangers(Pose2D(0.5), 2.0, 0.04, by_law=False) == [pytest.approx((1.0, 0.0))]
+
+
+def test_a_predecessor_of_which_no_pose_has_come_yet_is_where_its_row_says() -> None:
+    team = TeamState()
+    team.hear_row(1, TableRow(Header("robot1", 1, 1, 0.0), 1.5, 0.0, 0.0, 0.0, 0.0, Role.FOLLOWER), 0.0)
+    mates = TeamMates(2, team)
+    mates.predecessor = Predecessor(1)
+    assert mates.strangers(Pose2D(0.5), 2.0, 0.04, by_law=False) == [pytest.approx((1.0, 0.0))]
