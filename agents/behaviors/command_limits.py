@@ -42,7 +42,10 @@ class CommandLimits:
         `by_law`: the robot moves by a follower's law, and not on a way of its own.
         """
         limits, radius_m = self._mission.limits, self._mission.radius_m
-        strangers = self._mates.strangers(pose, sharing_reach_m(wanted, radius_m, limits), now, by_law=by_law)
+        # A controller may want any speed; what is beyond the drive's, `safe` takes away.
+        fastest_mps = min(abs(wanted.linear_x), max(limits.v_max_mps, limits.v_reverse_max_mps))
+        reach_m = sharing_reach_m(Twist(fastest_mps, 0.0), radius_m, limits)
+        strangers = self._mates.strangers(pose, reach_m, now, by_law=by_law)
         wanted = sharing(wanted, strangers, radius_m, limits)
         # A leader drives at its cruise speed, but may flee from what moves faster than that.
         cruise_mps = max(self._mission.leading.cruise_mps, abs(wanted.linear_x))

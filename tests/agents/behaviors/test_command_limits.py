@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from lfa.agents.avoidance.safety import sharing_reach_m
 from lfa.agents.behaviors.command_limits import CommandLimits
 from lfa.agents.behaviors.team_mates import TeamMates
 from lfa.agents.localization.estimator import Estimator
 from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.scan import Point
 from lfa.agents.perception.scan_age import ScanAge
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import Pose2D, Twist
@@ -52,3 +54,25 @@ def test_a_leader_flees_from_what_moves_faster_than_it_cruises() -> None:
     limits = CommandLimits(mission, TeamMates(1, team), ScanAge(), Estimator(), obstacles)
     flees = Twist(0.7, 0.3)
     assert limits.slow(flees, Role.LEADER, Pose2D(), 0.0, by_law=False) == flees
+
+
+class FarSight(TeamMates):
+    """Team-mates of robot 1 that note how far [m] a robot looks for them."""
+
+    def strangers(self, pose: Pose2D, within_m: float, now: float, *, by_law: bool = True) -> list[Point]:
+        self.within_m = within_m
+        return super().strangers(pose, within_m, now, by_law=by_law)
+
+
+@pytest.mark.parametrize("wanted_mps", [1e4, 1e200])
+def test_whatever_speed_a_controller_wants_team_mates_are_looked_for_as_far_as_the_drive_needs(
+    wanted_mps: float,
+) -> None:
+    mission, team = Mission(), TeamState()
+    obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
+    mates = FarSight(1, team)
+    CommandLimits(mission, mates, ScanAge(), Estimator(), obstacles).slow(
+        Twist(wanted_mps, 0.0), Role.FOLLOWER, Pose2D(), 0.0, by_law=True
+    )
+    fastest = Twist(mission.limits.v_max_mps, 0.0)
+    assert mates.within_m == sharing_reach_m(fastest, mission.radius_m, mission.limits)
