@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from lfa.agents.load.control_rate import CALM_S, LATE_SHARE, ControlRate
-from lfa.agents.team_state import ROW_S_MAX, table_s
+from lfa.agents.navigator import Navigator
+from lfa.agents.team_state import ROW_S_MAX, TeamState, table_s
 from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 from lfa.deploy.fuzz.schedules import FAIR, Schedule
 from lfa.protocol.lease.timing import timing_for
@@ -105,6 +107,17 @@ def test_the_text_has_the_rates() -> None:
     assert rate.text() == ""
     late_for(rate, late_s, 2 * LATE_SECONDS)
     assert rate.text() == "kept late by its machine: control at 12.5 Hz, table at 0.67 Hz"
+
+
+def test_a_late_robot_whose_mission_is_changed_ramps_up_by_its_own_period_until_it_keeps_time() -> None:
+    mission = Mission(profile="auto")
+    navigator = Navigator(1, mission, TeamState())
+    navigator.pace(12.5)
+    assert navigator.lead.period_s == 0.08
+    navigator.change(replace(mission, leading=replace(mission.leading, cruise_mps=0.3)), 1, 1.0)
+    assert navigator.lead.period_s == 0.08
+    navigator.pace(mission.control_hz)
+    assert navigator.lead.period_s == mission.control_period_s
 
 
 class LateTeam:
