@@ -78,6 +78,18 @@ def test_what_another_saw_moving_is_not_the_robot_itself() -> None:
     assert len(team.obstacles.moving([], AWAY, 0.0)) == 1
 
 
+def test_a_robot_can_lead_while_its_newest_row_has_a_place_and_no_trap() -> None:
+    team = TeamState()
+    assert not team.can_lead(2, 0.0)
+    team.hear_row(2, row(1, 0.0), 1.0)
+    assert team.can_lead(2, 3.9)
+    assert not team.can_lead(2, 4.1)
+    team.hear_row(2, replace(row(2, 0.0), stuck=True), 5.0)
+    assert not team.can_lead(2, 5.0)
+    team.hear_row(2, replace(row(3, 0.0), placed=False), 6.0)
+    assert not team.can_lead(2, 6.0)
+
+
 def test_a_robot_is_stuck_as_long_as_it_says_so() -> None:
     team = TeamState()
     assert not team.stuck(2, 0.0)

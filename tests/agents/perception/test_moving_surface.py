@@ -18,7 +18,7 @@ MOUTH: tuple[Segment, ...] = ((3.0, 0.34, 6.0, 0.34), (3.0, -0.34, 6.0, -0.34), 
 
 
 def range_of(segment: Segment, eye: Point, angle: float) -> float:
-    """The range [m] at which a beam meets a wall; inf where it does not."""
+    """Return the range [m] at which a beam meets a wall; inf where it does not."""
     (ax, ay, bx, by), (x, y) = segment, eye
     c, s = cos(angle), sin(angle)
     across = c * (by - ay) - s * (bx - ax)
@@ -82,6 +82,15 @@ def test_a_team_mate_that_drives_on_beside_a_wall_is_no_door() -> None:
         body = (1.1, y - 0.1, 1.1, y + 0.1)
         points = scan(((1.2, -4.0, 1.2, -0.6), body), (0.4, 0.0), 180)
         tracker.update(points, (0.4, 0.0), [(1.2, y)], 0.5, 0.1 * n, step_rad=pi / 90)
+        assert tracker.moving(0.1 * n) == []
+
+
+def test_a_wall_that_comes_into_sight_far_from_all_that_was_seen_does_not_move() -> None:
+    """Beams that met nothing there meet a wall now, as behind a curtain that is drawn aside."""
+    tracker = Tracker()
+    for n in range(60):
+        walls: tuple[Segment, ...] = ((-3.0, -1.0, 5.0, -1.0),)
+        look(tracker, walls if n < 30 else (*walls, (1.5, 0.0, 1.5, 3.0)), (0.4, 0.0), n)
         assert tracker.moving(0.1 * n) == []
 
 
