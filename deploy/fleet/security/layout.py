@@ -79,10 +79,12 @@ def write_requests(folder: Path, registry: Registry, renew: Sequence[str]) -> li
     """Write a request for each member without a fitting certificate, and for `renew`; return the requests' paths."""
     ca, waiting = authority.certificate_of(folder / CA_FILE), []
     private_folder(folder / REQUESTS)
+    members = set(registry.members())
     for name, common in registry.common_names.items():
         stem, path = folder / ISSUED / name, folder / REQUESTS / f"{name}.csr"
         addresses = addresses_of(name, registry.plan)
-        if name not in renew and authority.fits(stem, ca, common, addresses):
+        fits = name not in renew and authority.fits(stem, ca, common, addresses)
+        if fits or name not in members:  # who has left the plan has no keys any more
             path.unlink(missing_ok=True)
             continue
         authority.request(stem, path, common, addresses)

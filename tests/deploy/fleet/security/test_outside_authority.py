@@ -10,6 +10,7 @@ import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import Encoding
+from msgspec import structs
 
 from lfa.deploy.fleet.keys_command import command
 from lfa.deploy.fleet.security import authority, keys, registry
@@ -136,3 +137,17 @@ def test_a_robots_certificate_is_no_authority(tmp_path: Path) -> None:
     keys.make(tmp_path / "own", PLAN)
     with pytest.raises(Refused, match="no authority's certificate"):
         keys.make(tmp_path / "keys", PLAN, ca_cert=tmp_path / "own" / ISSUED / "robot1.pem")
+
+
+def test_a_robot_that_left_the_plan_needs_no_signature_and_holds_no_revocation_up(
+    tmp_path: Path, company: Company
+) -> None:
+    folder = tmp_path / "keys"
+    signed(folder, company)
+    keys.make(folder, PLAN)
+    smaller = structs.replace(PLAN, places={name: at for name, at in PLAN.places.items() if name != "robot2"})
+    keys.make(folder, smaller)
+    keys.make(folder, smaller)
+    keys.revoke(folder, ["robot1"])
+    assert "robot1" not in registry.load(folder).common_names
+    assert list((folder / "requests").iterdir()) == []
