@@ -125,8 +125,8 @@ model: $(STAMP)
 planted: $(STAMP)
 	$(BIN)/python -m tests.protocol.lease.hunt $(PLANTED)
 
-# The same bugs against drawn, systematic and guided schedules, and such of the fleet stop alone, 1300 in all: half an hour and more of one core. Shares and
-# --write as for make planted.
+# The same bugs against drawn, systematic and guided schedules, and schedules of the fleet stop alone, 1300 in all: half an
+# hour and more of one core. Shares and --write as for make planted.
 hunt: $(STAMP)
 	nice -n 15 $(BIN)/python -m tests.protocol.lease.hunt --together $(PLANTED)
 
