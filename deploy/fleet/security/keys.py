@@ -32,7 +32,7 @@ from msgspec import Struct, structs
 
 from lfa.deploy.fleet.security import authority
 from lfa.deploy.fleet.security.access_rules import PERSONS, KeyPlan, driver_of, host_name, sayable, stationed
-from lfa.deploy.fleet.security.layout import Unsigned, addresses_of, lay_out, write_requests
+from lfa.deploy.fleet.security.layout import Unsigned, addresses_of, lay_out, shut_out, write_requests
 from lfa.deploy.fleet.security.private_files import ISSUED, private_folder, write_private
 from lfa.deploy.fleet.security.registry import CA_KEY, REGISTRY, Registry, check_names, load
 from lfa.deploy.whole_output import whole_folder
@@ -160,8 +160,12 @@ def revoke(folder: Path, names: Sequence[str]) -> list[str]:
     check_names(registry, names)
     count = {name: registry.revoked.get(name, 0) + 1 for name in names if name in registry.common_names}
     left = {name: common for name, common in registry.common_names.items() if name not in names}
+    registry = structs.replace(registry, common_names=left, revoked=registry.revoked | count)
     try:
-        lay_out(folder, structs.replace(registry, common_names=left, revoked=registry.revoked | count), DAYS, renew=())
+        try:
+            lay_out(folder, registry, DAYS, renew=())
+        except Unsigned:  # what others wait for holds no revocation up
+            shut_out(folder, registry)
     except OSError as error:
         raise _unwritable(folder, error) from None
     return list(registry.plan.hosts)

@@ -106,9 +106,32 @@ def _lay_out_host(folder: Path, registry: Registry, host: str) -> None:
         write_private(here / file, (folder / ISSUED / source).read_bytes())
     joining = [name for name in (*plan.at(host), *map(host_name, plan.hosts)) if name in registry.common_names]
     write_private(here / USERS_FILE, b"".join((folder / ISSUED / f"{name}.password").read_bytes() for name in joining))
-    write_private(
-        here / ACCESS_FILE, msgspec.json.format(msgspec.json.encode(rules(plan, host, registry.common_names)))
-    )
+    _write_rules(here, registry, host)
+
+
+def shut_out(folder: Path, registry: Registry) -> None:
+    """Take the members without a common name off the lists of all machines, and their keys away. Raises OSError.
+
+    All others stay as they are, so that this waits for no signature.
+    """
+    out = [name for name in registry.members() if name not in registry.common_names]
+    admitted = {common.encode() for common in registry.common_names.values()}
+    for name in out:
+        _remove(folder / ISSUED / name)
+    for host in registry.plan.hosts:
+        here = folder_of(folder, host)
+        if not (here / USERS_FILE).exists():  # nothing was laid out for it yet
+            continue
+        for path in (here / f"{person_of(name) or name}.{kind}" for name in out for kind in KINDS):
+            path.unlink(missing_ok=True)
+        users = (here / USERS_FILE).read_bytes().splitlines(keepends=True)
+        write_private(here / USERS_FILE, b"".join(user for user in users if user.partition(b":")[0] in admitted))
+        _write_rules(here, registry, host)
+
+
+def _write_rules(here: Path, registry: Registry, host: str) -> None:
+    text = msgspec.json.format(msgspec.json.encode(rules(registry.plan, host, registry.common_names)))
+    write_private(here / ACCESS_FILE, text)
 
 
 def addresses_of(name: str, plan: KeyPlan) -> tuple[str, ...]:

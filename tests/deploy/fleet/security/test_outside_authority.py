@@ -151,3 +151,20 @@ def test_a_robot_that_left_the_plan_needs_no_signature_and_holds_no_revocation_u
     keys.revoke(folder, ["robot1"])
     assert "robot1" not in registry.load(folder).common_names
     assert list((folder / "requests").iterdir()) == []
+
+
+def test_a_revocation_waits_for_no_signature_of_others(tmp_path: Path, company: Company) -> None:
+    folder = tmp_path / "keys"
+    signed(folder, company)
+    keys.make(folder, PLAN)
+    here = registry.folder_of(folder, "a")
+    with pytest.raises(Refused, match="not signed yet"):
+        keys.make(folder, keys.spread("f", {"a": ("10.0.0.1",)}, (1, 2, 3)))
+    assert keys.revoke(folder, ["robot2"]) == ["a"]
+    users, rules = (here / "users").read_text(), (here / "access.json").read_text()
+    assert ("robot1:" in users, "robot2:" in users) == (True, False)
+    assert ('"robot1"' in rules, '"robot2"' in rules) == (True, False)
+    assert not (here / "robot2.key").exists()
+    assert not (folder / ISSUED / "robot2.key").exists()
+    assert (here / "robot1.key").exists()
+    assert (folder / ISSUED / "robot3.key").exists()
