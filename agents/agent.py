@@ -102,7 +102,7 @@ class Agent:
     @property
     def grid(self) -> Grid | None:
         """Occupancy grid of an explorer, as far as mapped; None for other robots."""
-        explore = None if self._core is None else self._core.navigator.explore
+        explore = None if self._core is None else self._core.navigator.leading.explore
         return None if explore is None or explore.mapping is None else explore.mapping.grid
 
     @property

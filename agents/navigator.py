@@ -6,8 +6,6 @@ Terms and keys may not be used here.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from msgspec.structs import replace
 
 from lfa.agents.avoidance.decision import Decision
@@ -27,7 +25,6 @@ from lfa.agents.following.predecessor import Predecessor
 from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.hand_driving import HandDriving
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
-from lfa.agents.leading.path_follower import PathFollower
 from lfa.agents.localization.estimator import Estimator
 from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel, resting
 from lfa.agents.perception.obstacle_tracker import Feature
@@ -40,9 +37,6 @@ from lfa.protocol.messages.consensus import Role
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
 from lfa.protocol.messages.team import ObstacleNote, RouteProgress
 from lfa.protocol.mission import Mission
-
-if TYPE_CHECKING:
-    from lfa.agents.exploration.explorer import Explore
 
 DT_MIN_S = 0.002
 
@@ -69,7 +63,9 @@ class Navigator:
         self._begin_roles(mission)
         self._stuck_monitor = StuckMonitor(again=mission.leading.motion != "explore")
         self._back_out = BackOut(mission, self.follower, self._detour, self._obstacles, self._stuck_monitor)
-        self._role, self._last = Role.WAITING, STILL
+        self._role = Role.WAITING
+        self.last = STILL
+        """Command of the newest control step."""
         self._driven_at: float | None = None
         self._placeless_since: float | None = None
         self.was_placed = False
@@ -88,15 +84,6 @@ class Navigator:
     def predecessor(self) -> Predecessor | None:
         """Robot ahead in the chain, as far as it is heard; None for no predecessor."""
         return self._mates.predecessor
-
-    @property
-    def lead(self) -> PathFollower:
-        return self.leading.lead
-
-    @property
-    def explore(self) -> Explore | None:
-        """Map and route of an explorer, where the mission requires them; otherwise None."""
-        return self.leading.explore
 
     @property
     def stuck(self) -> str | None:
@@ -138,16 +125,12 @@ class Navigator:
         """Present avoidance decision; None on the wanted motion."""
         return self._crossing.decision or self._detour.decision or self._ground_crossing.decision
 
-    @property
-    def last(self) -> Twist:
-        return self._last
-
     def see(self, scan: LaserScan, now: float) -> None:
         """Update with a scan; one that only repeats the last, shows nothing or is old counts as none."""
         known, late_s = self.estimator.pose_at(now), self.estimator.late_s(scan.header, now)
         if known is not None and self.scan_age.update(scan, known[0], now, late_s):
             self._obstacles.see(scan, known[0], self._mates.nearby(known[0], MATES_M, now), now)
-            if self.explore is not None or self._follow_slot.catches_up:  # a map needs all of them
+            if self.leading.explore is not None or self._follow_slot.catches_up:  # a map needs all of them
                 mates = self._mates.places(now)
                 self.leading.see(scan, known[0], known[1], mates)
                 self._follow_slot.see(scan, known[0], known[1], mates)
@@ -187,9 +170,9 @@ class Navigator:
         self._driven_at = now
         self._detour.decision = self._crossing.decision = None
         period_s, limits = self._mission.control_period_s, self._mission.limits
-        self._last = safe(STILL, self._last, (), self._mission.radius_m, limits, period_s)
-        self.follower.overridden(self._last)
-        return self._last
+        self.last = safe(STILL, self.last, (), self._mission.radius_m, limits, period_s)
+        self.follower.overridden(self.last)
+        return self.last
 
     def drive(self, role: Role, chain: tuple[int, ...], pose: Pose2D, twist: Twist, now: float) -> Twist:
         """Return the command for the next control period."""
@@ -206,34 +189,34 @@ class Navigator:
         points, moving = self._obstacles.points(pose), self._obstacles.moving(pose, now)
         still = resting(points, pose, moving) if self._crossing.patient else points + shadow(moving, pose)
         if role is Role.LEADER:
-            wanted = self._lead_route.step(chain, still, pose, self._last, self.estimator.odometer_m, now)
+            wanted = self._lead_route.step(chain, still, pose, self.last, self.estimator.odometer_m, now)
         elif role is Role.FOLLOWER:
-            wanted = self._follow_slot.step(still, pose, twist, self._last, dt, now, stuck=self.stuck is not None)
+            wanted = self._follow_slot.step(still, pose, twist, self.last, dt, now, stuck=self.stuck is not None)
             if self._back_out.under_way:
-                wanted = self._back_out.step(points, pose, wanted, self._last, now)
+                wanted = self._back_out.step(points, pose, wanted, self.last, now)
         else:
             wanted = meant = STILL
         if role is not Role.WAITING:
-            wanted = self._own.step(BehaviorInput(now, role, pose, self._last, wanted, still, moving))
-            wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving, self._last)
+            wanted = self._own.step(BehaviorInput(now, role, pose, self.last, wanted, still, moving))
+            wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving, self.last)
             wanted = meant = self._ground_crossing.cross(wanted, now)
             by_law = not (self._follow_slot.catches_up or self._back_out.under_way)
             wanted = self.limits.slow(wanted, role, pose, now, by_law=by_law)
         self._back_out.keep(pose)
         self._watch(role, pose, meant, wanted, now)
-        self._last = self.limits.brake(wanted, self._last, points, moving, pose, dt, now)
-        self.follower.overridden(self._last)
+        self.last = self.limits.brake(wanted, self.last, points, moving, pose, dt, now)
+        self.follower.overridden(self.last)
         if role is Role.LEADER:
-            progress = self.lead.progress(pose, self._last)
+            progress = self.leading.lead.progress(pose, self.last)
             self._team.progress = RouteProgress(progress.waypoint, progress.to_m, self._team.route)
-        return self._last
+        return self.last
 
     def narrow_ahead(self, pose: Pose2D) -> str | None:
         """Return the reason why only a column passes what is ahead of this leader; None when more do."""
         return self._lead_route.narrow_ahead(pose)
 
     def arrived(self, pose: Pose2D, twist: Twist) -> bool:
-        return self._role is Role.LEADER and self.lead.arrived(pose, twist)
+        return self._role is Role.LEADER and self.leading.lead.arrived(pose, twist)
 
     def _change(self, role: Role, pose: Pose2D, twist: Twist, now: float) -> None:
         self._role = role
@@ -253,7 +236,7 @@ class Navigator:
         `wanted` without the limits.
         """
         waits = role is Role.LEADER and self.leading.waiting
-        if role is Role.WAITING or waits or self._lead_route.by_hand or self.arrived(pose, self._last):
+        if role is Role.WAITING or waits or self._lead_route.by_hand or self.arrived(pose, self.last):
             self._stuck_monitor.rest(pose, now)
             return
         action, moving = (None, False) if (said := self.decision) is None else (said.action, said.kind == "moving")

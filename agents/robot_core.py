@@ -359,7 +359,7 @@ class RobotCore:
         if role is Role.LEADER:
             self._team_orders.lead(lease.term, now)
             narrow = partial(navigator.narrow_ahead, pose)
-            self._formation_commands.lead(navigator.lead, self._place.ids[1:], lease.term, now, narrow)
+            self._formation_commands.lead(navigator.leading.lead, self._place.ids[1:], lease.term, now, narrow)
         elif role is Role.FOLLOWER:
             self._team_orders.follow(lease.config.version.term, now)
         if role is Role.LEADER and not self._arrived and navigator.arrived(pose, command):

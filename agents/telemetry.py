@@ -58,8 +58,8 @@ class Reports:
         self._place(navigator, team, near, role, term, pose, twist, now)
         self._decision(navigator.decision, term, now)
         self._obstacle(navigator, pose, now)
-        if role is Role.LEADER and navigator.explore is not None:
-            self._plan(navigator.explore, pose, now)
+        if role is Role.LEADER and navigator.leading.explore is not None:
+            self._plan(navigator.leading.explore, pose, now)
 
     def _place(
         self, navigator: Navigator, team: TeamState, near: tuple[int, ...], role: Role, term: Term,
