@@ -13,6 +13,7 @@ from lfa.world import checkpoint
 from lfa.world.description.load import draw, load
 from lfa.world.description.scenario import STATE
 from lfa.world.world import World
+from tests.rigs.small_disk import fill, small_disk
 
 SCENARIO = draw(load("paper_path1"), 7)
 
@@ -55,15 +56,17 @@ def test_a_folder_without_a_state_is_refused_in_one_line(tmp_path: Path) -> None
 
 
 def test_on_a_full_disk_the_world_goes_on_and_says_so_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / STATE
-    path.write_bytes(b"as last kept")
-    path.with_name(f"{path.name}.new").symlink_to("/dev/full")
-    world = checkpoint.Remembering(World("f", SCENARIO, 7, 1, start_at=0.0), tmp_path)
-    for _ in range(30):
-        world.tick(world.next_deadline())
-    assert capsys.readouterr().err == f"{path}: No space left on device: the state on disk gets old\n"
-    assert path.read_bytes() == b"as last kept"
-    assert list(tmp_path.iterdir()) == [path]
-    while world.next_deadline() < checkpoint.AGAIN_S + 1.0:  # the link to the full device is gone
-        world.tick(world.next_deadline())
-    assert checkpoint.read(tmp_path).step > 0
+    with small_disk(tmp_path / "disk", 64) as disk:
+        path = disk / STATE
+        path.write_bytes(b"as last kept")
+        world = checkpoint.Remembering(World("f", SCENARIO, 7, 1, start_at=0.0), disk)
+        filler = fill(disk)
+        for _ in range(30):
+            world.tick(world.next_deadline())
+        assert capsys.readouterr().err == f"{path}: No space left on device: the state on disk gets old\n"
+        assert path.read_bytes() == b"as last kept"
+        filler.unlink()
+        assert list(disk.iterdir()) == [path]
+        while world.next_deadline() < checkpoint.AGAIN_S + 1.0:
+            world.tick(world.next_deadline())
+        assert checkpoint.read(disk).step > 0

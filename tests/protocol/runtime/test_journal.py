@@ -11,6 +11,7 @@ from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal, dige
 from lfa.protocol.runtime.node_runner import _NodeRunner
 from lfa.protocol.transport.bus import Inbox
 from lfa.protocol.witness import Witness
+from tests.rigs.small_disk import fill, small_disk
 
 HEADING = Heading(JOURNAL_VERSION, "robot2", 17, 3, {"fleet": "f"})
 
@@ -55,10 +56,11 @@ def test_a_byte_changed_within_an_entry_is_refused_by_the_entrys_number(tmp_path
 def test_on_a_full_disk_the_journal_ends_with_a_line_and_its_writer_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "robot2-17.bin").symlink_to("/dev/full")
-    written(tmp_path)
+    with small_disk(tmp_path / "disk", 16) as disk:
+        fill(disk)
+        written(disk)
     said = capsys.readouterr().err
-    assert said == f"{tmp_path / 'robot2-17.bin'}: No space left on device: the journal ends here\n"
+    assert said == f"{disk / 'robot2-17.bin'}: No space left on device: the journal ends here\n"
 
 
 def test_a_full_disk_at_the_start_costs_the_journal_and_not_the_robot(
