@@ -113,11 +113,11 @@ def test_a_late_robot_whose_mission_is_changed_ramps_up_by_its_own_period_until_
     mission = Mission(profile="auto")
     navigator = Navigator(1, mission, TeamState())
     navigator.pace(12.5)
-    assert navigator.lead.period_s == 0.08
+    assert navigator.leading.lead.period_s == 0.08
     navigator.change(replace(mission, leading=replace(mission.leading, cruise_mps=0.3)), 1, 1.0)
-    assert navigator.lead.period_s == 0.08
+    assert navigator.leading.lead.period_s == 0.08
     navigator.pace(mission.control_hz)
-    assert navigator.lead.period_s == mission.control_period_s
+    assert navigator.leading.lead.period_s == mission.control_period_s
 
 
 class LateTeam:
