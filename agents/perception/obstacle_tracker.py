@@ -289,8 +289,9 @@ def _hidden(end: Point, beside: Point, eye: Point) -> bool:
     far, near = hypot(end[0] - eye[0], end[1] - eye[1]), hypot(beside[0] - eye[0], beside[1] - eye[1])
     if near > far - GAP_M:
         return False
-    across = (end[0] - eye[0]) * (beside[1] - eye[1]) - (end[1] - eye[1]) * (beside[0] - eye[0])
-    return abs(across) < HIDDEN_RAD * near * far
+    ex, ey, bx, by = end[0] - eye[0], end[1] - eye[1], beside[0] - eye[0], beside[1] - eye[1]
+    # What is on the opposite side of the sensor, such as a follower, lies on the same line and hides nothing.
+    return ex * bx + ey * by > 0.0 and abs(ex * by - ey * bx) < HIDDEN_RAD * near * far
 
 
 def _circle(cluster: Sequence[Point], eye: Point) -> tuple[float, float, float]:

@@ -77,6 +77,15 @@ def test_what_comes_fast_is_told_before_it_has_come_a_metre(speed: float) -> Non
     assert feature.vx < -0.5 * speed
 
 
+def test_what_comes_head_on_moves_also_where_a_team_mate_follows_right_behind() -> None:
+    eye, tracker = (0.0, 0.0), Tracker()
+    for n in range(30):
+        ahead, behind = arc(4.0 - 0.03 * n, 0.05, 0.25, eye), arc(-1.0, -0.2, 0.15, eye)
+        tracker.update([*ahead, *behind], eye, [(-1.0, -0.2)], 0.5, 0.1 * n)
+    [feature] = tracker.moving(2.9)
+    assert feature.vx == pytest.approx(-0.3, abs=0.05)
+
+
 def test_what_paces_to_and_fro_moves_while_it_turns_round_too() -> None:
     tracker = Tracker()
     for n in range(160):
