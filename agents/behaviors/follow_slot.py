@@ -108,7 +108,8 @@ class FollowSlot:
         if back is not None:
             return back
         ahead_mps, within_m = sighting.twist.linear_x, BESIDE_SLOT_SHARE * slot.separation_m
-        beside = self._free_slot.steer((place.x, place.y), points, pose, ahead_mps, within_m, now)
+        hindered = self._detour.decision is not None
+        beside = self._free_slot.steer((place.x, place.y), points, pose, ahead_mps, within_m, now, hindered=hindered)
         if beside is not None:
             self._detour.decision = None
             return beside

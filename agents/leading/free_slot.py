@@ -18,6 +18,11 @@ HIDDEN_S, HIDDEN_M = 5.0, 0.5
 inside of the thing: only the near side of an obstacle is seen."""
 MOVED_M = 0.15
 """Motion [m] of the slot after which a follower that stands beside it drives again."""
+CIRCLED_M, CIRCLED_S, PAUSE_S = 0.3, 8.0, 5.0
+"""Distance [m] to a free slot within which detours that begin anew, at most `PAUSE_S` [s] apart, lead round it for ever
+when something stands close beside it; and the time [s] after which the robot stands instead."""
+STANDS_M = 0.15
+"""Distance [m] to the slot at which it then stands."""
 THERE_M, BESIDE_M = 0.05, 0.05
 TURN_GAIN, IN_PLACE_RAD, TURN_RADPS = 2.0, 0.6, 0.8
 SPEED_GAIN_PER_S, SPEED_MPS = 0.8, 0.25
@@ -31,16 +36,26 @@ class FreeSlot:
         self._hidden_since: float | None = None
         self._stands_for: Point | None = None
         """Slot in `map` beside which the robot stands; None while it drives."""
+        self._hindered: tuple[float, float] | None = None
+        """Times [s] of the first and of the latest detour close to the slot; None where there was none of late."""
 
     def steer(
-        self, slot: Point, points: Sequence[Point], pose: Pose2D, ahead_mps: float, within_m: float, now: float
+        self,
+        slot: Point,
+        points: Sequence[Point],
+        pose: Pose2D,
+        ahead_mps: float,
+        within_m: float,
+        now: float,
+        *,
+        hindered: bool = False,
     ) -> Twist | None:
         """Return the twist to the free place nearest to `slot` (in `map`), still once there; None where the slot is
         free, no place within `within_m` of it is, or the predecessor drives at `ahead_mps`. `points` are in
-        `base_link`.
+        `base_link`; `hindered` while a detour leads the robot.
         """
         if abs(ahead_mps) > RESTS_MPS:
-            self._stands_for = self._hidden_since = None
+            self._stands_for = self._hidden_since = self._hindered = None
             self._free_place.reset()
             return None
         if self._stands_for is not None:
@@ -48,6 +63,9 @@ class FreeSlot:
                 return STILL
             self._stands_for = None
         center = in_base(pose, slot)
+        if self._circles(hypot(*center), now, hindered=hindered):
+            self._stands_for, self._hindered = slot, None
+            return STILL
         if not _hidden(center, points):
             self._hidden_since = None
         elif self._hidden_since is None:
@@ -65,6 +83,16 @@ class FreeSlot:
         if abs(bearing) > IN_PLACE_RAD:
             return Twist(0.0, TURN_RADPS if bearing > 0.0 else -TURN_RADPS)
         return Twist(min(SPEED_MPS, SPEED_GAIN_PER_S * apart_m), TURN_GAIN * bearing)
+
+    def _circles(self, apart_m: float, now: float, *, hindered: bool) -> bool:
+        """Return whether detours have led the robot round a slot `apart_m` [m] away for long, and it is close enough to
+        stand.
+        """
+        if apart_m > CIRCLED_M or (self._hindered is not None and now - self._hindered[1] > PAUSE_S):
+            self._hindered = None
+        elif hindered:
+            self._hindered = (now if self._hindered is None else self._hindered[0], now)
+        return self._hindered is not None and now - self._hindered[0] >= CIRCLED_S and apart_m < STANDS_M
 
 
 def _hidden(place: Point, points: Sequence[Point]) -> bool:
