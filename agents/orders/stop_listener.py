@@ -1,4 +1,4 @@
-"""The fleet stop as one agent hears it: orders, its gateway, and questions between agents (E28 to E30)."""
+"""The fleet stop as one agent hears it: orders, its gateway, and questions of agents and operators (E28 to E30)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ class StopListener:
                     self.memory.hear_agent(robot, known)
             case Ask(what=what) if what == QUESTION and now - self._answered_at >= ANSWER_S_MIN:
                 self._answered_at = now
-                self._outbox.publish("stop_known", StopReport(self._outbox.header("stop_known", now), self.known))
+                header = self._outbox.header("stop_known", now)
+                self._outbox.publish("stop_known", StopReport(header, self.known, self.memory.robots))
 
     def step(self, now: float) -> None:
         """Ask the other agents if this one does not know enough, once in a while."""

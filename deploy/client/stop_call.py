@@ -15,10 +15,14 @@ from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.stop import EPOCH_MAX, StopState, StopWord
 
 REPEAT_S = 0.03
-ANSWER_S = 0.95
+ANSWER_S = 0.9
 """Time [s] within which every gateway answers, or is named."""
+NEWS_S = 0.1
+"""Time [s] after which a robot that said that its wheels turn, and nothing since, is waited for no longer."""
 REST_S = 4.0
-"""Time [s] within which a robot that has answered comes to rest, or is named."""
+"""Time [s] within which a robot that goes on answering comes to rest, or is named."""
+ASK_S = 0.1
+"""Time [s] between two questions which robots the fleet has, until somebody has told all."""
 KEPT_S = 0.3
 """Time [s] for which the word is repeated to a robot that stands, until its agent knows it too."""
 KNOWN_S = 0.4
@@ -41,7 +45,7 @@ class StopOutcome(Struct, frozen=True):
     silent: tuple[int, ...]
     """Robots whose gateway has not answered to this word: after a stop they may still drive."""
     moving: tuple[int, ...]
-    """Robots whose gateway has stopped, and whose wheels do not rest yet."""
+    """Robots whose gateway has stopped, and whose wheels do not rest yet by the newest answer."""
     overruled: bool = False
     """True for a resume after which somebody said stop again."""
 
@@ -62,7 +66,9 @@ class StopCall:
         self._robots: set[int] = set()
         self._named = False
         self._states: dict[int, StopState] = {}
+        self._heard_at: dict[int, float] = {}
         self._say_at = now
+        self._ask_at = now
 
     def name(self, robots: tuple[int, ...], *, all_known: bool = True) -> None:
         """Add robots that the fleet has; `all_known`: there are no others."""
@@ -77,6 +83,7 @@ class StopCall:
             return
         self._robots.add(robot)
         self._states[robot] = state
+        self._heard_at[robot] = now
         word = state.known.word
         if self._word is None or word <= self._word:
             return
@@ -85,6 +92,13 @@ class StopCall:
             return
         self._word = word if word.stand else _after(word, True)
         self._say_at = now
+
+    def asks(self, now: float) -> bool:
+        """Return True if the fleet is to be asked now which robots it has."""
+        if self._named or now < self._ask_at:
+            return False
+        self._ask_at = now + ASK_S
+        return True
 
     def said(self, now: float) -> Said | None:
         """Return the order to publish now, or None if none is due. Raises Refused for a resume without a stop."""
@@ -116,8 +130,13 @@ class StopCall:
         kept = waited_s >= KEPT_S or all(self._states[robot].kept for robot in result.done)
         if result.overruled or (result.complete and kept and (self._named or waited_s >= KNOWN_S)):
             return result
-        over_s = inf if self._word is None else ANSWER_S if result.silent or not result.moving else REST_S
+        over_s = inf if self._word is None else REST_S if self._waits_for_rest(result, now) else ANSWER_S
         return result if waited_s >= over_s else None
+
+    def _waits_for_rest(self, result: StopOutcome, now: float) -> bool:
+        """Return True if each gateway has answered, and those whose wheels turn go on answering."""
+        heard = all(now - self._heard_at[robot] < NEWS_S for robot in result.moving)
+        return bool(result.moving) and not result.silent and heard
 
     def _outcome(self) -> StopOutcome:
         word = self._word or StopWord()

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from lfa.agents.orders.stop_listener import QUESTION
 from lfa.deploy.client.operator import Operator
 from lfa.deploy.client.session import Subscriber
 from lfa.deploy.client.stop_call import StopCall, StopOutcome
 from lfa.protocol import clock, incarnations
-from lfa.protocol.messages.stop import StopState
+from lfa.protocol.messages.stop import StopReport, StopState
 from lfa.protocol.messages.team import MissionNote
 from lfa.protocol.names import robot_id_of, robot_name
 from lfa.protocol.topics import DRIVER_PREFIX, address
 from lfa.protocol.transport.message_bus import send
 
-TOPICS = frozenset({"*/stop_state", "*/mission"})
+TOPICS = frozenset({"*/stop_state", "*/stop_known", "*/mission"})
 """Topics that a session must hear for `stop_fleet`."""
 WAIT_S = 0.01
 
@@ -25,9 +26,10 @@ def stop_fleet(subscriber: Subscriber, *, stand: bool) -> StopOutcome:
     operator = Operator(subscriber.fleet.name, incarnations.drawn())
     call = StopCall(stand, clock.now())
     call.name(tuple(agent.robot for agent in subscriber.fleet.team), all_known=False)
-    send(subscriber.bus, operator.ask("mission", clock.now()))
     while True:
         now = clock.now()
+        if call.asks(now):
+            send(subscriber.bus, *(operator.ask(what, now) for what in ("mission", QUESTION)))
         said = call.said(now)
         if said is not None:
             send(subscriber.bus, operator.stop(said.word, said.gateways, now))
@@ -39,6 +41,8 @@ def stop_fleet(subscriber: Subscriber, *, stand: bool) -> StopOutcome:
                     call.hear(robot, message, clock.now())
                 case MissionNote(mission=mission):
                     call.name(mission.robots)
+                case StopReport(robots=robots) if robots:
+                    call.name(robots)
         call.name(_living(subscriber), all_known=False)
         outcome = call.outcome(clock.now())
         if outcome is not None:
@@ -64,7 +68,7 @@ def outcome_lines(outcome: StopOutcome, *, stand: bool) -> list[str]:
         state = "NOT STOPPED, no answer" if stand else "no answer, stays as it is"
         lines.append(f"{state}: {', '.join(map(robot_name, outcome.silent))}")
     if outcome.moving:
-        lines.append(f"stopped, but the wheels still turn: {', '.join(map(robot_name, outcome.moving))}")
+        lines.append(f"stopped, but wheels are not known to rest: {', '.join(map(robot_name, outcome.moving))}")
     if outcome.overruled:
         lines.append("somebody has said stop again in the meantime: it holds")
     if not (outcome.done or outcome.silent or outcome.moving):

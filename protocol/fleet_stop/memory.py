@@ -37,6 +37,11 @@ class StopMemory:
         """True if the newest word is a stop."""
         return self._word.stand
 
+    @property
+    def robots(self) -> tuple[int, ...]:
+        """Robots of the team: those of the mission, less those declared lost, and those of the chain."""
+        return tuple(sorted(self._robots | self._chain))
+
     def order(self, order: StopOrder) -> None:
         """Update with an operator's order."""
         if order.word is not None:

@@ -16,7 +16,10 @@ a message changes otherwise than by `WIRE_ADDS`, one version after those who sen
 UNSAID_WIRE = 5
 """Version of a sender whose messages have no field `wire` yet."""
 WIRE_ADDS: dict[int, tuple[str, ...]] = {
-    6: ("Prepare.wire", "Propose.wire", "Hello.wire", "CmdVel.grant_s", "Sensors.grant_s", "Propose.grant_ms"),
+    6: (
+        *("Prepare.wire", "Propose.wire", "Hello.wire", "CmdVel.grant_s", "Sensors.grant_s", "Propose.grant_ms"),
+        "StopReport.robots",
+    ),
 }
 """Fields that each version adds, at the end of their messages and with a default: earlier versions skip them."""
 MESSAGE_BYTES_MAX = 64 * 1024

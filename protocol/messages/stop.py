@@ -58,7 +58,9 @@ class StopState(Struct, frozen=True, array_like=True, tag="stop_state"):
 
 
 class StopReport(Struct, frozen=True, array_like=True, tag="stop_known"):
-    """Answer of an agent to an agent that has started and asks `stop`."""
+    """Answer of an agent to who asks `stop`: an agent that has started, or an operator who says stop or resume."""
 
     header: Header
     known: StopKnowledge
+    robots: tuple[Count, ...] = ()
+    """Robots of the team, as far as the agent knows; empty from one that does not tell."""

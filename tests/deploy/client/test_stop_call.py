@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lfa.deploy.client.stop_call import ANSWER_S, KNOWN_S, REPEAT_S, Said, StopCall
+from lfa.deploy.client.stop_call import ANSWER_S, ASK_S, KNOWN_S, NEWS_S, REPEAT_S, REST_S, Said, StopCall
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.header import Header
@@ -63,12 +63,33 @@ def test_who_has_not_answered_within_a_second_is_named() -> None:
     assert (outcome.done, outcome.silent) == ((1,), (2,))
 
 
-def test_a_robot_whose_wheels_still_turn_is_waited_for_and_then_named() -> None:
-    call, gateways = called(True, robots=1)
-    call.hear(1, gateways[0].state(1, True, at_rest=False), 0.1)
-    assert call.outcome(2.0) is None
-    outcome = call.outcome(5.0)
+def test_a_robot_that_goes_on_saying_that_its_wheels_turn_is_waited_for_and_then_named() -> None:
+    call, (gateway,) = called(True, robots=1)
+    now = 0.0
+    while now < REST_S:
+        call.hear(1, gateway.state(1, True, at_rest=False), now)
+        assert call.outcome(now) is None
+        now += 0.5 * NEWS_S
+    outcome = call.outcome(REST_S)
     assert outcome is not None and outcome.moving == (1,) and not outcome.complete
+
+
+def test_a_robot_is_named_that_said_that_its_wheels_turn_and_is_not_heard_any_more() -> None:
+    call, (one, two) = called(True)
+    call.hear(1, one.state(1, True), 0.1)
+    call.hear(2, two.state(1, True, at_rest=False), 0.1)
+    assert call.outcome(ANSWER_S - 0.01) is None
+    outcome = call.outcome(ANSWER_S)
+    assert outcome is not None and (outcome.done, outcome.moving) == ((1,), (2,)) and not outcome.complete
+
+
+def test_the_fleet_is_asked_for_its_robots_until_somebody_has_told_all() -> None:
+    call = StopCall(True, 0.0)
+    assert call.asks(0.0) and not call.asks(0.5 * ASK_S) and call.asks(ASK_S)
+    call.name((1,), all_known=False)
+    assert call.asks(2 * ASK_S)
+    call.name((1, 2))
+    assert not call.asks(9.0)
 
 
 def test_a_restarted_gateway_that_forgot_its_stop_counts_no_more() -> None:

@@ -51,6 +51,13 @@ def test_e30_who_joins_a_chain_that_was_stopped_stands_with_it() -> None:
     assert memory.stands and memory.certain
 
 
+def test_it_knows_the_robots_of_its_mission_and_of_its_chain_less_those_lost_for_good() -> None:
+    memory = StopMemory(1, (1, 2, 3))
+    memory.hear_chain((1, 2, 7))
+    memory.forget((3,))
+    assert memory.robots == (1, 2, 7)
+
+
 def test_a_certain_agent_takes_no_word_from_another() -> None:
     memory = StopMemory(1, (1,))
     memory.hear_agent(2, STOPPED)
