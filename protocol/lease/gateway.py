@@ -13,7 +13,7 @@ from math import isfinite
 from lfa.protocol.fleet_stop.latch import StopLatch
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.incarnations import is_later
-from lfa.protocol.lease.term_window import TermWindow
+from lfa.protocol.lease.term_window import REACH, TermWindow
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import NO_TERM, Fence, Fenced, GatewayStamp, Term
 from lfa.protocol.messages.header import Header
@@ -23,7 +23,7 @@ from lfa.protocol.mission import Limits
 SHUT, OLD_INCARNATION, OLD_TERM, FOREIGN_HOLDER = "shut", "old_incarnation", "old_term", "foreign_holder"
 FOREIGN_STAMP, OLD_STAMP, LATCHED, TWO_HOLDERS = "foreign_stamp", "old_stamp", "latched", "two_holders"
 FUTURE_STAMP, REORDERED, BAD_TWIST = "future_stamp", "reordered", "bad_twist"
-OTHER_TIMING = "other_timing"
+OTHER_TIMING, FAR_TERM = "other_timing", "far_term"
 
 
 class Gateway:
@@ -110,7 +110,7 @@ class Gateway:
             return BAD_TWIST
         if cmd.as_leader and self._latched is not None and cmd.term <= self._latched:
             return LATCHED
-        return None
+        return FAR_TERM if cmd.term.n > REACH else None
 
     def _within_limits(self, twist: Twist) -> Twist:
         """Return `twist` [m/s, rad/s], each part limited to what the drive can do."""

@@ -19,6 +19,9 @@ BURST = 1000
 """Growth above `FREE` that is believed at any time, besides `RATE_HZ`."""
 FRESH = 2**40
 """Distance above `FREE` up to which a process believes that knows nothing there yet: 35 years at `RATE_HZ`."""
+REACH = FREE + 2 * FRESH
+"""Greatest number that a term comes to: a made-up one that was believed, and 35 years of elections after it. No process
+knows a higher one, so none from the own gateway or agent is right either."""
 
 _BINDING = (Prepare, Release)
 

@@ -17,7 +17,7 @@ from lfa.protocol.lease.machine.deadlines import DEADLINES, DUES, NEVER, WAKES, 
 from lfa.protocol.lease.machine.memory import LeaseMemory
 from lfa.protocol.lease.machine.table import ACTIONS, LeaseEvent, LeaseState, refusal, state_of
 from lfa.protocol.lease.membership import ids, is_first
-from lfa.protocol.lease.term_window import highest
+from lfa.protocol.lease.term_window import REACH, highest
 from lfa.protocol.lease.timing import Timing
 from lfa.protocol.messages.consensus import (
     Config,
@@ -252,6 +252,8 @@ class Lease:
         """
         m = self._memory
         self._expire(now)
+        if term.n > REACH:
+            return m.drain()  # E26: no gateway has been told one
         m.window.know(term.n)
         m.seen, m.gateway_term = max(m.seen, term), max(m.gateway_term, term)
         if m.holder is not None and (term > m.holder.term or (latched and term == m.holder.term)):

@@ -6,7 +6,7 @@ import pytest
 
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.lease.gateway import Gateway
-from lfa.protocol.lease.term_window import BURST, FREE, FRESH
+from lfa.protocol.lease.term_window import BURST, FREE, FRESH, LAST
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.consensus import NO_TERM, Fence, GatewayStamp, Term
 from lfa.protocol.messages.header import Header
@@ -159,6 +159,13 @@ def test_e26_the_term_of_an_obeyed_command_is_known_and_a_fence_a_little_above_i
             assert gateway.command(command(OPEN, n=term), OPEN) is None
         above = Term(term + BURST, 2, 1)
         assert gateway.fence(Fence(Term(term, 1, 1), above), OPEN).term == (above if commanded else NO_TERM)
+
+
+def test_e26_no_command_makes_a_gateway_refuse_all_terms_that_a_team_comes_to() -> None:
+    gateway = opened()
+    assert gateway.command(command(OPEN, n=LAST), OPEN) == "far_term"
+    assert gateway.command(command(OPEN, seq=1), OPEN) is None
+    assert gateway.term_max.n == 3
 
 
 def test_e14_the_death_of_the_agent_bars_its_term_but_not_the_next() -> None:

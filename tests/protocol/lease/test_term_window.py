@@ -85,6 +85,16 @@ def test_e26_a_gateway_believes_no_fence_of_the_last_term_and_confirms_no_old_on
     assert gateway.term_max == now_ms
 
 
+def test_e26_a_gateway_that_names_the_last_term_leaves_its_leader_and_its_followers_as_they_are() -> None:
+    team = Team()
+    team.run(2.0)
+    for robot in (1, 3):
+        process = team.processes[robot]
+        team.deliver(process, process.lease.gateway_term, (Term(LAST, 3, 1),))
+    assert drives(team, 4.0)
+    assert team.leaders() == [1]
+
+
 def test_e26_above_the_free_numbers_terms_grow_no_faster_than_elections_do() -> None:
     window = TermWindow()
     assert window.believes(FREE, 10.0)
