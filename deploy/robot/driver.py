@@ -130,7 +130,7 @@ class Driver:
     def tick(self, now: float) -> list[Envelope]:
         """Drive the twist that the gateway lets through, and return the hardware's measurements as messages.
 
-        An error of the hardware ends the driver; its last command to the motors is a stop.
+        An error of the hardware, or of its watchdog, ends the driver; its last command to the motors is a stop.
         """
         if self.finished:
             return []
@@ -141,12 +141,12 @@ class Driver:
         try:
             self._base.drive(self._gateway.twist(now), now)
             reading = self._base.read(now)
+            if reading is None:  # its agent then knows no fresh stamp of this gateway, and the deadman brakes
+                return []
+            self._alive(now)
         except Exception:
             self.brake(now)
             raise
-        if reading is None:  # its agent then knows no fresh stamp of this gateway, and the deadman brakes
-            return []
-        self._alive(now)
         return self._said(reading, self._gateway, now)
 
     def brake(self, now: float) -> None:

@@ -58,6 +58,10 @@ class Options(Struct, frozen=True):
     """Socket of systemd (NOTIFY_SOCKET); empty: none."""
 
 
+_ENDING, _OF_TERMINALS = (signal.SIGTERM, signal.SIGINT), (signal.SIGHUP, signal.SIGQUIT)
+"""Signals that end a process in order: a driver whose terminal is closed has to stop its wheels, too."""
+
+
 class _NodeRunner:
     """One node in the loop, with its session, inbox, node host and current subscriptions."""
 
@@ -313,6 +317,7 @@ def _on_signals(wake: Wake) -> _StopRequest:
         stop.requested, stop.signal = True, signal.Signals(signum)
         wake.set()
 
-    signal.signal(signal.SIGTERM, order)
-    signal.signal(signal.SIGINT, order)
+    heeded = [number for number in _OF_TERMINALS if signal.getsignal(number) != signal.SIG_IGN]  # nohup ignores one
+    for number in (*_ENDING, *heeded):
+        signal.signal(number, order)
     return stop

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -116,3 +119,16 @@ def test_a_real_robot_whose_agent_is_killed_brakes_by_itself(terminals: Terminal
         assert mixed.sensors is not None and mixed.sensors.odometer_m < GOAL_M
     finally:
         mixed.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGQUIT])
+def test_a_driver_whose_terminal_is_closed_ends_in_order(number: signal.Signals, tmp_path: Path) -> None:
+    """What ends it otherwise leaves the wheels at the last command."""
+    command = [sys.executable, "-P", "-m", "lfa.deploy.robot.cli", "--id", "3"]
+    command += ["--connect", f"unixsock-stream/{tmp_path}/none"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as driver:
+        assert driver.stdout is not None and driver.stderr is not None
+        driver.stderr.readline()
+        driver.send_signal(number)
+        assert driver.stdout.read() == f"driver3: ended, by {number.name}, before a router was there\n"
+    assert driver.returncode == 0

@@ -10,6 +10,7 @@ import pytest
 
 from lfa.deploy.robot.base import Reading, SimulatedBase
 from lfa.deploy.robot.driver import PERIOD_S, Driver
+from lfa.protocol.errors import Refused
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 from lfa.protocol.lease.timing import timing_of
 from lfa.protocol.messages.codec import Message
@@ -184,6 +185,19 @@ def test_hardware_that_raises_hears_a_stop_last() -> None:
     with pytest.raises(OSError, match="serial line gone"):
         bench.driver.tick(bench.driver.next_deadline())
     assert base._wanted == STILL
+
+
+def test_wheels_without_a_watchdog_stop_at_once() -> None:
+    """The process may need seconds to end: to close a link to a router that hangs."""
+    bench = Bench().begin().run(0.5, GO)
+
+    def ended(_now: float) -> None:
+        raise Refused("the watchdog process has ended")
+
+    bench.driver._alive = ended
+    with pytest.raises(Refused):
+        bench.driver.tick(bench.driver.next_deadline())
+    assert bench.base is not None and bench.base._wanted == STILL
 
 
 def test_motors_whose_driver_hangs_brake_by_themselves() -> None:
