@@ -17,8 +17,8 @@ from lfa.protocol.messages.stop import EPOCH_MAX, StopState, StopWord
 REPEAT_S = 0.03
 ANSWER_S = 0.9
 """Time [s] within which every gateway answers, or is named."""
-NEWS_S = 0.1
-"""Time [s] after which a robot that said that its wheels turn, and nothing since, is waited for no longer."""
+BRAKED_S, NEWS_S = 0.8, 0.2
+"""Time [s] within which a robot that has answered comes to rest; after it, the silence [s] for which it is named."""
 REST_S = 4.0
 """Time [s] within which a robot that goes on answering comes to rest, or is named."""
 ASK_S = 0.1
@@ -130,13 +130,15 @@ class StopCall:
         kept = waited_s >= KEPT_S or all(self._states[robot].kept for robot in result.done)
         if result.overruled or (result.complete and kept and (self._named or waited_s >= KNOWN_S)):
             return result
-        over_s = inf if self._word is None else REST_S if self._waits_for_rest(result, now) else ANSWER_S
-        return result if waited_s >= over_s else None
+        return result if waited_s >= self._patience_s(result, now) else None
 
-    def _waits_for_rest(self, result: StopOutcome, now: float) -> bool:
-        """Return True if each gateway has answered, and those whose wheels turn go on answering."""
-        heard = all(now - self._heard_at[robot] < NEWS_S for robot in result.moving)
-        return bool(result.moving) and not result.silent and heard
+    def _patience_s(self, result: StopOutcome, now: float) -> float:
+        """Return for how long [s] after its beginning a stop or resume with this result is waited for."""
+        if self._word is None:
+            return inf
+        if result.silent or not result.moving:
+            return ANSWER_S
+        return REST_S if all(now - self._heard_at[robot] < NEWS_S for robot in result.moving) else BRAKED_S
 
     def _outcome(self) -> StopOutcome:
         word = self._word or StopWord()

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from lfa.deploy.bench.harness.team import endless
 from lfa.deploy.client.session import FleetAddress, listen
 from lfa.deploy.client.stop_call import StopOutcome
-from lfa.deploy.client.stop_fleet import TOPICS, stop_fleet
+from lfa.deploy.client.stop_fleet import TOPICS, outcome_lines, stop_fleet
 from lfa.deploy.recording.run_folder import toml
 from lfa.protocol import clock
 from lfa.protocol.messages.team import Event
@@ -103,12 +103,14 @@ def _stopped(fleet: Machines, name: str) -> tuple[StopOutcome, float]:
         return stop_fleet(operator, stand=True), clock.now() - began
 
 
-def _resumed(fleet: Machines, look: Onlooker) -> bool:
-    """Once all are in one chain, say stop again and then resume; return whether all have done as told."""
+def _resume(fleet: Machines, look: Onlooker) -> None:
+    """Once all are in one chain, say stop again and then resume; all must do as told."""
     look.wait(lambda: look.whole(set(ROBOTS)), "not whole again", PATIENCE_S)
     part = fleet.part(WORLD)
     with listen(FleetAddress(part.fleet, part.socket, ()), TOPICS) as operator:
-        return stop_fleet(operator, stand=True).complete and stop_fleet(operator, stand=False).complete
+        for stand in (True, False):
+            outcome = stop_fleet(operator, stand=stand)
+            assert outcome.complete, outcome_lines(outcome, stand=stand)
 
 
 @pytest.mark.parametrize("percent", [0, pytest.param(20, marks=pytest.mark.long), 60])
@@ -122,7 +124,7 @@ def test_e28_a_stop_reaches_all_robots_of_four_machines_or_names_them_whatever_i
         fleet.net.lose(percent)
         outcome, took_s = _stopped(fleet, "c")
         fleet.net.heal()
-        assert _resumed(fleet, look)
+        _resume(fleet, look)
     named = f"{len(outcome.silent) + len(outcome.moving)} named"
     figure(f"lfa stop, 12 robots on 4 hosts, {percent} % loss: all stopped, or {named}", took_s, STOPPED_S)
     assert sorted((*outcome.done, *outcome.silent, *outcome.moving)) == list(ROBOTS)
@@ -139,7 +141,7 @@ def test_e28_a_stop_reaches_every_gateway_while_the_leaders_machine_is_cut_off(
         fleet.net.unplug(fleet.host(name))
         outcome, took_s = _stopped(fleet, next(n for n in "bc" if n != name))
         fleet.net.plug_in(fleet.host(name))
-        assert _resumed(fleet, look)
+        _resume(fleet, look)
     figure("lfa stop, the leader's host cut off: all stopped", took_s, STOPPED_S)
     assert outcome.done == ROBOTS
 
@@ -167,7 +169,7 @@ def test_e28_a_stop_on_a_machine_that_is_cut_off_names_every_robot(up: tuple[Mac
         _forget_the_others(fleet, "c")
         outcome, took_s = _stopped(fleet, "c")
         fleet.net.plug_in(fleet.host("c"))
-        assert _resumed(fleet, look)
+        _resume(fleet, look)
     figure("lfa stop, said on a host that is cut off: all named", took_s, STOPPED_S)
     assert (outcome.silent, outcome.done) == (ROBOTS, ())
 

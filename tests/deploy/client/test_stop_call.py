@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lfa.deploy.client.stop_call import ANSWER_S, ASK_S, KNOWN_S, NEWS_S, REPEAT_S, REST_S, Said, StopCall
+from lfa.deploy.client.stop_call import ANSWER_S, ASK_S, BRAKED_S, KNOWN_S, NEWS_S, REPEAT_S, REST_S, Said, StopCall
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.consensus import Member
 from lfa.protocol.messages.header import Header
@@ -78,8 +78,8 @@ def test_a_robot_is_named_that_said_that_its_wheels_turn_and_is_not_heard_any_mo
     call, (one, two) = called(True)
     call.hear(1, one.state(1, True), 0.1)
     call.hear(2, two.state(1, True, at_rest=False), 0.1)
-    assert call.outcome(ANSWER_S - 0.01) is None
-    outcome = call.outcome(ANSWER_S)
+    assert call.outcome(BRAKED_S - 0.01) is None
+    outcome = call.outcome(BRAKED_S)
     assert outcome is not None and (outcome.done, outcome.moving) == ((1,), (2,)) and not outcome.complete
 
 
