@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from msgspec import structs
 from rich.console import Console
 
 from lfa.deploy.client.team_status import RobotStatus
@@ -18,9 +19,12 @@ ROW = RobotStatus(
 )  # fmt: skip
 
 
-def shown(width: int) -> list[str]:
+STOPPED = structs.replace(ROW, role="leader", state="leader, stopped: lfa resume lets it go")
+
+
+def shown(width: int, row: RobotStatus = ROW, *, wraps: bool = False) -> list[str]:
     out = io.StringIO()
-    Console(file=out, width=width).print(watch._table([ROW], None, width))
+    Console(file=out, width=width).print(watch._table([row], None, width, wraps=wraps))
     return [line.rstrip() for line in out.getvalue().splitlines()]
 
 
@@ -31,6 +35,19 @@ def test_no_cell_of_the_table_is_cut(width: int) -> None:
     assert max(len(head), len(row)) <= width
     assert ("CPU %" in head) is (width >= watch.WIDE)
     assert row.split()[-1] == "follow"
+
+
+@pytest.mark.parametrize("width", [60, 79, 80, 120])
+def test_a_long_state_is_cut_and_no_other_cell(width: int) -> None:
+    head, row = shown(width, STOPPED)
+    assert head.startswith("robot role   term ahead off mm turn °")
+    assert row.split()[:4] == ["12", "leader", "4479", "11"]
+    assert "stopp" in row
+
+
+def test_the_table_printed_once_has_a_long_state_whole() -> None:
+    lines = shown(80, STOPPED, wraps=True)[1:]
+    assert " ".join(" ".join(lines).split()).endswith("stopped: lfa resume lets it go")
 
 
 def test_the_keys_are_listed_in_sixty_columns() -> None:

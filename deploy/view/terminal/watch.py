@@ -82,7 +82,7 @@ def command(
         from rich.console import Console
 
         width = max(WIDTH_MIN, shutil.get_terminal_size().columns)
-        Console(width=width).print(_table(rows, None, width))
+        Console(width=width).print(_table(rows, None, width, wraps=True))
     return 0 if any(row.pose_age_s is not None for row in rows) else 1
 
 
@@ -217,20 +217,21 @@ def _screen(subscriber: Subscriber, board: Board, hand: KeyHandler, width: int, 
     )
 
 
-def _table(rows: list[RobotStatus], chosen: int | None, width: int) -> RenderableType:
+def _table(rows: list[RobotStatus], chosen: int | None, width: int, *, wraps: bool = False) -> RenderableType:
+    """Draw the robots; `wraps`: a state that is too long takes further lines, instead of being cut."""
     from rich.table import Table
 
     kept = [n for n, head in enumerate(HEADS) if width >= WIDE or head not in PROCESS_HEADS]
 
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False)
     for head in (HEADS[n] for n in kept):
-        left = head in ("role", "state")
-        table.add_column(head, justify="left" if left else "right", no_wrap=True, overflow="ellipsis")
+        # rich takes what lacks in width from the columns that may wrap: from the state alone
+        left, long = head in ("role", "state"), head == "state"
+        table.add_column(head, justify="left" if left else "right", no_wrap=not long, overflow="ellipsis")
     for row in rows:
-        table.add_row(
-            *(cell(_cells(row)[n]) for n in kept),
-            style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, ""),
-        )
+        cells = [cell(_cells(row)[n]) for n in kept]
+        cells[-1].no_wrap = not wraps
+        table.add_row(*cells, style="reverse" if row.robot == chosen else ROLE_STYLES.get(row.role, ""))
     return table
 
 
@@ -248,7 +249,7 @@ def _cells(row: RobotStatus) -> tuple[str, ...]:
         _number(row.loop_lag_ms, 1.0),
         _number(row.cpu_percent, 1.0),
         _number(row.rss_mib, 1.0),
-        row.state,
+        row.state.removeprefix(f"{row.role}, "),
     )
 
 
