@@ -50,6 +50,8 @@ class OrderCall:
         self._base: TeamOrder | None = None
         self._order: TeamOrder | None = None
         self._leader: int | None = None
+        self._carried = False
+        """True once a leader tells this very order: another operator's may have the same version."""
         self._known: list[int] = []
         self._reason = ""
         self._say_at = now
@@ -64,11 +66,13 @@ class OrderCall:
         if not robot:
             return
         if isinstance(message, OrderNote):
-            if self._order is None and message.term is not None:
+            if self._order is not None:
+                self._carried = self._carried or (message.term is not None and message.order == self._order)
+            elif message.term is not None:
                 self._base = message.order
                 self._make()
         elif self._order is not None and message.data.get("version") == self._order.version:
-            if message.kind == "order_refused":
+            if message.kind == "order_refused" and not self._carried:
                 self._reason, self._leader = str(message.data.get("reason")), robot
             elif message.kind == "order":
                 self._acknowledged(robot, leads=message.data.get("by") == "leader")
@@ -104,6 +108,8 @@ class OrderCall:
         """Return the result once it is final."""
         version = 0 if self._order is None else self._order.version
         enough = self._mission is not None and 2 * len(self._known) > len(self._mission.robots)
-        if self._reason or (self._leader is not None and enough) or now - self._begun >= ANSWER_S:
-            return OrderOutcome(version, self._leader, tuple(self._known), self._reason)
+        done = self._carried and self._leader is not None and enough
+        if self._reason or done or now - self._begun >= ANSWER_S:
+            leader = self._leader if self._carried or self._reason else None
+            return OrderOutcome(version, leader, tuple(self._known), self._reason)
         return None

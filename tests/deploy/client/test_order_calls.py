@@ -43,9 +43,17 @@ class Team:
         self.calls.hear_mission(MISSION)
         self.calls.hear(HOLDS)
 
-    def answer(self, robot: int, by: str) -> None:
+    def answer(self, robot: int, by: str, order: TeamOrder | None = None) -> None:
+        """Answer as `robot` that it knows order 1: as leader, with the order itself, `order` or the last one said."""
         sender = structs.replace(header(), sender=f"robot{robot}")
+        if by == "leader":
+            self.calls.hear(OrderNote(sender, order or self.said[-1], Term(1, 1, 1)))
         self.calls.hear(Event(sender, "order", None, {"version": 1, "by": by}))
+
+    def refuse(self) -> None:
+        """Answer as leader that order 1 is refused, that of this operator or that of another."""
+        data = {"version": 1, "reason": "version 1 holds already"}
+        self.calls.hear(Event(structs.replace(header(), sender="robot1"), "order_refused", None, data))
 
 
 def test_a_pause_is_told_as_carried_out_when_the_leader_and_most_of_the_team_know_it() -> None:
@@ -61,6 +69,35 @@ def test_a_pause_is_told_as_carried_out_when_the_leader_and_most_of_the_team_kno
     assert team.told == []
     team.answer(2, "follower")
     team.calls.step(0.3)
+    assert team.told == [(True, "order 1 carried out by robot 1, 2 robots know it")]
+
+
+def test_an_order_of_another_operator_with_the_same_version_is_not_taken_for_ones_own() -> None:
+    team = Team()
+    team.know()
+    team.calls.begin(unchanged, True, 0.0, team.tell)
+    team.know()
+    team.calls.step(0.1)
+    other = TeamOrder(structs.replace(MISSION.leading, cruise_mps=0.2), MISSION.formation, version=1)
+    team.answer(1, "leader", other)
+    team.answer(2, "follower")
+    team.calls.step(0.2)
+    assert team.told == []
+    team.refuse()
+    team.calls.step(0.3)
+    assert team.told == [(False, "robot 1 refuses it: version 1 holds already")]
+
+
+def test_the_refusal_of_another_operators_order_with_the_same_version_is_not_ones_own() -> None:
+    team = Team()
+    team.know()
+    team.calls.begin(unchanged, True, 0.0, team.tell)
+    team.know()
+    team.calls.step(0.1)
+    team.answer(1, "leader")
+    team.refuse()
+    team.answer(2, "follower")
+    team.calls.step(0.2)
     assert team.told == [(True, "order 1 carried out by robot 1, 2 robots know it")]
 
 
