@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lfa.deploy.fleet.plan import host_plan
@@ -166,7 +166,8 @@ class Machines:
         """Copy the state folders of all machines, with their journals and logs, to where they survive the test."""
         kept = Path(tempfile.mkdtemp(prefix=KEPT, dir="/tmp"))
         for name in self.names:
-            shutil.copytree(self.state(name), kept / name, ignore=_no_file, ignore_dangling_symlinks=True)
+            there = kept / name
+            shutil.copytree(self.state(name), there, ignore=_no_file, ignore_dangling_symlinks=True, copy_function=_copy)
         return kept
 
     # --- actions ---------------------------------------------------------------------------------------------------
@@ -232,6 +233,12 @@ class Machines:
 def _no_file(folder: str, names: list[str]) -> list[str]:
     """Return the names in `folder` that cannot be copied: sockets."""
     return [name for name in names if (Path(folder) / name).is_socket()]
+
+
+def _copy(source: str, target: str) -> None:
+    """Copy a file, unless the fleet, which runs on, has removed it since the folder was listed."""
+    with suppress(FileNotFoundError):
+        shutil.copy2(source, target)
 
 
 @contextmanager
