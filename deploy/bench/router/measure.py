@@ -1,4 +1,8 @@
-"""Rows of `lfa bench router`: one router between processes that carry the traffic of robots and compute nothing."""
+"""Rows of `lfa bench router`: one router between processes that carry the traffic of robots and compute nothing.
+
+What the routers of a federation carry is counted in the simulator, beside what the formula of
+deploy/docs/performance.md says, and taken times the measured cost of a message.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,9 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
+from statistics import mean
 
 import msgspec
 from msgspec import Struct
@@ -16,6 +21,7 @@ from msgspec import Struct
 from lfa.deploy.bench.harness.child_process import cpu_s, started
 from lfa.deploy.bench.harness.rows import Case, Quantity, measured, select, show
 from lfa.deploy.bench.router import traffic
+from lfa.deploy.bench.router.federation import HEAD, Federation, predicted, simulated
 from lfa.deploy.bench.router.traffic import TrafficCount, TrafficTask
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
@@ -28,6 +34,8 @@ PROCESSES = 4
 DURATION_S = 10.0
 PROGRAM = f"from {traffic.__name__} import start; start()"
 READY_S_MAX = 20.0
+FEDERATIONS = (Federation(100, 4), Federation(200, 10))
+FEDERATIONS_FULL = (*FEDERATIONS, Federation(1000, 20))
 
 
 class RouterLoad(Struct, frozen=True):
@@ -46,14 +54,15 @@ class RouterLoad(Struct, frozen=True):
 
 
 def run(as_json: bool, rows: str = "*", full: bool = False) -> int:
-    """Print the rows; return 0 if all hold, else 1. `full`: 200 robots, too."""
+    """Print the rows; return 0 if all hold, else 1. `full`: 200 robots, and a federation of 1000, too."""
     return show(measured(select(cases(full), rows), 1, rows), as_json)
 
 
 def cases(full: bool) -> list[Case]:
     """Return the loads to measure."""
     usual = [_case(robots) for robots in (ROBOTS, *((ROBOTS_FULL,) if full else ()))]
-    return [*usual, Case("as many as go", (Quantity("messages", "1/s"), Quantity("router, per message", "us")), _flood)]
+    flood = Case("as many as go", (Quantity("messages", "1/s"), Quantity("router, per message", "us")), _flood)
+    return [*usual, flood, *map(_federation_case, FEDERATIONS_FULL if full else FEDERATIONS)]
 
 
 def _case(robots: int) -> Case:
@@ -66,12 +75,38 @@ def _case(robots: int) -> Case:
     return Case(f"{robots} robots at {RATE_HZ:g} Hz", quantities, partial(_robots, robots))
 
 
+def _federation_case(federation: Federation) -> Case:
+    head_hz, other_hz = predicted(federation)
+    quantities = (
+        Quantity("leader's router, messages passed on", "1/s", head_hz, "near"),
+        Quantity("another router, messages passed on", "1/s", other_hz, "near"),
+        Quantity("leader's router, share of a core", "%"),
+        Quantity("another router, share of a core", "%"),
+    )
+    name = f"federation/{federation.robots} robots on {federation.machines} machines"
+    return Case(name, quantities, partial(_federation, federation))
+
+
+def _federation(federation: Federation) -> list[float]:
+    routers, duration_s = simulated(federation)
+    each_hz = [router.passed_on / duration_s for router in routers]
+    head_hz, other_hz = each_hz[HEAD], mean(hz for place, hz in enumerate(each_hz) if place != HEAD)
+    percent = 100.0 * 1e-6 * _each_us(_load(ROBOTS))
+    return [head_hz, other_hz, percent * head_hz, percent * other_hz]
+
+
 def _robots(robots: int) -> list[float]:
-    load = _measure(robots, PROCESSES, RATE_HZ)
+    load = _load(robots)
     heard = len(traffic.HEARS) / len(traffic.SAYS)
     published = sum(count.published for count in load.counts) * heard
     percent = 100.0 * load.cpu_s / load.lasted_s
     return [100.0 * load.received / published, load.received / load.lasted_s, percent, _each_us(load)]
+
+
+@cache
+def _load(robots: int) -> RouterLoad:
+    """Measure the usual load of so many robots; once, for all rows that need it."""
+    return _measure(robots, PROCESSES, RATE_HZ)
 
 
 def _flood() -> list[float]:
