@@ -166,8 +166,9 @@ class Machines:
         """Copy the state folders of all machines, with their journals and logs, to where they survive the test."""
         kept = Path(tempfile.mkdtemp(prefix=KEPT, dir="/tmp"))
         for name in self.names:
-            there = kept / name
-            shutil.copytree(self.state(name), there, ignore=_no_file, ignore_dangling_symlinks=True, copy_function=_copy)
+            shutil.copytree(
+                self.state(name), kept / name, ignore=_no_file, ignore_dangling_symlinks=True, copy_function=_copy
+            )
         return kept
 
     # --- actions ---------------------------------------------------------------------------------------------------
