@@ -2,8 +2,9 @@
 
 A deadline has two times [s], both on the process's own clock: from the first on, a tick does what is due; for the
 second, the process is woken. They differ where waiting costs nothing. A process that ticks at `again_at` anyway is not
-woken shortly before for a round, which it sends a tick early instead, nor for a HELLO that it does not need to send; an
-attempt that is asked for again within half a heartbeat is given up then.
+woken shortly before for a round, which it sends a tick early instead where the one after that can wait for a tick, too:
+else rounds would come twice as often as they need; nor for a HELLO that it does not need to send; an attempt that is
+asked for again within half a heartbeat is given up then.
 """
 
 from __future__ import annotations
@@ -41,8 +42,10 @@ def _release(m: LeaseMemory, _again_at: float) -> float:
 
 
 def _round(m: LeaseMemory, again_at: float) -> float:
-    at = NEVER if m.holder is None else m.holder.next_round_at
-    return -NEVER if at <= again_at - LATE_S else at
+    if m.holder is None:
+        return NEVER
+    at, latest_at = m.holder.next_round_at, again_at - LATE_S
+    return min(at, latest_at - m.holder.timing.heartbeat_s) if at <= latest_at else at
 
 
 def _round_wakes(m: LeaseMemory, again_at: float) -> float:

@@ -62,6 +62,22 @@ def test_e2_who_looks_in_less_often_than_rounds_are_due_is_woken_for_them() -> N
     assert lease.next_deadline(asked_at + 1.0) == due_at
 
 
+def test_e2_who_steps_less_often_than_rounds_are_due_asks_once_a_heartbeat_no_more() -> None:
+    """With steps longer than a heartbeat no round is sent early: the one after it would need a wake-up all the same."""
+    lease, now, _, _ = elected(slow_s=0.001)
+    step_s = 1.25 * STD.heartbeat_s
+    asked, again_at = [now], now + step_s
+    while len(asked) < 9:
+        now = min(lease.next_deadline(again_at), again_at)
+        again_at += step_s if now == again_at else 0.0
+        for propose in sent(lease.tick(now, again_at), Propose):
+            assert isinstance(propose, Propose)
+            asked.append(now)
+            for other in OTHERS:
+                lease.receive(other, Grant(propose.term, propose.round, propose.config.version, 0.0), now)
+    assert [later - before for before, later in pairwise(asked)] == pytest.approx([STD.heartbeat_s] * 8)
+
+
 def test_bug_6_leadership_is_announced_only_with_the_quorums_grants() -> None:
     lease = alone()
     propose = proposed(lease, STD.grant_s)
