@@ -167,11 +167,12 @@ class Simulator(VirtualTime):
 
     def publish(self, key: str, payload: bytes) -> None:
         """Publish a message from outside the simulation, such as an operator's, to subscribers of `key` and to taps."""
-        message = decode(payload, TOPIC[key.split("/")[3]].type)
+        topic = TOPIC[key.split("/")[3]]
+        message = decode(payload, topic.type)
         for tap in self.taps:
             tap(self.now, key, payload, message)
         for process, _ in self._routes.of(key).receivers:
-            self.at(self.now + LOCAL_DELAY_S, self._give, process, key, message, payload)
+            self.at(self.now + LOCAL_DELAY_S, self._give, process, key, message, payload, topic.wakes)
 
     def upcoming(self) -> Iterator[tuple[NodeHost, GrantedCall]]:
         """Yield the next calls of all nodes that nothing can change or precede any more, in their order.
@@ -196,7 +197,10 @@ class Simulator(VirtualTime):
 
     # --- one call of one node ---------------------------------------------------------------------------------
 
-    def _give(self, process: _SimulatedNode, key: str, message: Message | Local, payload: bytes) -> None:
+    def _give(
+        self, process: _SimulatedNode, key: str, message: Message | Local, payload: bytes, wakes: bool = True
+    ) -> None:
+        """Deliver a message or local event. What `wakes` nobody changes no deadline: a real loop would see it later."""
         if process.gone:
             return
         if process.paused:
@@ -206,7 +210,9 @@ class Simulator(VirtualTime):
         now = clock.offset_s + clock.rate * self.now
         if not key and isinstance(message, Local):
             process.links.see(message, now)
-        self._after(process, process.host.deliver(now, key, message, payload))
+        sent = process.host.deliver(now, key, message, payload)
+        if sent or wakes:
+            self._after(process, sent)
 
     def _tick(self, process: _SimulatedNode, deadline: float) -> None:
         """Call the node's tick if `deadline` [s, its own clock], from its last call, has come; else plan again."""
@@ -293,7 +299,9 @@ class Simulator(VirtualTime):
             tap(self.now, key, payload, message)
         now, give, delays = self.now, self._give, self.link_model.delays
         sent_from, receivers = self._routes.of(key)
-        if key.split("/", 4)[3] in NO_ECHO:
+        topic = key.split("/", 4)[3]
+        wakes = TOPIC[topic].wakes
+        if topic in NO_ECHO:
             receivers = [one for one in receivers if one[0] is not sender]
         if self.deaf:
             name = sender.node.name
@@ -301,10 +309,10 @@ class Simulator(VirtualTime):
         calls: list[tuple[float, Callable[..., None], tuple[Any, ...]]] = []
         for process, place in receivers:
             if sent_from is None or place == sent_from:
-                calls.append((now + LOCAL_DELAY_S, give, (process, key, message, payload)))
+                calls.append((now + LOCAL_DELAY_S, give, (process, key, message, payload, wakes)))
                 continue
             for delay_s in delays(sent_from, place):
-                calls.append((now + delay_s, give, (process, key, message, payload)))
+                calls.append((now + delay_s, give, (process, key, message, payload, wakes)))
         self.at_each(calls)
 
     def _refresh(self, process: _SimulatedNode) -> None:

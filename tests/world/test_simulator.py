@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfa.protocol.geometry import Twist
-from lfa.protocol.messages.codec import Message
+from lfa.protocol.messages.codec import Message, encode
 from lfa.protocol.messages.consensus import Role, Term
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.team import Ask, PoseStamped
@@ -75,6 +75,44 @@ def test_a_node_ticks_by_its_own_clock() -> None:
     simulator.run(1.005)
     assert len(a.ticks) == 11
     assert len(b.ticks) == 21
+
+
+class Counted(Talker):
+    """Talker that counts how often it is asked for its next deadline, and answers the poses of robot 1."""
+
+    asked = 0
+
+    def next_deadline(self) -> float:
+        self.asked += 1
+        return super().next_deadline()
+
+    def receive(self, received: Received) -> list[Envelope]:
+        super().receive(received)
+        said = received.message
+        return [self._pose(received.at)] if isinstance(said, PoseStamped) and said.header.sender == "robot1" else []
+
+
+@pytest.mark.parametrize(("topic", "more"), [("pose", 0), ("ask", 1)])
+def test_a_deadline_is_asked_for_anew_by_a_message_that_wakes_and_by_no_other(topic: str, more: int) -> None:
+    simulator = Simulator(Radio(0.001, 0.0), seed=1)
+    node = Counted("robot3")
+    simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 0, {})))
+    simulator.run(0.25)
+    before, header = node.asked, Header("robot2", 1, 0, 0.25)
+    pose = PoseStamped(header, 0.0, 0.0, 0.0, 0.0, Twist(), 0.0, Role.FOLLOWER, Term())
+    simulator.publish(key("f", "robot2", topic), encode(pose if topic == "pose" else Ask(header, "mission")))
+    simulator.run(0.26)
+    assert [said for _, said in node.heard][-1].header == header
+    assert node.asked == before + more
+
+
+def test_what_a_node_answers_to_a_message_that_wakes_nobody_is_sent_at_once() -> None:
+    simulator, _, b = pair()
+    node = Counted("robot3")
+    simulator.add(node, Journal(None, Heading(JOURNAL_VERSION, node.name, 1, 0, {})))
+    simulator.run(0.15)
+    answers = [at for at, said in b.poses() if said.header.sender == "robot3" and said.header.stamp not in node.ticks]
+    assert answers[-1] == pytest.approx(0.102, abs=1e-4)
 
 
 def test_a_killed_node_is_silent_and_the_others_are_told_within_milliseconds() -> None:
