@@ -38,7 +38,7 @@ ORDER = (
 
     "world/description", "world/physics", "world/sensors", "world/robot_hardware", "world/added_obstacles",
     "world/time_grid", "world/saved_state", "world/simulated_sensors", "world/world", "world/checkpoint",
-    "world/virtual_time", "world/routes", "world/simulator", "world/cli",
+    "world/virtual_time", "world/collection", "world/routes", "world/simulator", "world/cli",
 
     "deploy/version", "deploy/whole_output", "deploy/terminal_text", "deploy/command_line", "deploy/robot_colours",
     "deploy/own_code", "deploy/recording",

@@ -43,6 +43,7 @@ from lfa.protocol.topics import WORLD_NAME
 from lfa.protocol.transport.link_model import LINK_CONDITIONS, Radio
 from lfa.protocol.transport.message_bus import send
 from lfa.protocol.witness import Witness
+from lfa.world.collection import seldom_collected
 from lfa.world.description.load import Point, Scenario, draw
 from lfa.world.simulator import Simulator
 from lfa.world.world import World
@@ -74,7 +75,7 @@ def run(
     recorder = Recorder(folder, about.metadata())
     run = SimulatedRun(drawn, seed, faults, recorder.record, folder / JOURNALS, drivers)
     started = time.perf_counter()
-    with Interrupts(OWN_FILES) as interrupts:
+    with Interrupts(OWN_FILES) as interrupts, seldom_collected():
         run.advance(inf, lambda: interrupts.signal is not None)
         verdict = run.close(verdict_of(interrupts))
     recording = recorder.close()
@@ -92,7 +93,7 @@ def measure(scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Unre
     refuse_faults(drawn, faults)
     about = About(scenario.name, MODE, seed, FLEET)
     run = SimulatedRun(drawn, seed, faults, memory.record, None)
-    with Interrupts(OWN_FILES) as interrupts:
+    with Interrupts(OWN_FILES) as interrupts, seldom_collected():
         run.advance(inf, lambda: interrupts.signal is not None)
         verdict = run.close(verdict_of(interrupts))
     if interrupts.signal is not None:

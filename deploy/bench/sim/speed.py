@@ -25,6 +25,7 @@ from lfa.deploy.recording.recorder import Recorder
 from lfa.deploy.run.simulate import SimulatedRun
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.codec import Message, decode, encode
+from lfa.world.collection import seldom_collected
 from lfa.world.description.load import draw, load
 
 SCENARIO, SEED, BEAMS = "straight", 1, 180
@@ -124,7 +125,7 @@ def cost_of(case: SpeedCase) -> Cost:
     drawn = draw(load(SCENARIO, settings, case.robots), SEED)
     simulated_s = case.until_s - FROM_S
     said: list[tuple[float, str, Message]] = []
-    with tempfile.TemporaryDirectory(prefix="lfa-") as place:
+    with tempfile.TemporaryDirectory(prefix="lfa-") as place, seldom_collected():  # as `lfa sim`
         recorder = Recorder(_folder(place, "run"), {})
 
         def record(t: float, key: str, message: Message) -> None:
