@@ -21,6 +21,9 @@ TEAM_CORES = 0.1
 ROBOT_CORES, STEP_CORES = 0.018, 0.0019
 """Share of a core for each robot, and for each of its control steps a second; with its part of world, router and
 recorder."""
+WORLD_PART = 1.0 / 7.0
+"""Part of a robot's costs that falls on the world, which is one process: it has one core, however many there are.
+Router and recorder take as much."""
 USUAL_SHARE, PATIENT_SHARE = 0.75, 0.95
 """Share of the machine that a run may take: the rest is what keeps processes in time. The profiles `wifi` and `auto`
 bear three times the lateness of the others, or more."""
@@ -46,7 +49,7 @@ def carried(mission: Mission, on_cores: float) -> int:
     """Return how many robots with the rates of `mission` a machine with so many cores carries; at least 1."""
     share = PATIENT_SHARE if mission.profile in PATIENT else USUAL_SHARE
     each = ROBOT_CORES + STEP_CORES * mission.control_hz
-    return max(1, int((share * on_cores - TEAM_CORES) / each))
+    return max(1, int(min((share * on_cores - TEAM_CORES) / each, share / (WORLD_PART * each))))
 
 
 def fitted(scenario: Scenario, kept: frozenset[str]) -> Scenario:
@@ -67,12 +70,14 @@ def fit_to(scenario: Scenario, kept: frozenset[str], on_cores: float) -> tuple[S
         return scenario, ""
     lower = slower(scenario, kept)
     then = carried(lower.mission, on_cores)
-    machine = f"this machine ({on_cores:g} cores) carries {most} robots at {scenario.mission.control_hz:g} Hz"
+    hz, slow_hz = scenario.mission.control_hz, lower.mission.control_hz
+    machine = f"this machine ({on_cores:g} core{'' if on_cores == 1.0 else 's'}) carries {most} robots at {hz:g} Hz"
     if lower != scenario:
         machine += f", {then} with {_rates(lower)}"
     if robots > then:
         return lower, f"{machine}: {robots} robots will be late, and may lose their leader"
-    return lower, f"{machine}: {robots} robots run so (--set mission.control_hz=50 keeps that rate)"
+    keeps = f" (--set mission.control_hz={hz:g} keeps that rate)" if slow_hz < hz else ""
+    return lower, f"{machine}: {robots} robots run so{keeps}"
 
 
 def slower(scenario: Scenario, kept: frozenset[str] = frozenset()) -> Scenario:

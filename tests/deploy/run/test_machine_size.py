@@ -52,6 +52,25 @@ def test_rates_that_are_low_already_stay_as_they_are(profile: str) -> None:
     assert fit_to(scenario, NOTHING, 2.0) == (scenario, "")
 
 
+def test_a_machine_of_one_core_is_told_of_in_the_singular() -> None:
+    assert "this machine (1 core) carries 5 robots" in fit_to(team(16), NOTHING, 1.0)[1]
+
+
+def test_the_rate_that_may_be_kept_is_the_scenarios_own() -> None:
+    _, text = fit_to(team(16, "mission.control_hz=40"), NOTHING, 2.0)
+    assert text.endswith("16 robots run so (--set mission.control_hz=40 keeps that rate)")
+
+
+def test_no_rate_is_offered_to_be_kept_that_is_kept_already() -> None:
+    _, text = fit_to(team(30), frozenset({"mission.control_hz"}), 4.0)
+    assert text.endswith("32 with control at 50 Hz, profile auto and 90 lidar beams: 30 robots run so")
+
+
+@pytest.mark.parametrize(("hz", "most"), [(50.0, 46), (20.0, 93)])
+def test_cores_that_the_world_cannot_use_carry_no_more_robots(hz: float, most: int) -> None:
+    assert [carried(Mission(control_hz=hz), cores) for cores in (8.0, 64.0)] == [most, most]
+
+
 @pytest.mark.parametrize("on_cores", [0.1, 0.5])
 def test_the_smallest_machine_carries_one_robot(on_cores: float) -> None:
     assert carried(Mission(), on_cores) >= 1
