@@ -62,7 +62,7 @@ class Overload(Struct, kw_only=True):
     late_s: dict[str, float]
     """Largest lateness [s] of each robot's loop, or the world's, that was late for seconds, by its name."""
     slow_hz: dict[str, float] = {}
-    """Lowest control rate [Hz] of each robot that stepped less often, for its machine kept it late."""
+    """Lowest control rate [Hz] of each robot that its machine kept late: usual if it sent fewer rows only."""
 
 
 class Summary(Struct, kw_only=True):

@@ -76,7 +76,7 @@ def _overloaded(overload: Overload) -> str:
     if overload.slow_hz:
         slowest = min(overload.slow_hz, key=overload.slow_hz.__getitem__)
         who = "1 robot" if len(overload.slow_hz) == 1 else f"{len(overload.slow_hz)} robots"
-        signs.append(f"{who} stepped less often, {slowest} at {overload.slow_hz[slowest]:.3g} Hz")
+        signs.append(f"{who} did less to keep time, {slowest} stepped at {overload.slow_hz[slowest]:.3g} Hz")
     return f"this machine did not keep up: {'; '.join(signs)}"
 
 

@@ -292,6 +292,6 @@ def test_a_machine_that_does_not_keep_up_is_one_line_of_the_end_and_no_failure()
     [told] = [row for row in text(summary, None).splitlines() if "did not keep up" in row]
     assert told == (
         "  this machine did not keep up: the world stood still for 1.00 s; 1 robot was late, robot2 by 0.20 s; "
-        "1 robot stepped less often, robot2 at 12.5 Hz"
+        "1 robot did less to keep time, robot2 stepped at 12.5 Hz"
     )
     assert summary.outcome == "goal_reached" and summary.exit_code == 0
