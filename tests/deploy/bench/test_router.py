@@ -59,8 +59,8 @@ def test_a_command_stays_on_the_machine_of_its_robot_whose_driver_the_world_play
     "federation",
     [
         Federation(40, 4),
-        pytest.param(Federation(100, 4), marks=pytest.mark.long),
-        pytest.param(Federation(200, 10), marks=pytest.mark.long),
+        pytest.param(Federation(100, 4), marks=pytest.mark.campaign),
+        pytest.param(Federation(200, 10), marks=pytest.mark.campaign),
     ],
 )
 def test_the_formula_of_a_federation_says_within_a_tenth_what_its_routers_pass_on(federation: Federation) -> None:
