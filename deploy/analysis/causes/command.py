@@ -54,8 +54,9 @@ def why(folder: Path) -> Causes:
     seen, events = mcap_reader.read(folder), event_log.lines(folder)
     over_s = next((line["t"] for line in events if line["kind"] in ("over", "end")), seen.end_s)
     failures = evidence.failures(read(folder, over_s))
-    done = effects.facts(seen, events, scenario_of(folder).mission.robots)
-    known = sorted([*failures, *done, *orders.facts(folder)], key=lambda fact: fact.at_s)
+    done = effects.facts(seen, events, sorted(seen.truth))
+    ordered = orders.facts(folder, scenario_of(folder).mission)
+    known = sorted([*failures, *done, *ordered], key=lambda fact: fact.at_s)
     chains = tuple(explain(fact, known) for fact in done if fact.kind in EFFECTS)
     named = {fact for chain in chains for fact in chain.facts}
     return Causes(str(folder), chains, tuple(f for f in failures if f.kind in FAILURES and f not in named))

@@ -130,7 +130,9 @@ def _decisions(lines: Sequence[Line]) -> Iterator[Fact]:
 def _leases(lines: Sequence[Line]) -> Iterator[Fact]:
     """Yield each end of a lease, and each role in which a robot waits after it had driven."""
     had_role: set[int] = set()
+    chain: list[int] | None = None
     for line in lines:
+        chain = line["chain"] if line["kind"] == "chain" else chain
         robot = line["robot"]
         if not isinstance(robot, int):
             continue
@@ -140,7 +142,8 @@ def _leases(lines: Sequence[Line]) -> Iterator[Fact]:
             yield Fact(line["t"], "lease lost", name, text, other=str(line.get("change")))
         if line["kind"] == "role":
             if line["role"] == "waiting" and robot in had_role:
-                yield Fact(line["t"], "wait", name, f"{called(name)} waited, for a leader", other="role")
+                reason = "for a leader" if chain is None or robot in chain else "out of the chain"
+                yield Fact(line["t"], "wait", name, f"{called(name)} waited, {reason}", other="role")
             if line["role"] != "waiting":
                 had_role.add(robot)
 

@@ -14,6 +14,9 @@ from msgspec import Struct
 
 from lfa.deploy.analysis.causes.fact import ROOTS, Fact, FactKind
 
+LET_GO = ("resume", "go")
+"""Orders that let robots drive on: none of them is the cause of a stop."""
+
 Where = Literal["same", "other", "touches", "anywhere"]
 """Process of a cause: the effect's own, its second one, either of these, or any."""
 SLACK_S = 0.02
@@ -75,6 +78,7 @@ RULES: tuple[CausalRule, ...] = (
     CausalRule("deaf",          "died",            "anywhere",  3.0),
 
     CausalRule("wait",          "obstacle",        "same",      0.1),
+    CausalRule("wait",          "order",           "same",      3.0, "retire"),
     CausalRule("wait",          "left",            "anywhere",  2.0),
     CausalRule("wait",          "died",            "anywhere",  2.0),
     CausalRule("wait",          "cut",             "touches",   5.0),
@@ -174,6 +178,8 @@ def causes(effect: Fact, known: Sequence[Fact]) -> list[Fact]:
 
 def _fits(rule: CausalRule, cause: Fact, effect: Fact) -> bool:
     if cause.kind != rule.cause or cause == effect or (rule.other and cause.other != rule.other):
+        return False
+    if (effect.kind, cause.kind) == ("stop", "order") and cause.other in LET_GO:
         return False
     if cause.at_s > effect.at_s + SLACK_S or (cause.kind == effect.kind and cause.at_s >= effect.at_s):
         return False
