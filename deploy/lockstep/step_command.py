@@ -12,6 +12,7 @@ from lfa.deploy.client.session import Subscriber, find, listen
 from lfa.deploy.lockstep.stepping import STEP, STEPPED, ticks_of
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
+from lfa.protocol.errors import Refused
 from lfa.protocol.messages.team import Event
 from lfa.protocol.transport.message_bus import send
 
@@ -48,12 +49,15 @@ def command(
 def _answer(subscriber: Subscriber, own_number: int) -> Event | None:
     """Return the event that answers the operator of this number: where the run stands, or from where it goes on.
 
-    None if none comes.
+    None if none comes. Raises Refused for a fleet in real time, whose processes have tokens: in lockstep none has one.
     """
     until = clock.now() + ANSWER_S_MAX
     while clock.now() < until:
         for _, message in subscriber.take():
             if isinstance(message, Event) and message.kind == STEPPED and message.data.get("asked") == own_number:
                 return message
+        if subscriber.living:
+            stands = "only a run of lfa run SCENARIO --lockstep goes by ticks"
+            raise Refused(f"fleet {subscriber.fleet.name} runs in real time: {stands}")
         subscriber.wait(WAIT_S)
     return None

@@ -48,6 +48,15 @@ def test_every_core_returns_the_same_again(tmp_path: Path) -> None:
     assert recording["dropped"] == 0
 
 
+def test_a_fleet_in_real_time_is_not_stepped_and_one_line_says_so(tmp_path: Path) -> None:
+    with running(tmp_path / "run", "straight", "--robots", "1") as run:
+        run.wait_for("leader_command")
+        fleet = f"straight-{run.launcher.pid}"
+        done = lfa("step", "5", "--fleet", fleet)
+    [line] = done.stderr.splitlines()
+    assert done.returncode == 2 and line.startswith(f"lfa: fleet {fleet} runs in real time: "), line
+
+
 def test_an_operator_sees_a_fleet_and_changes_its_formation(tmp_path: Path) -> None:
     with running(tmp_path / "run", "straight", "--robots", "3") as run:
         run.wait_for("leader_command")
