@@ -105,6 +105,12 @@ class Subscriber:
         """Names with a liveliness token at the last call of `take`."""
         return {owner for owner, _ in self._tokens}
 
+    def refuse_absent(self, what: str) -> None:
+        """Raise Refused, which names what was asked for, if no process of the fleet had a token at the last `take`."""
+        if not self._tokens:
+            fleet = self.fleet
+            raise Refused(f"{what}: nothing of fleet {fleet.name} is heard at {fleet.endpoint}; is the fleet running?")
+
     def is_alive(self, name: str) -> bool:
         """Return True if `name` had a liveliness token at the last call of `take`.
 

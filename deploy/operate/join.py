@@ -42,6 +42,8 @@ def say(
         raise Refused(f"{what} {robot} --for {slot_of}: must be a robot's id, or 0 for the tail")
     with listen(find(fleet, connect, keys), TOPICS) as ear:
         outcome = change_roster(ear, what, robot, slot_of)
+        if outcome.leader is None:
+            ear.refuse_absent(f"{what} {robot}")
     if outcome.reason:
         raise Refused(outcome.reason)
     print_visible(msgspec.json.encode(outcome).decode() if as_json else outcome_text(what, outcome))

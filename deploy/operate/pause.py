@@ -39,6 +39,8 @@ def say(
     """Change a fleet's mission as `make` says, print what became of it, and return the exit code. Raises Refused."""
     with listen(find(fleet, connect, keys), TOPICS) as subscriber:
         outcome = order_fleet(subscriber, make(subscriber), paused=paused)
+        if outcome.leader is None:
+            subscriber.refuse_absent(what)
     if outcome.reason:
         raise Refused(f"{what}: robot{outcome.leader} refuses it: {outcome.reason}")
     if as_json:

@@ -7,15 +7,19 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from lfa.deploy.client import session
 from lfa.deploy.client.discovery import Running
-from lfa.deploy.client.session import FleetAddress, find, scenario_of_fleet
+from lfa.deploy.client.session import FleetAddress, Subscriber, find, scenario_of_fleet
 from lfa.deploy.fleet.host.router import default_endpoints
 from lfa.deploy.process.identity import Identity
 from lfa.protocol.errors import Refused
+from lfa.protocol.node import PeerUp
+from lfa.protocol.transport.bus import Inbox, Wake
+from lfa.protocol.transport.zenoh_bus import ZenohBus
 from lfa.protocol.transport.zenoh_config import default_endpoint
 from lfa.world.description.load import SCENARIOS
 
@@ -67,6 +71,15 @@ def test_another_fleet_does_not_stop_a_command_that_names_its_own(
 @pytest.mark.parametrize("connect", [None, OWN, NEXT])
 def test_a_command_shows_the_certificate_of_its_host_at_each_of_the_hosts_routers(connect: str | None) -> None:
     assert find("worlds", connect).keys == KEYS
+
+
+def test_a_fleet_of_which_nothing_is_heard_is_not_there_and_one_without_a_leader_is() -> None:
+    wake = Wake()
+    subscriber = Subscriber(FleetAddress("far", THIRD, ()), cast(ZenohBus, None), Inbox(wake, 1), wake)
+    with pytest.raises(Refused, match="pause: nothing of fleet far is heard at tcp"):
+        subscriber.refuse_absent("pause")
+    subscriber._see_token(PeerUp("robot2", 1))
+    subscriber.refuse_absent("pause")
 
 
 @pytest.mark.usefixtures("two_fleets")
