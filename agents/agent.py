@@ -80,6 +80,11 @@ class Agent:
         return self._core is not None and self._core.defer_grants
 
     @property
+    def defer_rounds(self) -> bool:
+        """True while the leader's rounds can wait for the next control step: this robot follows, and has no vote."""
+        return self._core is not None and self._core.defer_rounds
+
+    @property
     def lacks_messages(self) -> bool:
         """True while this robot does not hear all that its team sends, or has no mission (E27)."""
         return self._core is None or self._core.lacks_messages

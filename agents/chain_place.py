@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lfa.protocol.lease.machine.lease import Lease
+from lfa.protocol.lease.quorum import electors
 from lfa.protocol.messages.consensus import Role
 
 
@@ -18,6 +19,7 @@ class ChainPlace:
     def _take(self, chain: tuple[int, ...]) -> None:
         self._ids: tuple[int, ...] = chain
         self._neighbours: tuple[int, ...] = ()
+        self._votes = self._lease.me in electors(self._lease.config)
         if self._id in chain:
             place = chain.index(self._id)
             self._neighbours = chain[max(0, place - 1) : place] + chain[place + 1 : place + 2]
@@ -30,6 +32,11 @@ class ChainPlace:
             self._config = config
             self._take(self._lease.chain)
         return self._ids
+
+    @property
+    def votes(self) -> bool:
+        """True if this incarnation has a vote in the newest config known, or in the one before while that changes."""
+        return self._votes if self.ids else False
 
     @property
     def first(self) -> int:

@@ -72,7 +72,7 @@ class RobotCore:
         check_mission(mission)
         if robot_id not in mission.robots and not spare:
             raise Refused(f"id {robot_id}: not in the mission, which has robots {list(mission.robots)}")
-        self.defer_grants = False
+        self.defer_grants = self.defer_rounds = False
         self.refusal: str | None = None
         """What this robot's mission says otherwise than its team's (E25); None if nothing."""
         self.leaves = False
@@ -339,6 +339,7 @@ class RobotCore:
         if self._asks == self._stop_listener.memory.certain:
             self._subscribe()
         role = Role.WAITING if self._pending_release else self._role()
+        self.defer_rounds = role is Role.FOLLOWER and not self._place.votes
         known = navigator.estimator.pose_at(now)
         if known is None:
             self._control_without_pose(role, now)

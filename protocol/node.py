@@ -96,6 +96,10 @@ class Node(Protocol):
         """True while answers on `lease` to this node alone, GRANT above all, can wait for its next deadline."""
 
     @property
+    def defer_rounds(self) -> bool:
+        """True while what is said on `lease` to all, PROPOSE above all, can wait for the node's next deadline."""
+
+    @property
     def finished(self) -> bool:
         """True when the final messages are out; the runner then ends the process."""
 

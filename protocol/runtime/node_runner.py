@@ -102,7 +102,7 @@ class _NodeRunner:
         if not self._follow() and self._links.due(now):
             self.bus.resubscribe()
         host.journal.flush()
-        self.inbox.defer_grants = node.defer_grants
+        self.inbox.defer_grants, self.inbox.defer_rounds = node.defer_grants, node.defer_rounds
         return late
 
     def tick_p99_s(self) -> float:

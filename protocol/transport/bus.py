@@ -105,6 +105,8 @@ class Inbox:
         self._eager = eager
         self.defer_grants = False
         """Do not wake for answers to this process alone: set while its lease lasts well beyond its next deadline."""
+        self.defer_rounds = False
+        """Do not wake for what is said on `lease` to all: set while the process has no vote in it."""
         self._lock = threading.Lock()
         self._allowances: dict[str, tuple[float, float]] = {}
         """Remaining number of events that an owner may queue, and the time [s] of that number."""
@@ -146,7 +148,9 @@ class Inbox:
     def _can_wait(self, where: Address) -> bool:
         if where.topic != "lease":
             return False
-        return self._defer_hellos if where.to == TO_HELLO else self.defer_grants and where.to != TO_ALL
+        if where.to == TO_HELLO:
+            return self._defer_hellos
+        return self.defer_rounds if where.to == TO_ALL else self.defer_grants
 
     def _admits(self, arrival: Arrival, where: Address | None) -> bool:
         """Return whether the caps of its owner admit an arrival; count it otherwise."""

@@ -29,21 +29,20 @@ def arrival(at: float, topic: str) -> Arrival:
 
 
 @pytest.mark.parametrize(
-    ("to", "defer_hellos", "defer_grants", "wakes"),
+    ("to", "defers", "wakes"),
     [
-        ("hello", True, False, False),
-        ("hello", False, True, True),
-        ("robot1", True, True, False),  # GRANT, and any other answer to this process alone
-        ("robot1", True, False, True),
-        ("all", True, True, True),  # PROPOSE, PREPARE, RELEASE, FENCED
+        ("hello", "hellos", False),
+        ("hello", "grants rounds", True),
+        ("robot1", "grants", False),  # GRANT, and any other answer to this process alone
+        ("robot1", "hellos rounds", True),
+        ("all", "rounds", False),  # PROPOSE, PREPARE, RELEASE, FENCED
+        ("all", "hellos grants", True),
     ],
 )
-def test_the_key_alone_decides_which_lease_messages_can_wait(
-    to: str, defer_hellos: bool, defer_grants: bool, wakes: bool
-) -> None:
+def test_the_key_alone_decides_which_lease_messages_can_wait(to: str, defers: str, wakes: bool) -> None:
     wake = Wake()
-    inbox = Inbox(wake, defer_hellos=defer_hellos)
-    inbox.defer_grants = defer_grants
+    inbox = Inbox(wake, defer_hellos="hellos" in defers)
+    inbox.defer_grants, inbox.defer_rounds = "grants" in defers, "rounds" in defers
     inbox.put(Arrival(0.0, f"lfa/f/robot2/lease/{to}", b"no message at all"))
     assert wake.wait(0.0) is wakes
     assert len(inbox.take()) == 1
