@@ -157,8 +157,8 @@ class Agent:
             self._core.receive(message, now)
             return self._outbox.drain()
         match message:
-            case MissionNote(mission=mission):
-                self._begin(mission, now)
+            case MissionNote():
+                self._begin(message.whole, now)
             case Vitals():
                 waiting_status(self._outbox, message, now)
             case Stop():

@@ -54,7 +54,9 @@ class Navigator:
         self.follower = follower_of(mission)
         self.leading = Leadership(mission, self.formation, team)
         self._mates = TeamMates(robot_id, team)
-        self._obstacles = ObstacleModel(mission.radius_m, mission.limits, team.obstacles)
+        self._obstacles = ObstacleModel(
+            mission.radius_m, mission.limits, team.obstacles, polygon=bool(mission.footprint_m)
+        )
         self._ground_crossing = GroundCrossing(self._obstacles.ground, mission.limits, mission.radius_m)
         self.scan_age = ScanAge()
         self.own_readings = OwnReadings()

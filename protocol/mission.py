@@ -9,12 +9,17 @@ from __future__ import annotations
 from math import pi
 from typing import Literal
 
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType
+
+from lfa.protocol.geometry import Point
 
 KNOWN_MAX = 64
 """Maximum number of known obstacles that a leader plans around: each costs planning time."""
 ROUTE_M_MAX = 10_000.0
 """Maximum route length [m]: a leader stores one point per 0.1 m, so that a longer route would exhaust the memory."""
+
+FOOTPRINT_CORNERS_MAX = 32
+"""Largest number of corners of a body: each costs time in every control step."""
 
 CONTROL_HZ, CONTROL_HZ_MIN = 50.0, 10.0
 """Usual and least rate [Hz] of the robots' control steps."""
@@ -157,11 +162,19 @@ class Mission(Struct, frozen=True, forbid_unknown_fields=True):
     """Silence [s] of all operators after which every robot stands, until one is there again; `lfa watch` shows that one
     is. None: a team needs no operator."""
     version: int = 1
+    footprint_m: tuple[Point, ...] | UnsetType = UNSET
+    """Corners x, y [m] of a body that is a convex polygon within the circle of `radius_m`, in `base_link`,
+    counter-clockwise around its origin: such a robot passes wherever the polygon does. Not given: it is round."""
 
     @property
     def control_period_s(self) -> float:
         """Time [s] between two control steps of a robot."""
         return 1.0 / self.control_hz
+
+    @property
+    def half_width_m(self) -> float:
+        """Half of the width [m] of the body: what it needs to either side of a straight way."""
+        return max(abs(y) for _, y in self.footprint_m) if self.footprint_m else self.radius_m
 
     @property
     def goal_m(self) -> tuple[float, float]:

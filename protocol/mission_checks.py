@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import hypot, inf, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, RefusedValue, Rule, apply_rules, out_of_range, wrong
-from lfa.protocol.mission import CONTROL_HZ, CONTROL_HZ_MIN, KNOWN_MAX, ROUTE_M_MAX, Leading, Mission
+from lfa.protocol.geometry import Point, convex
+from lfa.protocol.mission import (
+    CONTROL_HZ,
+    CONTROL_HZ_MIN,
+    FOOTPRINT_CORNERS_MAX,
+    KNOWN_MAX,
+    ROUTE_M_MAX,
+    Leading,
+    Mission,
+)
 
+REACH_M = 1e-3
+"""Distance [m] by which the corners of a body may lie outside of its circle: a radius is written with few digits."""
 _ROBOTS, _ROUTE, _TIMES = "mission.robots", "mission.leading.route_m", "mission.leading.times_s"
 
 
@@ -95,6 +106,28 @@ def _boxes(mission: Mission) -> Iterator[Mistake]:
             yield wrong(where, list(box), "x1, y1, x2, y2 [m] with x1 < x2 and y1 < y2")
 
 
+def _footprint(mission: Mission) -> Iterator[Mistake]:
+    if mission.footprint_m:
+        yield from footprint_mistakes("mission.footprint_m", mission.footprint_m, mission.radius_m)
+
+
+def footprint_mistakes(where: str, corners: Sequence[Point], radius_m: float) -> Iterator[Mistake]:
+    """Find a body at key `where` that is not convex, does not hold `base_link`, or is larger than its circle."""
+    value = [list(corner) for corner in corners]
+    sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
+    if len(corners) > FOOTPRINT_CORNERS_MAX:
+        yield wrong(where, f"{len(corners)} corners", f"at most {FOOTPRINT_CORNERS_MAX}")
+    elif not (all(isfinite(c) for corner in corners for c in corner) and convex(corners)):
+        yield wrong(where, value, "at least three corners of a convex polygon, counter-clockwise")
+    elif any(ax * by - ay * bx <= 0.0 for (ax, ay), (bx, by) in sides):
+        yield wrong(where, value, "around the origin [0, 0], where base_link is")
+    else:
+        reach_m = max(hypot(x, y) for x, y in corners)
+        if radius_m < reach_m - REACH_M:
+            right = f"at least {reach_m:.4g}, the distance of the farthest corner of {where}"
+            yield wrong("mission.radius_m", radius_m, right, where)
+
+
 def _orientations(mission: Mission) -> Iterator[Mistake]:
     for n, orientation in enumerate(mission.leading.orientations):
         if not (isfinite(orientation.at_m) and orientation.at_m >= 0.0):
@@ -129,5 +162,5 @@ def _ranges(mission: Mission) -> Iterator[Mistake]:
 
 
 MISSION_RULES: tuple[Rule[Mission], ...] = tuple(
-    Rule(check) for check in (_robots, _can_lead, _ranges, _route, _times, _known, _boxes, _orientations)
+    Rule(check) for check in (_robots, _can_lead, _ranges, _route, _times, _known, _boxes, _orientations, _footprint)
 )

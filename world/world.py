@@ -268,7 +268,7 @@ class World:
         return self._truths.envelope("truth", truth)
 
     def _mission(self, now: float) -> Envelope:
-        note = MissionNote(self._outbox.header("mission", now), self._announced)
+        note = MissionNote.of(self._outbox.header("mission", now), self._announced)
         return self._outbox.envelope("mission", note)
 
     def _hear_lag(self, lag_s: float, now: float) -> list[Envelope]:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from math import atan2, cos, hypot, inf, pi, sin, sqrt
 
 from lfa.agents.avoidance.safety import BRAKING_SHARE, turn_on_spot
+from lfa.agents.perception.footprint import PolygonBody
 from lfa.agents.perception.scan import STRAIGHT_RADPS, Point, free_along
 from lfa.protocol.geometry import Twist, wrap
 from lfa.protocol.mission import Limits
@@ -25,12 +26,18 @@ LOOK_M = 0.9
 LEAST_M = 0.06
 """Length [m] below which an arc is none."""
 CURVATURES_PER_M = (0.0, 0.35, 0.8, 1.4, 2.2, 3.4, 5.5, 9.0)
+FINE_PER_M = (0.07, 0.17)
+"""Curvatures that a polygon compares besides: between walls hardly wider than itself it turns by degrees."""
 HEADING_M = 0.25
 """Distance to the route [m] that an error of heading of 1 rad at the end of an arc counts as."""
 SHORT, CLOSE, CHANGE_M = 0.9, 0.35, 0.05
 """Cost of each metre that an arc is short of `LOOK_M`, of each metre without `ROOM_M`, and of another curvature than
 the last one's."""
-ALIGNED_RAD = 0.15
+ALIGNED_RAD, SQUARE_RAD = 0.15, 0.04
+"""Angle [rad] to the route below which a round body and a polygon face along it: the latter passes a gap hardly wider
+than itself only squarely."""
+TURNS_RAD = 0.03
+"""Angle [rad] by which a polygon must be able to turn on the spot, else it backs off to where it can."""
 BACK_MPS = 0.15
 BACK_FREE_M = 0.06
 ROUNDING_M = 1e-6
@@ -43,9 +50,13 @@ Near = tuple[float, float, float]
 class ArcPlanner:
     """Local planner of one robot that leads along a planned route."""
 
-    def __init__(self, radius_m: float, limits: Limits) -> None:
+    def __init__(self, radius_m: float, limits: Limits, footprint: PolygonBody | None = None) -> None:
+        """Create a planner; `footprint` is None for a round body."""
         self._radius_m = radius_m
         self._limits = limits
+        self._footprint = footprint
+        bent = CURVATURES_PER_M[1:] if footprint is None else (*FINE_PER_M, *CURVATURES_PER_M[1:])
+        self._curvatures = (0.0, *bent, *(-c for c in bent))
         self._curvature: float | None = None
         self.blocked = False
         """True while no arc leads on although the robot faces along its route."""
@@ -64,9 +75,9 @@ class ArcPlanner:
         """
         self.blocked = False
         if wanted.linear_x <= 0.0:
-            return wanted
+            return self._turned(points, wanted)
         look_m = min(LOOK_M, max(hypot(*route(LOOK_M)), LEAST_M))
-        if free_along(points, wanted, self._radius_m + ROOM_M) >= look_m:
+        if self._free_along(points, wanted, ROOM_M) >= look_m:
             self._curvature = None
             return wanted
         reach_m = look_m + self._radius_m + ROOM_M
@@ -90,10 +101,11 @@ class ArcPlanner:
         ahead = [point for point in near if point[1] > 0.0]
         least, best = inf, None
         own = wanted.angular_z / wanted.linear_x
-        for curvature in (own, *CURVATURES_PER_M, *(-c for c in CURVATURES_PER_M[1:])):
+        for curvature in (own, *self._curvatures):
             arc = Twist(1.0, curvature)
-            points = _beside(ahead if _leads_away(curvature, look_m, width_m) else near, curvature, width_m)
-            free_m = free_along(points, arc, self._radius_m + SKIN_M, look_m)
+            leads_away = self._footprint is None and _leads_away(curvature, look_m, width_m)
+            points = _beside(ahead if leads_away else near, curvature, width_m)
+            free_m = self._free_along(points, arc, SKIN_M, look_m)
             if free_m < LEAST_M:
                 continue
             cost = _off(route, curvature, free_m) + SHORT * (look_m - free_m)
@@ -101,7 +113,7 @@ class ArcPlanner:
                 cost += CHANGE_M
             if cost >= least:
                 continue
-            roomy_m = free_along(points, arc, width_m, free_m)
+            roomy_m = self._free_along(points, arc, ROOM_M, free_m)
             cost += CLOSE * (free_m - roomy_m)
             if cost < least:
                 least, best = cost, (curvature, roomy_m if roomy_m < free_m else inf)
@@ -119,11 +131,30 @@ class ArcPlanner:
         """
         x, y = route(self._radius_m + ROOM_M)
         bearing = atan2(y, x)
-        if abs(bearing) > ALIGNED_RAD:
-            return turn_on_spot(bearing, turn_radps, self._limits)
+        if abs(bearing) > (ALIGNED_RAD if self._footprint is None else SQUARE_RAD):
+            return self._turned(points, turn_on_spot(bearing, turn_radps, self._limits))
         self.blocked = True
-        free_m = free_along(points, Twist(-1.0, 0.0), self._radius_m + SKIN_M)
+        return self.back(points)
+
+    def _turned(self, points: Sequence[Point], wanted: Twist) -> Twist:
+        """Return `wanted`, which turns on the spot or backs; back off where the body cannot turn so far."""
+        if self._footprint is None or wanted.linear_x < 0.0 or wanted.angular_z == 0.0:
+            return wanted
+        free_rad = self._footprint.free_turn(points, wanted.angular_z, SKIN_M, TURNS_RAD)
+        if free_rad >= TURNS_RAD:
+            return wanted
+        self.blocked = True
+        return self.back(points)
+
+    def back(self, points: Sequence[Point]) -> Twist:
+        """Return the twist that backs off; still where that is barred."""
+        free_m = self._free_along(points, Twist(-1.0, 0.0), SKIN_M)
         return Twist(-BACK_MPS if free_m > BACK_FREE_M else 0.0, 0.0)
+
+    def _free_along(self, points: Sequence[Point], twist: Twist, margin_m: float, within_m: float = inf) -> float:
+        if self._footprint is not None:
+            return self._footprint.free_along(points, twist, margin_m, within_m)
+        return free_along(points, twist, self._radius_m + margin_m, within_m)
 
 
 def _leads_away(curvature: float, look_m: float, width_m: float) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import atan2, copysign, hypot, isfinite, pi, sqrt
 
+from lfa.agents.perception.footprint import PolygonBody
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.mission import Limits
@@ -26,20 +27,47 @@ SHARED_RAD = pi / 3
 TURN_S = 0.4
 
 
-def safe(wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, limits: Limits, dt: float) -> Twist:
-    """Return `wanted` made safe. `points` are in `base_link`; `last` is the command before, `dt` [s] ago."""
+def safe(
+    wanted: Twist,
+    last: Twist,
+    points: Sequence[Point],
+    radius_m: float,
+    limits: Limits,
+    dt: float,
+    footprint: PolygonBody | None = None,
+) -> Twist:
+    """Return `wanted` made safe. `points` are in `base_link`; `last` is the command before, `dt` [s] ago.
+
+    `footprint` is None for a round body.
+    """
     if not (isfinite(wanted.linear_x) and isfinite(wanted.angular_z)):
         wanted = STILL
     v, omega = within(wanted, limits)
-    free_m = free_along(points, Twist(v, omega), radius_m + SKIN_M)
-    v_stop = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * free_m) ** 0.5
-    if abs(v) > v_stop:
-        scale = v_stop / abs(v)
-        # A round body may turn at any distance: what stands before its nose must not hold the turn that frees it.
-        v, omega = v * scale, omega * max(scale, 1.0 - v_stop / TURNING_MPS)
-    return Twist(
-        _near(v, last.linear_x, limits.a_max_mps2 * dt), _near(omega, last.angular_z, limits.alpha_max_radps2 * dt)
-    )
+    if footprint is not None:
+        share = _swept_share(Twist(v, omega), points, footprint, limits)
+        wanted = _reached(Twist(v * share, omega * share), last, limits, dt)
+        # The drive reaches a bend later than it is wanted, and the body sweeps something else until then.
+        share = _swept_share(wanted, points, footprint, limits)
+        v, omega = wanted.linear_x * share, wanted.angular_z * share
+    else:
+        free_m = free_along(points, Twist(v, omega), radius_m + SKIN_M)
+        v_stop = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * free_m) ** 0.5
+        if abs(v) > v_stop:
+            scale = v_stop / abs(v)
+            # A round body may turn at any distance: what stands before its nose must not hold the turn that frees it.
+            v, omega = v * scale, omega * max(scale, 1.0 - v_stop / TURNING_MPS)
+    return _reached(Twist(v, omega), last, limits, dt)
+
+
+def _swept_share(twist: Twist, points: Sequence[Point], footprint: PolygonBody, limits: Limits) -> float:
+    """Return the share of `twist` from which the drive can stop before what the body sweeps, its turn included."""
+    v, omega = abs(twist.linear_x), abs(twist.angular_z)
+    stop_rad = omega * omega / (2.0 * BRAKING_SHARE * limits.alpha_max_radps2)
+    if v > 0.0:
+        stop_m = v * v / (2.0 * BRAKING_SHARE * limits.a_max_mps2)
+        needed_m = max(stop_m, stop_rad * v / omega) if omega > 0.0 else stop_m
+        return sqrt(footprint.free_along(points, twist, SKIN_M, needed_m) / needed_m)
+    return sqrt(footprint.free_turn(points, twist.angular_z, SKIN_M, stop_rad) / stop_rad) if omega > 0.0 else 1.0
 
 
 def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits) -> Twist:
@@ -89,6 +117,14 @@ def turn_on_spot(bearing: float, radps_max: float, limits: Limits) -> Twist:
     """Return the turn towards `bearing` [rad] at `radps_max` [rad/s] at most, from which the drive can stop there."""
     rate = min(radps_max, limits.omega_max_radps, sqrt(2.0 * limits.alpha_max_radps2 * abs(bearing)))
     return Twist(0.0, copysign(rate, bearing))
+
+
+def _reached(wanted: Twist, last: Twist, limits: Limits, dt: float) -> Twist:
+    """Return `wanted` as far as the drive gets from `last` within `dt` [s]."""
+    return Twist(
+        _near(wanted.linear_x, last.linear_x, limits.a_max_mps2 * dt),
+        _near(wanted.angular_z, last.angular_z, limits.alpha_max_radps2 * dt),
+    )
 
 
 def _near(value: float, last: float, step: float) -> float:

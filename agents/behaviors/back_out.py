@@ -7,6 +7,7 @@ from math import inf, pi
 from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.following.follower import Follower
+from lfa.agents.perception.footprint import PolygonBody
 from lfa.agents.perception.obstacle_model import ObstacleModel
 from lfa.agents.perception.scan import Point
 from lfa.agents.recovery.back_up import BackUp
@@ -30,7 +31,7 @@ class BackOut:
         self._detour = detour
         self._obstacles = obstacles
         self._stuck = stuck
-        self._path = BackUp()
+        self._path = BackUp(PolygonBody.of(mission))
         self._stands_since: float | None = None
         """Time [s] since which the way back is barred; None while it is not."""
         self._patience_s = STANDS_S

@@ -10,6 +10,7 @@ from lfa.agents.avoidance.moving_points import before
 from lfa.agents.avoidance.safety import safe, sharing, sharing_reach_m
 from lfa.agents.behaviors.team_mates import TeamMates
 from lfa.agents.localization.estimator import Estimator
+from lfa.agents.perception.footprint import PolygonBody
 from lfa.agents.perception.obstacle_model import ObstacleModel
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point
@@ -31,6 +32,7 @@ class CommandLimits:
         self, mission: Mission, mates: TeamMates, scan_age: ScanAge, estimator: Estimator, obstacles: ObstacleModel
     ) -> None:
         self._mission = mission
+        self._footprint = PolygonBody.of(mission)
         self._mates = mates
         self._scan_age = scan_age
         self._estimator = estimator
@@ -79,4 +81,4 @@ class CommandLimits:
         bodies = [replace(mate, radius_m=self._mission.radius_m) for mate in mates]
         met = before([*moving, *bodies], pose, BEFORE_S, wanted.linear_x)
         braked_for = points + self._obstacles.ground.doubtful(pose) + met
-        return safe(wanted, last, braked_for, self._mission.radius_m, self._mission.limits, dt)
+        return safe(wanted, last, braked_for, self._mission.radius_m, self._mission.limits, dt, self._footprint)

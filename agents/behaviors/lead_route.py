@@ -70,7 +70,7 @@ class LeadRoute:
         if self._leading.rounding:
             return "way round a trap"
         ahead = partial(self._leading.lead.ahead, pose)
-        gap_m = narrow_gap_m(self._obstacles.points(pose), ahead, self._mission.radius_m)
+        gap_m = narrow_gap_m(self._obstacles.points(pose), ahead, self._mission.radius_m, self._mission.half_width_m)
         return None if gap_m is None else f"gap of {gap_m:.1f} m"
 
 

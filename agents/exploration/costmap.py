@@ -107,9 +107,13 @@ class Costmap:
         return STRAIGHT * total / count * hypot(b[0] - a[0], b[1] - a[1]) / CELL_M
 
 
-def prices_of(radius_m: float) -> bytes:
-    """Return the cost of a straight step for each nearness; 0 is blocked."""
-    close_m, barred_m = radius_m + 0.5 * CELL_M + SKIN_M, radius_m - TIGHT_M
+def prices_of(radius_m: float, half_width_m: float | None = None) -> bytes:
+    """Return the cost of a straight step for each nearness; 0 is blocked.
+
+    `half_width_m` is what a polygon within the circle needs to either side of a straight way; None: the body is round.
+    """
+    close_m = radius_m + 0.5 * CELL_M + SKIN_M
+    barred_m = (radius_m if half_width_m is None else half_width_m) - TIGHT_M
     prices = []
     for near in range(256):
         clear_m = (REACH - near / NEAR_PER_CELL) * CELL_M

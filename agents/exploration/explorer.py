@@ -107,4 +107,4 @@ class Explore:
 
     def _plan(self, mapping: Mapping) -> None:
         keepout = self._mission.leading.keepout_m
-        self.planner = Planner(mapping.grid, self._goal, self._mission.radius_m, keepout)
+        self.planner = Planner(mapping.grid, self._goal, self._mission.radius_m, keepout, self._mission.half_width_m)

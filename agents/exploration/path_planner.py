@@ -49,11 +49,13 @@ class Planner:
     none.
     """
 
-    def __init__(self, grid: Grid, goal: Point, radius_m: float, keepout: Sequence[Box] = ()) -> None:
+    def __init__(
+        self, grid: Grid, goal: Point, radius_m: float, keepout: Sequence[Box] = (), half_width_m: float | None = None
+    ) -> None:
         self._grid = grid
         self.goal = goal
         """Goal in `map`; where it moves on, the present route holds until a new one is found."""
-        self._prices = prices_of(radius_m)
+        self._prices = prices_of(radius_m, half_width_m)
         self._apart_m = 2.0 * radius_m + MATE_GAP_M
         self._keepout = [run for box in keepout for run in runs_of(grid, box)]
         self._search: Iterator[int] | None = None

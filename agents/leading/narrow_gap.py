@@ -14,13 +14,16 @@ BODIES, ROOM_M = 2.0, 0.6
 """A gap is narrow below this number of bodies and this room [m] beside them."""
 
 
-def narrow_gap_m(points: Sequence[Point], route: Callable[[float], Point], radius_m: float) -> float | None:
+def narrow_gap_m(
+    points: Sequence[Point], route: Callable[[float], Point], radius_m: float, half_width_m: float | None = None
+) -> float | None:
     """Return the width [m] of the narrowest gap ahead that only a column passes; None when there is none. What no body
     passes is no gap: the route leads through an obstacle there, and a detour round it.
 
-    `points` are in `base_link`, and so is `route(s)`, the point `s` [m] ahead on the route.
+    `points` are in `base_link`, and so is `route(s)`, the point `s` [m] ahead on the route. `half_width_m` is the room
+    that a body needs to either side of a straight way; None: it is round.
     """
-    narrowest = 2.0 * BODIES * radius_m + ROOM_M
+    narrowest, least = 2.0 * BODIES * radius_m + ROOM_M, 2.0 * (radius_m if half_width_m is None else half_width_m)
     found = None
     for n in range(1, round(LOOK_M / STEP_M) + 1):
         x, y = route(n * STEP_M)
@@ -32,6 +35,6 @@ def narrow_gap_m(points: Sequence[Point], route: Callable[[float], Point], radiu
                     left = aside
                 elif right < aside < 0.0:
                     right = aside
-        if left < BESIDE_M and right > -BESIDE_M and 2.0 * radius_m <= left - right < narrowest:
+        if left < BESIDE_M and right > -BESIDE_M and least <= left - right < narrowest:
             found = narrowest = left - right
     return found

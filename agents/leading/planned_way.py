@@ -13,7 +13,9 @@ from lfa.agents.exploration.explorer import Explore
 from lfa.agents.exploration.occupancy_grid import Mapping
 from lfa.agents.following.factory import heading_filter_of
 from lfa.agents.leading.path_follower import PathFollower
+from lfa.agents.perception.footprint import PolygonBody
 from lfa.agents.perception.scan import Point, without
+from lfa.agents.recovery.run_up import RunUp
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, in_base
 from lfa.protocol.mission import Mission
 
@@ -42,7 +44,10 @@ class PlannedWay:
             leading, mission.limits, mission.radius_m, mission.control_period_s, slots_swing=swings
         )
         self._radius_m = mission.radius_m
-        self._arcs = ArcPlanner(mission.radius_m, mission.limits)
+        footprint = PolygonBody.of(mission)
+        self._arcs = ArcPlanner(mission.radius_m, mission.limits, footprint)
+        self._run_up = None if footprint is None else RunUp()
+        """Run-ups of a polygon; a round body needs none."""
         self._blocked: tuple[float, Pose2D] | None = None
         """Time [s] and place at which no arc led on first; None since the robot has left it."""
         self._mates: Sequence[Pose2D] = ()
@@ -74,6 +79,10 @@ class PlannedWay:
         swing = self.lead.slots_swing and not alone
         turn_radps = TEAM_RADPS if swing else inf
         twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps, self.lead.bend_mps)
+        if self._run_up is not None:
+            backs = self._run_up.step(pose, self._arcs.back(points), blocked=self._arcs.blocked)
+            if backs is not None:
+                return backs
         if self._blocked is not None and distance(self._blocked[1], pose) > self._radius_m:
             self._blocked = None
         if self._arcs.blocked:

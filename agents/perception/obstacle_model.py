@@ -36,10 +36,11 @@ TURN_MPS = 0.05
 class ObstacleModel:
     """Obstacle model of one robot. `ground` is the floor as far as sensed."""
 
-    def __init__(self, radius_m: float, limits: Limits, shared: SharedObstacles) -> None:
+    def __init__(self, radius_m: float, limits: Limits, shared: SharedObstacles, *, polygon: bool = False) -> None:
+        """Create an empty model; a body that is a `polygon` has corners where its scanner may not look."""
         self._radius_m = radius_m
         self._shared = shared
-        self._scan = Surroundings()
+        self._scan = Surroundings(remembers=polygon)
         self._tracker = Tracker()
         self.ground = GroundMap(limits)
 

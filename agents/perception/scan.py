@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, atan2, cos, hypot, inf, pi, sin, sqrt
+from math import acos, atan2, cos, hypot, inf, isnan, pi, sin, sqrt
 
-from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.geometry import TAU, Pose2D, Twist, in_base
 from lfa.protocol.messages.robot import LaserScan
 
 SIGHT_M = 5.0
@@ -17,14 +17,27 @@ cell of the explorer's map, so that no reading marks the robot's own cell."""
 ROUNDED = 1.0 + 1e-9
 """Factor that covers the rounding error of a square."""
 
+KEPT_M, KEPT_S, KEPT_CELL_M = 0.8, 30.0, 0.03
+"""Distance [m] to the robot and time [s] up to which a point is kept on which no beam falls any more, and size [m] of
+the cells of which each keeps one."""
+BLIND_RAD = 0.05
+"""Angle [rad] beside a direction within which no beam looks, where the scanner does not."""
+
 Point = tuple[float, float]
 
 
 class Surroundings:
     """Points of the newest scan, kept in `map` so that they stay in place while the robot moves on."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, remembers: bool = False) -> None:
+        """Create an empty one; with `remembers`, what is close beside the robot is kept where its scanner does not
+        look.
+        """
+        self._remembers = remembers
         self._points_map: list[Point] = []
+        self._unseen: dict[tuple[int, int], tuple[Point, float]] = {}
+        """Points [m] in `map` close to the robot that the newest scan cannot show, by their cell, with the time [s] at
+        which they were seen."""
         self.seen_at: float | None = None
         self.reach_m = SIGHT_M
         """Range [m] up to which that scan has points: the scanner's own, if it is less than `SIGHT_M`."""
@@ -36,12 +49,26 @@ class Surroundings:
         x, y, angle, step = pose_map.x, pose_map.y, pose_map.theta + scan.angle_min, scan.angle_increment
         low, high = max(scan.range_min_m, READING_M_MIN), min(SIGHT_M, scan.range_max_m)
         self.reach_m, self.step_rad = high, abs(step)
+        if self._remembers:
+            self._remember(scan, pose_map, now)
         self._points_map = [
             (x + r * cos(angle + i * step), y + r * sin(angle + i * step))
             for i, r in enumerate(scan.ranges_m)
             if low < r < high
         ]
         self.seen_at = now
+
+    def _remember(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
+        """Keep the points of the last scan, and of those before, on which no beam of this one falls."""
+        beams, step, aside = scan.ranges_m, scan.angle_increment, int(BLIND_RAD / max(abs(scan.angle_increment), 1e-3))
+        known = {(round(x / KEPT_CELL_M), round(y / KEPT_CELL_M)): ((x, y), now) for x, y in self._points_map}
+        self._unseen = {
+            cell: (point, at)
+            for cell, (point, at) in (self._unseen | known).items()
+            if now - at < KEPT_S
+            and hypot(point[0] - pose_map.x, point[1] - pose_map.y) < KEPT_M
+            and _is_blind(beams, step, aside, in_base(pose_map, point), scan.angle_min)
+        }
 
     @property
     def points_map(self) -> list[Point]:
@@ -56,7 +83,13 @@ class Surroundings:
             (c * dx + s * dy, c * dy - s * dx)
             for px, py in self._points_map
             if (dx := px - x) * dx + (dy := py - y) * dy < limit
-        ]
+        ] + [in_base(pose_map, point) for point, _ in self._unseen.values()]
+
+
+def _is_blind(beams: Sequence[float], step: float, aside: int, point: Point, angle_min: float) -> bool:
+    """Return whether no beam of a scan looks in the direction of `point` in `base_link`, or within `aside` beams."""
+    place = round(((atan2(point[1], point[0]) - angle_min) % TAU) / step) if step else 0
+    return all(isnan(beams[n]) for n in range(max(0, place - aside), min(len(beams), place + aside + 1)))
 
 
 def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Point]:

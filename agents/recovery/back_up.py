@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from math import atan2, cos, hypot, pi, sin
 
 from lfa.agents.avoidance.safety import SKIN_M
+from lfa.agents.perception.footprint import PolygonBody
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Pose2D, Twist, in_base, wrap
 
@@ -36,7 +37,9 @@ BEYOND_M = 1.0
 class BackUp:
     """Trail of one robot, and the way back along it once `begin` was called."""
 
-    def __init__(self) -> None:
+    def __init__(self, footprint: PolygonBody | None = None) -> None:
+        """Create a trail; `footprint` is None for a round body."""
+        self._footprint = footprint
         self._trail: deque[Point] = deque(maxlen=round(TRAIL_M / STEP_M))
         self._left_m: float | None = None
         self._at: Point | None = None
@@ -80,7 +83,11 @@ class BackUp:
         x, y = in_base(pose, self._trail[-1])
         reach = max(hypot(x, y), AHEAD_M)
         twist = Twist(-BACK_MPS, -BACK_MPS * 2.0 * y / (reach * reach))
-        if x < 0.0 and free_along(points, twist, radius_m + SKIN_M) > ROOM_M:
+        if self._footprint is None:
+            free_m = free_along(points, twist, radius_m + SKIN_M)
+        else:
+            free_m = self._footprint.free_along(points, twist, SKIN_M)
+        if x < 0.0 and free_m > ROOM_M:
             return twist
         return back_to(points, (x, y), radius_m)
 

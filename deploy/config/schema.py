@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import msgspec
 import typer
-from msgspec import NODEFAULT, Struct
+from msgspec import NODEFAULT, UNSET, Struct, UnsetType
 from msgspec.structs import FieldInfo, fields
 
 from lfa.agents.following.controller import CONTROLLERS, find_controller
@@ -157,7 +157,7 @@ def _type(kind: Any) -> str:
     if origin is Literal:
         return " or ".join(f'"{value}"' for value in arguments)
     if origin in (Union, UnionType):
-        return " or ".join(_type(argument) for argument in arguments if argument is not type(None))
+        return " or ".join(_type(argument) for argument in arguments if argument not in (type(None), UnsetType))
     if origin is tuple:
         inner = [_type(argument) for argument in arguments if argument is not Ellipsis]
         return f"list of {inner[0]}" if Ellipsis in arguments else f"[{', '.join(inner)}]"
@@ -174,7 +174,7 @@ def _default(field: FieldInfo) -> str:
     )
     if value is NODEFAULT:
         return ""
-    if value is None:
+    if value is None or value is UNSET:
         return "not given"
     return msgspec.json.encode(value).decode()
 

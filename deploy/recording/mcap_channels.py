@@ -15,7 +15,7 @@ from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType
 
 NonFinite = Literal["inf", "-inf", "nan"]
 Number = float | NonFinite
@@ -53,7 +53,7 @@ def plain(value: Any) -> Any:
     if not issubclass(kind, Struct):
         return str(value)
     tag, names = _fields(kind)
-    fields = {name: plain(getattr(value, name)) for name in names}
+    fields = {name: plain(member) for name in names if (member := getattr(value, name)) is not UNSET}
     return fields if tag is None else {"type": tag, **fields}
 
 
@@ -63,7 +63,7 @@ def restore(body: bytes, kind: type[Struct]) -> Any:
 
 
 def _restored(value: Any, annotation: Any) -> Any:
-    if value is None or annotation is Any:
+    if value is None or value is UNSET or annotation is Any:
         return value
     if annotation is float:
         return float(value)
@@ -186,7 +186,10 @@ def shape(kind: type[Struct]) -> type[Struct]:
     """Return the type of the JSON that `encode` writes for `kind`: same fields by name, floats as `Number`."""
     hints = get_type_hints(kind)
     config = kind.__struct_config__
-    fields = [(name, _shape_of(hints[name])) for name in kind.__struct_fields__]
+    fields = [
+        (name, _shape_of(hints[name]), *((UNSET,) if UnsetType in get_args(hints[name]) else ()))
+        for name in kind.__struct_fields__
+    ]
     return msgspec.defstruct(kind.__name__, fields, tag=config.tag, namespace={"__doc__": kind.__doc__}, gc=False)
 
 

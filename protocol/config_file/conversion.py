@@ -8,7 +8,7 @@ from types import UnionType
 from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import msgspec
-from msgspec import NODEFAULT, Struct
+from msgspec import NODEFAULT, Struct, UnsetType
 from msgspec.structs import FieldInfo, fields
 
 from lfa.protocol.config_file.mistake import Mistake, shown, wrong
@@ -129,9 +129,9 @@ def _hints(struct: type[Struct]) -> dict[str, Any]:
 
 
 def _given(kind: Any) -> Any:
-    """Return `kind` without None: for `float | None` the type of a value that is given."""
+    """Return `kind` without None and UNSET: for `float | None` the type of a value that is given."""
     if get_origin(kind) in (Union, UnionType):
-        return Union[tuple(one for one in get_args(kind) if one is not type(None))]  # noqa: UP007
+        return Union[tuple(one for one in get_args(kind) if one not in (type(None), UnsetType))]  # noqa: UP007
     return kind
 
 

@@ -18,7 +18,7 @@ UNSAID_WIRE = 5
 WIRE_ADDS: dict[int, tuple[str, ...]] = {
     6: (
         *("Prepare.wire", "Propose.wire", "Hello.wire", "CmdVel.grant_s", "Sensors.grant_s", "Propose.grant_ms"),
-        "StopReport.robots",
+        *("StopReport.robots", "MissionNote.footprint_m"),
     ),
 }
 """Fields that each version adds, at the end of their messages and with a default: earlier versions skip them."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
-from msgspec import Struct
+from msgspec import UNSET, Meta, Struct
+from msgspec.structs import replace
 
 from lfa.protocol.geometry import Number, Pose2D, Twist
 from lfa.protocol.messages.consensus import Role, Term
 from lfa.protocol.messages.header import Count, Header, Stamp
-from lfa.protocol.mission import Mission
+from lfa.protocol.mission import FOOTPRINT_CORNERS_MAX, Mission
 
 
 class PoseStamped(Struct, frozen=True, array_like=True, tag="pose"):
@@ -125,8 +126,21 @@ class PlanNote(Struct, frozen=True, array_like=True, tag="plan"):
 
 
 class MissionNote(Struct, frozen=True, array_like=True, tag="mission"):
+    """Mission for the robots. Its footprint stands beside it, where the version before skips it (E35)."""
+
     header: Header
     mission: Mission
+    footprint_m: Annotated[tuple[tuple[Number, Number], ...], Meta(max_length=FOOTPRINT_CORNERS_MAX)] = ()
+
+    @classmethod
+    def of(cls, header: Header, mission: Mission) -> MissionNote:
+        """Return the note that tells `mission`."""
+        return cls(header, replace(mission, footprint_m=UNSET), mission.footprint_m or ())
+
+    @property
+    def whole(self) -> Mission:
+        """Return the mission with the footprint."""
+        return replace(self.mission, footprint_m=self.footprint_m) if self.footprint_m else self.mission
 
 
 class Ask(Struct, frozen=True, array_like=True, tag="ask"):

@@ -1,5 +1,7 @@
 """A mission that no team could obey is refused with one line: field, value, what would be right."""
 
+from math import cos, sin
+
 import msgspec
 import pytest
 
@@ -38,6 +40,14 @@ REFUSED += [
         ({"motion": "path_following"}, "left out without"),
     )
 ]
+
+BODIES = (
+    (((0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1)), "around the origin"),
+    (((0.1, 0.1), (0.1, -0.1), (-0.1, -0.1), (-0.1, 0.1)), "counter-clockwise"),
+    (((0.2, 0.1), (-0.2, 0.1), (-0.2, -0.1), (0.2, -0.1)), "mission.radius_m = 0.15: must be at least 0.2236"),
+    (tuple((0.1 * cos(0.1 * n), 0.1 * sin(0.1 * n)) for n in range(62)), "62 corners: must be at most 32"),
+)
+REFUSED += [(msgspec.structs.replace(GOOD, footprint_m=corners), says) for corners, says in BODIES]
 
 
 @pytest.mark.parametrize(("mission", "says"), REFUSED, ids=[says for _, says in REFUSED])

@@ -9,14 +9,13 @@ from math import hypot, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, Rule, out_of_range, wrong
 from lfa.protocol.geometry import TAU, convex
+from lfa.protocol.mission_checks import footprint_mistakes
 from lfa.protocol.names import robot_name
 from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Scenario
 from lfa.world.description.terrain import feature_mistakes, features
 
 ROBOTS_MAX = 1000
 LENGTH_M_MIN = 0.001
-REACH_M = 1e-3
-"""Rounding [m] of a radius that a corner may lie outside of."""
 BEAMS_MIN, BEAMS_MAX = 4, 4096
 """Bounds of the number of beams of a scanner; a robot without one has 0."""
 SEEING_MOTIONS = ("reactive", "explore")
@@ -69,21 +68,15 @@ def _assertions(scenario: Scenario) -> Iterator[Mistake]:
 
 
 def _footprint(scenario: Scenario) -> Iterator[Mistake]:
-    """Find a body that is not convex, does not hold `base_link`, or is larger than the circle kept free for it."""
-    where, corners, radius_m = "world.body.footprint_m", scenario.world.body.footprint_m, scenario.mission.radius_m
+    """Find a body that is none, or another one than the robots are told of."""
+    where, corners, told = "world.body.footprint_m", scenario.world.body.footprint_m, scenario.mission.footprint_m
     if not corners:
         return
-    value = [list(corner) for corner in corners]
-    sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
-    if not (all(isfinite(c) for corner in corners for c in corner) and convex(corners)):
-        yield wrong(where, value, "at least three corners of a convex polygon, counter-clockwise")
-    elif any(ax * by - ay * bx <= 0.0 for (ax, ay), (bx, by) in sides):
-        yield wrong(where, value, "around the origin [0, 0], where base_link is")
+    if told and told != corners:
+        right = "that of mission.footprint_m, or left out"
+        yield wrong(where, [list(corner) for corner in corners], right, "mission.footprint_m")
     else:
-        reach_m = max(hypot(x, y) for x, y in corners)
-        if radius_m < reach_m - REACH_M:
-            right = f"at least {reach_m:.4g}, the distance of the farthest corner of {where}"
-            yield wrong("mission.radius_m", radius_m, right, where)
+        yield from footprint_mistakes(where, corners, scenario.mission.radius_m)
 
 
 def _mount(scenario: Scenario) -> Iterator[Mistake]:

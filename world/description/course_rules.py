@@ -49,7 +49,7 @@ def _goal(scenario: Scenario) -> Iterator[Mistake]:
     yield from _covered(scenario, goal, f"the goal at ({goal[0]:.2f}, {goal[1]:.2f})")
     missed = None
     if not any(_in_wall(scenario, place) for place in ((first.x, first.y), goal)):  # of which a line is said already
-        missed = parted(((first.x, first.y), *route), scenario.world.walls_m, mission.radius_m)
+        missed = parted(((first.x, first.y), *route), scenario.world.walls_m, mission.half_width_m)
     if missed == goal:
         yield wrong("mission.leading.route_m", value, f"a goal that can be reached, walls part it from {start}")
     elif missed is not None:

@@ -107,7 +107,7 @@ def load(
         raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
     apply_rules(MISSION_RULES, scenario.mission, mistakes)
     apply_rules((*SCENARIO_RULES, SENSOR_RULE), scenario, mistakes)
-    scenario = _on_map(scenario, path.parent, mistakes)
+    scenario = _on_map(_embodied(scenario), path.parent, mistakes)
     apply_rules((COURSE_RULE, *rules), scenario, mistakes)
     if mistakes:
         raise RefusedFile(_error(file, mistake, keys, robots) for mistake in mistakes)
@@ -134,10 +134,22 @@ def _checked(scenario: Scenario, seed: int, rules: Sequence[Rule[Scenario]] = ()
     assert scenario.generator is not None
     drawn, mistakes = generated(scenario, seed)
     apply_rules(MISSION_RULES, drawn.mission, mistakes)
-    apply_rules((*SCENARIO_RULES, SENSOR_RULE, *rules, COURSE_RULE), drawn, mistakes)
+    apply_rules((*SCENARIO_RULES, SENSOR_RULE), drawn, mistakes)
+    drawn = _embodied(drawn)
+    apply_rules((*rules, COURSE_RULE), drawn, mistakes)
     if mistakes:
         raise refuse(scenario.generator.name, seed, mistakes)
     return drawn
+
+
+def _embodied(scenario: Scenario) -> Scenario:
+    """Return `scenario` with one polygon for the simulated bodies and for what the robots know of them."""
+    mission, world = scenario.mission, scenario.world
+    if not (mission.footprint_m or world.body.footprint_m):
+        return scenario
+    corners = mission.footprint_m or world.body.footprint_m
+    body = replace(world.body, footprint_m=corners)
+    return replace(scenario, mission=replace(mission, footprint_m=corners), world=replace(world, body=body))
 
 
 def _beside_generator(scenario: Scenario) -> list[Mistake]:

@@ -60,7 +60,7 @@ class Body(Struct, frozen=True, forbid_unknown_fields=True):
     wheel_radius_m: float = 0.05
     footprint_m: tuple[Point, ...] = ()
     """Corners x, y [m] of a body that is a convex polygon, in `base_link`, counter-clockwise around its origin. Empty:
-    the body is round."""
+    that of `mission.footprint_m`, else the body is round. The robots know it, as if their mission had it."""
 
 
 class Lidar(Struct, frozen=True, forbid_unknown_fields=True):

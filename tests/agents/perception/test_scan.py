@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from lfa.agents.perception.scan import SIGHT_M, Surroundings, free_along, without
+from lfa.agents.perception.scan import KEPT_M, KEPT_S, SIGHT_M, Surroundings, free_along, without
 from lfa.protocol.geometry import Pose2D, Twist, along_arc
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import LaserScan
@@ -87,3 +87,41 @@ def test_points_beyond_a_limit_of_the_free_way_do_not_change_it(points: list[tup
 def test_the_free_way_among_points_ends_at_the_first_of_them(points: list[tuple[float, float]], bend: float) -> None:
     arc = Twist(0.5, 0.5 * bend)
     assert free_along(points, arc, 0.2) == min((free_along([point], arc, 0.2) for point in points), default=inf)
+
+
+BEHIND = scan(inf, inf, 0.5, inf)
+BLIND_BEHIND = scan(inf, inf, nan, inf)
+
+
+def test_a_polygon_remembers_what_is_close_where_its_scanner_does_not_look() -> None:
+    seen = Surroundings(remembers=True)
+    seen.scan(BEHIND, Pose2D(), 0.0)
+    seen.scan(BLIND_BEHIND, Pose2D(0.1, 0.0, 0.0), 0.1)
+    [(x, y)] = seen.points(Pose2D(0.1, 0.0, 0.0))
+    assert abs(x + 0.6) < 1e-9
+    assert abs(y) < 1e-9
+
+
+def test_what_a_beam_looks_through_is_not_remembered() -> None:
+    seen = Surroundings(remembers=True)
+    seen.scan(BEHIND, Pose2D(), 0.0)
+    seen.scan(scan(inf, inf, inf, inf), Pose2D(), 0.1)
+    assert seen.points(Pose2D()) == []
+
+
+def test_what_is_far_or_was_seen_long_ago_is_not_remembered() -> None:
+    seen = Surroundings(remembers=True)
+    seen.scan(BEHIND, Pose2D(), 0.0)
+    seen.scan(BLIND_BEHIND, Pose2D(KEPT_M, 0.0, 0.0), 0.1)
+    assert seen.points(Pose2D()) == []
+    seen.scan(BEHIND, Pose2D(), 1.0)
+    seen.scan(BLIND_BEHIND, Pose2D(), 1.1)
+    seen.scan(BLIND_BEHIND, Pose2D(), 1.1 + KEPT_S)
+    assert seen.points(Pose2D()) == []
+
+
+def test_a_round_robot_knows_its_newest_scan_only() -> None:
+    seen = Surroundings()
+    seen.scan(BEHIND, Pose2D(), 0.0)
+    seen.scan(BLIND_BEHIND, Pose2D(), 0.1)
+    assert seen.points(Pose2D()) == []

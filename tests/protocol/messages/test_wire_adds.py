@@ -13,7 +13,8 @@ from msgspec import structs
 from lfa.protocol.messages import codec, consensus
 from lfa.protocol.messages.consensus import Hello, LeaseNote, Member, Prepare, Propose, Term, Version
 from lfa.protocol.messages.header import UNSAID_WIRE, WIRE_ADDS, WIRE_VERSION, Header
-from lfa.protocol.mission import Mission
+from lfa.protocol.messages.team import MissionNote
+from lfa.protocol.mission import Leading, Mission
 
 BEFORE = json.loads((Path(__file__).parent / "wire_5.json").read_text())
 """Fields of each message, and of each struct in one, in the version before."""
@@ -81,3 +82,17 @@ def test_e35_a_message_of_the_version_before_says_by_its_silence_which_it_is(bod
     note = codec.decode(msgspec.msgpack.encode([tag, header, values[: len(kept) + 1]]), LeaseNote)
     assert isinstance(note, LeaseNote)
     assert note.body == structs.replace(body, wire=UNSAID_WIRE)
+
+
+def test_e35_the_version_before_reads_the_mission_of_robots_that_are_polygons_without_their_footprint() -> None:
+    corners = ((0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1))
+    mission = structs.replace(Mission(leading=Leading(route_m=((1.0, 0.0),))), footprint_m=corners)
+    sent = codec.encode(MissionNote.of(HEADER, mission))
+    tag, header, plain, told = msgspec.msgpack.decode(sent)
+    assert "footprint_m" not in plain
+    assert len(told) == len(corners)
+    older = codec.decode(msgspec.msgpack.encode([tag, header, plain]), MissionNote)
+    newer = codec.decode(sent, MissionNote)
+    assert isinstance(older, MissionNote) and isinstance(newer, MissionNote)
+    assert older.whole == structs.replace(mission, footprint_m=msgspec.UNSET)
+    assert newer.whole == mission

@@ -253,3 +253,31 @@ def test_a_body_that_cannot_be_is_refused_in_one_line(corners: str, radius_m: fl
 def test_a_body_that_is_a_polygon_is_taken() -> None:
     world = load("straight", [f"world.body.footprint_m={JACKAL}", "mission.radius_m=0.333"]).world
     assert world.body.footprint_m[0] == (0.254, 0.215)
+
+
+def test_the_robots_know_the_polygon_of_the_simulated_bodies_and_the_other_way_round() -> None:
+    told = load("straight", [f"mission.footprint_m={JACKAL}", "mission.radius_m=0.333"])
+    built = load("straight", [f"world.body.footprint_m={JACKAL}", "mission.radius_m=0.333"])
+    assert told == built
+    assert told.mission.footprint_m == told.world.body.footprint_m != ()
+
+
+def test_robots_are_told_of_no_other_body_than_they_have() -> None:
+    other = "[[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]"
+    with pytest.raises(Refused) as refused:
+        load("straight", [f"mission.footprint_m={other}", f"world.body.footprint_m={JACKAL}", "mission.radius_m=0.333"])
+    assert "must be that of mission.footprint_m" in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("gap_m", "passes"), [(0.53, True), (0.40, False)])
+def test_a_wall_whose_gap_the_polygon_passes_parts_nothing_though_its_circle_would_not(
+    gap_m: float, passes: bool
+) -> None:
+    walls = [[-3, -3, 45, -3], [45, -3, 45, 3], [45, 3, -3, 3], [-3, 3, -3, -3]]
+    walls += [[5, -3, 5, -gap_m / 2], [5, gap_m / 2, 5, 3]]
+    keys = [f"world.body.footprint_m={JACKAL}", "mission.radius_m=0.333", f"world.walls_m={walls}"]
+    if passes:
+        assert load("straight", keys, robots=1).mission.half_width_m == 0.215
+        return
+    with pytest.raises(Refused, match="can be reached, walls part it"):
+        load("straight", keys, robots=1)
