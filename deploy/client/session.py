@@ -105,8 +105,15 @@ class Subscriber:
         """Names with a liveliness token at the last call of `take`."""
         return {owner for owner, _ in self._tokens}
 
-    def refuse_absent(self, what: str) -> None:
-        """Raise Refused, which names what was asked for, if no process of the fleet had a token at the last `take`."""
+    def refuse_absent(self, what: str, wait_s: float = 0.0) -> None:
+        """Raise Refused, which names what was asked for, if no process of the fleet has a token within `wait_s` [s].
+
+        Without `wait_s` those of the last `take` count. With it, messages that come meanwhile are dropped.
+        """
+        until = clock.now() + wait_s
+        while not self._tokens and clock.now() < until:
+            self.wait(0.05)
+            self.take()
         if not self._tokens:
             fleet = self.fleet
             raise Refused(f"{what}: nothing of fleet {fleet.name} is heard at {fleet.endpoint}; is the fleet running?")

@@ -33,6 +33,8 @@ def command(
     with listen(find(fleet, connect, keys), frozenset({"*/event"})) as subscriber:
         clock.sleep(JOINED_S)
         answer = ask(subscriber, side)
+        if answer is None:
+            subscriber.refuse_absent(f"formation {side}")
     if as_json:
         facts = {"side": side, "acknowledged": answer is not None}
         print_visible(

@@ -22,6 +22,8 @@ from lfa.protocol.transport.message_bus import send
 PERIOD_S = 0.05
 RELEASED_S = 0.55
 """Time [s] without a key after which it counts as released: terminals repeat a held key after half a second."""
+HEARD_S = 3.0
+"""Time [s] within which something of a fleet that runs is heard."""
 HELP = "w forward, s back, a left, d right, space brakes, q quits; the team goes on with its order 2 s after"
 
 #                      v, omega as shares of --speed and --turn
@@ -35,12 +37,13 @@ def command(
     connect: Connect = None,
     keys: Keys = None,
 ) -> int:
-    """Drive until q or Ctrl-C; return 0. Raises Refused without a terminal, or for speeds that are none."""
+    """Drive until q or Ctrl-C; return 0. Raises Refused without a terminal or a fleet, or for speeds that are none."""
     if not (0.0 < speed < float("inf") and 0.0 < turn < float("inf")):
         raise Refused(f"--speed {speed:g} --turn {turn:g}: must be above 0 [m/s, rad/s]")
     if not sys.stdin.isatty():
         raise Refused("teleop needs a terminal: its keys are read one by one")
     with listen(find(fleet, connect, keys), frozenset()) as subscriber:
+        subscriber.refuse_absent("teleop", HEARD_S)
         print_visible(HELP)
         before = termios.tcgetattr(sys.stdin)
         tty.setcbreak(sys.stdin)

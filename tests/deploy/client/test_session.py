@@ -77,7 +77,7 @@ def test_a_fleet_of_which_nothing_is_heard_is_not_there_and_one_without_a_leader
     wake = Wake()
     subscriber = Subscriber(FleetAddress("far", THIRD, ()), cast(ZenohBus, None), Inbox(wake, 1), wake)
     with pytest.raises(Refused, match="pause: nothing of fleet far is heard at tcp"):
-        subscriber.refuse_absent("pause")
+        subscriber.refuse_absent("pause", 0.1)
     subscriber._see_token(PeerUp("robot2", 1))
     subscriber.refuse_absent("pause")
 
