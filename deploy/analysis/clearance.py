@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from math import inf
 
@@ -10,6 +11,8 @@ import numpy as np
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.world.description.load import Scenario
 from lfa.world.description.scenario import Obstacle
+
+Corners = Sequence[tuple[float, float]]
 
 EVERY = 3
 """Step in ground truth records between two checks: a robot moves 6 cm at most in that time."""
@@ -41,7 +44,13 @@ def least_clearance_m(robot: int, seen: RecordedRun, scenario: Scenario) -> floa
 
 def to_things_m(robot: int, seen: RecordedRun, scenario: Scenario) -> float:
     """Return the least distance [m] from a robot's body to a wall or an obstacle, as of `least_clearance_m`."""
-    rows, world = seen.truth[robot][::EVERY], scenario.world
+    rows, world, corners = seen.truth[robot][::EVERY], scenario.world, scenario.mission.footprint_m
+    if corners:
+        gaps = [
+            _from_polygon(rows, corners, obstacle, seen.obstacles.get(n)) for n, obstacle in enumerate(world.obstacles)
+        ]
+        gaps += [_between(rows[:, 1], rows[:, 2], rows[:, 3], corners, wall) for wall in world.walls_m]
+        return min((float(gap.min()) for gap in gaps), default=inf)
     gaps = [
         _to_obstacle(rows, obstacle, seen.obstacles.get(index)) for index, obstacle in enumerate(world.obstacles)
     ] + [_to_segment(rows[:, 1], rows[:, 2], *wall) for wall in world.walls_m]
@@ -62,13 +71,46 @@ def _to_mates_m(robot: int, seen: RecordedRun, touching_m: float) -> float:
 
 def _to_obstacle(rows: Array, obstacle: Obstacle, moved: Array | None) -> Array:
     """Return the distances [m] of the robot's centre from an obstacle's surface; 0 inside a polygon."""
-    x, y = rows[:, 1] - obstacle.center_m[0], rows[:, 2] - obstacle.center_m[1]
-    if moved is not None:
-        x = rows[:, 1] - np.interp(rows[:, 0], moved[:, 0], moved[:, 1])
-        y = rows[:, 2] - np.interp(rows[:, 0], moved[:, 0], moved[:, 2])
+    x, y = _from_centre(rows, obstacle, moved)
     if obstacle.radius_m is not None:
         return np.asarray(np.hypot(x, y) - obstacle.radius_m)
+    return _to_polygon(x, y, obstacle.corners_m or ())
+
+
+def _from_polygon(rows: Array, body: Corners, obstacle: Obstacle, moved: Array | None) -> Array:
+    """Return the distances [m] of a body that is a polygon from an obstacle's surface."""
+    x, y = _from_centre(rows, obstacle, moved)
+    theta = rows[:, 3]
+    if obstacle.radius_m is not None:
+        return np.asarray(_to_polygon(*_in_body(x, y, theta, 0.0, 0.0), body) - obstacle.radius_m)
     corners = obstacle.corners_m or ()
+    sides = pairwise((*corners, corners[0]))
+    return np.asarray(np.min([_between(x, y, theta, body, (*a, *b)) for a, b in sides], axis=0))
+
+
+def _between(x: Array, y: Array, theta: Array, body: Corners, side: tuple[float, float, float, float]) -> Array:
+    """Return the distances [m] between bodies at x, y, theta and the segment `side`: one end of either is nearest."""
+    c, s, ends = np.cos(theta), np.sin(theta), (side[:2], side[2:])
+    apart = [_to_segment(x + c * cx - s * cy, y + s * cx + c * cy, *side) for cx, cy in body]
+    return np.asarray(np.min(apart + [_to_polygon(*_in_body(x, y, theta, *end), body) for end in ends], axis=0))
+
+
+def _in_body(x: Array, y: Array, theta: Array, at_x: float, at_y: float) -> tuple[Array, Array]:
+    """Return where a point is as seen from bodies at x, y, theta."""
+    c, s = np.cos(theta), np.sin(theta)
+    return c * (at_x - x) + s * (at_y - y), c * (at_y - y) - s * (at_x - x)
+
+
+def _from_centre(rows: Array, obstacle: Obstacle, moved: Array | None) -> tuple[Array, Array]:
+    """Return the robot's places [m] as seen from an obstacle's centre."""
+    if moved is None:
+        return rows[:, 1] - obstacle.center_m[0], rows[:, 2] - obstacle.center_m[1]
+    at = [np.interp(rows[:, 0], moved[:, 0], moved[:, column]) for column in (1, 2)]
+    return rows[:, 1] - at[0], rows[:, 2] - at[1]
+
+
+def _to_polygon(x: Array, y: Array, corners: Corners) -> Array:
+    """Return the distances [m] of points from a convex polygon; 0 inside of it."""
     ring = list(pairwise((*corners, corners[0])))
     inside = np.all([(bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0.0 for (ax, ay), (bx, by) in ring], axis=0)
     return np.where(inside, 0.0, np.min([_to_segment(x, y, *a, *b) for a, b in ring], axis=0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, pi
 
 import numpy as np
 import pytest
@@ -49,6 +49,27 @@ def test_the_least_clearance_is_from_the_body_to_the_nearest_surface(obstacle: s
     scenario = world(obstacle)
     body_m = scenario.mission.radius_m
     assert least_clearance_m(1, seen(own=straight()), scenario) == pytest.approx(gap_m - body_m, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "turned_rad", "gap_m"),
+    [
+        ("obstacles=[{center_m=[1.5,0.9], radius_m=0.3}]", 0.0, 0.6 - 0.215),
+        (f"obstacles=[{{center_m=[1.5,-1.2], corners_m={SQUARE}}}]", 0.0, 0.7 - 0.215),
+        ("walls_m=[[-1.0,0.4,9.0,0.4]]", 0.0, 0.4 - 0.215),
+        ("walls_m=[[-1.0,0.4,9.0,0.4]]", pi / 2, 0.4 - 0.254),
+        ("walls_m=[[1.5,0.3,1.5,2.0]]", 0.0, 0.3 - 0.215),
+        ("walls_m=[[-1.0,0.4,9.0,0.4]]", pi / 4, 0.4 - (0.254 + 0.215) / 2**0.5),
+    ],
+)
+def test_the_least_clearance_of_a_polygon_is_from_its_nearest_side_or_corner(
+    obstacle: str, turned_rad: float, gap_m: float
+) -> None:
+    body = "body.footprint_m=[[0.254,0.215],[-0.254,0.215],[-0.254,-0.215],[0.254,-0.215]]"
+    scenario = load("straight", [f"world.{obstacle}", f"world.{body}", "mission.radius_m=0.333"], robots=2)
+    rows = straight()
+    rows[:, 3] = turned_rad
+    assert least_clearance_m(1, seen(own=rows), scenario) == pytest.approx(gap_m, abs=0.01)
 
 
 def test_another_robot_counts_once_they_have_been_apart() -> None:
