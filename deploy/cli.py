@@ -142,7 +142,7 @@ COMMANDS = (
     Command("bag", "lfa.deploy.ros.bag", "Write a run as a rosbag2 folder, for ros2 bag play, Foxglove, PlotJuggler.",
           "lfa bag runs/paper_path1-20260101-120000"),
     Command("keys", "lfa.deploy.fleet.keys_command",
-          "Manage certificates and publish rights: init, rotate, revoke, show.",
+          "Manage certificates and publish rights: init, csr, rotate, revoke, show.",
           "lfa keys init keys --robots 12 --hosts a=10.0.0.1,b=10.0.0.2; lfa keys revoke keys robot3"),
     Command("bench", "lfa.deploy.bench.harness.command",
           "Run a benchmark; each figure is printed beside its required value.",

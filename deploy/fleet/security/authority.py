@@ -105,8 +105,10 @@ def certificate_of(path: Path) -> x509.Certificate:
     try:
         found = x509.load_pem_x509_certificate(read_bytes(path, PEM_BYTES_MAX))
         signs = found.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
-    except (OSError, *DAMAGED, x509.ExtensionNotFound, x509.DuplicateExtension) as error:
-        raise Refused(f"{path}: {error}, must be an authority's certificate in PEM") from None
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror or error}, must be an authority's certificate in PEM") from None
+    except (*DAMAGED, x509.ExtensionNotFound, x509.DuplicateExtension):
+        raise Refused(f"{path}: holds none, must be an authority's certificate in PEM") from None
     if not signs:
         raise Refused(f"{path}: is no authority's certificate (basic constraints), must be the one that signs")
     return found

@@ -168,3 +168,10 @@ def test_a_revocation_waits_for_no_signature_of_others(tmp_path: Path, company: 
     assert not (folder / ISSUED / "robot2.key").exists()
     assert (here / "robot1.key").exists()
     assert (folder / ISSUED / "robot3.key").exists()
+
+
+def test_an_authoritys_file_that_is_not_there_is_named_once_and_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "none.pem"
+    with pytest.raises(Refused) as refused:
+        authority.certificate_of(path)
+    assert str(refused.value) == f"{path}: No such file or directory, must be an authority's certificate in PEM"
