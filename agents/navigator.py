@@ -143,9 +143,9 @@ class Navigator:
         if known is not None:
             self._obstacles.update_ground(profile, known[0], now)
 
-    def avoid_trap(self, note: ObstacleNote, now: float) -> None:
+    def avoid_trap(self, note: ObstacleNote) -> None:
         """Keep out of a place in which another robot got stuck."""
-        self._back_out.bar((note.x, note.y), now)
+        self._back_out.bar((note.x, note.y))
 
     def back_out(self, pose: Pose2D) -> None:
         """Start backing out of the place in which the robot is stuck."""
@@ -204,7 +204,7 @@ class Navigator:
             wanted = meant = self._ground_crossing.cross(wanted, now)
             by_law = not (self._follow_slot.catches_up or self._back_out.under_way)
             wanted = self.limits.slow(wanted, role, pose, now, by_law=by_law)
-        self._back_out.keep(pose)
+        self._back_out.keep(pose, now)
         self._watch(role, pose, meant, wanted, now)
         self.last = self.limits.brake(wanted, self.last, points, moving, pose, dt, now)
         self.follower.overridden(self.last)

@@ -47,7 +47,7 @@ class TeamMessages:
                     if least_s is not None:
                         ahead.clock.reported(least_s, now)
             case ObstacleNote(kind="trap"):
-                navigator.avoid_trap(message, now)
+                navigator.avoid_trap(message)
             case ObstacleNote():
                 self._team.obstacles.update(robot, message, now)
             case FormationNote():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from math import inf, pi
+from collections import deque
+from math import hypot, inf, pi
 
 from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.avoidance.detour import Detour
+from lfa.agents.avoidance.safety import SKIN_M
 from lfa.agents.following.follower import Follower
 from lfa.agents.perception.footprint import PolygonBody
-from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.obstacle_model import TRAP_M, ObstacleModel
 from lfa.agents.perception.scan import Point
 from lfa.agents.recovery.back_up import BackUp
 from lfa.agents.recovery.stuck_detector import StuckMonitor
@@ -18,6 +20,8 @@ from lfa.protocol.mission import Mission
 STANDS_S, STANDS_S_MAX = 10.0, 80.0
 """Time [s] for which a robot stands whose way back is barred; then it gives backing out up, and tries to follow. Each
 time it doubles, up to a maximum."""
+TRAPS_MAX = 16
+"""Number of traps in which a robot stands and which it remembers; the oldest is forgotten."""
 
 
 class BackOut:
@@ -35,6 +39,8 @@ class BackOut:
         self._stands_since: float | None = None
         """Time [s] since which the way back is barred; None while it is not."""
         self._patience_s = STANDS_S
+        self._traps: deque[Point] = deque(maxlen=TRAPS_MAX)
+        """Traps in `map` to block once this robot is out of them."""
 
     @property
     def under_way(self) -> bool:
@@ -47,10 +53,14 @@ class BackOut:
             self._stands_since = None
             self._stuck.backing_out = True
 
-    def keep(self, pose: Pose2D) -> None:
-        """Extend the trail by which the robot would back out."""
+    def keep(self, pose: Pose2D, now: float) -> None:
+        """Extend the trail by which the robot would back out, and block the traps that it is out of."""
         if not self._path.under_way:
             self._path.keep(pose)
+        clear_m = TRAP_M + self._mission.radius_m + SKIN_M
+        for x, y in [trap for trap in self._traps if hypot(trap[0] - pose.x, trap[1] - pose.y) >= clear_m]:
+            self._traps.remove((x, y))
+            self._obstacles.avoid_trap(x, y, now)
 
     def step(self, points: list[Point], pose: Pose2D, wanted: Twist, last: Twist, now: float) -> Twist:
         """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out, or has stood
@@ -72,10 +82,13 @@ class BackOut:
         self._path.end()
         self._patience_s = min(2.0 * self._patience_s, STANDS_S_MAX) if gives_up else STANDS_S
         if self._path.trap is not None and not gives_up:
-            self.bar(self._path.trap, now)
+            self.bar(self._path.trap)
         return wanted
 
-    def bar(self, trap: Point, now: float) -> None:
-        """Block `trap` from now on, except for an explorer: it plans on its map, and would be enclosed in a corner."""
-        if self._mission.leading.motion != "explore":
-            self._obstacles.avoid_trap(*trap, now)
+    def bar(self, trap: Point) -> None:
+        """Block `trap` as soon as this robot stands clear of it: the edge of what is blocked would enclose it.
+
+        Not for an explorer: it plans on its map, and would be enclosed in a corner.
+        """
+        if self._mission.leading.motion != "explore" and trap not in self._traps:
+            self._traps.append(trap)

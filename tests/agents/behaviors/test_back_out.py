@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from lfa.agents.avoidance.decision import Action
 from lfa.agents.avoidance.detour import Detour
+from lfa.agents.avoidance.safety import SKIN_M
 from lfa.agents.behaviors.back_out import STANDS_S, STANDS_S_MAX, BackOut
 from lfa.agents.following.factory import follower_of
-from lfa.agents.perception.obstacle_model import ObstacleModel
+from lfa.agents.perception.obstacle_model import TRAP_M, ObstacleModel
 from lfa.agents.recovery.stuck_detector import StuckMonitor
 from lfa.agents.team_state import TeamState
 from lfa.protocol.geometry import STILL, Pose2D, Twist
@@ -29,7 +30,7 @@ class Stuck:
         self.out = BackOut(MISSION, follower_of(MISSION), detour, model, self.monitor)
         self.model = model
         for n in range(21):
-            self.out.keep(Pose2D(0.1 * n))
+            self.out.keep(Pose2D(0.1 * n), self.now)
         self.begin()
 
     def begin(self) -> None:
@@ -65,3 +66,22 @@ def test_each_time_in_one_place_it_stands_twice_as_long_up_to_a_maximum() -> Non
         stood.append(round(stuck.stands_s()))
         stuck.begin()
     assert stood == [10, 20, 40, 80, 80]
+
+
+def test_a_trap_that_reaches_to_the_robot_is_blocked_once_it_stands_clear_of_it() -> None:
+    """Another robot got stuck beside this one, which still has to come out of the same place."""
+    stuck = Stuck()
+    stuck.out.bar((HERE.x + TRAP_M, HERE.y))
+    stuck.out.keep(HERE, stuck.now)
+    assert stuck.model.points(HERE) == []
+    clear = Pose2D(HERE.x - MISSION.radius_m - SKIN_M - 0.01)
+    stuck.out.keep(clear, stuck.now)
+    assert stuck.model.points(clear) != []
+
+
+def test_a_robot_that_counts_as_out_for_want_of_a_trail_is_not_enclosed_in_its_own_trap() -> None:
+    stuck = Stuck()
+    while stuck.out.under_way:  # moved along its trail to its beginning, which lies within the trap
+        stuck.out.step([], Pose2D(0.3), AHEAD, STILL, stuck.now)
+    stuck.out.keep(Pose2D(HERE.x - 0.5), stuck.now)
+    assert stuck.model.points(HERE) == []
