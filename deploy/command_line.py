@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO, errno.EISDIR, errno.ENOTDIR)
 """errno values of a file system that refuses a write during a run: not an error of the program (exit code 1)."""
-NAMES = (errno.ENAMETOOLONG, errno.ELOOP)
-"""errno values of a path that cannot exist: bad input (exit code 2)."""
+NAMES = (errno.ENAMETOOLONG, errno.ELOOP, errno.ENOENT)
+"""errno values of a path that cannot exist, or in a folder that does not: bad input (exit code 2)."""
 
 
 def run_cli(name: str, app: typer.Typer) -> int:
@@ -53,7 +53,7 @@ def _guarded(name: str, call: Callable[[], int]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        if error.errno in NAMES:
+        if error.errno in NAMES and error.filename:
             return print_errors(name, f"{error.filename}: {error.strerror}: must be the path of a file or a folder")
         if error.errno not in DISK:
             raise

@@ -12,6 +12,8 @@ import pytest
 
 from lfa.deploy import completion
 from lfa.deploy.cli import COMMANDS, overview
+from lfa.deploy.command_line import command_app, run_cli
+from lfa.deploy.whole_output import whole_file
 from lfa.world.description.load import shipped
 
 LFA = (sys.executable, "-c", "from lfa.deploy.cli import main; main()")
@@ -34,6 +36,21 @@ def test_a_path_that_nothing_can_have_is_refused_in_one_line() -> None:
     assert done.stderr.startswith(f"lfa: {'n' * 300}")
     assert done.stderr.endswith("File name too long: must be the path of a file or a folder\n")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_file_in_a_folder_that_is_not_there_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As by `lfa view RUN --html none/clip.html`."""
+
+    def write() -> None:
+        with whole_file(tmp_path / "none/clip.html") as fresh:
+            fresh.write_text("")
+
+    monkeypatch.setattr("sys.argv", ["lfa"])
+    assert run_cli("lfa", command_app(write, "", "")) == 2
+    right = "No such file or directory: must be the path of a file or a folder"
+    assert capsys.readouterr().err == f"lfa: {tmp_path}/none/clip.html: {right}\n"
 
 
 @pytest.mark.parametrize("asked", ["--help", "--version", "list"])
