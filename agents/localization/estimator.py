@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from lfa.agents.localization.clock_offset import ClockOffset
 from lfa.agents.localization.covariance import Covariance
-from lfa.agents.localization.plausibility import FrozenOdometry, plausible
+from lfa.agents.localization.plausibility import FrozenOdometry, HungLocalization, plausible
 from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, compose, inverse, part_of_arc, slowed, wrap
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import Localization, Sensors
@@ -74,7 +74,7 @@ class Estimator:
         self._noise = noise
         self._odometry_s_max = odometry_s_max
         self._clock = ClockOffset()
-        self._wheels = FrozenOdometry()
+        self._wheels, self._hung = FrozenOdometry(), HungLocalization()
         self._incarnation: int | None = None
         self._history: deque[_Odometry] = deque(maxlen=ODOMETRY_KEPT)
         self._map_odom: Pose2D | None = None
@@ -120,7 +120,9 @@ class Estimator:
         if not (isfinite(stamp) and plausible(fix.pose_map, Twist()) and sure):
             self.refused += 1
             return False
-        if self._history and stamp < self._history[0].stamp:
+        if self._history and (
+            stamp < self._history[0].stamp or self._hung.update(fix.pose_map, self._history[-1].pose_odom)
+        ):
             self.refused += 1
             return False
         self.last_fix_at = received_at
@@ -192,7 +194,7 @@ class Estimator:
     def _restart(self, incarnation: int) -> None:
         """Restart for a new driver, or one with a new clock: `odom` may be another."""
         self._incarnation = incarnation
-        self._clock, self._wheels = ClockOffset(), FrozenOdometry()
+        self._clock, self._wheels, self._hung = ClockOffset(), FrozenOdometry(), HungLocalization()
         self._history.clear()
         self._map_odom = None
         self._pending = None
@@ -201,6 +203,7 @@ class Estimator:
     def _correct(self, fix: Localization) -> None:
         odometry = _at(self._history, fix.header.stamp)
         if self._map_odom is None:
+            self._unfixed_m = 0.0
             self._relocate(fix, odometry)
             return
         predicted = compose(self._map_odom, odometry.pose_odom)
@@ -250,10 +253,13 @@ class Estimator:
             self._relocate(fix, odometry)
 
     def _relocate(self, fix: Localization, odometry: _Odometry) -> None:
+        """Place the robot at `fix`. How far it has driven without a fix is forgotten at the next that agrees only: a
+        localization that hangs contradicts the wheels again and again.
+        """
         self._map_odom = compose(fix.pose_map, inverse(odometry.pose_odom))
         self._fix_at = odometry
         self._covariance = Covariance(*self._fix_variances(fix))
-        self._outliers_in_a_row, self._unfixed_m = 0, 0.0
+        self._outliers_in_a_row = 0
 
 
 def _near(step: Pose2D, noise: EstimatorNoise) -> bool:

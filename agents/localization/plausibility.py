@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfa.protocol.geometry import Pose2D, Twist
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, distance, wrap
 
 POSITION_MAX_M = 1e6
 SPEED_MAX = 50.0
@@ -22,22 +22,77 @@ def plausible(pose: Pose2D, twist: Twist) -> bool:
 
 FROZEN_S = 0.5
 """Time [s] after which odometry that says it moves, and has not moved, is an old one that is said again."""
-MOVES_MPS, MOVES_RADPS = 0.05, 0.1
-"""Speeds [m/s, rad/s] beyond which odometry must have moved within `FROZEN_S`: any encoder counts centimetres."""
+FROZEN_M = 0.1
+"""Way [m], or turn by `TURN_M_PER_RAD`, by the said speeds after which a pose must have moved along: within `FROZEN_S`
+of driving at 0.2 m/s. Less counts centimetres of an encoder, or what jitters about one place."""
+FROZEN_SHARE = 0.2
+"""Least share of the said way that a pose has moved."""
+REST_MPS, REST_RADPS = 0.05, 0.1
+"""Speeds [m/s, rad/s] below which odometry says that the robot rests."""
+TURN_M_PER_RAD = 0.3
+"""Way [m] that a turn of one radian counts as."""
+GAP_S_MAX = 0.5
+"""Time [s] between two messages for which the speed of the later one is taken to have held."""
 
 
 class FrozenOdometry:
-    """Whether one robot's odometry repeats itself under fresh stamps, as a driver does that has lost its wheels."""
+    """Whether one robot's odometry stays where it is while it says that it moves, as a driver's does that has lost its
+    wheels.
+    """
 
     def __init__(self) -> None:
-        self._pose: Pose2D | None = None
-        self._moved_at = 0.0
+        self._from: Pose2D | None = None
+        """Pose from which the ways are counted."""
+        self._said = Pose2D()
+        """Motion since then by the said speeds."""
+        self._from_at = self._stamp = 0.0
         self.frozen = False
 
     def update(self, pose: Pose2D, twist: Twist, stamp: float) -> bool:
         """Update with odometry of `stamp` [s]; return `frozen`."""
-        rests = abs(twist.linear_x) < MOVES_MPS and abs(twist.angular_z) < MOVES_RADPS
-        if rests or pose != self._pose:
-            self._pose, self._moved_at = pose, stamp
-        self.frozen = stamp - self._moved_at > FROZEN_S
+        if self._from is None:
+            self._from, self._from_at, self._stamp = pose, stamp, stamp
+            return False
+        dt_s, self._stamp = min(stamp - self._stamp, GAP_S_MAX), stamp
+        self._said = along_arc(self._said, twist, dt_s)
+        said_m, moved_m = _way_m(Pose2D(), self._said), _way_m(self._from, pose)
+        if said_m >= FROZEN_M and stamp - self._from_at > FROZEN_S:
+            self.frozen = moved_m < FROZEN_SHARE * said_m
+        elif not self.frozen or (not _rests(twist) and moved_m < FROZEN_SHARE * FROZEN_M):
+            return self.frozen
+        else:
+            self.frozen = False
+        self._from, self._said, self._from_at = pose, Pose2D(), stamp
         return self.frozen
+
+
+HUNG_M, HUNG_SHARE = 0.3, 0.3
+"""Way [m] by the wheels of which the fixes must have made that share: what they say of one place, noise and all, is an
+old pose that is said again. So is what they say of a robot whose wheels slip, which is no robot to drive either."""
+
+
+class HungLocalization:
+    """Whether one robot's fixes stay where they are under fresh stamps while its wheels drive on."""
+
+    def __init__(self) -> None:
+        self._from: tuple[Pose2D, Pose2D] | None = None
+        """Fix, and pose in `odom`, from which the ways are counted."""
+
+    def update(self, pose_map: Pose2D, pose_odom: Pose2D) -> bool:
+        """Update with a fix, and the odometry of the moment; return True if the localization hangs."""
+        if self._from is not None:
+            way_m, moved_m = distance(self._from[1], pose_odom), distance(self._from[0], pose_map)
+            if way_m < HUNG_M:
+                return False
+            if moved_m < HUNG_SHARE * way_m:
+                return True
+        self._from = pose_map, pose_odom
+        return False
+
+
+def _rests(twist: Twist) -> bool:
+    return abs(twist.linear_x) < REST_MPS and abs(twist.angular_z) < REST_RADPS
+
+
+def _way_m(start: Pose2D, end: Pose2D) -> float:
+    return distance(start, end) + TURN_M_PER_RAD * abs(wrap(end.theta - start.theta))

@@ -155,6 +155,21 @@ def test_a_localization_that_ended_slows_the_robot_and_then_is_no_pose_until_the
     assert drive.estimator.limited(go) == go
 
 
+@pytest.mark.parametrize(("jitter_m", "mps"), [(0.0, 0.5), (0.0, 0.1), (0.005, 0.5), (0.005, 0.2)])
+def test_a_localization_that_says_one_place_while_the_wheels_drive_on_is_none(jitter_m: float, mps: float) -> None:
+    """It contradicts the wheels again and again, as a robot does once that was carried."""
+    drive = Drive()
+    for _ in range(100):
+        drive.step(Twist(0.5, 0.0))
+    hung, gauss = drive.true, drive.chance.gauss
+    for _ in range(round(2.5 / mps / DT)):
+        drive.step(Twist(mps, 0.0), Pose2D(hung.x + gauss(0.0, jitter_m), hung.y + gauss(0.0, jitter_m), hung.theta))
+    assert drive.estimator.missing(drive.now) == "localization"
+    for _ in range(60):
+        drive.step(STILL)
+    assert drive.step(STILL)[0] < 0.02, "it says where the robot is, again"
+
+
 def test_a_robot_that_stands_keeps_its_pose_without_fixes() -> None:
     drive = Drive()
     for _ in range(50):
@@ -251,6 +266,20 @@ def test_odometry_that_repeats_itself_under_fresh_stamps_and_says_that_it_moves_
     for _ in range(5):
         drive.step(Twist(0.3, 0.0))
     assert drive.estimator.missing(drive.now) is None, "it moves again"
+
+
+def test_odometry_that_jitters_about_one_place_and_says_that_it_moves_is_none() -> None:
+    drive = Drive()
+    for _ in range(50):
+        drive.step(Twist(0.3, 0.0))
+    frozen = drive.odom
+    for n in range(60):
+        drive.step(Twist(0.3, 0.0))
+        drive.odom = Pose2D(frozen.x + 1e-4 * (n % 3), frozen.y, frozen.theta)
+    assert drive.estimator.missing(drive.now) == "odometry"
+    for _ in range(5):
+        drive.step(Twist(0.01, 0.0))
+    assert drive.estimator.missing(drive.now) is None, "it says that it rests, as it does"
 
 
 @pytest.mark.parametrize("back_s", [1.0, 3600.0, 30 * 86400.0])
