@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, atan2, cos, hypot, inf, isnan, pi, sin, sqrt
+from math import acos, atan2, cos, dist, hypot, inf, isnan, pi, sin, sqrt
 
 from lfa.protocol.geometry import TAU, Pose2D, Twist, in_base
 from lfa.protocol.messages.robot import LaserScan
@@ -14,6 +14,9 @@ STRAIGHT_RADPS = 1e-3
 READING_M_MIN = 0.05
 """Range [m] below which a reading is none, whatever `range_min_m` allows: some scanners report 0 for no echo. Half a
 cell of the explorer's map, so that no reading marks the robot's own cell."""
+HIDDEN_M = 0.05
+"""Distance [m] beyond the scanner's minimum up to which a known point may be what a beam is too near to: from scan to
+scan a robot moves so far."""
 ROUNDED = 1.0 + 1e-9
 """Factor that covers the rounding error of a square."""
 
@@ -51,10 +54,11 @@ class Surroundings:
         self.reach_m, self.step_rad = high, abs(step)
         if self._remembers:
             self._remember(scan, pose_map, now)
+        hidden = self._too_near(scan, pose_map) if -inf in scan.ranges_m else {}
         self._points_map = [
-            (x + r * cos(angle + i * step), y + r * sin(angle + i * step))
+            (x + r * cos(angle + i * step), y + r * sin(angle + i * step)) if low < r else hidden[i]
             for i, r in enumerate(scan.ranges_m)
-            if low < r < high
+            if low < r < high or i in hidden
         ]
         self.seen_at = now
 
@@ -69,6 +73,24 @@ class Surroundings:
             and hypot(point[0] - pose_map.x, point[1] - pose_map.y) < KEPT_M
             and _is_blind(beams, step, aside, in_base(pose_map, point), scan.angle_min)
         }
+
+    def _too_near(self, scan: LaserScan, pose_map: Pose2D) -> dict[int, Point]:
+        """Return the nearest point known in each beam that has come too near to be measured (-inf): it is still there.
+
+        Beams of which nothing is known are left out: a filter may hide the robot's own parts so.
+        """
+        hidden: dict[int, Point] = {}
+        step = scan.angle_increment or TAU
+        count, around = len(scan.ranges_m), max(1, round(TAU / abs(step)))
+        for point in sorted(self._points_map, key=lambda known: dist(known, (pose_map.x, pose_map.y)), reverse=True):
+            away_x, away_y = point[0] - pose_map.x, point[1] - pose_map.y
+            if hypot(away_x, away_y) <= scan.range_min_m + HIDDEN_M:
+                bearing = atan2(away_y, away_x) - pose_map.theta - scan.angle_min
+                turned = bearing if step > 0.0 else -bearing
+                beam = round(turned % TAU / abs(step)) % around
+                if beam < count and scan.ranges_m[beam] == -inf:
+                    hidden[beam] = point
+        return hidden
 
     @property
     def points_map(self) -> list[Point]:

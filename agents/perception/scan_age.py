@@ -1,8 +1,9 @@
 """Age of the last scan that counts, and the speed that it allows: a robot that sees nothing any more slows and stands.
 
-A scanner that hangs publishes nothing, or the same scan again and again. A repeated scan counts as none once the robot
+A scanner that hangs publishes nothing, or its last scans again and again. A repeated scan counts as none once the robot
 has moved far enough for its ranges to change. So does a scan in which no beam has measured anything, as under a cap or
-with a dead laser or with limits that exclude each other, and one that was made long before it arrived.
+with a dead laser or with limits that exclude each other; one in which all is gone that stood around the robot; one that
+sees nothing near; and one that was made long before it arrived.
 """
 
 from __future__ import annotations
@@ -28,6 +29,13 @@ LOST_S = 5.0
 """Age [s] of the last scan from which a robot counts as stuck (S5), so that its chain goes on without it."""
 MOVED_M, MOVED_RAD = 0.05, 0.05
 """Motion since the last scan that counted, after which an equal scan cannot be a new one."""
+REPEATS = 10
+"""Number of scans that are remembered: a driver may repeat the turns that its buffer holds."""
+NEAR_M_MAX = 0.5
+"""Range [m] that a scanner must be able to measure: one that begins to see farther off shows no way past anything."""
+GONE_SHARE, GONE_REACH, GONE_M = 0.25, 0.7, 0.5
+"""Share of the beams that had a reading within that share of the range: while the robot has moved less than GONE_M [m],
+they cannot all have none."""
 FACES_MIN, ACROSS = 3, 0.5
 """Number of neighbouring beams on surfaces across the motion, and the least share of the motion across a surface, from
 which a motion must have changed the scan: between two long walls a robot may well see the same again."""
@@ -37,8 +45,8 @@ class ScanAge:
     """Age of the last scan that counts. A robot that never had a scan has no scanner, and is not limited."""
 
     def __init__(self) -> None:
-        self._ranges: tuple[float, ...] | None = None
-        self._pose = Pose2D()
+        self._known: deque[tuple[tuple[float, ...], Pose2D]] = deque(maxlen=REPEATS)
+        """Ranges of the newest scans that differ, and the pose at which each was first seen; the newest comes last."""
         self._at: float | None = None
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.slow_hz: float | None = None
@@ -46,20 +54,28 @@ class ScanAge:
 
     def update(self, scan: LaserScan, pose: Pose2D, now: float, late_s: float = 0.0) -> bool:
         """Take a scan made at `pose` in `map`, which took `late_s` [s] to arrive; return whether it counts."""
-        if late_s > SCAN_S_MAX or not _has_measured(scan):
+        if late_s > SCAN_S_MAX or not _has_measured(scan) or self._is_gone(scan, pose):
             if self._at is None:  # there is a scanner, and its age counts from its first message
                 self._at = now
             return False
-        if self._ranges is not None and _are_equal(scan.ranges_m, self._ranges):
-            if _must_differ(scan, self._pose, pose):
-                return False
-        else:
-            self._ranges, self._pose = scan.ranges_m, pose
+        before = _pose_of(scan.ranges_m, self._known)
+        if before is None:
+            self._known.append((scan.ranges_m, pose))
+        elif _must_differ(scan, before, pose):
+            return False
         if self._at is not None:
             self._periods.append(now - self._at)
             self.slow_hz = _slow_hz(self._periods)
         self._at = now
         return True
+
+    def _is_gone(self, scan: LaserScan, pose: Pose2D) -> bool:
+        """Return whether `scan` shows nothing at all where the newest scan that counts showed much all around."""
+        if not self._known or any(r < inf for r in scan.ranges_m):
+            return False
+        ranges_m, seen_from = self._known[-1]
+        near = sum(scan.range_min_m < r < GONE_REACH * scan.range_max_m for r in ranges_m)
+        return near >= GONE_SHARE * len(ranges_m) and distance(seen_from, pose) < GONE_M
 
     def age_s(self, now: float) -> float:
         """Return the age [s] of the last scan that counts; 0 for a robot without a scanner."""
@@ -98,15 +114,24 @@ def _has_measured(scan: LaserScan) -> bool:
     """
     low = max(scan.range_min_m, READING_M_MIN)
     spread = len(scan.ranges_m) < 2 or 0.0 < abs(scan.angle_increment) <= pi
-    return low < scan.range_max_m and spread and any(r >= low for r in scan.ranges_m)
+    return low < scan.range_max_m and low <= NEAR_M_MAX and spread and any(r >= low for r in scan.ranges_m)
+
+
+def _pose_of(ranges_m: tuple[float, ...], known: deque[tuple[tuple[float, ...], Pose2D]]) -> Pose2D | None:
+    """Return the pose of the scan in `known` that has these ranges, beam by beam; None if there is none.
+
+    A bad beam, nan, equals a bad beam; without one, scans are equal as tuples or not at all.
+    """
+    bad = isnan(sum(ranges_m))
+    for others_m, pose in known:
+        if ranges_m == others_m or (bad and _are_equal(ranges_m, others_m)):
+            return pose
+    return None
 
 
 def _are_equal(ranges_m: tuple[float, ...], others_m: tuple[float, ...]) -> bool:
-    """Return whether two scans are equal beam by beam; a bad beam, nan, equals a bad beam."""
-    if ranges_m == others_m:
-        return True
-    if len(ranges_m) != len(others_m) or not isnan(sum(ranges_m)):
-        return False  # without a bad beam they are equal as tuples or not at all
+    if len(ranges_m) != len(others_m):
+        return False
     pairs = zip(ranges_m, others_m, strict=True)
     return all(r == o or (r != r and o != o) for r, o in pairs)  # noqa: PLR0124
 

@@ -32,6 +32,19 @@ def test_out_of_range_too_near_and_bad_beams_are_no_points() -> None:
     assert seen.points(Pose2D()) == []
 
 
+def test_what_has_come_too_near_to_be_measured_is_still_there() -> None:
+    """Until its beam sees past it. A filter may hide the robot's own parts as too near: nothing was seen there."""
+    for turn in (1.0, -1.0):
+        seen, near = Surroundings(), replace(scan(1.0, inf, inf, inf), range_min_m=0.5, angle_increment=turn * pi / 2)
+        seen.scan(near, Pose2D(), 0.0)
+        seen.scan(replace(near, ranges_m=(0.52, -inf, inf, inf)), Pose2D(0.48, 0.0, 0.0), 0.1)
+        for n in (1, 2):
+            seen.scan(replace(near, ranges_m=(-inf, -inf, inf, inf)), Pose2D(0.5 + 0.1 * n, 0.0, 0.0), 0.1 + 0.1 * n)
+            assert [(round(x, 9), round(y, 9)) for x, y in seen.points_map] == [(1.0, 0.0)]
+        seen.scan(replace(near, ranges_m=(3.0, -inf, inf, inf)), Pose2D(0.7, 0.0, 0.0), 0.4)
+        assert [(round(x, 9), round(y, 9)) for x, y in seen.points_map] == [(3.7, 0.0)]
+
+
 def test_a_range_of_zero_is_no_point_whatever_the_scanners_minimum_says() -> None:
     seen = Surroundings()
     seen.scan(replace(scan(0.0, 0.04, 1.0, inf), range_min_m=0.0), Pose2D(), 0.0)

@@ -70,6 +70,29 @@ def test_equal_scans_are_scans_where_nothing_need_change(ranges: tuple[float, ..
     assert age.limited(GO, 1.9) == GO
 
 
+@pytest.mark.parametrize("turns", [2, 5])
+def test_a_driver_that_repeats_its_last_turns_gives_no_scans(turns: int) -> None:
+    """As one does whose buffer is no longer filled."""
+    age = ScanAge()
+    for n in range(40):
+        nearer = min(n, 10 + n % turns)
+        age.update(scan(*(r - 0.02 * nearer for r in WALL_AHEAD)), Pose2D(0.04 * n, 0.0, 0.0), 0.1 * n)
+    assert age.limited(GO, 3.9) == STILL
+
+
+def test_all_that_stood_around_a_robot_is_not_gone_from_one_scan_to_the_next() -> None:
+    age = ScanAge()
+    assert age.update(scan(*WALL_AHEAD), Pose2D(), 0.0)
+    assert not age.update(scan(*(inf,) * 8), Pose2D(0.04, 0.0, 0.0), 0.1)
+    assert age.update(scan(*(inf,) * 8), Pose2D(2.0, 0.0, 0.0), 9.0), "where the robot has come, nothing need be"
+
+
+@pytest.mark.parametrize(("range_min_m", "counts"), [(0.5, True), (0.6, False)])
+def test_a_scanner_that_sees_nothing_near_shows_no_way_past_anything(range_min_m: float, counts: bool) -> None:
+    far = structs.replace(scan(2.0, inf), range_min_m=range_min_m)
+    assert ScanAge().update(far, Pose2D(), 0.0) is counts
+
+
 def test_a_scanner_that_stops_drives_nobody_into_an_obstacle(tmp_path: Path) -> None:
     obstacle = "world.obstacles=[{center_m=[7.5, 0.1], radius_m=0.4}]"
     sets = ["mission.leading.route_m=[[12.0, 0.0]]", "world.lidar.rate_hz=0.1", "time_limit_s=40.0", obstacle]
