@@ -11,6 +11,7 @@ from __future__ import annotations
 from msgspec import structs
 
 from lfa.protocol.errors import Refused
+from lfa.protocol.lease.term_window import TermWindow
 from lfa.protocol.messages.consensus import NO_TERM, Term
 from lfa.protocol.messages.orders import OrderNote, TeamOrder
 from lfa.protocol.mission import Mission
@@ -34,6 +35,8 @@ class TeamOrders:
         self._proposed: TeamOrder | None = None
         """Newest order of an operator that no leader has been heard to carry out."""
         self._repeat_at = float("-inf")
+        self._window = TermWindow()
+        """Versions that are believed, as terms are (E26): one that a robot made up is not the last."""
         self._carried = NO_TERM
         """Term under which this robot heard the order last, or carries it itself."""
         self._reminded = NO_TERM
@@ -41,6 +44,8 @@ class TeamOrders:
 
     def propose(self, order: TeamOrder, leads: bool, term: Term, now: float) -> bool:
         """Process an operator's order: as leader, carry it out or say why not. Return True if the mission changes."""
+        if not self._window.believes(order.version, now):
+            return False
         if not leads:
             if self._proposed is None or order.version > self._proposed.version:
                 self._proposed = order
@@ -62,7 +67,7 @@ class TeamOrders:
     def hear(self, note: OrderNote, newest: Term, now: float) -> bool:
         """Process what a leader carries; `newest` is the newest known term. Return True if the mission changes."""
         order, term = note.order, note.term
-        if term is None or term < newest or order.version == 0:
+        if term is None or term < newest or order.version == 0 or not self._window.believes(order.version, now):
             return False
         if (order.version, term) <= (self.order.version, self._carried):
             return False

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.consensus import Member
-from lfa.protocol.messages.stop import EPOCH_MAX, StopState, StopWord
+from lfa.protocol.messages.stop import EPOCH_FREE, EPOCH_MAX, NO_STOP, StopState, StopWord
 
 REPEAT_S = 0.03
 ANSWER_S = 0.9
@@ -25,6 +25,8 @@ ASK_S = 0.1
 """Time [s] between two questions which robots the fleet has, until somebody has told all."""
 KEPT_S = 0.3
 """Time [s] for which the word is repeated to a robot that stands, until its agent knows it too."""
+EPOCHS_APART = 1000
+"""Number of words by which gateways are apart at most that have heard the same operators."""
 KNOWN_S = 0.4
 """Time [s] within which a fleet says which robots it has."""
 
@@ -84,7 +86,7 @@ class StopCall:
         self._robots.add(robot)
         self._states[robot] = state
         self._heard_at[robot] = now
-        word = state.known.word
+        word = max(self._believed(), default=NO_STOP)
         if self._word is None or word <= self._word:
             return
         if not self._stand:
@@ -115,10 +117,20 @@ class StopCall:
         known = [state.known for state in self._states.values()]
         if not known:
             raise Refused("resume: no gateway answers; is the fleet running?")
-        newest = max(one.word for one in known)
+        newest = max(self._believed(), default=NO_STOP)
         if not newest.stand and all(one.certain and one.word == newest for one in known):
             raise Refused(f"resume: none of the {len(known)} robots that answer is stopped")
         return _after(newest, False)
+
+    def _believed(self) -> list[StopWord]:
+        """Return the words of gateways that count: a made-up epoch must not be the last one."""
+        words = [state.known.word for state in self._states.values()]
+
+        def many_tell(epoch: int) -> bool:
+            tellers = sum(other.epoch >= epoch - EPOCHS_APART for other in words)
+            return 2 * tellers > len(self._robots) and (tellers > 1 or self._named)
+
+        return [word for word in words if word.epoch <= EPOCH_FREE or many_tell(word.epoch)]
 
     def _all_answered(self) -> bool:
         return self._named and bool(self._robots) and self._robots <= self._states.keys()

@@ -12,6 +12,9 @@ from lfa.protocol.messages.header import Count, Header
 
 EPOCH_MAX = 2**53
 """Largest epoch, the largest number of a message: an operator counts up by one for each word."""
+EPOCH_FREE = 2**43
+"""Epoch up to which an operator believes a single gateway: so many words nobody says. A greater one, which a robot made
+up, counts once more than half of the gateways tell one about as great (E29)."""
 
 
 class StopWord(Struct, frozen=True, array_like=True, order=True, gc=False):

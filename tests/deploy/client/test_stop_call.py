@@ -46,6 +46,34 @@ def test_a_stop_counts_up_from_the_resume_that_an_answer_tells_of() -> None:
     assert call.said(0.001) == Said(StopWord(7, True), (Member(1, 9),))
 
 
+@pytest.mark.parametrize("stand", [True, False])
+def test_e29_the_last_epoch_in_one_gateways_answer_keeps_no_operator_from_stopping_and_resuming(stand: bool) -> None:
+    call, gateways = called(True, 3)
+    call.hear(3, gateways[2].state(2**53, stand), 0.001)
+    for robot in (1, 2):
+        call.hear(robot, gateways[robot - 1].state(6, False), 0.002)
+    said = call.said(0.002)
+    assert said is not None and said.word == StopWord(7, True)
+    call, _ = called(False, 3)
+    call.hear(3, gateways[2].state(2**53, stand), 0.001)
+    for robot in (1, 2):
+        call.hear(robot, gateways[robot - 1].state(7, True), 0.002)
+    said = call.said(0.002)
+    assert said is not None and said.word == StopWord(8, False)
+    for robot in (1, 2):
+        call.hear(robot, gateways[robot - 1].state(8, False), 0.003)
+    outcome = call.outcome(ANSWER_S + 0.1)
+    assert outcome is not None and not outcome.overruled and {1, 2} <= set(outcome.done)
+
+
+def test_e29_a_great_epoch_that_most_gateways_tell_is_counted_up() -> None:
+    call, gateways = called(True, 3)
+    for robot in (1, 2):
+        call.hear(robot, gateways[robot - 1].state(2**43 + robot, False), 0.001)
+    said = call.said(0.001)
+    assert said is not None and said.word == StopWord(2**43 + 3, True)
+
+
 def test_a_stop_that_holds_already_is_the_same_stop() -> None:
     call, gateways = called(True)
     for robot, gateway in enumerate(gateways, start=1):

@@ -57,6 +57,16 @@ def test_e32_late_and_replayed_orders_are_refused() -> None:
     assert robot.orders.mission.goal_m == (7.0, 0.0)
 
 
+def test_e32_a_made_up_version_is_not_the_last() -> None:
+    for leads in (True, False):
+        robot = Robot()
+        assert not robot.orders.propose(to(9.0, 2**53), leads, OLD, 0.0)
+        assert not robot.orders.hear(carried(to(9.0, 2**53), OLD), OLD, 0.1)
+        assert not leads or not robot.orders.hear_robot(carried(to(9.0, 2**53), OLD), OLD, 0.2)
+        assert not robot.orders.begin(NEW, 0.3)
+        assert robot.orders.propose(to(7.0, 1), True, NEW, 0.4)
+
+
 def test_e32_an_order_that_the_mission_does_not_allow_changes_nothing() -> None:
     robot = Robot()
     hasty = TeamOrder(structs.replace(MISSION.leading, cruise_mps=9.0), MISSION.formation, 1)
