@@ -14,6 +14,8 @@ SHADOW_S, SHADOW_STEPS, SHADOW_M_MAX = 8.0, 3, 1.2
 [m] up to which it counts as slow."""
 AWAY_M = 0.08
 """Clearance [m] that is left when a robot drives towards what moves; nearer, it drives away from it or stands."""
+MET_M = 0.01
+"""Distance [m] from the robot's centre, in the direction of what comes over it, of the point that stands for it."""
 ASIDE_SHARE = 0.5
 """Cosine of the angle off the robot's motion beyond which what comes towards it comes from the side."""
 
@@ -50,9 +52,24 @@ def before(moving: Sequence[Feature], pose: Pose2D, within_s: float, v_mps: floa
         x, y = feature.at(within_s)
         dx, dy = x - pose.x, y - pose.y
         apart = hypot(dx, dy)
-        if feature.radius_m < apart < hypot(feature.x - pose.x, feature.y - pose.y):
-            share = 1.0 - (feature.radius_m + AWAY_M) / apart
-            px, py = c * dx + s * dy, c * dy - s * dx
-            if v_mps * px >= ASIDE_SHARE * apart * abs(v_mps):
-                points.append((share * px, share * py))
+        share = 1.0 - (feature.radius_m + AWAY_M) / max(apart, MET_M)
+        if _meets(feature, pose, within_s):  # where it is then, it has come through the robot: it comes from here
+            dx, dy = feature.x - pose.x, feature.y - pose.y
+            apart = hypot(dx, dy)
+            share = MET_M / max(apart, MET_M)
+        elif share <= 0.0 or apart >= hypot(feature.x - pose.x, feature.y - pose.y):
+            continue
+        px, py = c * dx + s * dy, c * dy - s * dx
+        if v_mps * px >= ASIDE_SHARE * apart * abs(v_mps):
+            points.append((share * px, share * py))
     return points
+
+
+def _meets(feature: Feature, pose: Pose2D, within_s: float) -> bool:
+    """Return whether what moves comes over the robot's centre, but for `AWAY_M`, within `within_s` [s]."""
+    dx, dy, square = feature.x - pose.x, feature.y - pose.y, feature.vx**2 + feature.vy**2
+    nearest_s = -(dx * feature.vx + dy * feature.vy) / square if square else 0.0
+    if nearest_s <= 0.0:
+        return False
+    x, y = feature.at(min(nearest_s, within_s))
+    return hypot(x - pose.x, y - pose.y) <= feature.radius_m + AWAY_M

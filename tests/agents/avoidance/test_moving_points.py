@@ -9,6 +9,7 @@ import pytest
 from lfa.agents.avoidance.moving_points import (
     ASIDE_SHARE,
     AWAY_M,
+    MET_M,
     SHADOW_M_MAX,
     SHADOW_S,
     SHADOW_STEPS,
@@ -69,13 +70,29 @@ def test_the_brake_sees_what_comes_obliquely_in_its_direction() -> None:
     ("feature", "v_mps"),
     [
         pytest.param(moving(1.0, 5.0, 0.0, 0.5), 0.4, id="it goes away"),
-        pytest.param(moving(1.0, 2.9, 0.0, -0.7), 0.4, id="it will be where the robot is"),
         pytest.param(moving(1.0, 5.0, 0.0, -0.5), -0.4, id="the robot drives away from it"),
         pytest.param(moving(3.0, 2.5, -0.5, 0.0), 0.4, id="it comes from the side"),
     ],
 )
 def test_the_brake_leaves_out_what_it_cannot_help(feature: list[Feature], v_mps: float) -> None:
     assert before(feature, HERE, 1.0, v_mps) == []
+
+
+@pytest.mark.parametrize(
+    ("y", "vy"),
+    [
+        pytest.param(2.9, -0.7, id="it will be beside the robot's centre"),
+        pytest.param(2.9, -0.9, id="it will be in it"),
+        pytest.param(2.6, -1.5, id="it will have come through it"),
+    ],
+)
+def test_the_brake_sees_what_comes_over_the_robot_where_it_comes_from(y: float, vy: float) -> None:
+    (point,) = before(moving(1.0, y, 0.0, vy), HERE, 1.0, 0.4)
+    assert point == pytest.approx((MET_M, 0.0))
+
+
+def test_from_what_comes_over_the_robot_it_may_drive_away() -> None:
+    assert before(moving(1.0, 2.9, 0.0, -0.9), HERE, 1.0, -0.4) == []
 
 
 def test_a_robot_that_backs_brakes_for_what_comes_from_behind() -> None:

@@ -37,6 +37,11 @@ def test_a_robot_brakes_before_the_place_that_a_team_mate_crosses_next() -> None
     assert speed_beside((0.21, 0.36), (0.0, -0.27)) < 0.1
 
 
+def test_a_robot_brakes_before_a_team_mate_that_would_be_in_its_body_within_half_a_second() -> None:
+    """As near as that its place of then had counted as no place to brake for."""
+    assert speed_beside((0.42, 0.0), (-0.6, 0.0)) == 0.0
+
+
 @pytest.mark.parametrize(
     ("mate", "velocity"),
     [((0.5, 0.0), (0.3, 0.0)), ((0.21, 0.40), (0.0, 0.0)), ((-0.5, 0.0), (0.3, 0.0)), ((0.1, 0.5), (0.21, 0.0))],
