@@ -102,9 +102,11 @@ class Detour:
             self._since, self._clear_since = now, None
             self._side, self._crept_s = 0.0, 0.0
             self._obstacle = obstacle(inf if blocked_m is None else blocked_m)
-        elif self.decision.action is Action.CREEP and blocked_m is not None:
-            self._obstacle = obstacle(blocked_m)  # creeping is meant to show more of it
-        elif blocked_m is None and self._clear(points, target, now) and now - self._since >= HOLD_S:
+        elif blocked_m is not None:
+            self._clear_since = None  # one scan in which the motion is free ends no detour
+            if self.decision.action is Action.CREEP:
+                self._obstacle = obstacle(blocked_m)  # creeping is meant to show more of it
+        elif self._clear(points, target, now) and now - self._since >= HOLD_S:
             self.decision = None
             return None
         return self._round(points, target, speed_mps, inf if blocked_m is None else blocked_m, now)

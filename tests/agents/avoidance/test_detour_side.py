@@ -222,6 +222,14 @@ def test_a_way_to_the_target_that_was_barred_has_to_be_free_for_as_long_again() 
     assert detour.decision is not None
 
 
+def test_one_scan_in_which_the_motion_is_free_ends_no_detour() -> None:
+    """The straight way to the target is free all the time, the bend that the law wants only now and then."""
+    detour, bends = driven((0.0, little(LEFT))), Twist(0.5, 1.0)
+    for after_s, points in ((1.5, []), (1.7, [(0.49, 0.41)]), (2.0, [])):
+        detour.steer(points, TARGET, bends, 0.4, BEGIN + after_s)
+    assert detour.decision is not None
+
+
 def test_a_decision_of_another_behaviour_ends_like_one_of_its_own() -> None:
     detour = Detour(RADIUS_M, Limits())
     detour.decision = Decision(Action.MAKE_ROOM, inf, 0.0)

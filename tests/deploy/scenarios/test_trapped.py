@@ -101,11 +101,9 @@ def test_an_explorer_is_not_barred_in_by_a_trap_that_it_is_told_of() -> None:
     assert hypot(places[-1].x - start.x, places[-1].y - start.y) > TRAP_M
 
 
-def test_a_leader_that_only_stands_before_a_thing_plans_a_way_round_it_or_says_so(tmp_path: Path) -> None:
-    """A splinter that one beam in a few scans meets: there is a way beside it, but never for long enough to take it."""
+def test_a_leader_gets_past_a_splinter_that_one_beam_in_a_few_scans_meets(tmp_path: Path) -> None:
+    """A scan that does not show it must not end the detour beside it: the leader stood before it, and touched it."""
     thing = "world.obstacles=[{center_m=[4.0,0.0], corners_m=[[0,0],[0.005,0],[0.005,0.005]]}]"
     short = ("mission.leading.route_m=[[8.0,0.0]]", "time_limit_s=90.0", "mission.leading.cruise_mps=0.5")
     summary = run(load("straight", (thing, *short), robots=1), 0, tmp_path / "run").summary
-    decisions = event_log.of_kind(event_log.lines(tmp_path / "run"), "decision")
-    assert "plan_round" in {event["action"] for event in decisions}
-    assert summary.outcome == "goal_reached" or "S1: stands on its way" in str(summary.reason)
+    assert (summary.outcome, summary.robots[0].contacts) == ("goal_reached", 0), summary.reason
