@@ -131,7 +131,7 @@ class Navigator:
         """Update with a scan; one that only repeats the last, shows nothing or is old counts as none."""
         known, late_s = self.estimator.pose_at(now), self.estimator.late_s(scan.header, now)
         if known is not None and self.scan_age.update(scan, known[0], now, late_s):
-            self._obstacles.see(scan, known[0], self._mates.nearby(known[0], MATES_M, now), now)
+            self._obstacles.see(scan, known[0], self._mates.nearby(known[0], MATES_M, now), now, self.estimator.jumps)
             if self.leading.explore is not None or self._follow_slot.catches_up:  # a map needs all of them
                 mates = self._mates.places(now)
                 self.leading.see(scan, known[0], known[1], mates)

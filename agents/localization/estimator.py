@@ -9,7 +9,7 @@ and all later corrections are zero.
 from __future__ import annotations
 
 from collections import deque
-from math import isfinite
+from math import hypot, isfinite
 
 from msgspec import Struct
 
@@ -37,6 +37,9 @@ UNFIXED_MPS = 0.2
 SIGMA_M_MAX, SIGMA_RAD_MAX = 0.3, 0.35
 """Standard deviations of position [m] and heading [rad] beyond which there is no pose, and of a fix beyond which it is
 none: by 20 degrees astray, a robot is 0.35 m off its line after one metre."""
+JUMP_M, JUMP_M_PER_RAD = 0.04, 2.5
+"""Correction of the pose by one fix from which what was seen before lies elsewhere in `map` than what is seen now: at
+the robot, and for what is this far away, where a turn of one radian moves it by as much."""
 BACKWARD_TO_RESTART = 10
 """Number of successive odometry messages with stamps before the newest one, after which the sender's clock counts as
 set back."""
@@ -86,6 +89,8 @@ class Estimator:
         self.refused = 0
         self.outliers = 0
         self.relocations = 0
+        self.jumps = 0
+        """Number of corrections by more than `JUMP_M`."""
         self.last_fix_at: float | None = None
         self._unfixed_m = 0.0
 
@@ -219,6 +224,7 @@ class Estimator:
             return
         self._outliers_in_a_row, self._unfixed_m = 0, 0.0
         dx, dy, dtheta = self._covariance.update(innovation, variances)
+        self.jumps += hypot(dx, dy) + JUMP_M_PER_RAD * abs(dtheta) > JUMP_M
         corrected = Pose2D(predicted.x + dx, predicted.y + dy, wrap(predicted.theta + dtheta))
         self._map_odom = compose(corrected, inverse(odometry.pose_odom))
 
@@ -250,6 +256,7 @@ class Estimator:
         self._outlier = fix.pose_map
         if self._outliers_in_a_row >= OUTLIERS_TO_RELOCATE:
             self.relocations += 1
+            self.jumps += 1
             self._relocate(fix, odometry)
 
     def _relocate(self, fix: Localization, odometry: _Odometry) -> None:

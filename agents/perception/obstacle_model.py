@@ -42,13 +42,19 @@ class ObstacleModel:
         self._shared = shared
         self._scan = Surroundings(remembers=polygon)
         self._tracker = Tracker()
+        self._jumps = 0
+        """Number of jumps of the pose before the newest scan."""
         self.ground = GroundMap(limits)
 
-    def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float) -> None:
+    def see(self, scan: LaserScan, pose: Pose2D, mates: Sequence[Pose2D], now: float, jumps: int = 0) -> None:
         """Update with a scan made at `pose`, and assign its points to obstacles.
 
-        `mates` are the team-mates within `MATES_M`, and may hold farther ones.
+        `mates` are the team-mates within `MATES_M`, and may hold farther ones. `jumps` counts those of the pose: with
+        one, walls lie elsewhere in `map` than in the scans before.
         """
+        if jumps != self._jumps:
+            self._jumps = jumps
+            self._tracker.forget_surfaces()
         self._scan.scan(scan, pose, now)
         places = [(mate.x, mate.y) for mate in mates]
         seen, eye = self._scan, (pose.x, pose.y)

@@ -185,6 +185,10 @@ class Tracker:
         walls = [points for points, thing in self._seen if isinstance(thing, Feature) and thing.kind == "wall"]
         self._surfaces.update(walls, view, mates, mate_m, now)
 
+    def forget_surfaces(self) -> None:
+        """Compare the walls of scans to come with none that were seen so far: the pose has jumped."""
+        self._surfaces = SurfaceWatch()
+
     def nearest(self, x: float, y: float, now: float) -> tuple[Feature, float] | None:
         """Return the obstacle of the newest scan nearest to (x, y) in `map`, and its distance [m]; None if there is
         none.

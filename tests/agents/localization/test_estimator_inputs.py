@@ -308,3 +308,27 @@ def test_a_robot_found_again_is_as_uncertain_as_its_fix() -> None:
     assert one.relocations == 1
     one.localization(fix(1.02, Pose2D(5.05, 5.0, pi / 2.0)), 1.02)
     assert one.outliers == OUTLIERS_TO_RELOCATE + 1
+
+
+@pytest.mark.parametrize(
+    ("step", "jumps"),
+    [
+        (Pose2D(0.07, 0.0, 0.0), 0),
+        (Pose2D(0.06, -0.06, 0.0), 1),
+        (Pose2D(0.0, 0.0, 0.03), 0),
+        (Pose2D(0.0, 0.0, -0.04), 1),
+    ],
+)
+def test_a_correction_of_the_pose_by_more_than_noise_is_a_jump(step: Pose2D, jumps: int) -> None:
+    """A fix that is as sure as the pose moves it half of the way."""
+    one = estimator(replace(SURE, fix_m=0.05, fix_rad=0.05))
+    said(one, step)
+    assert one.jumps == jumps
+
+
+def test_a_robot_that_is_found_elsewhere_has_jumped() -> None:
+    one = estimator()
+    said(one, *[CARRIED] * 4)
+    assert one.jumps == 0
+    said(one, CARRIED)
+    assert one.jumps == 1

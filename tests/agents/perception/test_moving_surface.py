@@ -106,3 +106,25 @@ def test_a_thing_that_leaves_a_wall_is_told_before_it_has_come_half_a_metre(mps:
     [thing] = moving
     assert hypot(thing.x - 1.4, thing.y - y) < 0.3
     assert thing.vy > 0.4 * mps
+
+
+ROOM: tuple[Segment, ...] = ((2.0, -2.0, 2.0, 2.0), (-2.0, 2.0, 2.0, 2.0), (-2.0, -2.0, -2.0, 2.0),
+                             (0.5, -1.0, 2.0, -1.0))  # fmt: skip
+
+
+def most_moving(forgets: bool) -> int:
+    """The most that seems to move in a room at rest, as the robot's pose is corrected by 0.14 m after a second."""
+    tracker, most = Tracker(), 0
+    for n in range(30):
+        off = 0.1 if n >= 10 else 0.0
+        points = [(x + off, y - off) for x, y in scan(ROOM, (0.0, 0.0), 180)]
+        if n == 10 and forgets:
+            tracker.forget_surfaces()
+        tracker.update(points, (off, -off), [], 0.5, 0.1 * n, step_rad=pi / 90)
+        most = max(most, len(tracker.moving(0.1 * n)))
+    return most
+
+
+def test_the_walls_of_a_room_do_not_move_as_the_pose_of_the_robot_jumps() -> None:
+    assert most_moving(forgets=False) > 0
+    assert most_moving(forgets=True) == 0

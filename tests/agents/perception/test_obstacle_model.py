@@ -52,3 +52,24 @@ def test_a_team_mate_beyond_the_distance_asked_for_changes_nothing_of_what_a_sca
         model.see(scan_of_post(ahead_m, radius_m, 8.0), Pose2D(), mates, 1.0)
         shown.append([model.nearest(Pose2D(), kind, 1.0) for kind in ("stationary", "wall")])
     assert shown[0] == shown[1]
+
+
+def scan_of_end(beside_m: float) -> LaserScan:
+    """Return the scan of the end of a wall that lies across the way, 1 m ahead, to `beside_m` on the left."""
+    ranges = []
+    for n in range(BEAMS):
+        angle = -pi + 2.0 * pi * n / BEAMS
+        meets = cos(angle) > 0.0 and -3.0 < sin(angle) / cos(angle) < beside_m
+        ranges.append(1.0 / cos(angle) if meets else inf)
+    return LaserScan(Header("robot1", 1, 0, 0.0), -pi, 2.0 * pi / BEAMS, 0.05, 8.0, tuple(ranges))
+
+
+@pytest.mark.parametrize(("jumps", "moves"), [(1, False), (0, True)])
+def test_a_wall_that_lies_elsewhere_since_the_pose_has_jumped_does_not_move(jumps: int, moves: bool) -> None:
+    model = ObstacleModel(0.15, Limits(), SharedObstacles(lambda _now: ()))
+    moved = False
+    for n in range(20):
+        here, now = Pose2D(0.0, 0.15 if n >= 10 else 0.0, 0.0), 0.1 * n
+        model.see(scan_of_end(0.0), here, (), now, jumps if n >= 10 else 0)
+        moved = moved or model.moving(here, now) != []
+    assert moved is moves
