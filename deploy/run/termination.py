@@ -8,7 +8,7 @@ when an agent publishes a `failed` event, and has run out of time when the world
 from __future__ import annotations
 
 from itertools import pairwise
-from math import hypot
+from math import hypot, inf
 
 from lfa.agents.leading.free_place import FREE_WITHIN_M
 from lfa.deploy.recording.outcome import Verdict
@@ -26,6 +26,9 @@ REST_SPEED = 1e-3  # [m/s] and [rad/s]
 SLOT_SHARE = 0.5
 """Distance of a robot at rest from its slot up to which it is in it, as a share of its commanded distance k^d."""
 TRACKING_S_MAX = TOPIC["tracking"].timeout_s or 1.0
+
+GAVE_WAY_S = 10.0
+"""Time [s] for which a robot's decision about what moves counts as what keeps it from its place."""
 
 JUDGED = frozenset({Truth, TableRow, Tracking, Event, Status, OrderNote})
 """Types of the messages that tell something about the end of a run; one in two is of another."""
@@ -55,6 +58,8 @@ class Termination:
         """Place [m] that a leader takes instead of the goal, on which something stands."""
         self._tracking: dict[int, tuple[Tracking, float]] = {}
         """Last report of each follower, and when [s] it came."""
+        self._gave_way_s: dict[int, float] = {}
+        """Time [s] of the last decision of each robot about what moves."""
         self.verdict: Verdict | None = None
 
     def see(self, message: Message) -> Verdict | None:
@@ -72,6 +77,8 @@ class Termination:
                     self._leading, self._order_version, self._route = order.leading, order.version, order.route
                 case Event(kind="waypoint_taken", data={"waypoint": int() as n, "x": float() as x, "y": float() as y}):
                     self._take_place(n, x, y)
+                case Event(kind="decision", data={"class": "moving"}):
+                    self._gave_way_s[robot_id_of(message.header.sender) or 0] = self._now_s
                 case Tracking():
                     self._tracking[robot_id_of(message.header.sender) or 0] = message, self._now_s
                 case Event(kind="failed"):
@@ -114,15 +121,20 @@ class Termination:
         progress = self._progress.get(leader.id)
         passed = 0 if progress is None or progress.route != self._route else progress.waypoint
         if passed < len(points):
-            return f"robot {leader.id} is on its way to way-point {1 + passed}"
+            return f"robot {leader.id} is on its way to way-point {1 + passed}{self._since_gave_way(leader.id)}"
         places = [points[-1], *([] if self._place is None else [self._place])]
         if min(hypot(leader.x - x, leader.y - y) for x, y in places) > leading.goal_tolerance_m:
             return f"robot {leader.id} is off the goal"
         moving = next((robot.id for robot in chain if not _at_rest(robot)), None)
         if moving is not None:
-            return f"robot {moving} moves"
+            return f"robot {moving} moves{self._since_gave_way(moving)}"
         astray = next((robot.id for ahead, robot in pairwise(chain) if not self._in_slot(robot, ahead)), None)
-        return None if astray is None else f"robot {astray} is not in its slot"
+        return None if astray is None else f"robot {astray} is not in its slot{self._since_gave_way(astray)}"
+
+    def _since_gave_way(self, robot: int) -> str:
+        """Return the words for how long ago [s] a robot gave way to what moves; empty where that explains nothing."""
+        since_s = self._now_s - self._gave_way_s.get(robot, -inf)
+        return f" (it gave way to what moves {since_s:.0f} s before)" if since_s <= GAVE_WAY_S else ""
 
     def _take_place(self, number: int, x: float, y: float) -> None:
         """Accept a place that replaces the goal, if it is no farther from the goal than such a place may be."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
 from msgspec.structs import replace
 
-from lfa.deploy.run.termination import REST_S, Termination
+from lfa.deploy.run.termination import GAVE_WAY_S, REST_S, Termination
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.consensus import Role, Term
@@ -100,6 +101,24 @@ def test_the_time_limits_reason_says_who_was_missing() -> None:
     verdict = termination.see(_truth(20.0, 2.95))
     assert verdict is not None
     assert verdict.reason == "not at the goal after 20 s: robot 2 is not in its slot"
+
+
+@pytest.mark.parametrize(
+    ("about", "at_s", "why"),
+    [
+        ("moving", 17.0, " (it gave way to what moves 3 s before)"),
+        ("moving", 20.0 - GAVE_WAY_S - 0.5, ""),
+        ("wall", 17.0, ""),
+    ],
+)
+def test_the_time_limits_reason_tells_of_who_gave_way_of_late(about: str, at_s: float, why: str) -> None:
+    """A slot that lies where something roams is left again and again."""
+    termination = Termination(_scenario())
+    for said in (_row(1), _truth(at_s, 2.95), _event("decision", "robot2", None, action="right", **{"class": about})):
+        termination.see(said)
+    verdict = termination.see(_truth(20.0, 2.95, follower_turns=0.3))
+    assert verdict is not None
+    assert verdict.reason == f"not at the goal after 20 s: robot 2 moves{why}"
 
 
 def test_a_short_rest_is_not_yet_the_goal() -> None:
