@@ -36,6 +36,9 @@ BESIDE_SLOT_SHARE = 0.45
 """Distance of a place beside a slot that is taken, as a share of k^d, at most; it still counts as in its slot."""
 BESIDE_PREDECESSOR_M = 0.1
 FRESH_S = 0.5
+RESTS_MPS, BARS_SHARE = 0.01, 0.5
+"""Speed [m/s] of a predecessor at rest, and cosine of the angle between the ways to it and from it to the slot above
+which it stands between: the law keeps its distance there, and the detour leads round obstacles, not round it."""
 WAY_BACK = Decision(Action.PLAN_ROUND, inf, 0.0, "wall", "the slot is out of reach of a detour", "angle")
 """Decision of a follower that plans its way back to its slot, for the log."""
 
@@ -104,7 +107,8 @@ class FollowSlot:
         if trace and self._follower.readout.error_m < ON_TRACE_M:
             return wanted
         place = self._follower.readout.slot_map
-        back = self._catch_up((place.x, place.y), points, pose, last, now, stuck=stuck)
+        barred = stuck or _bars(sighting, (place.x, place.y), pose)
+        back = self._catch_up((place.x, place.y), points, pose, last, now, barred=barred)
         if back is not None:
             return back
         ahead_mps, within_m = sighting.twist.linear_x, BESIDE_SLOT_SHARE * slot.separation_m
@@ -150,11 +154,13 @@ class FollowSlot:
         last: Twist,
         now: float,
         *,
-        stuck: bool,
+        barred: bool,
     ) -> Twist | None:
-        """Return the twist of a planned way back to `slot` in `map`; None while the follower needs none."""
+        """Return the twist of a planned way back to `slot` in `map`; None while the follower needs none. `barred` where
+        it is hindered, whatever the detour says.
+        """
         decision = self._detour.decision
-        hindered = stuck or (decision is not None and decision.kind in ON_THE_MAP)
+        hindered = barred or (decision is not None and decision.kind in ON_THE_MAP)
         if self._way_back is None:
             if not hindered:
                 return None
@@ -171,3 +177,10 @@ class FollowSlot:
             self._detour.decision = None
             self._follower.rejoin(pose, last)
         return twist
+
+
+def _bars(sighting: Sighting, slot: Point, pose: Pose2D) -> bool:
+    """Return whether the predecessor rests between a robot at `pose` and its `slot` (in `map`)."""
+    ahead = sighting.pose
+    px, py, sx, sy = ahead.x - pose.x, ahead.y - pose.y, slot[0] - ahead.x, slot[1] - ahead.y
+    return abs(sighting.twist.linear_x) < RESTS_MPS and px * sx + py * sy > BARS_SHARE * hypot(px, py) * hypot(sx, sy)

@@ -1,9 +1,10 @@
-"""A leader that its last safety function holds at rest still knows where it means to drive, and gets on."""
+"""A robot that something holds at rest still knows where it means to drive, and gets on."""
 
 from __future__ import annotations
 
 import pytest
 
+from lfa.deploy.bench.driving.one_run import complaint, driven, loaded
 from lfa.deploy.run.simulate import measure
 from lfa.world.description.load import load
 
@@ -18,3 +19,24 @@ def test_a_leader_that_begins_with_its_nose_at_a_post_gets_past_it(gap_m: float)
     assert found == ("goal_reached", [0]), (
         f"{summary.reason}; reproduce: lfa sim straight --robots 1 --seed 1 {options}"
     )
+
+
+FACE_TO_FACE = """
+title = "face to face"
+time_limit_s = 25.0
+[mission]
+robots = [1, 2]
+[mission.formation]
+separation_m = 1.0
+side = "column"
+[mission.leading]
+route_m = [[1.0, 0.0]]
+[world]
+starts = [[0.95, 0.0, 0.0], [1.6, 0.0, 3.1415]]
+"""
+
+
+def test_a_follower_gets_past_a_predecessor_that_rests_between_it_and_its_slot() -> None:
+    """The law keeps its distance there, and led it aside by hundredths of a metre a second."""
+    with driven(loaded("face_to_face", FACE_TO_FACE), 1) as done:
+        assert complaint(done.summary) is None
