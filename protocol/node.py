@@ -96,10 +96,6 @@ class Node(Protocol):
         """True while answers on `lease` to this node alone, GRANT above all, can wait for its next deadline."""
 
     @property
-    def defer_rounds(self) -> bool:
-        """True while what is said on `lease` to all, PROPOSE above all, can wait for the node's next deadline."""
-
-    @property
     def finished(self) -> bool:
         """True when the final messages are out; the runner then ends the process."""
 
@@ -134,6 +130,15 @@ def lacks_messages(node: Node) -> bool:
     """
     lacks: bool = getattr(node, "lacks_messages", False)
     return lacks
+
+
+def defers_rounds(node: Node) -> bool:
+    """Return True while what is said on `lease` to all, PROPOSE above all, can wait for the node's next deadline.
+
+    False for a node that does not say it: world, witness, driver.
+    """
+    defers: bool = getattr(node, "defer_rounds", False)
+    return defers
 
 
 def may_end(node: Node) -> bool:

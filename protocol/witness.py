@@ -30,7 +30,7 @@ class Witness:
     """Node around a `Lease` with id 0. Without a mission it asks for one."""
 
     name = WITNESS_NAME
-    defer_hellos = defer_grants = defer_rounds = False
+    defer_hellos = defer_grants = False
 
     def __init__(self, fleet: str, incarnation: int, floor: int, mission: Mission | None = None) -> None:
         self.incarnation = incarnation

@@ -117,10 +117,6 @@ class Remembering:
         return self._world.defer_grants
 
     @property
-    def defer_rounds(self) -> bool:
-        return self._world.defer_rounds
-
-    @property
     def finished(self) -> bool:
         return self._world.finished
 

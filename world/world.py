@@ -60,7 +60,7 @@ class World:
         self.incarnation = incarnation
         self.finished = False
         self.refusal: str | None = None
-        self.defer_hellos = self.defer_grants = self.defer_rounds = False
+        self.defer_hellos = self.defer_grants = False
         self.started_with = _started_with(scenario, seed, start_at, bodies, memory)
         self._fleet = fleet
         self._announced = scenario.mission

@@ -19,7 +19,7 @@ PERIOD_S = 0.01
 class StopNode:
     """Operator who says stop (`stand`) or resume to the `robots` of a fleet, once; `outcome` is None until the end."""
 
-    defer_hellos = defer_grants = defer_rounds = False
+    defer_hellos = defer_grants = False
 
     def __init__(self, fleet: str, name: str, incarnation: int, robots: tuple[int, ...], *, stand: bool) -> None:
         """Create a node; `name` is that of its process in the simulation, its messages are the operator's."""

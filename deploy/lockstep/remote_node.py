@@ -20,7 +20,7 @@ from lfa.protocol.topics import TOPIC, address
 class RemoteNode:
     """State of a node as its process has last told it; calls go through its `RemoteHost`."""
 
-    defer_hellos = defer_grants = defer_rounds = False
+    defer_hellos = defer_grants = False
 
     def __init__(self, name: str, incarnation: int, first: CallResult) -> None:
         """Take over the node's state from the hello of its process."""

@@ -66,7 +66,7 @@ class Driver:
         self.incarnation = incarnation
         self.finished = False
         self.refusal: str | None = None
-        self.defer_hellos = self.defer_grants = self.defer_rounds = False
+        self.defer_hellos = self.defer_grants = False
         self.started_with: dict[str, Any] = {"kind": "driver", "robot_id": robot_id}
         self.interests = heard_by_driver(fleet, robot_id)
         self._robot_id = robot_id

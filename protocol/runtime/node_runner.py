@@ -19,7 +19,7 @@ from msgspec import Struct
 from lfa.protocol import clock
 from lfa.protocol.errors import Refused
 from lfa.protocol.messages.team import OperatorNote
-from lfa.protocol.node import Local, Node, Stop, lacks_messages, reborn, waits_for
+from lfa.protocol.node import Local, Node, Stop, defers_rounds, lacks_messages, reborn, waits_for
 from lfa.protocol.output import write_line
 from lfa.protocol.runtime import log_capture
 from lfa.protocol.runtime.journal import JOURNAL_VERSION, Heading, Journal
@@ -102,7 +102,7 @@ class _NodeRunner:
         if not self._follow() and self._links.due(now):
             self.bus.resubscribe()
         host.journal.flush()
-        self.inbox.defer_grants, self.inbox.defer_rounds = node.defer_grants, node.defer_rounds
+        self.inbox.defer_grants, self.inbox.defer_rounds = node.defer_grants, defers_rounds(node)
         return late
 
     def tick_p99_s(self) -> float:
