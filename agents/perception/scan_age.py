@@ -33,9 +33,9 @@ REPEATS = 10
 """Number of scans that are remembered: a driver may repeat the turns that its buffer holds."""
 NEAR_M_MAX = 0.5
 """Range [m] that a scanner must be able to measure: one that begins to see farther off shows no way past anything."""
-GONE_SHARE, GONE_REACH, GONE_M = 0.25, 0.7, 0.5
-"""Share of the beams that had a reading within that share of the range: while the robot has moved less than GONE_M [m],
-they cannot all have none."""
+GONE_SHARE, GONE_BEAMS, GONE_REACH, GONE_M = 0.25, 12, 0.7, 0.5
+"""Share of the beams, and their least number, that had a reading within a share of the range: while the robot has moved
+less than GONE_M [m], they cannot all have none. Fewer beams may all have been on one thing that was taken away."""
 FACES_MIN, ACROSS = 3, 0.5
 """Number of neighbouring beams on surfaces across the motion, and the least share of the motion across a surface, from
 which a motion must have changed the scan: between two long walls a robot may well see the same again."""
@@ -75,7 +75,7 @@ class ScanAge:
             return False
         ranges_m, seen_from = self._known[-1]
         near = sum(scan.range_min_m < r < GONE_REACH * scan.range_max_m for r in ranges_m)
-        return near >= GONE_SHARE * len(ranges_m) and distance(seen_from, pose) < GONE_M
+        return near >= max(GONE_SHARE * len(ranges_m), GONE_BEAMS) and distance(seen_from, pose) < GONE_M
 
     def age_s(self, now: float) -> float:
         """Return the age [s] of the last scan that counts; 0 for a robot without a scanner."""

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from msgspec import structs
 
-from lfa.agents.perception.scan_age import SCAN_S_MAX, ScanAge
+from lfa.agents.perception.scan_age import GONE_BEAMS, SCAN_S_MAX, ScanAge
 from lfa.deploy.recording import event_log
 from lfa.deploy.run.simulate import run
 from lfa.protocol.geometry import STILL, Pose2D, Twist
@@ -82,9 +82,16 @@ def test_a_driver_that_repeats_its_last_turns_gives_no_scans(turns: int) -> None
 
 def test_all_that_stood_around_a_robot_is_not_gone_from_one_scan_to_the_next() -> None:
     age = ScanAge()
-    assert age.update(scan(*WALL_AHEAD), Pose2D(), 0.0)
-    assert not age.update(scan(*(inf,) * 8), Pose2D(0.04, 0.0, 0.0), 0.1)
-    assert age.update(scan(*(inf,) * 8), Pose2D(2.0, 0.0, 0.0), 9.0), "where the robot has come, nothing need be"
+    assert age.update(scan(*(1.0,) * GONE_BEAMS, inf, inf), Pose2D(), 0.0)
+    nothing = scan(*(inf,) * (GONE_BEAMS + 2))
+    assert not age.update(nothing, Pose2D(0.04, 0.0, 0.0), 0.1)
+    assert age.update(nothing, Pose2D(2.0, 0.0, 0.0), 9.0), "where the robot has come, nothing need be"
+
+
+def test_what_few_beams_saw_may_have_been_taken_away() -> None:
+    age = ScanAge()
+    age.update(scan(1.0, 1.1, *(inf,) * 6), Pose2D(), 0.0)
+    assert age.update(scan(*(inf,) * 8), Pose2D(), 0.1)
 
 
 @pytest.mark.parametrize(("range_min_m", "counts"), [(0.5, True), (0.6, False)])
