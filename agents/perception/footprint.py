@@ -21,6 +21,9 @@ NEARING = 0.02
 the robot drives does not stop it."""
 NEARER_MM = 2.0
 """Length [mm] by which less is kept than the nearest point inside the margin leaves: other readings err, too."""
+ERROR_M = 0.02
+"""Depth [m] inside the body up to which a reading errs as those of a wall beside it do. A deeper one is of no wall, and
+says nothing of how far the others err: a part of the robot itself, dust before the scanner."""
 CORNER = 1.5
 """Length of a right corner of the margin in margins, and more."""
 PAST_RAD = 1e-9
@@ -69,11 +72,13 @@ class PolygonBody:
             radius_m = abs(v / omega)
             free_rad = self._free_rad(points, twist, v / omega, margin_m, within_m / radius_m)
             return within_m if free_rad == within_m / radius_m else radius_m * free_rad
-        kept_m = self._kept_m(points, twist, margin_m)
-        if kept_m is None:
+        met = self._met(points, twist, margin_m)
+        if met is None:
             return 0.0
-        sign, sides = (1.0 if v > 0.0 else -1.0), self._grown(kept_m).sides
-        return max(0.0, min([within_m, *(_straight(sides, x, y, sign) for x, y in points)]))
+        sign, free_m = (1.0 if v > 0.0 else -1.0), within_m
+        for grown, those in met:
+            free_m = min([free_m, *(_straight(grown.sides, x, y, sign) for x, y in those)])
+        return max(0.0, free_m)
 
     def free_turn(self, points: Sequence[Point], radps: float, margin_m: float, within_rad: float = inf) -> float:
         """Return the angle [rad] of a turn on the spot towards the sign of `radps`, until a point is met as there."""
@@ -83,30 +88,23 @@ class PolygonBody:
         self, points: Sequence[Point], twist: Twist, center_y: float, margin_m: float, within_rad: float
     ) -> float:
         """Return the angle [rad] of a turn about (0, `center_y`) until a point is met."""
-        kept_m = self._kept_m(points, twist, margin_m)
-        if kept_m is None:
+        met = self._met(points, twist, margin_m)
+        if met is None:
             return 0.0
-        grown = self._grown(kept_m)
-        outer_m = max(hypot(x, y - center_y) for x, y in grown.corners)
-        inner_m = max(0.0, *(ny * center_y - far_m for _, ny, far_m in grown.sides))
-        # The largest distance beyond a side is a lower bound of that to the polygon: no point that is met is left out.
-        near, far = inner_m * inner_m / ROUNDED, outer_m * outer_m * ROUNDED
-        direction = -1.0 if twist.angular_z > 0.0 else 1.0  # seen from the body the points turn the other way
         free_rad = within_rad
-        for x, y in points:
-            beside = y - center_y
-            square = x * x + beside * beside
-            if near < square < far:
-                met_rad = _turned(grown.sides, center_y, atan2(beside, x), sqrt(square), direction, free_rad)
-                free_rad = min(free_rad, met_rad)
+        for grown, those in met:
+            free_rad = _turn(grown, those, center_y, twist.angular_z, free_rad)
         return free_rad
 
-    def _kept_m(self, points: Sequence[Point], twist: Twist, margin_m: float) -> float | None:
-        """Return the margin [m] that a motion can keep: `margin_m`, or a little less than the nearest point leaves;
-        None where `twist` brings a point inside the margin nearer to the side that it is beside.
+    def _met(
+        self, points: Sequence[Point], twist: Twist, margin_m: float
+    ) -> list[tuple[_Grown, Sequence[Point]]] | None:
+        """Return the body with the margin that a motion can keep, and the points that it must not meet: `margin_m`, or
+        a little less than the nearest point leaves; None where `twist` brings a point inside the margin nearer to the
+        side that it is beside. Points deeper in the body than `ERROR_M` must only not come into its core.
         """
         reach_m, v, omega = self.reach_m + CORNER * margin_m, twist.linear_x, twist.angular_z
-        square, nearest_m = reach_m * reach_m, margin_m
+        square, nearest_m, deep = reach_m * reach_m, margin_m, list[Point]()
         for x, y in points:
             if x * x + y * y >= square:
                 continue
@@ -115,15 +113,40 @@ class PolygonBody:
                 moves_x, moves_y = omega * y - v, -omega * x
                 if nx * moves_x + ny * moves_y < -NEARING * hypot(moves_x, moves_y):
                     return None
-                nearest_m = min(nearest_m, apart_m)
-        if nearest_m == margin_m:
-            return margin_m
-        # In whole millimetres, so that few polygons are kept; what is inside the body is an error of a reading.
-        return max(floor(1000.0 * nearest_m - NEARER_MM) / 1000.0, self._core_m)
+                if apart_m < -ERROR_M:
+                    deep.append((x, y))
+                else:
+                    nearest_m = min(nearest_m, apart_m)
+        kept_m = margin_m
+        if nearest_m < margin_m:  # in whole millimetres, so that few polygons are kept
+            kept_m = max(floor(1000.0 * nearest_m - NEARER_MM) / 1000.0, self._core_m)
+        if not deep:
+            return [(self._grown(kept_m), points)]
+        others = [point for point in points if point not in deep]
+        return [(self._grown(kept_m), others), (self._grown(self._core_m), deep)]
 
     def _grow(self, margin_m: float) -> _Grown:
         sides = tuple((nx, ny, far_m + margin_m) for nx, ny, far_m in self._sides)
         return _Grown(sides, tuple(_corner(sides[n - 1], side) for n, side in enumerate(sides)))
+
+
+def _turn(grown: _Grown, points: Sequence[Point], center_y: float, omega: float, within_rad: float) -> float:
+    """Return the angle [rad] of a turn about (0, `center_y`), towards the sign of `omega`, until `grown` meets a point;
+    `within_rad` if it meets none before.
+    """
+    outer_m = max(hypot(x, y - center_y) for x, y in grown.corners)
+    inner_m = max(0.0, *(ny * center_y - far_m for _, ny, far_m in grown.sides))
+    # The largest distance beyond a side is a lower bound of that to the polygon: no point that is met is left out.
+    near, far = inner_m * inner_m / ROUNDED, outer_m * outer_m * ROUNDED
+    direction = -1.0 if omega > 0.0 else 1.0  # seen from the body the points turn the other way
+    free_rad = within_rad
+    for x, y in points:
+        beside = y - center_y
+        square = x * x + beside * beside
+        if near < square < far:
+            met_rad = _turned(grown.sides, center_y, atan2(beside, x), sqrt(square), direction, free_rad)
+            free_rad = min(free_rad, met_rad)
+    return free_rad
 
 
 def _side(a: Point, b: Point) -> Side:

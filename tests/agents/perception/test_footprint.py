@@ -82,6 +82,12 @@ def test_a_point_inside_the_margin_bars_what_comes_nearer_to_it_and_frees_what_l
     assert BODY.free_along(before_the_nose, Twist(-0.5, 0.0), MARGIN_M) == inf
 
 
+@pytest.mark.parametrize("odd", [(-0.2, 0.0), (0.0, 0.15), (0.1, -0.14)])
+def test_a_reading_deep_inside_the_body_lets_it_come_no_nearer_to_a_wall(odd: tuple[float, float]) -> None:
+    wall = [(0.6, 0.02 * n) for n in range(-20, 21)]
+    assert BODY.free_along([*wall, odd], Twist(0.3, 0.0), MARGIN_M) == pytest.approx(0.6 - 0.254 - MARGIN_M)
+
+
 @pytest.mark.parametrize("corners", [(), JACKAL[:2], tuple(reversed(JACKAL)), tuple((x + 1.0, y) for x, y in JACKAL)])
 def test_what_is_no_polygon_around_base_link_is_no_footprint(corners: tuple[tuple[float, float], ...]) -> None:
     assert PolygonBody.of(replace(Mission(), footprint_m=corners)) is None
