@@ -25,6 +25,8 @@ OBEYED_MPS, OBEYED_RADPS = 0.1, 0.5
 SHARED_RAD = pi / 3
 """Angle [rad] off the motion, now or after turning for `TURN_S`, within which a team-mate counts as ahead."""
 TURN_S = 0.4
+RESTS = 1e-6
+"""Speed [m/s, rad/s] below which nothing is needed to stop: squares of what fades out would vanish as divisors."""
 
 
 def safe(
@@ -61,7 +63,7 @@ def safe(
 
 def _swept_share(twist: Twist, points: Sequence[Point], footprint: PolygonBody, limits: Limits) -> float:
     """Return the share of `twist` from which the drive can stop before what the body sweeps, its turn included."""
-    v, omega = abs(twist.linear_x), abs(twist.angular_z)
+    v, omega = (0.0 if abs(rate) < RESTS else abs(rate) for rate in (twist.linear_x, twist.angular_z))
     stop_rad = omega * omega / (2.0 * BRAKING_SHARE * limits.alpha_max_radps2)
     if v > 0.0:
         stop_m = v * v / (2.0 * BRAKING_SHARE * limits.a_max_mps2)

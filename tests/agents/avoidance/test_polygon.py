@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import cos, sin
 
+import pytest
+
 from lfa.agents.avoidance.arc_planner import BACK_MPS, ArcPlanner
 from lfa.agents.avoidance.safety import safe
 from lfa.agents.perception.footprint import PolygonBody
@@ -57,6 +59,13 @@ def test_a_bend_that_the_drive_reaches_late_does_not_lead_a_corner_into_a_wall()
         pose = along_arc(pose, last, DT)
         least_m = min(least_m, out_of_it_m(seen_from(pose, wall)))
     assert least_m > 0.0
+
+
+@pytest.mark.parametrize("wanted", [Twist(1e-170, 0.0), Twist(0.0, -1e-170), Twist(5e-324, 0.3), STILL])
+def test_a_command_that_fades_out_is_made_safe_as_any_other(wanted: Twist) -> None:
+    limited = safe(wanted, STILL, CORRIDOR, RADIUS_M, LIMITS, DT, BODY)
+    assert abs(limited.linear_x) <= abs(wanted.linear_x)
+    assert abs(limited.angular_z) <= abs(wanted.angular_z)
 
 
 def along_x(s: float) -> Point:
