@@ -64,14 +64,14 @@ class Surroundings:
 
     def _remember(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
         """Keep the points of the last scan, and of those before, on which no beam of this one falls."""
-        beams, step, aside = scan.ranges_m, scan.angle_increment, int(BLIND_RAD / max(abs(scan.angle_increment), 1e-3))
+        aside = int(BLIND_RAD / max(abs(scan.angle_increment), 1e-3))
         known = {(round(x / KEPT_CELL_M), round(y / KEPT_CELL_M)): ((x, y), now) for x, y in self._points_map}
         self._unseen = {
             cell: (point, at)
             for cell, (point, at) in (self._unseen | known).items()
             if now - at < KEPT_S
             and hypot(point[0] - pose_map.x, point[1] - pose_map.y) < KEPT_M
-            and _is_blind(beams, step, aside, in_base(pose_map, point), scan.angle_min)
+            and _is_blind(scan, aside, in_base(pose_map, point))
         }
 
     def _too_near(self, scan: LaserScan, pose_map: Pose2D) -> dict[int, Point]:
@@ -80,15 +80,11 @@ class Surroundings:
         Beams of which nothing is known are left out: a filter may hide the robot's own parts so.
         """
         hidden: dict[int, Point] = {}
-        step = scan.angle_increment or TAU
-        count, around = len(scan.ranges_m), max(1, round(TAU / abs(step)))
         for point in sorted(self._points_map, key=lambda known: dist(known, (pose_map.x, pose_map.y)), reverse=True):
             away_x, away_y = point[0] - pose_map.x, point[1] - pose_map.y
             if hypot(away_x, away_y) <= scan.range_min_m + HIDDEN_M:
-                bearing = atan2(away_y, away_x) - pose_map.theta - scan.angle_min
-                turned = bearing if step > 0.0 else -bearing
-                beam = round(turned % TAU / abs(step)) % around
-                if beam < count and scan.ranges_m[beam] == -inf:
+                [beam] = _beams(scan, atan2(away_y, away_x) - pose_map.theta)
+                if beam < len(scan.ranges_m) and scan.ranges_m[beam] == -inf:
                     hidden[beam] = point
         return hidden
 
@@ -108,10 +104,21 @@ class Surroundings:
         ] + [in_base(pose_map, point) for point, _ in self._unseen.values()]
 
 
-def _is_blind(beams: Sequence[float], step: float, aside: int, point: Point, angle_min: float) -> bool:
+def _is_blind(scan: LaserScan, aside: int, point: Point) -> bool:
     """Return whether no beam of a scan looks in the direction of `point` in `base_link`, or within `aside` beams."""
-    place = round(((atan2(point[1], point[0]) - angle_min) % TAU) / step) if step else 0
-    return all(isnan(beams[n]) for n in range(max(0, place - aside), min(len(beams), place + aside + 1)))
+    beams = scan.ranges_m
+    return all(n >= len(beams) or isnan(beams[n]) for n in _beams(scan, atan2(point[1], point[0]), aside))
+
+
+def _beams(scan: LaserScan, bearing: float, aside: int = 0) -> list[int]:
+    """Return the numbers of the beam in direction `bearing` [rad] in `base_link` and of `aside` more on either side,
+    whether the scanner turns left or right; above those of the scan where it does not look.
+    """
+    step = scan.angle_increment or TAU
+    turned = bearing - scan.angle_min if step > 0.0 else scan.angle_min - bearing
+    around = max(1, round(TAU / abs(step)))
+    place = round(turned % TAU / abs(step))
+    return [n % around for n in range(place - aside, place + aside + 1)]
 
 
 def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Point]:

@@ -2,6 +2,7 @@
 
 from math import hypot, inf, nan, pi
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -119,6 +120,16 @@ def test_what_a_beam_looks_through_is_not_remembered() -> None:
     seen = Surroundings(remembers=True)
     seen.scan(BEHIND, Pose2D(), 0.0)
     seen.scan(scan(inf, inf, inf, inf), Pose2D(), 0.1)
+    assert seen.points(Pose2D()) == []
+
+
+@pytest.mark.parametrize(("angle_min", "step"), [(0.0, -pi / 2), (-pi, pi / 2), (1e-9, pi / 2), (1.0, -pi / 2)])
+def test_what_a_beam_looks_through_is_not_remembered_whichever_way_the_scanner_turns(
+    angle_min: float, step: float
+) -> None:
+    seen = Surroundings(remembers=True)
+    seen.scan(LaserScan(HEADER, angle_min, step, 0.05, 8.0, (0.5, 0.5, 0.5, 0.5)), Pose2D(), 0.0)
+    seen.scan(LaserScan(HEADER, angle_min, step, 0.05, 8.0, (inf, inf, inf, inf)), Pose2D(0.0, 0.0, 1e-6), 0.1)
     assert seen.points(Pose2D()) == []
 
 
