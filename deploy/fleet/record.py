@@ -31,6 +31,7 @@ from lfa.deploy.run.termination import Termination
 from lfa.deploy.terminal_text import print_visible
 from lfa.protocol import clock, incarnations
 from lfa.protocol.errors import Refused
+from lfa.protocol.messages.codec import Message
 from lfa.protocol.messages.simulation import Truth
 from lfa.protocol.messages.team import MissionNote
 from lfa.protocol.mission import Mission
@@ -141,15 +142,19 @@ class _Followed:
     def _write(self, subscriber: Subscriber) -> None:
         """Record all new messages, at world time [s], or without a world at the time since the recording's start."""
         for arrival, message in subscriber.take():
-            if isinstance(message, Truth):
-                self._seen.see(arrival.at, message.time_s)
-            elif isinstance(message, MissionNote):
-                self._mission = message.mission
-            if self._termination is not None:
-                self._termination.see(message)
+            self._see(message, arrival.at)
             at_s = self._seen.of(arrival.at) if self._seen.known else arrival.at - self._begun
             self._recorder.record(at_s, arrival.key, message)
             self._holes.see(at_s, arrival.key, message.header)
+
+    def _see(self, message: Message, at: float) -> None:
+        """Take what tells of the fleet's mission, its world's time and its end from a message that came at `at` [s]."""
+        if isinstance(message, Truth):
+            self._seen.see(at, message.time_s)
+        elif isinstance(message, MissionNote):
+            self._mission = message.whole
+        if self._termination is not None:
+            self._termination.see(message)
 
     def summarize(self, recording: Recording) -> Summary | None:
         """Write the summary of what was recorded and return it; None if not even the mission is known."""
