@@ -260,9 +260,11 @@ class Estimator:
             self._relocate(fix, odometry)
 
     def _relocate(self, fix: Localization, odometry: _Odometry) -> None:
-        """Place the robot at `fix`. How far it has driven without a fix is forgotten at the next that agrees only: a
-        localization that hangs contradicts the wheels again and again.
+        """Place the robot at `fix`. How far it has driven without a fix is forgotten only if the fixes go along with
+        the wheels: a localization that hangs contradicts them again and again.
         """
+        if self._hung.agrees:
+            self._unfixed_m = 0.0
         self._map_odom = compose(fix.pose_map, inverse(odometry.pose_odom))
         self._fix_at = odometry
         self._covariance = Covariance(*self._fix_variances(fix))

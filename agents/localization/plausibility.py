@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfa.protocol.geometry import Pose2D, Twist, along_arc, distance, wrap
+from lfa.protocol.geometry import Pose2D, Twist, along_arc, between, distance, wrap
 
 POSITION_MAX_M = 1e6
 SPEED_MAX = 50.0
@@ -70,6 +70,9 @@ HUNG_M, HUNG_SHARE = 0.3, 0.3
 """Way [m] by the wheels of which the fixes must have made that share: what they say of one place, noise and all, is an
 old pose that is said again. So is what they say of a robot whose wheels slip, which is no robot to drive either."""
 
+AGREES_SHARE = 0.5
+"""Share of such a way by which fixes and wheels differ at most where the fixes only err more than they say."""
+
 
 class HungLocalization:
     """Whether one robot's fixes stay where they are under fresh stamps while its wheels drive on."""
@@ -77,6 +80,8 @@ class HungLocalization:
     def __init__(self) -> None:
         self._from: tuple[Pose2D, Pose2D] | None = None
         """Fix, and pose in `odom`, from which the ways are counted."""
+        self.agrees = False
+        """True if the fixes went along with the wheels on the last way of `HUNG_M`."""
 
     def update(self, pose_map: Pose2D, pose_odom: Pose2D) -> bool:
         """Update with a fix, and the odometry of the moment; return True if the localization hangs."""
@@ -84,6 +89,8 @@ class HungLocalization:
             way_m, moved_m = distance(self._from[1], pose_odom), distance(self._from[0], pose_map)
             if way_m < HUNG_M:
                 return False
+            fixed, driven = between(self._from[0], pose_map), between(self._from[1], pose_odom)
+            self.agrees = distance(fixed, driven) < AGREES_SHARE * way_m
             if moved_m < HUNG_SHARE * way_m:
                 return True
         self._from = pose_map, pose_odom

@@ -170,6 +170,13 @@ def test_a_localization_that_says_one_place_while_the_wheels_drive_on_is_none(ji
     assert drive.step(STILL)[0] < 0.02, "it says where the robot is, again"
 
 
+def test_fixes_that_err_more_than_they_say_and_go_along_with_the_wheels_are_no_hung_localization() -> None:
+    drive = Drive(noise_m=0.07, noise_rad=0.05)
+    for n in range(3000):
+        drive.step(Twist(0.5, 0.0))
+        assert drive.estimator.missing(drive.now) is None, f"after {n} steps"
+
+
 def test_a_robot_that_stands_keeps_its_pose_without_fixes() -> None:
     drive = Drive()
     for _ in range(50):
