@@ -57,7 +57,7 @@ class FrozenOdometry:
         self._said = along_arc(self._said, twist, dt_s)
         said_m, moved_m = _way_m(Pose2D(), self._said), _way_m(self._from, pose)
         if said_m >= FROZEN_M and stamp - self._from_at > FROZEN_S:
-            self.frozen = moved_m < FROZEN_SHARE * said_m
+            self.frozen = moved_m < FROZEN_SHARE * said_m and not _rests(twist)  # a gyroscope at rest drifts
         elif not self.frozen or (not _rests(twist) and moved_m < FROZEN_SHARE * FROZEN_M):
             return self.frozen
         else:

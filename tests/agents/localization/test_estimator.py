@@ -289,6 +289,14 @@ def test_odometry_that_jitters_about_one_place_and_says_that_it_moves_is_none() 
     assert drive.estimator.missing(drive.now) is None, "it says that it rests, as it does"
 
 
+def test_a_gyroscope_that_drifts_at_rest_is_no_frozen_odometry() -> None:
+    drive = Drive()
+    for _ in range(3000):
+        drive.step(Twist(0.0, 0.05))
+        drive.odom = drive.true = Pose2D(2.0, -1.0, 0.4)
+        assert drive.estimator.missing(drive.now) is None
+
+
 @pytest.mark.parametrize("back_s", [1.0, 3600.0, 30 * 86400.0])
 def test_a_driver_whose_clock_is_set_back_or_forward_loses_its_pose_for_a_moment(back_s: float) -> None:
     drive = Drive()
