@@ -14,7 +14,7 @@ from math import cos, hypot, inf, isnan, pi, sin
 
 from lfa.agents.perception.scan import READING_M_MIN
 from lfa.protocol.geometry import STILL, Pose2D, Twist, distance, wrap
-from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.messages.robot import NEAR_M_MAX, LaserScan
 from lfa.protocol.topics import TOPIC
 
 SCAN_S_MAX = TOPIC["scan"].timeout_s or 0.35
@@ -31,8 +31,6 @@ MOVED_M, MOVED_RAD = 0.05, 0.05
 """Motion since the last scan that counted, after which an equal scan cannot be a new one."""
 REPEATS = 10
 """Number of scans that are remembered: a driver may repeat the turns that its buffer holds."""
-NEAR_M_MAX = 0.5
-"""Range [m] that a scanner must be able to measure: one that begins to see farther off shows no way past anything."""
 GONE_SHARE, GONE_BEAMS, GONE_REACH, GONE_M = 0.25, 12, 0.7, 0.5
 """Share of the beams, and their least number, that had a reading within a share of the range: while the robot has moved
 less than GONE_M [m], they cannot all have none. Fewer beams may all have been on one thing that was taken away."""

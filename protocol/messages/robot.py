@@ -50,6 +50,10 @@ class Localization(Struct, frozen=True, array_like=True, tag="localization"):
     sigma_rad: Number = 0.0
 
 
+NEAR_M_MAX = 0.5
+"""Range [m] that a scanner must be able to measure: one that begins to see farther off shows no way past anything."""
+
+
 class LaserScan(Struct, frozen=True, array_like=True, tag="scan"):
     """Laser scan by REP-117: beyond `range_max_m` is +inf, below `range_min_m` is -inf, a bad reading is nan."""
 

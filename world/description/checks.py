@@ -9,6 +9,7 @@ from math import hypot, isfinite, pi
 
 from lfa.protocol.config_file.mistake import Mistake, Range, Rule, out_of_range, wrong
 from lfa.protocol.geometry import TAU, convex
+from lfa.protocol.messages.robot import NEAR_M_MAX
 from lfa.protocol.mission_checks import footprint_mistakes
 from lfa.protocol.names import robot_name
 from lfa.world.description.scenario import SPEED_MPS_MAX, SPEED_MPS_MIN, Assert, Obstacle, Scenario
@@ -121,7 +122,7 @@ def _ranges(scenario: Scenario) -> Iterator[Mistake]:
         Range("world.body.mass_kg", world.body.mass_kg, 0.1, 1e4),
         Range("world.body.push_n", world.body.push_n, 0.1, 1e6),
         Range("world.body.wheel_radius_m", world.body.wheel_radius_m, 0.005, 1.0),
-        Range("world.lidar.range_min_m", lidar.range_min_m, 0.0, lidar.range_max_m, "world.lidar.range_max_m"),
+        Range("world.lidar.range_min_m", lidar.range_min_m, 0.0, min(lidar.range_max_m, NEAR_M_MAX)),
         Range("world.lidar.range_max_m", lidar.range_max_m, 0.1, 1e3),
         Range("world.lidar.fov_rad", lidar.fov_rad, 0.1, TAU),
         Range("world.lidar.rate_hz", lidar.rate_hz, 0.1, world.physics_hz, "world.physics_hz"),

@@ -57,7 +57,7 @@ BAD = [
     (["world.physics_hz=20"], ["world.physics_hz = 20", "from 100 to 1000"]),
     (["world.physics_hz=1e9"], ["world.physics_hz", "from 100 to 1000"]),
     (["world.lidar.beams='many'"], ["world.lidar.beams = many", "a whole number, not text"]),
-    (["world.lidar.range_min_m=9"], ["world.lidar.range_min_m = 9", "from 0 to 8"]),
+    (["world.lidar.range_min_m=0.6"], ["world.lidar.range_min_m = 0.6", "from 0 to 0.5"]),
     (["radio.loss=1.5"], ["radio.loss = 1.5"]),
     (["world.obstacles=[{center_m=[0.2,0], radius_m=0.3}]"], ["obstacles[0]", "clear of the start of robot 1"]),
     (["world.obstacles=[{center_m=[40,0], radius_m=0.3}]"], ["obstacles[0]", "clear of the goal"]),
