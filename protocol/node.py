@@ -137,8 +137,7 @@ def defers_rounds(node: Node) -> bool:
 
     False for a node that does not say it: world, witness, driver.
     """
-    defers: bool = getattr(node, "defer_rounds", False)
-    return defers
+    return bool(getattr(node, "defer_rounds", False))
 
 
 def may_end(node: Node) -> bool:
