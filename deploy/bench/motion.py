@@ -1,11 +1,11 @@
 """`lfa bench motion`: complete teams in virtual time, on every ground that driving is judged by.
 
 The rows: every shipped scenario; the BARN worlds (`lfa bench barn`, and with the noise of `explore`); gaps, traps,
-corners and a closing door; whatever moves; maps that nobody knows; the time of one control step. A run is good if it
-ends at its goal without contact, without a violated invariant and without a robot left behind. What falls short is
-listed by cause, each run with its folder, in which `lfa why`, `lfa plot` and `lfa view` show it again.
-Maps and worlds of others are searched in `shared`, beside the checkout or above it; without them their rows are
-skipped with a message.
+corners and a closing door; whatever moves; maps that nobody knows; the time to the goal over the shortest possible one
+on known ground; the time of one control step. A run is good if it ends at its goal without contact, without a violated
+invariant and without a robot left behind. What falls short is listed by cause, each run with its folder, in which
+`lfa why`, `lfa plot` and `lfa view` show it again. Maps and worlds of others are searched in `shared`, beside the
+checkout or above it; without them their rows are skipped with a message.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from random import Random
 from time import strftime
 
 from lfa.deploy.bench import barn
-from lfa.deploy.bench.driving import courses, movers, step_time, unknown_maps
+from lfa.deploy.bench.driving import courses, fastest_way, movers, step_time, unknown_maps
 from lfa.deploy.bench.driving.course_file import course_text
 from lfa.deploy.bench.driving.courses import CourseKind
+from lfa.deploy.bench.driving.fastest_way import TimedKind
 from lfa.deploy.bench.driving.movers import MoverKind
 from lfa.deploy.bench.driving.one_run import complaint, driven, loaded, note, show_failures
 from lfa.deploy.bench.driving.unknown_maps import BenchMap
@@ -63,6 +64,7 @@ def cases(seeds: int | None, failed: Path, rows: str = "*") -> list[Case]:
         ),
         *(_mover(kind, motion, seeds or MOVER_SEEDS, failed) for kind in movers.KINDS for motion in movers.MOTIONS),
         *_unknown(seeds, failed, rows),
+        *(_timed(kind, seeds or SEEDS, failed) for kind in fastest_way.KINDS),
         Case("step/180 beams", (Quantity("p99", "ms", STEP_MS_MAX),), step_time.step_ms),
     ]
 
@@ -165,6 +167,29 @@ def pair_good(ground: BenchMap, count: int, failed: Path, number: int) -> list[f
         note(f"unknown/{ground.name}", done, wrong, failed)
         way_m = max(robot.way_m or 0.0 for robot in done.summary.robots if robot.role_at_end == "leader")
     return [float(wrong is None), way_m / unknown_maps.shortest_on(ground, pair, scenario.mission.radius_m)]
+
+
+def _timed(kind: TimedKind, seeds: int, failed: Path) -> Case:
+    quantities = (
+        Quantity(f"good of {seeds}", "runs", float(seeds), "at least"),
+        Quantity("time over the shortest possible", "", kind.ratio_max, over="mean"),
+    )
+    parts = [CasePart(seed, partial(timed_good, kind, failed, seed)) for seed in range(1, seeds + 1)]
+    return many(f"time/{kind.name}", quantities, parts)
+
+
+def timed_good(kind: TimedKind, failed: Path, seed: int) -> list[float]:
+    """Return 1 if the run of one robot is good and in time, else 0, and its time over the shortest possible one."""
+    name = f"time/{kind.name}"
+    timed = kind.draw(Random(f"{kind.name} {seed}"), fastest_way.RADIUS_M)
+    scenario = loaded(kind.name, course_text(name, timed.course, "path_following", robots=1), timed.sets)
+    with driven(scenario, seed) as done:
+        took_s = done.summary.arrived_at_s or scenario.time_limit_s
+        ratio = took_s / timed.least_s(scenario.mission.limits.a_max_mps2)
+        late = f"{ratio:.2f} times the shortest possible time" if ratio > kind.ratio_max else None
+        wrong = complaint(done.summary) or late
+        note(name, done, wrong, failed)
+    return [float(wrong is None), ratio]
 
 
 def _left_out(name: str, rows: str, why: str) -> None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from math import hypot, pi
+from math import dist, hypot, pi
 from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from lfa.deploy.bench import motion
-from lfa.deploy.bench.driving import courses, movers, step_time, unknown_maps
-from lfa.deploy.bench.driving.course_file import course_text
-from lfa.deploy.bench.driving.one_run import by_cause, complaint, driven, loaded, note, show_failures
+from lfa.deploy.bench.driving import courses, fastest_way, movers, step_time, unknown_maps
+from lfa.deploy.bench.driving.course_file import CRUISE_MPS, course_text
+from lfa.deploy.bench.driving.one_run import FAILURES, by_cause, complaint, driven, loaded, note, show_failures
 from lfa.deploy.bench.driving.shortest_way import shortest_m
 from lfa.deploy.bench.driving.unknown_maps import GROUNDS, BenchMap
 from lfa.protocol.errors import Refused
@@ -23,7 +24,7 @@ from lfa.world.description.load import load, shipped
 def test_the_rows_are_those_that_driving_is_judged_by(tmp_path: Path) -> None:
     names = {case.name for case in motion.cases(1, tmp_path)}
     assert {f"scenario/{name}" for name in shipped()} <= names
-    assert {"course/u_trap/reactive", "mover/head_on/explore", "unknown/rooms", "step/180 beams"} <= names
+    assert {"course/u_trap/reactive", "mover/head_on/explore", "unknown/rooms", "time/open", "step/180 beams"} <= names
 
 
 @pytest.mark.parametrize("kind", courses.KINDS, ids=lambda kind: kind.name)
@@ -114,3 +115,23 @@ def test_a_run_that_does_not_end_at_its_goal_is_not_good(goal: float, limit: flo
 def test_the_control_steps_of_a_simulated_team_are_timed() -> None:
     [p99_ms] = step_time.step_ms(until_s=1.0)
     assert p99_ms > 0.0
+
+
+def test_no_way_in_clutter_is_shorter_than_the_straight_line_and_none_in_time_than_the_cruise_allows() -> None:
+    for kind in fastest_way.KINDS:
+        timed = kind.draw(Random(1), fastest_way.RADIUS_M)
+        line_m = dist(timed.course.route_m[0], timed.course.route_m[-1])
+        assert timed.way_m >= line_m
+        assert timed.least_s(0.5) == pytest.approx(timed.way_m / CRUISE_MPS + CRUISE_MPS / 0.5)
+
+
+def test_a_robot_among_obstacles_that_it_knows_takes_hardly_longer_than_any_drive_could(tmp_path: Path) -> None:
+    clutter = fastest_way.KINDS[1]
+    good, ratio = motion.timed_good(clutter, tmp_path, 1)
+    assert good == 1.0 and 0.97 < ratio < clutter.ratio_max
+
+
+def test_a_run_that_takes_longer_than_the_bar_is_not_good(tmp_path: Path) -> None:
+    fast = structs.replace(fastest_way.KINDS[0], ratio_max=0.9)
+    assert motion.timed_good(fast, tmp_path, 1)[0] == 0.0
+    assert "times the shortest possible time" in (tmp_path / FAILURES).read_text()
