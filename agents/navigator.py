@@ -245,5 +245,7 @@ class Navigator:
         held = role is Role.FOLLOWER and abs(meant.linear_x) >= WANTED_MPS > abs(wanted.linear_x)
         leads = held or (role is Role.LEADER and self.leading.under_way)
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
-        planned = self.leading.rounding or self._follow_slot.catches_up
-        self._stuck_monitor.watch(pose, wanted, action, lost, now, leads=leads, again=not planned, moving=moving)
+        again, hung_at = not (self.leading.rounding or self._follow_slot.catches_up), self.estimator.hung_at
+        self._stuck_monitor.watch(
+            pose, wanted, action, lost, now, leads=leads, again=again, moving=moving, hung_at=hung_at
+        )

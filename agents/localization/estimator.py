@@ -91,6 +91,8 @@ class Estimator:
         self.relocations = 0
         self.jumps = 0
         """Number of corrections by more than `JUMP_M`."""
+        self.hung_at: Pose2D | None = None
+        """Place in `map` that the fixes say while the wheels drive on; None while they do not hang."""
         self.last_fix_at: float | None = None
         self._unfixed_m = 0.0
 
@@ -125,9 +127,12 @@ class Estimator:
         if not (isfinite(stamp) and plausible(fix.pose_map, Twist()) and sure):
             self.refused += 1
             return False
-        if self._history and (
-            stamp < self._history[0].stamp or self._hung.update(fix.pose_map, self._history[-1].pose_odom)
-        ):
+        if self._history and stamp < self._history[0].stamp:
+            self.refused += 1
+            return False
+        hangs = bool(self._history) and self._hung.update(fix.pose_map, self._history[-1].pose_odom)
+        self.hung_at = fix.pose_map if hangs else None
+        if hangs:
             self.refused += 1
             return False
         self.last_fix_at = received_at
@@ -201,8 +206,7 @@ class Estimator:
         self._incarnation = incarnation
         self._clock, self._wheels, self._hung = ClockOffset(), FrozenOdometry(), HungLocalization()
         self._history.clear()
-        self._map_odom = None
-        self._pending = None
+        self._map_odom = self._pending = self.hung_at = None
         self._backward_in_a_row = 0
 
     def _correct(self, fix: Localization) -> None:

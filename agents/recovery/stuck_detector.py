@@ -62,6 +62,7 @@ class StuckMonitor:
         leads: bool,
         again: bool = True,
         moving: bool = False,
+        hung_at: Pose2D | None = None,
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
         move, or a follower that would and that only limits hold, such as a team-mate before it. Without `again`, coming
@@ -69,7 +70,7 @@ class StuckMonitor:
         """
         if self.backing_out:
             return
-        held = self._stuck.watch(pose, wanted, action, lost, now, moving=moving)
+        held = self._stuck.watch(pose, wanted, action, lost, now, moving=moving, hung_at=hung_at)
         if held == COMES_BACK and not again:
             held = None
         if not leads:
@@ -155,10 +156,12 @@ class StuckConditions:
         now: float,
         *,
         moving: bool = False,
+        hung_at: Pose2D | None = None,
     ) -> str | None:
         """Return the reason why the robot is stuck, or None. `action` is its present decision's, `wanted` before
         limits, `lost` the reason of S5 while an input that it needs is missing. `moving`: the decision is about what
-        moves; a robot that comes back after it has given way is in no trap.
+        moves; a robot that comes back after it has given way is in no trap. `hung_at` is the place that the fixes say
+        while the wheels drive on: they may slip.
         """
         self._note(pose, action, moving, now)
         if lost is not None:
@@ -173,7 +176,7 @@ class StuckConditions:
             return "S3: turned round again and again"
         if self._again and self._comes_back(now):
             return COMES_BACK
-        return "S1: commanded to move, and did not" if self._does_not_move(pose, wanted, now) else None
+        return "S1: commanded to move, and did not" if self._does_not_move(hung_at or pose, wanted, now) else None
 
     def _note(self, pose: Pose2D, action: Action | None, moving: bool, now: float) -> None:
         if action != self._action:

@@ -165,9 +165,12 @@ def test_a_localization_that_says_one_place_while_the_wheels_drive_on_is_none(ji
     for _ in range(round(2.5 / mps / DT)):
         drive.step(Twist(mps, 0.0), Pose2D(hung.x + gauss(0.0, jitter_m), hung.y + gauss(0.0, jitter_m), hung.theta))
     assert drive.estimator.missing(drive.now) == "localization"
+    at = drive.estimator.hung_at
+    assert at is not None and hypot(at.x - hung.x, at.y - hung.y) < 0.05
     for _ in range(60):
         drive.step(STILL)
     assert drive.step(STILL)[0] < 0.02, "it says where the robot is, again"
+    assert drive.estimator.hung_at is None
 
 
 def test_fixes_that_err_more_than_they_say_and_go_along_with_the_wheels_are_no_hung_localization() -> None:

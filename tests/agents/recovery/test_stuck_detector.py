@@ -33,6 +33,13 @@ def test_S1_commanded_to_move_and_did_not() -> None:
     assert watched(10.0, speed=0.2) is None
 
 
+def test_S1_holds_where_the_localization_says_one_place_while_the_wheels_drive_on() -> None:
+    stuck, reason = StuckConditions(), None
+    for n in range(round((STILL_S + 0.2) / 0.02)):
+        reason = stuck.watch(Pose2D(0.004 * n, 0.0, 0.0), AHEAD, None, None, 0.02 * n, hung_at=Pose2D(0.01 * (n % 2)))
+    assert str(reason).startswith("S1")
+
+
 def test_who_is_not_asked_to_move_is_not_stuck() -> None:
     assert watched(20.0, wanted=STILL) is None
 

@@ -23,3 +23,12 @@ def test_the_shipped_terrain_leaves_nobody_behind(tmp_path: Path) -> None:
     summary = run(load("terrain"), 16, tmp_path / "run").summary
     assert (summary.outcome, summary.left_behind) == ("goal_reached", []), "lfa sim terrain --seed 16"
     assert sum(robot.contacts for robot in summary.robots) == 0
+
+
+def test_a_leader_whose_wheels_slip_at_a_bump_hands_over_and_comes_after(tmp_path: Path) -> None:
+    """It takes the bump for lower than its wheels climb; they drive on, and its localization says one place."""
+    bump = "world.bumps=[{center_m=[4.0,0.0],width_m=0.6,length_m=1.2,height_m=0.06}]"
+    sets = (bump, "mission.limits.climb_step_m=0.3", "mission.leading.route_m=[[6.0,0.0]]", "time_limit_s=60.0")
+    summary = run(load("straight", [*sets], 2), 1, tmp_path / "run").summary
+    assert [reign.cause for reign in summary.leaders] == ["start", "handed_over"]
+    assert (summary.outcome, summary.left_behind) == ("goal_reached", [])
