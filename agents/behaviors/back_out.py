@@ -36,6 +36,8 @@ class BackOut:
         self._obstacles = obstacles
         self._stuck = stuck
         self._path = BackUp(PolygonBody.of(mission))
+        self._clear_m = TRAP_M + mission.radius_m + SKIN_M
+        """Distance [m] from a trap at which the robot stands clear of what is blocked there."""
         self._stands_since: float | None = None
         """Time [s] since which the way back is barred; None while it is not."""
         self._patience_s = STANDS_S
@@ -49,7 +51,7 @@ class BackOut:
     def begin(self, pose: Pose2D) -> None:
         """Start backing out of the place in which the robot is stuck."""
         if self._stuck.reason is not None and not self._path.under_way:
-            self._path.begin(pose)
+            self._path.begin(pose, self._clear_m + SKIN_M)
             self._stands_since = None
             self._stuck.backing_out = True
 
@@ -57,8 +59,7 @@ class BackOut:
         """Extend the trail by which the robot would back out, and block the traps that it is out of."""
         if not self._path.under_way:
             self._path.keep(pose)
-        clear_m = TRAP_M + self._mission.radius_m + SKIN_M
-        for x, y in [trap for trap in self._traps if hypot(trap[0] - pose.x, trap[1] - pose.y) >= clear_m]:
+        for x, y in [trap for trap in self._traps if hypot(trap[0] - pose.x, trap[1] - pose.y) >= self._clear_m]:
             self._traps.remove((x, y))
             self._obstacles.avoid_trap(x, y, now)
 

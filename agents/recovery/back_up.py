@@ -60,9 +60,9 @@ class BackUp:
             trail.pop()
         trail.append((x, y))
 
-    def begin(self, pose: Pose2D) -> None:
-        """Start backing up from `pose`."""
-        self._left_m, self._at = OUT_M, (pose.x, pose.y)
+    def begin(self, pose: Pose2D, least_m: float = OUT_M) -> None:
+        """Start backing up from `pose`, by `least_m` [m] or more."""
+        self._left_m, self._at = max(OUT_M, least_m), (pose.x, pose.y)
         self.trap = self._at
 
     def end(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import structs
+
 from lfa.agents.avoidance.decision import Action
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.safety import SKIN_M
@@ -85,3 +87,20 @@ def test_a_robot_that_counts_as_out_for_want_of_a_trail_is_not_enclosed_in_its_o
         stuck.out.step([], Pose2D(0.3), AHEAD, STILL, stuck.now)
     stuck.out.keep(Pose2D(HERE.x - 0.5), stuck.now)
     assert stuck.model.points(HERE) == []
+
+
+def test_a_large_robot_backs_out_until_it_stands_clear_of_what_it_blocks() -> None:
+    large, monitor, team = structs.replace(MISSION, radius_m=1.5), StuckMonitor(), TeamState()
+    model = ObstacleModel(large.radius_m, large.limits, team.obstacles)
+    out = BackOut(large, follower_of(large), Detour(large.radius_m, large.limits), model, monitor)
+    x, now = 0.0, 0.0
+    while x < 4.0:
+        x, now = x + 0.1, now + 0.1
+        out.keep(Pose2D(x), now)
+        monitor.watch(Pose2D(4.0), STILL, Action.BLOCKED, None, now, leads=False)
+    out.begin(Pose2D(x))
+    while out.under_way:
+        out.step([], Pose2D(x), AHEAD, STILL, now)
+        x, now = x - 0.02, now + 0.1
+    out.keep(Pose2D(x), now)
+    assert model.points(Pose2D(x)) != []
