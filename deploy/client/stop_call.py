@@ -86,8 +86,10 @@ class StopCall:
         self._robots.add(robot)
         self._states[robot] = state
         self._heard_at[robot] = now
+        if self._word is None or state.known.word <= self._word:  # as most answers: the others are not looked at
+            return
         word = max(self._believed(), default=NO_STOP)
-        if self._word is None or word <= self._word:
+        if word <= self._word:
             return
         if not self._stand:
             self._overruled = self._overruled or word.stand
