@@ -68,7 +68,7 @@ class ScanAge:
         return True
 
     def _is_gone(self, scan: LaserScan, pose: Pose2D) -> bool:
-        """Return whether `scan` shows nothing at all where the newest scan that counts showed much all around."""
+        """Return whether `scan` shows nothing at all where the newest scan that counts showed much."""
         if not self._known or any(r < inf for r in scan.ranges_m):
             return False
         ranges_m, seen_from = self._known[-1]

@@ -63,6 +63,7 @@ TESTED: dict[str, str] = {
     "lfa watch": "tests/processes/test_readme_commands.py",
     "lfa fault kill leader": "tests/processes/test_readme_commands.py",
     **dict.fromkeys(("lfa bench NAME", "lfa bench router"), "tests/deploy/bench/test_router.py"),
+    "lfa bench agent": "tests/deploy/bench/test_agent.py",
     "lfa bench agents": "tests/deploy/bench/test_agents.py",
     "lfa bench learn": "tests/deploy/bench/test_learn.py",
 }
