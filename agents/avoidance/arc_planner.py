@@ -12,8 +12,9 @@ from collections.abc import Callable, Sequence
 from math import atan2, cos, hypot, inf, pi, sin, sqrt
 
 from lfa.agents.avoidance.safety import BRAKING_SHARE, turn_on_spot
-from lfa.agents.perception.footprint import PolygonBody
+from lfa.agents.perception.footprint import Inside, PolygonBody
 from lfa.agents.perception.scan import STRAIGHT_RADPS, Point, free_along
+from lfa.agents.perception.swept import Near
 from lfa.protocol.geometry import Twist, wrap
 from lfa.protocol.mission import Limits
 
@@ -42,9 +43,6 @@ BACK_MPS = 0.15
 BACK_FREE_M = 0.06
 ROUNDING_M = 1e-6
 """Distance [m] that covers rounding errors where points beside an arc are chosen."""
-
-Near = tuple[float, float, float]
-"""Square of a point's distance [m^2], and the point in `base_link` [m]: in this order the nearest are first."""
 
 
 class ArcPlanner:
@@ -77,12 +75,13 @@ class ArcPlanner:
         if wanted.linear_x <= 0.0:
             return self._turned(points, wanted)
         look_m = min(LOOK_M, max(hypot(*route(LOOK_M)), LEAST_M))
-        if self._free_along(points, wanted, ROOM_M) >= look_m:
+        inside = None if self._footprint is None else _Inside(self._footprint, points)
+        if self._free_along(points, wanted, ROOM_M, look_m, None if inside is None else inside.room) >= look_m:
             self._curvature = None
             return wanted
         reach_m = look_m + self._radius_m + ROOM_M
         near = sorted([(far, x, y) for x, y in points if (far := x * x + y * y) < reach_m * reach_m])
-        best = self._best(near, route, wanted, look_m)
+        best = self._best(near, inside, route, wanted, look_m)
         if best is None:
             return self._turn([(x, y) for _, x, y in near], route, turn_radps)
         self._curvature, roomy_m = best
@@ -92,20 +91,32 @@ class ArcPlanner:
         return Twist(v, v * self._curvature)
 
     def _best(
-        self, near: Sequence[Near], route: Callable[[float], Point], wanted: Twist, look_m: float
+        self,
+        near: Sequence[Near],
+        inside: _Inside | None,
+        route: Callable[[float], Point],
+        wanted: Twist,
+        look_m: float,
     ) -> tuple[float, float] | None:
         """Return the curvature [1/m] of the best arc, and its length [m] before something is nearer beside it than
         `ROOM_M`, which is inf where nothing is; None without an arc.
         """
         width_m = self._radius_m + ROOM_M
-        ahead = [point for point in near if point[1] > 0.0]
+        reach_m = width_m if self._footprint is None else self._footprint.grown_m(ROOM_M)
+        held = 0.0 if self._footprint is None else reach_m * reach_m
+        ahead = [point for point in near if point[1] > 0.0 or point[0] < held]
         least, best = inf, None
         own = wanted.angular_z / wanted.linear_x
         for curvature in (own, *self._curvatures):
             arc = Twist(1.0, curvature)
-            leads_away = self._footprint is None and _leads_away(curvature, look_m, width_m)
-            points = _beside(ahead if leads_away else near, curvature, width_m)
-            free_m = self._free_along(points, arc, SKIN_M, look_m)
+            those = ahead if _leads_away(curvature, look_m, reach_m) else near
+            skin = room = None
+            if self._footprint is None or inside is None:
+                points = _beside(those, curvature, width_m)
+            else:
+                points = self._footprint.beside(those, curvature, ROOM_M)
+                skin, room = inside.beside(curvature, width_m)
+            free_m = self._free_along(points, arc, SKIN_M, look_m, skin)
             if free_m < LEAST_M:
                 continue
             cost = _off(route, curvature, free_m) + SHORT * (look_m - free_m)
@@ -113,7 +124,7 @@ class ArcPlanner:
                 cost += CHANGE_M
             if cost >= least:
                 continue
-            roomy_m = self._free_along(points, arc, ROOM_M, free_m)
+            roomy_m = self._free_along(points, arc, ROOM_M, free_m, room)
             cost += CLOSE * (free_m - roomy_m)
             if cost < least:
                 least, best = cost, (curvature, roomy_m if roomy_m < free_m else inf)
@@ -151,10 +162,32 @@ class ArcPlanner:
         free_m = self._free_along(points, Twist(-1.0, 0.0), SKIN_M)
         return Twist(-BACK_MPS if free_m > BACK_FREE_M else 0.0, 0.0)
 
-    def _free_along(self, points: Sequence[Point], twist: Twist, margin_m: float, within_m: float = inf) -> float:
+    def _free_along(
+        self,
+        points: Sequence[Point],
+        twist: Twist,
+        margin_m: float,
+        within_m: float = inf,
+        inside: Sequence[Inside] | None = None,
+    ) -> float:
         if self._footprint is not None:
-            return self._footprint.free_along(points, twist, margin_m, within_m)
+            return self._footprint.free_along(points, twist, margin_m, within_m, inside)
         return free_along(points, twist, self._radius_m + margin_m, within_m)
+
+
+class _Inside:
+    """Points inside the margins of a polygon, found once for all arcs of a step."""
+
+    def __init__(self, footprint: PolygonBody, points: Sequence[Point]) -> None:
+        self.room = footprint.inside(points, ROOM_M)
+        self._room = {(x, y): one for one in self.room for *_, x, y in (one,)}
+        self._skin = {(x, y): one for one in footprint.nearer(self.room, SKIN_M) for *_, x, y in (one,)}
+        self._near = [(x * x + y * y, x, y) for x, y in self._room]
+
+    def beside(self, curvature: float, width_m: float) -> tuple[list[Inside], list[Inside]]:
+        """Return those inside `SKIN_M` and those inside `ROOM_M` that an arc may come nearer to than `width_m` [m]."""
+        points = _beside(self._near, curvature, width_m) if self._near else ()
+        return [self._skin[point] for point in points if point in self._skin], [self._room[point] for point in points]
 
 
 def _leads_away(curvature: float, look_m: float, width_m: float) -> bool:

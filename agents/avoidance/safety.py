@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import atan2, copysign, hypot, isfinite, pi, sqrt
 
-from lfa.agents.perception.footprint import PolygonBody
+from lfa.agents.perception.footprint import Inside, PolygonBody
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Twist
 from lfa.protocol.mission import Limits
@@ -46,10 +46,11 @@ def safe(
         wanted = STILL
     v, omega = within(wanted, limits)
     if footprint is not None:
-        share = _swept_share(Twist(v, omega), points, footprint, limits)
+        inside = footprint.inside(points, SKIN_M)
+        share = _swept_share(Twist(v, omega), points, inside, footprint, limits)
         wanted = _reached(Twist(v * share, omega * share), last, limits, dt)
         # The drive reaches a bend later than it is wanted, and the body sweeps something else until then.
-        share = _swept_share(wanted, points, footprint, limits)
+        share = _swept_share(wanted, points, inside, footprint, limits)
         v, omega = wanted.linear_x * share, wanted.angular_z * share
     else:
         free_m = free_along(points, Twist(v, omega), radius_m + SKIN_M)
@@ -61,15 +62,19 @@ def safe(
     return _reached(Twist(v, omega), last, limits, dt)
 
 
-def _swept_share(twist: Twist, points: Sequence[Point], footprint: PolygonBody, limits: Limits) -> float:
+def _swept_share(
+    twist: Twist, points: Sequence[Point], inside: Sequence[Inside], footprint: PolygonBody, limits: Limits
+) -> float:
     """Return the share of `twist` from which the drive can stop before what the body sweeps, its turn included."""
     v, omega = (0.0 if abs(rate) < RESTS else abs(rate) for rate in (twist.linear_x, twist.angular_z))
     stop_rad = omega * omega / (2.0 * BRAKING_SHARE * limits.alpha_max_radps2)
     if v > 0.0:
         stop_m = v * v / (2.0 * BRAKING_SHARE * limits.a_max_mps2)
         needed_m = max(stop_m, stop_rad * v / omega) if omega > 0.0 else stop_m
-        return sqrt(footprint.free_along(points, twist, SKIN_M, needed_m) / needed_m)
-    return sqrt(footprint.free_turn(points, twist.angular_z, SKIN_M, stop_rad) / stop_rad) if omega > 0.0 else 1.0
+        return sqrt(footprint.free_along(points, twist, SKIN_M, needed_m, inside) / needed_m)
+    if omega > 0.0:
+        return sqrt(footprint.free_turn(points, twist.angular_z, SKIN_M, stop_rad, inside) / stop_rad)
+    return 1.0
 
 
 def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits) -> Twist:

@@ -14,9 +14,13 @@ from lfa.protocol.mission import Mission
 JACKAL = ((0.254, 0.215), (-0.254, 0.215), (-0.254, -0.215), (0.254, -0.215))
 BODY = PolygonBody(JACKAL)
 MARGIN_M, STEP_M = 0.02, 0.002
+MANY = tuple((0.3 * cos(n * pi / 16), 0.25 * sin(n * pi / 16)) for n in range(32))
+POLYGONS = {"rectangle": JACKAL, "triangle": ((0.4, 0.0), (-0.2, 0.25), (-0.2, -0.25)), "32 corners": MANY}
 CORRIDOR = [(0.02 * n, side * 0.265) for n in range(-100, 100) for side in (1.0, -1.0)]
 """Walls 5 cm beside the body: narrower than its circle, so that it cannot turn there."""
 arcs = st.builds(Twist, st.sampled_from((1.0, -1.0)), st.floats(-6.0, 6.0))
+points_around = st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2)), max_size=12)
+polygons = st.sampled_from(sorted(POLYGONS)).map(lambda name: PolygonBody(POLYGONS[name]))
 
 
 def out_of_it_m(x: float, y: float) -> float:
@@ -53,6 +57,40 @@ def test_a_turn_on_the_spot_ends_where_a_corner_comes_to_the_margin(far_m: float
         turned += 0.01
     if free_rad < pi:
         assert out_of_it_m(*in_base(Pose2D(0.0, 0.0, sign * (free_rad + 1e-4)), (x, y))) <= MARGIN_M + 1e-3
+
+
+@given(polygons, points_around, arcs, st.sampled_from((0.9, inf)))
+def test_the_way_among_many_points_ends_at_the_first_one_that_is_met(
+    body: PolygonBody, points: list[tuple[float, float]], arc: Twist, within_m: float
+) -> None:
+    """Points outside of the margin: what is inside changes the margin for all."""
+    outside = [point for point in points if not body.inside([point], MARGIN_M)]
+    each = [body.free_along([point], arc, MARGIN_M, within_m) for point in outside]
+    assert body.free_along(outside, arc, MARGIN_M, within_m) == min(each, default=within_m)
+
+
+@given(polygons, st.lists(st.tuples(st.floats(-0.1, 0.7), st.floats(-0.4, 0.4)), max_size=30), st.floats(-6.0, 6.0))
+def test_points_that_are_not_beside_an_arc_end_no_way_on_it(
+    body: PolygonBody, points: list[tuple[float, float]], curvature: float
+) -> None:
+    outside = [point for point in points if not body.inside([point], MARGIN_M)]
+    beside = body.beside([(x * x + y * y, x, y) for x, y in outside], curvature, MARGIN_M)
+    arc = Twist(1.0, curvature)
+    assert body.free_along(beside, arc, MARGIN_M, 0.9) == body.free_along(outside, arc, MARGIN_M, 0.9)
+
+
+@given(st.sampled_from(sorted(POLYGONS)), points_around, st.sampled_from((0.02, 0.12)))
+def test_a_point_is_inside_by_the_side_that_it_is_farthest_beyond(
+    name: str, points: list[tuple[float, float]], margin_m: float
+) -> None:
+    corners, found = POLYGONS[name], PolygonBody(POLYGONS[name]).inside(points, margin_m)
+    for apart_m, nx, ny, x, y in found:
+        beyond = [
+            ((by - ay) * (x - ax) - (bx - ax) * (y - ay)) / hypot(bx - ax, by - ay)
+            for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True)
+        ]
+        assert apart_m == pytest.approx(max(beyond), abs=1e-9)
+        assert hypot(nx, ny) == pytest.approx(1.0)
 
 
 def test_a_passage_narrower_than_its_circle_is_free_straight_along_and_not_for_a_turn() -> None:
