@@ -25,6 +25,8 @@ GONE_S, HOLD_S = 1.5, 10.0
 """Time [s] for which it must have turned away until its follower follows again, and for which this one stands while it
 neither comes nor has turned away: it looks for its way."""
 REVERSES_MPS = -0.02
+RESTS_MPS, RESTS_RADPS = 0.01, 0.02
+"""Speeds below which a predecessor rests: where both stand for `HOLD_S`, it does not come, whichever way it faces."""
 NEAR_BODIES, NEAR_M, CLEAR_M = 2.0, 0.8, 0.2
 """Distance within which it comes near: this number of bodies, and this room [m] between them; and the room [m] beyond
 that at which its follower stands."""
@@ -47,6 +49,8 @@ class MakeRoom:
         self._came_at = -inf
         self._made = False
         """True from the first twist that makes room until the predecessor has gone."""
+        self._moved_at: float | None = None
+        """Time [s] at which this robot made room by moving, or its predecessor moved."""
 
     def end(self) -> None:
         """Make no room any more: nobody comes, or the robot has another role."""
@@ -57,6 +61,18 @@ class MakeRoom:
         """Return the twist backwards, still where that is barred or not needed now; None while nobody needs room.
         `points` are what stands, in `base_link`.
         """
+        rests = abs(sighting.twist.linear_x) < RESTS_MPS and abs(sighting.twist.angular_z) < RESTS_RADPS
+        if not rests or self._moved_at is None:
+            self._moved_at = now
+        if now - self._moved_at >= HOLD_S:
+            self.end()
+            return None
+        twist = self._made_room(sighting, points, pose, now)
+        if twist is not None and twist != STILL:
+            self._moved_at = now
+        return twist
+
+    def _made_room(self, sighting: Sighting, points: Sequence[Point], pose: Pose2D, now: float) -> Twist | None:
         if self._comes(sighting, pose):
             self._came_at = now
             self._comes_since = now if self._comes_since is None else self._comes_since

@@ -55,8 +55,8 @@ class ObstacleModel:
         if jumps != self._jumps:
             self._jumps = jumps
             self._tracker.forget_surfaces()
-        self._scan.scan(scan, pose, now)
         places = [(mate.x, mate.y) for mate in mates]
+        self._scan.scan(scan, pose, now, places, MATE_M)
         seen, eye = self._scan, (pose.x, pose.y)
         self._tracker.update(seen.points_map, eye, places, MATE_M, now, seen.reach_m, seen.step_rad)
 

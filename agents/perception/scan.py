@@ -23,6 +23,12 @@ ROUNDED = 1.0 + 1e-9
 KEPT_M, KEPT_S, KEPT_CELL_M = 0.8, 30.0, 0.03
 """Distance [m] to the robot and time [s] up to which a point is kept on which no beam falls any more, and size [m] of
 the cells of which each keeps one."""
+COARSE_RAD, SPARSE_RAD, EDGE_M = 0.036, 0.21, 0.1
+"""Angles [rad] between two beams above which what ends between them may stick out farther than the body's skin covers,
+and above which nobody knows where it ends; and difference [m] of their ranges from which the nearer one shows an edge.
+"""
+ALL_ROUND_BEAMS = 2
+"""Number of beams by which a scan may fall short of a whole turn and still has all of it in view."""
 BLIND_RAD = 0.05
 """Angle [rad] beside a direction within which no beam looks, where the scanner does not."""
 
@@ -33,11 +39,13 @@ class Surroundings:
     """Points of the newest scan, kept in `map` so that they stay in place while the robot moves on."""
 
     def __init__(self, *, remembers: bool = False) -> None:
-        """Create an empty one; with `remembers`, what is close beside the robot is kept where its scanner does not
-        look.
+        """Create an empty one. What is close beside the robot is kept where its scanner does not look, if that has not
+        the whole turn in view; with `remembers`, also where single beams say nothing.
         """
         self._remembers = remembers
         self._points_map: list[Point] = []
+        self._edges_map: list[Point] = []
+        """Points [m] in `map` half a beam beside the edges that the newest scan shows, with coarse beams only."""
         self._unseen: dict[tuple[int, int], tuple[Point, float]] = {}
         """Points [m] in `map` close to the robot that the newest scan cannot show, by their cell, with the time [s] at
         which they were seen."""
@@ -47,29 +55,41 @@ class Surroundings:
         self.step_rad = 0.0
         """Angle [rad] between two of its beams."""
 
-    def scan(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
-        """Update with a scan made at `pose_map`. Out-of-range and bad readings give no points (REP-117)."""
+    def scan(
+        self, scan: LaserScan, pose_map: Pose2D, now: float, mates: Sequence[Point] = (), mate_m: float = 0.0
+    ) -> None:
+        """Update with a scan made at `pose_map`. Out-of-range and bad readings give no points (REP-117). What was seen
+        within `mate_m` of `mates` (in `map`) is not kept where the scanner does not look: they say where they are.
+        """
         x, y, angle, step = pose_map.x, pose_map.y, pose_map.theta + scan.angle_min, scan.angle_increment
         low, high = max(scan.range_min_m, READING_M_MIN), min(SIGHT_M, scan.range_max_m)
         self.reach_m, self.step_rad = high, abs(step)
-        if self._remembers:
-            self._remember(scan, pose_map, now)
+        if self._remembers or abs(step) * (len(scan.ranges_m) + ALL_ROUND_BEAMS) < TAU:
+            self._remember(scan, pose_map, now, mates, mate_m)
         hidden = self._too_near(scan, pose_map) if -inf in scan.ranges_m else {}
         self._points_map = [
             (x + r * cos(angle + i * step), y + r * sin(angle + i * step)) if low < r else hidden[i]
             for i, r in enumerate(scan.ranges_m)
             if low < r < high or i in hidden
         ]
+        self._edges_map = [
+            (x + r * cos(angle + beam * step), y + r * sin(angle + beam * step))
+            for beam, r in (_edges(scan.ranges_m, low, high) if COARSE_RAD < self.step_rad < SPARSE_RAD else ())
+        ]
         self.seen_at = now
 
-    def _remember(self, scan: LaserScan, pose_map: Pose2D, now: float) -> None:
+    def _remember(self, scan: LaserScan, pose_map: Pose2D, now: float, mates: Sequence[Point], mate_m: float) -> None:
         """Keep the points of the last scan, and of those before, on which no beam of this one falls."""
         aside = int(BLIND_RAD / max(abs(scan.angle_increment), 1e-3))
-        known = {(round(x / KEPT_CELL_M), round(y / KEPT_CELL_M)): ((x, y), now) for x, y in self._points_map}
+        known = {
+            (round(x / KEPT_CELL_M), round(y / KEPT_CELL_M)): ((x, y), now)
+            for x, y in self._points_map + self._edges_map
+        }
         self._unseen = {
             cell: (point, at)
             for cell, (point, at) in (self._unseen | known).items()
             if now - at < KEPT_S
+            and all(dist(point, mate) > mate_m for mate in mates)
             and hypot(point[0] - pose_map.x, point[1] - pose_map.y) < KEPT_M
             and _is_blind(scan, aside, in_base(pose_map, point))
         }
@@ -99,9 +119,23 @@ class Surroundings:
         limit = within_m * within_m
         return [
             (c * dx + s * dy, c * dy - s * dx)
-            for px, py in self._points_map
+            for px, py in (self._points_map + self._edges_map if self._edges_map else self._points_map)
             if (dx := px - x) * dx + (dy := py - y) * dy < limit
         ] + [in_base(pose_map, point) for point, _ in self._unseen.values()]
+
+
+def _edges(ranges_m: Sequence[float], low: float, high: float) -> list[tuple[float, float]]:
+    """Return where edges lie at the mean, as the beam's number plus or minus a half, and the edge's range [m].
+
+    A surface that ends between two beams ends half a beam beside the one that hits it, more or less.
+    """
+    return [
+        (i + 0.5 * aside, r)
+        for i, r in enumerate(ranges_m)
+        if low < r < high
+        for aside in (-1, 1)
+        if not 0 <= i + aside < len(ranges_m) or not ranges_m[i + aside] < r + EDGE_M
+    ]
 
 
 def _is_blind(scan: LaserScan, aside: int, point: Point) -> bool:

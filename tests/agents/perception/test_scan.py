@@ -1,6 +1,6 @@
 """From a scan to what stands in the way."""
 
-from math import hypot, inf, nan, pi
+from math import atan2, hypot, inf, nan, pi
 
 import pytest
 from hypothesis import example, given
@@ -149,3 +149,41 @@ def test_a_round_robot_knows_its_newest_scan_only() -> None:
     seen.scan(BEHIND, Pose2D(), 0.0)
     seen.scan(BLIND_BEHIND, Pose2D(), 0.1)
     assert seen.points(Pose2D()) == []
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_what_a_coarse_scan_shows_ends_half_a_beam_beside_the_last_reading(turn: float) -> None:
+    step, seen = 0.1, Surroundings()
+    coarse = LaserScan(HEADER, -turn * 0.2, turn * step, 0.05, 8.0, (inf, 1.0, 1.0, 3.0, inf))
+    seen.scan(coarse, Pose2D(), 0.0)
+    bearings = sorted(round(atan2(y, x) * turn / step, 6) for x, y in seen.points(Pose2D()) if hypot(x, y) < 1.01)
+    assert bearings == [-1.5, -1.0, 0.0, 0.5]
+
+
+def test_a_fine_scan_has_points_only_where_beams_end() -> None:
+    seen = Surroundings()
+    seen.scan(LaserScan(HEADER, 0.0, pi / 90, 0.05, 8.0, (inf, 1.0, inf)), Pose2D(), 0.0)
+    assert len(seen.points(Pose2D())) == 1
+
+
+def half_scan(behind_m: float, ahead_m: float = inf) -> tuple[LaserScan, LaserScan]:
+    """A scanner that sees half of the turn, towards something `behind_m` away, and turned away from that."""
+    step = pi / 90
+    there = LaserScan(HEADER, -pi / 2, step, 0.05, 8.0, tuple(behind_m if n == 45 else inf for n in range(91)))
+    return there, replace(there, ranges_m=tuple(ahead_m for _ in range(91)))
+
+
+def test_a_round_robot_whose_scanner_looks_ahead_remembers_what_is_close_behind_it() -> None:
+    """It turned, and reversed into what it had faced."""
+    seen, (there, away) = Surroundings(), half_scan(0.5)
+    seen.scan(there, Pose2D(), 0.0)
+    seen.scan(away, Pose2D(0.0, 0.0, pi), 0.1)
+    [(x, y)] = seen.points(Pose2D(0.0, 0.0, pi))
+    assert (x, y) == (pytest.approx(-0.5), pytest.approx(0.0, abs=1e-9))
+
+
+def test_a_team_mate_is_not_remembered_where_it_was() -> None:
+    seen, (there, away) = Surroundings(), half_scan(0.5)
+    seen.scan(there, Pose2D(), 0.0)
+    seen.scan(away, Pose2D(0.0, 0.0, pi), 0.1, [(0.6, 0.0)], 0.2)
+    assert seen.points(Pose2D(0.0, 0.0, pi)) == []
