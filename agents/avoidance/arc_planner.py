@@ -15,7 +15,7 @@ from lfa.agents.avoidance.safety import BRAKING_SHARE, turn_on_spot
 from lfa.agents.perception.footprint import Inside, PolygonBody
 from lfa.agents.perception.scan import STRAIGHT_RADPS, Point, free_along
 from lfa.agents.perception.swept import Near
-from lfa.protocol.geometry import Twist, wrap
+from lfa.protocol.geometry import Pose2D, Twist, in_base, wrap
 from lfa.protocol.mission import Limits
 
 SKIN_M = 0.025
@@ -58,6 +58,9 @@ class ArcPlanner:
         self._curvature: float | None = None
         self.blocked = False
         """True while no arc leads on although the robot faces along its route."""
+        self._turns_away = False
+        """True from where neither an arc nor the way back is free, beside what the body touches, until it is off that.
+        """
 
     def steer(
         self,
@@ -82,8 +85,10 @@ class ArcPlanner:
         reach_m = look_m + self._radius_m + ROOM_M
         near = sorted([(far, x, y) for x, y in points if (far := x * x + y * y) < reach_m * reach_m])
         best = self._best(near, inside, route, wanted, look_m)
+        nearest = [(x, y) for _, x, y in near]
+        self._turns_away = self._turns_away and self._touches(nearest)
         if best is None:
-            return self._turn([(x, y) for _, x, y in near], route, turn_radps)
+            return self._turn(nearest, route, turn_radps)
         self._curvature, roomy_m = best
         v = min(max(wanted.linear_x, bend_mps(self._curvature)), self._close_mps(roomy_m))
         omega_max = self._limits.omega_max_radps
@@ -138,14 +143,35 @@ class ArcPlanner:
 
     def _turn(self, points: Sequence[Point], route: Callable[[float], Point], turn_radps: float) -> Twist:
         """Return a turn on the spot towards the route, which a round body can always make; back off when it faces
-        along the route already.
+        along the route already, or turn away from the nearest of `points`, where that is barred, too.
         """
-        x, y = route(self._radius_m + ROOM_M)
-        bearing = atan2(y, x)
-        if abs(bearing) > (ALIGNED_RAD if self._footprint is None else SQUARE_RAD):
-            return self._turned(points, turn_on_spot(bearing, turn_radps, self._limits))
-        self.blocked = True
-        return self.back(points)
+        away = self._away(points) if self._turns_away else None
+        if away is None:
+            self._turns_away = False
+            x, y = route(self._radius_m + ROOM_M)
+            bearing = atan2(y, x)
+            if abs(bearing) > (ALIGNED_RAD if self._footprint is None else SQUARE_RAD):
+                return self._turned(points, turn_on_spot(bearing, turn_radps, self._limits))
+            self.blocked, backs = True, self.back(points)
+            away = None if backs.linear_x < 0.0 else self._away(points)
+            if away is None:
+                return backs
+            self._turns_away = True
+        self.blocked = False
+        return turn_on_spot(away, turn_radps, self._limits)
+
+    def _away(self, nearest: Sequence[Point]) -> float | None:
+        """Return the bearing [rad] away from the first of `nearest`, if it touches a round body that can drive off."""
+        if self._footprint is not None or not self._touches(nearest):
+            return None
+        x, y = nearest[0]
+        away = Pose2D(0.0, 0.0, atan2(-y, -x))
+        ahead = [in_base(away, point) for point in nearest]
+        return away.theta if free_along(ahead, Twist(1.0, 0.0), self._radius_m + SKIN_M) >= LEAST_M else None
+
+    def _touches(self, nearest: Sequence[Point]) -> bool:
+        """Return whether the first of `nearest` is nearer to a round body than an arc may lead it."""
+        return bool(nearest) and hypot(*nearest[0]) < self._radius_m + SKIN_M
 
     def _turned(self, points: Sequence[Point], wanted: Twist) -> Twist:
         """Return `wanted`, which turns on the spot or backs; back off where the body cannot turn so far."""

@@ -88,3 +88,11 @@ def test_an_arc_straighter_than_the_wanted_one_is_driven_as_fast_as_its_own_bend
     assert abs(curvature) < 2.1 / 0.5
     assert twist.linear_x == pytest.approx(max(0.5, 1.0 / (1.0 + abs(curvature))))
     assert twist.linear_x > 0.5
+
+
+def test_a_robot_that_touches_a_wall_beside_it_turns_away_and_drives_off() -> None:
+    """Readings of the wall before and behind it bar both ways along the wall."""
+    wall = [(0.02 * n, RADIUS_M + 0.002 * (n % 2)) for n in range(-40, 41)]
+    pose, least = drive(wall, Pose2D(), 12.0)
+    assert pose.x > 1.5
+    assert least > -0.001
