@@ -234,18 +234,16 @@ class Navigator:
             self.follower.rejoin(pose, twist)
 
     def _watch(self, role: Role, pose: Pose2D, meant: Twist, wanted: Twist, now: float) -> None:
-        """Update the stuck monitor; the robot cannot be stuck when it has arrived or waits for its team. `meant` is
-        `wanted` without the limits.
-        """
-        waits = role is Role.LEADER and self.leading.waiting
-        if role is Role.WAITING or waits or self._lead_route.by_hand or self.arrived(pose, self.last):
+        """Update the stuck monitor. `meant` is `wanted` without limits; who waits or has arrived cannot be stuck."""
+        leader, arrived = role is Role.LEADER, self.arrived(pose, self.last)
+        if role is Role.WAITING or (leader and self.leading.waiting) or self._lead_route.by_hand or arrived:
             self._stuck_monitor.rest(pose, now)
             return
         action, moving = (None, False) if (said := self.decision) is None else (said.action, said.kind == "moving")
         held = role is Role.FOLLOWER and abs(meant.linear_x) >= WANTED_MPS > abs(wanted.linear_x)
-        leads = held or (role is Role.LEADER and self.leading.under_way)
+        leads, plans = held or (leader and self.leading.under_way), leader and self.leading.plans
         lost = SCAN_LOST if self.scan_age.age_s(now) > LOST_S else None
-        again, hung_at = not (self.leading.rounding or self._follow_slot.catches_up), self.estimator.hung_at
+        again, at = not (self.leading.rounding or self._follow_slot.catches_up), self.estimator.hung_at
         self._stuck_monitor.watch(
-            pose, wanted, action, lost, now, leads=leads, again=again, moving=moving, hung_at=hung_at
+            pose, wanted, action, lost, now, leads=leads, again=again, moving=moving, plans=plans, hung_at=at
         )

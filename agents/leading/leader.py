@@ -105,6 +105,11 @@ class Leadership:
         return self._speed_mps > 0.0 and (self.explore is None or bool(self.explore.route))
 
     @property
+    def plans(self) -> bool:
+        """True while the leader should move, and has no way yet."""
+        return self._speed_mps > 0.0 and self.explore is not None and not self.explore.route
+
+    @property
     def waiting(self) -> bool:
         """True while the leader stands until its team catches up."""
         return self._waiting_since is not None and not self.waited_out

@@ -39,7 +39,9 @@ class StuckMonitor:
         self._at: Pose2D | None = None
         self._held_at = 0.0
         self._stands: tuple[float, Pose2D] | None = None
-        """Time since which, and pose at which, a leader that should move has stood."""
+        """Time since which, and pose at which, a leader that should move has stood, the time left out in which it
+        planned its way."""
+        self._watched_at = 0.0
         self.reason: str | None = None
         self.backing_out = False
         """True while the robot backs out: it stays stuck until it is out of the place."""
@@ -62,18 +64,23 @@ class StuckMonitor:
         leads: bool,
         again: bool = True,
         moving: bool = False,
+        plans: bool = False,
         hung_at: Pose2D | None = None,
     ) -> None:
         """Update in a control step on the way; arguments as of `StuckConditions.watch`. `leads`: a leader that should
         move, or a follower that would and that only limits hold, such as a team-mate before it. Without `again`, coming
-        back (S3) does not count now: a planned way does. `moving`: what is avoided moves.
+        back (S3) does not count now: a planned way does. `moving`: what is avoided moves. `plans`: a leader that
+        searches its way.
         """
+        since_s, self._watched_at = now - self._watched_at, now
         if self.backing_out:
             return
         held = self._stuck.watch(pose, wanted, action, lost, now, moving=moving, hung_at=hung_at)
         if held == COMES_BACK and not again:
             held = None
-        if not leads:
+        if plans and self._stands is not None:
+            self._stands = self._stands[0] + since_s, self._stands[1]
+        elif not leads:
             self._stands = None
         elif self._stands_for_s(pose, now) >= STANDS_S and held is None:
             held = "S1: stands on its way"

@@ -206,3 +206,15 @@ def test_who_is_out_of_the_place_backs_out_no_more_and_is_watched_anew() -> None
     assert not monitor.backing_out
     monitor.watch(Pose2D(), AHEAD, None, None, STILL_S + 0.22, leads=False)
     assert monitor.reason is None
+
+
+@pytest.mark.parametrize("planned_s", [1.5, 30.0])
+def test_S1_the_time_in_which_a_leader_plans_its_way_neither_counts_nor_ends_its_stand(planned_s: float) -> None:
+    """One whose ways all began with what its body touches planned the next one each three seconds, for ever."""
+    stuck, now, stood_s = StuckMonitor(), 0.0, 0.0
+    while stuck.reason is None and stood_s < 2.0 * STANDS_S:
+        plans = now % (1.5 + planned_s) >= 1.5
+        now, stood_s = now + 0.02, stood_s + (0.0 if plans else 0.02)
+        stuck.watch(Pose2D(), STILL, Action.PLAN_ROUND, None, now, leads=not plans, plans=plans)
+    assert str(stuck.reason).startswith("S1")
+    assert stood_s == pytest.approx(STANDS_S, abs=0.5)
