@@ -77,30 +77,31 @@ def _swept_share(
     return 1.0
 
 
-def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits) -> Twist:
+def sharing(wanted: Twist, mates: Sequence[Point], radius_m: float, limits: Limits, lag_s: float = 0.0) -> Twist:
     """Return `wanted`, slowed towards each of `mates` (centres in `base_link`) to stop within half of the room between:
-    the other robot may approach under the same rule.
+    the other robot may approach under the same rule. `lag_s` is the time [s] in which the robot drives on as before.
     """
     v = wanted.linear_x
     sign = 1.0 if v >= 0.0 else -1.0
-    turn, reach_m = wanted.angular_z * TURN_S, sharing_reach_m(wanted, radius_m, limits)
+    turn, reach_m = wanted.angular_z * TURN_S, sharing_reach_m(wanted, radius_m, limits, lag_s)
+    braking_mps2 = BRAKING_SHARE * limits.a_max_mps2
     for x, y in mates:
         if x * x + y * y > reach_m * reach_m:
             continue
         bearing = atan2(sign * y, sign * x)
         if abs(bearing - max(min(turn, 0.0), min(max(turn, 0.0), bearing))) < SHARED_RAD:
             room_m = max(0.0, 0.5 * (hypot(x, y) - 2.0 * radius_m) - SKIN_M)
-            v_max = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * room_m) ** 0.5
+            v_max = ((braking_mps2 * lag_s) ** 2 + 2.0 * braking_mps2 * room_m) ** 0.5 - braking_mps2 * lag_s
             if abs(v) > v_max:
                 wanted = Twist(sign * v_max, wanted.angular_z * v_max / abs(v))
                 v = wanted.linear_x
     return wanted
 
 
-def sharing_reach_m(wanted: Twist, radius_m: float, limits: Limits) -> float:
+def sharing_reach_m(wanted: Twist, radius_m: float, limits: Limits, lag_s: float = 0.0) -> float:
     """Return the distance [m] of centres beyond which `sharing` slows `wanted` for no team-mate."""
     stops_within_m = wanted.linear_x * wanted.linear_x / (2.0 * BRAKING_SHARE * limits.a_max_mps2)
-    return 2.0 * (radius_m + SKIN_M + stops_within_m) + ROUNDING_M
+    return 2.0 * (radius_m + SKIN_M + abs(wanted.linear_x) * lag_s + stops_within_m) + ROUNDING_M
 
 
 def obeyed(command: Twist, measured: Twist) -> Twist:

@@ -24,6 +24,10 @@ BEFORE_S = 0.5
 MATES_M = 1.5
 """Distance [m] up to which team-mates are looked at: twice a body's width, and the way of both in that time."""
 
+USUAL_PERIOD_S, LAG_PERIODS = 0.02, 2.0
+"""Control period [s] whose lag the braking's reserve covers, and number of periods beyond it in which two robots that
+approach drive on: until the other one's pose is known, and until the own command acts."""
+
 
 class CommandLimits:
     """Limits of one robot: by team-mates, by the age of scan and pose, by the drive, and by all obstacles last."""
@@ -46,9 +50,10 @@ class CommandLimits:
         limits, radius_m = self._mission.limits, self._mission.radius_m
         # A controller may want any speed; what is beyond the drive's, `safe` takes away.
         fastest_mps = min(abs(wanted.linear_x), max(limits.v_max_mps, limits.v_reverse_max_mps))
-        reach_m = sharing_reach_m(Twist(fastest_mps, 0.0), radius_m, limits)
+        lag_s = LAG_PERIODS * max(0.0, self._mission.control_period_s - USUAL_PERIOD_S)
+        reach_m = sharing_reach_m(Twist(fastest_mps, 0.0), radius_m, limits, lag_s)
         strangers = self._mates.strangers(pose, reach_m, now, by_law=by_law)
-        wanted = sharing(wanted, strangers, radius_m, limits)
+        wanted = sharing(wanted, strangers, radius_m, limits, lag_s)
         # A leader drives at its cruise speed, but may flee from what moves faster than that.
         cruise_mps = max(self._mission.leading.cruise_mps, abs(wanted.linear_x))
         usual_mps = cruise_mps if role is Role.LEADER else limits.v_max_mps

@@ -187,3 +187,11 @@ def test_a_turn_on_the_spot_is_at_the_drives_rate_from_which_it_stops_at_the_bea
     limits = Limits(omega_max_radps=2.0, alpha_max_radps2=4.0)
     assert turn_on_spot(bearing, inf, limits) == Twist(0.0, pytest.approx(radps))
     assert abs(turn_on_spot(bearing, 0.2, limits).angular_z) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("lag_s", [0.05, 0.16])
+def test_the_way_that_two_robots_drive_until_they_brake_is_left_free(lag_s: float) -> None:
+    for apart_m in (0.6, 1.0, 2.0):
+        out = sharing(Twist(2.5, 0.0), [(apart_m, 0.0)], 0.15, LIMITS, lag_s)
+        way_m = out.linear_x * lag_s + out.linear_x**2 / (2.0 * BRAKING_SHARE * LIMITS.a_max_mps2)
+        assert way_m == pytest.approx(0.5 * (apart_m - 0.3) - SKIN_M)
