@@ -6,7 +6,7 @@ A detour leads round an obstacle and back to its target; to a target inside of t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, hypot
+from math import atan2, hypot, inf
 
 from lfa.agents.leading.free_place import FreePlace
 from lfa.agents.perception.scan import Point
@@ -23,6 +23,9 @@ CIRCLED_M, CIRCLED_S, PAUSE_S = 0.3, 8.0, 5.0
 when something stands close beside it; and the time [s] after which the robot stands instead."""
 STANDS_M = 0.15
 """Distance [m] to the slot at which it then stands."""
+VISITS, LEFT_M, AS_NEAR_M = 2, 0.2, 0.1
+"""Times that a robot has come within reach of a resting slot, and has gone more than `LEFT_M` [m] beyond that again;
+when it comes once more, something stands in its way there, and it stays where it is as near as ever, to `AS_NEAR_M`."""
 THERE_M, BESIDE_M = 0.05, 0.05
 TURN_GAIN, IN_PLACE_RAD, TURN_RADPS = 2.0, 0.6, 0.8
 SPEED_GAIN_PER_S, SPEED_MPS = 0.8, 0.25
@@ -38,6 +41,8 @@ class FreeSlot:
         """Slot in `map` beside which the robot stands; None while it drives."""
         self._hindered: tuple[float, float] | None = None
         """Times [s] of the first and of the latest detour close to the slot; None where there was none of late."""
+        self._visits, self._near, self._least_m = 0, False, inf
+        """Times that the robot has come near the slot at rest, whether it is there now, and how near [m] it got."""
 
     def steer(
         self,
@@ -56,6 +61,7 @@ class FreeSlot:
         """
         if abs(ahead_mps) > RESTS_MPS:
             self._stands_for = self._hidden_since = self._hindered = None
+            self._visits, self._near, self._least_m = 0, False, inf
             self._free_place.reset()
             return None
         if self._stands_for is not None:
@@ -63,7 +69,8 @@ class FreeSlot:
                 return STILL
             self._stands_for = None
         center = in_base(pose, slot)
-        if self._circles(hypot(*center), now, hindered=hindered):
+        apart_m = hypot(*center)
+        if self._circles(apart_m, now, hindered=hindered) or self._returns(apart_m, within_m):
             self._stands_for, self._hindered = slot, None
             return STILL
         if not _hidden(center, points):
@@ -76,13 +83,10 @@ class FreeSlot:
         if place is None or hypot(place[0] - slot[0], place[1] - slot[1]) > within_m:
             return None
         x, y = in_base(pose, place)
-        apart_m, bearing = hypot(x, y), atan2(y, x)
-        if apart_m < THERE_M:
+        if hypot(x, y) < THERE_M:
             self._stands_for = slot
             return STILL
-        if abs(bearing) > IN_PLACE_RAD:
-            return Twist(0.0, TURN_RADPS if bearing > 0.0 else -TURN_RADPS)
-        return Twist(min(SPEED_MPS, SPEED_GAIN_PER_S * apart_m), TURN_GAIN * bearing)
+        return _towards(x, y)
 
     def _circles(self, apart_m: float, now: float, *, hindered: bool) -> bool:
         """Return whether detours have led the robot round a slot `apart_m` [m] away for long, and it is close enough to
@@ -93,6 +97,28 @@ class FreeSlot:
         elif hindered:
             self._hindered = (now if self._hindered is None else self._hindered[0], now)
         return self._hindered is not None and now - self._hindered[0] >= CIRCLED_S and apart_m < STANDS_M
+
+    def _returns(self, apart_m: float, within_m: float) -> bool:
+        """Return whether the robot has come within `within_m` of its slot again and again, and is `apart_m` from it
+        now, about as near as it ever was.
+        """
+        if apart_m > within_m + LEFT_M:
+            self._near = False
+        elif apart_m <= within_m and not self._near:
+            self._near = True
+            self._visits += 1
+        if self._visits > VISITS:
+            return apart_m <= min(self._least_m + AS_NEAR_M, within_m)
+        self._least_m = min(self._least_m, apart_m)
+        return False
+
+
+def _towards(x: float, y: float) -> Twist:
+    """Return the twist to a place at (`x`, `y`) [m] in `base_link`: a turn on the spot first, where it lies aside."""
+    bearing = atan2(y, x)
+    if abs(bearing) > IN_PLACE_RAD:
+        return Twist(0.0, TURN_RADPS if bearing > 0.0 else -TURN_RADPS)
+    return Twist(min(SPEED_MPS, SPEED_GAIN_PER_S * hypot(x, y)), TURN_GAIN * bearing)
 
 
 def _hidden(place: Point, points: Sequence[Point]) -> bool:

@@ -26,6 +26,9 @@ OUT_M = 1.0
 """Distance [m] from the slot beyond which a follower is out of it."""
 BACK_M = 0.7
 """Distance [m] from the slot within which, with nothing between, the follower's law takes over again."""
+CLOSE_M = 0.25
+"""Distance [m] from the slot within which it does so in any case; within `BACK_M` also where a team-mate stands on the
+slot: a place beside that is a matter of `free_slot.py`, and no way leads there."""
 CALM_S = 5.0
 """Time [s] after a way that was not found before another is planned."""
 CRUISE_SHARE = 0.8
@@ -89,11 +92,14 @@ class WayBack:
         if way is None:
             return None
         way.chase(slot)
-        way.work(True, pose, mates(now), now)
+        places = mates(now)
+        way.work(True, pose, places, now)
         x, y = in_base(pose, slot)
         near_m = hypot(x, y)
         half_width_m = self._mission.radius_m + NARROW_M
-        there = near_m <= BACK_M and barring_point(points, atan2(y, x), near_m, half_width_m) is None
+        taken = any(hypot(mate.x - slot[0], mate.y - slot[1]) < 2.0 * half_width_m for mate in places)
+        free = near_m <= BACK_M and (taken or barring_point(points, atan2(y, x), near_m, half_width_m) is None)
+        there = near_m <= CLOSE_M or free
         if there or way.explore.failure is not None:
             self._not_before = -inf if there else now + CALM_S
             self.end()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lfa.agents.leading.free_slot import CIRCLED_S, MOVED_M, PAUSE_S, FreeSlot
+from lfa.agents.leading.free_slot import CIRCLED_S, LEFT_M, MOVED_M, PAUSE_S, VISITS, FreeSlot
 from lfa.protocol.geometry import STILL, Pose2D, Twist
 
 SLOT = (1.0, 0.0)
@@ -51,3 +51,20 @@ def test_a_follower_that_came_from_far_circles_only_from_where_it_is_close() -> 
     slots = FreeSlot(0.15)
     steered(FAR, CIRCLED_S, slots=slots)
     assert slots.steer(SLOT, (), CLOSE, 0.0, 0.45, CIRCLED_S + 0.5, hindered=True) is None
+
+
+def visited(times: int, *, beyond_m: float = 0.7, ahead_mps: float = 0.0) -> Twist | None:
+    """What a follower does at last that has come near its slot so often, and went away again between."""
+    slots, twist = FreeSlot(0.15), None
+    for n in range(times):
+        for apart_m in (beyond_m, 0.4, 0.2):
+            twist = slots.steer(SLOT, (), Pose2D(1.0 - apart_m), ahead_mps, 0.45, 10.0 * n + apart_m)
+    return twist
+
+
+def test_a_follower_that_comes_near_its_slot_again_and_again_stands_where_it_is_as_near_as_ever() -> None:
+    """Round a block beside its slot a detour led it in a wide circle, to the run's end."""
+    assert visited(VISITS) is None
+    assert visited(VISITS + 1) == STILL
+    assert visited(3 * VISITS, beyond_m=0.45 + LEFT_M - 0.01) is None, "it did not leave"
+    assert visited(3 * VISITS, ahead_mps=0.1) is None, "its predecessor drives"

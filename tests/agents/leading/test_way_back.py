@@ -8,7 +8,7 @@ import pytest
 
 from lfa.agents.leading.free_place import TAKEN_S
 from lfa.agents.leading.free_slot import HIDDEN_S, FreeSlot
-from lfa.agents.leading.way_back import BACK_M, OUT_M, PATIENCE_S, WayBack
+from lfa.agents.leading.way_back import BACK_M, CLOSE_M, OUT_M, PATIENCE_S, WayBack
 from lfa.protocol.geometry import STILL, Point, Pose2D, along_arc
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import LaserScan
@@ -97,3 +97,25 @@ def test_a_slot_that_is_free_is_left_to_the_follower() -> None:
     for n in range(10):
         assert free.steer(SLOT, [(0.5, 2.0)], Pose2D(3.0, 0.0, 0.0), 0.0, 0.7, float(n)) is None
     assert free.steer(SLOT, [], Pose2D(3.0, 0.0, 0.0), 0.0, 0.7, 10.0) is None
+
+
+def test_a_way_back_ends_close_to_a_slot_that_something_stands_beside() -> None:
+    """Nothing can lie between; it dithered there before a wall, to the run's end."""
+    back, pose = begun(-20.0), Pose2D(SLOT[0] - 0.9 * CLOSE_M, 0.0, 0.0)
+    wall = [(0.9 * CLOSE_M + 0.1, 0.05 * n) for n in range(-20, 21)]
+    assert back.steer(wall, pose, SLOT, lambda _: [], STILL, 0.0) is None
+    assert back.way is None
+
+
+def test_it_goes_on_where_something_stands_between_the_follower_and_its_slot() -> None:
+    back, pose = begun(-20.0), Pose2D(SLOT[0] - 0.9 * BACK_M, 0.0, 0.0)
+    wall = [(0.5 * BACK_M, 0.05 * n) for n in range(-20, 21)]
+    back.steer(wall, pose, SLOT, lambda _: [], STILL, 0.0)
+    assert back.way is not None
+
+
+def test_it_ends_near_a_slot_that_a_team_mate_stands_on() -> None:
+    back, pose = begun(-20.0), Pose2D(SLOT[0] - 0.9 * BACK_M, 0.0, 0.0)
+    mate = [(0.9 * BACK_M - 0.15 + 0.05 * abs(n), 0.05 * n) for n in range(-3, 4)]
+    assert back.steer(mate, pose, SLOT, lambda _: [Pose2D(*SLOT, 0.0)], STILL, 0.0) is None
+    assert back.way is None
