@@ -172,3 +172,12 @@ def test_it_makes_room_for_a_bounded_time() -> None:
     assert place.does(seen()) is not None
     assert place.room.step(seen(), place.points, AT, 0.9 + ROOM_S) is not None
     assert place.room.step(seen(), place.points, AT, 1.1 + ROOM_S) is None
+
+
+def test_where_both_stand_nobody_comes_and_the_follower_follows_again() -> None:
+    """A predecessor at rest in its slot may face its follower for ever."""
+    place, rests = Place(walls(0.5, 0.5)), seen(x=4.2, twist=STILL)
+    assert place.does(seen()) is not None
+    stands_s = [0.5 * n for n in range(60) if place.room.step(rests, place.points, AT, 2.0 + 0.5 * n) == STILL]
+    assert stands_s[-1] == HOLD_S - 0.5
+    assert place.room.step(rests, place.points, AT, 60.0) is None
