@@ -1,11 +1,11 @@
 """`lfa bench motion`: complete teams in virtual time, on every ground that driving is judged by.
 
 The rows: every shipped scenario; the BARN worlds (`lfa bench barn`, and with the noise of `explore`); gaps, traps,
-corners and a closing door; whatever moves; maps that nobody knows; the time to the goal over the shortest possible one
-on known ground; the time of one control step. A run is good if it ends at its goal without contact, without a violated
-invariant and without a robot left behind. What falls short is listed by cause, each run with its folder, in which
-`lfa why`, `lfa plot` and `lfa view` show it again. Maps and worlds of others are searched in `shared`, beside the
-checkout or above it; without them their rows are skipped with a message.
+corners and a closing door; worlds, teams and scanners at random; whatever moves; maps that nobody knows; the time to
+the goal over the shortest possible one on known ground; the time of one control step. A run is good if it ends at its
+goal without contact, without a violated invariant and without a robot left behind. What falls short is listed by cause,
+each run with its folder, in which `lfa why`, `lfa plot` and `lfa view` show it again. Maps and worlds of others are
+searched in `shared`, beside the checkout or above it; without them their rows are skipped with a message.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from random import Random
 from time import strftime
 
 from lfa.deploy.bench import barn
-from lfa.deploy.bench.driving import courses, fastest_way, movers, step_time, unknown_maps
+from lfa.deploy.bench.driving import courses, drawn_worlds, fastest_way, movers, step_time, unknown_maps
 from lfa.deploy.bench.driving.course_file import course_text
 from lfa.deploy.bench.driving.courses import CourseKind
 from lfa.deploy.bench.driving.fastest_way import TimedKind
@@ -35,6 +35,7 @@ from lfa.protocol.errors import Refused
 SEEDS = 10
 """Runs of each shipped scenario, course and body, where the command line gives no number."""
 MOVER_SEEDS = 20
+DRAWN_SEEDS = 100
 GOOD_SHARE = 0.98
 WAY_RATIO_MAX = 1.4
 STEP_MS_MAX = 1.5
@@ -62,6 +63,7 @@ def cases(seeds: int | None, failed: Path, rows: str = "*") -> list[Case]:
             for motion in kind.motions
             for radius_m in kind.radii_m
         ),
+        _drawn(seeds or DRAWN_SEEDS, failed),
         *(_mover(kind, motion, seeds or MOVER_SEEDS, failed) for kind in movers.KINDS for motion in movers.MOTIONS),
         *_unknown(seeds, failed, rows),
         *(_timed(kind, seeds or SEEDS, failed) for kind in fastest_way.KINDS),
@@ -114,6 +116,21 @@ def course_good(name: str, kind: CourseKind, motion: str, radius_m: float, faile
     with driven(loaded(kind.name, text), seed) as done:
         wrong = complaint(done.summary)
         note(name, done, wrong, failed)
+    return [float(wrong is None)]
+
+
+def _drawn(seeds: int, failed: Path) -> Case:
+    good = Quantity(f"good of {seeds}", "runs", float(ceil(GOOD_SHARE * seeds)), "at least")
+    return many("drawn", (good,), [CasePart(seed, partial(drawn_good, failed, seed)) for seed in range(1, seeds + 1)])
+
+
+def drawn_good(failed: Path, seed: int) -> list[float]:
+    """Return 1 if the run in the world that the seed draws is good and nobody touches anything, else 0."""
+    world = drawn_worlds.drawn(seed)
+    text = course_text("drawn", world.course, world.motion, world.robots)
+    with driven(loaded("drawn", text, world.sets), seed) as done:
+        wrong = complaint(done.summary)
+        note("drawn", done, wrong, failed)
     return [float(wrong is None)]
 
 

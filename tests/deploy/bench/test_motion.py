@@ -11,7 +11,7 @@ import pytest
 from msgspec import structs
 
 from lfa.deploy.bench import motion
-from lfa.deploy.bench.driving import courses, fastest_way, movers, step_time, unknown_maps
+from lfa.deploy.bench.driving import courses, drawn_worlds, fastest_way, movers, step_time, unknown_maps
 from lfa.deploy.bench.driving.course_file import CRUISE_MPS, course_text
 from lfa.deploy.bench.driving.one_run import FAILURES, by_cause, complaint, driven, loaded, note, show_failures
 from lfa.deploy.bench.driving.shortest_way import shortest_m
@@ -24,7 +24,14 @@ from lfa.world.description.load import load, shipped
 def test_the_rows_are_those_that_driving_is_judged_by(tmp_path: Path) -> None:
     names = {case.name for case in motion.cases(1, tmp_path)}
     assert {f"scenario/{name}" for name in shipped()} <= names
-    assert {"course/u_trap/reactive", "mover/head_on/explore", "unknown/rooms", "time/open", "step/180 beams"} <= names
+    assert {
+        "course/u_trap/reactive",
+        "mover/head_on/explore",
+        "unknown/rooms",
+        "time/open",
+        "step/180 beams",
+        "drawn",
+    } <= names
 
 
 @pytest.mark.parametrize("kind", courses.KINDS, ids=lambda kind: kind.name)
@@ -44,6 +51,22 @@ def test_each_mover_moves_at_each_of_its_speeds(kind: movers.MoverKind) -> None:
         world = loaded(kind.name, course_text(kind.name, course, "explore")).world
         assert mps == wanted
         assert world.obstacles and all(one.moves for one in world.obstacles)
+
+
+@pytest.mark.parametrize("seed", range(1, 13))
+def test_a_drawn_world_loads_and_leaves_start_goal_and_a_way_free(seed: int) -> None:
+    world = drawn_worlds.drawn(seed)
+    assert world == drawn_worlds.drawn(seed)
+    text = course_text("drawn", world.course, world.motion, world.robots)
+    scenario = loaded("drawn", text, world.sets)  # it refuses what stands on a start or on the goal
+    assert len(scenario.world.obstacles) == len(world.course.obstacles) >= 4
+    assert scenario.world.lidar.beams in (60, 90, 180, 360)
+
+
+def test_ground_that_a_board_shuts_off_is_drawn_again() -> None:
+    shut = np.array([(4.0, 0.05 * n) for n in range(-99, 100)])
+    assert not drawn_worlds.passes(shut, 0.15, 9.0)
+    assert drawn_worlds.passes(shut[:120], 0.15, 9.0)
 
 
 @pytest.mark.parametrize(("theta", "mps", "count"), [(0.0, 0.3, 1), (0.0, 0.0, 0), (pi, 0.3, 0), (pi, -0.3, 1)])
