@@ -1,16 +1,18 @@
 """Planner of a route through partly known ground: when to search, and when to replace the present route.
 
-If the map contradicts the route, or shows a clearly cheaper one, the search (astar.py) starts anew, also from within a
-dead end. costmap.py holds the cost of a step, path_smoothing.py turns cells into a route.
+Where the map contradicts the route, a search forward finds another one on the newest map, also out of a dead end. Its
+heuristic is the cost to go, which a search backward renews all the time, over many control steps (astar.py): that alone
+would answer with a map of ten seconds ago. costmap.py holds the cost of a step, path_smoothing.py turns cells into a
+route.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from itertools import pairwise
 from math import ceil, cos, hypot, inf, sin
 
-from lfa.agents.exploration.astar import chain, search
+from lfa.agents.exploration.astar import CostToGo, forward, search
 from lfa.agents.exploration.costmap import Box, Costmap, between, prices_of, runs_of
 from lfa.agents.exploration.occupancy_grid import CELL_M, Grid, Point
 from lfa.agents.exploration.path_smoothing import PIECE_M, smoothed, straightened
@@ -40,6 +42,8 @@ BARRED_AGAIN = 1
 walled in: noise may have barred a gap that the body passes."""
 MOVED_M = 0.4
 """Distance [m] of the goal from the end of the route above which a new one is searched."""
+PASSED_CELLS = 12
+"""Number of a new way's first cells that the robot may have passed while it was searched."""
 CHECK_S = 0.2
 """Period [s] of the check whether the map still agrees with the route."""
 
@@ -59,7 +63,13 @@ class Planner:
         self._apart_m = 2.0 * radius_m + MATE_GAP_M
         self._keepout = [run for box in keepout for run in runs_of(grid, box)]
         self._search: Iterator[int] | None = None
-        self._begun_at = -inf
+        self._renewal: Iterator[int] | None = None
+        self._to_go: CostToGo | None = None
+        """Newest cost to go, to the goal `_to_go_goal`; None before the first."""
+        self._to_go_goal: Point = goal
+        self._renewed = False
+        """True since the cost to go is newer than the last search."""
+        self._begun_at = self._renewed_at = -inf
         self._checked_at = -inf
         self._pose: Point = goal
         self._barred: list[tuple[Point, float]] = []
@@ -72,34 +82,45 @@ class Planner:
         self.unreachable: str | None = None
 
     def work(self, cells: int, here: Point, mates: Sequence[Pose2D], now: float) -> bool:
-        """Search on for about `cells` cells; return True when there is a new `route` from `here`."""
+        """Search on for about `cells` cells; return True when there is a new `route` from `here`.
+
+        A search for a way that is needed comes first. What it leaves of the budget renews the cost to go, on which the
+        next ones rest; whether there is a cheaper way is asked when that is done.
+        """
         self._pose = here
-        if self._search is None:
-            if now - self._checked_at < CHECK_S:
-                return False
+        if self._search is None and now - self._checked_at >= CHECK_S:
             self._checked_at = now
-            blocked = not self.route or self.blocked_m(here) is not None
-            conflict = self._conflict(here, mates) and now - self._begun_at >= CONFLICT_S
-            due = now - self._begun_at >= (RENEW_S if self.route else RETRY_S)
-            moved = self._goal_moved() and now - self._begun_at >= RETRY_S
-            if not ((blocked and self.route) or conflict or moved or due):
-                return False
-            self._begun_at = now
-            self._barred = [(place, until) for place, until in self._barred if now < until]
-            self._search = self._plan(tuple(mates), blocked or conflict or moved)
+            self._search = self._due(tuple(mates), now)
+        if self._renewal is None and self._to_go is not None and now - self._renewed_at >= RENEW_S:
+            self._renewed_at = now
+            self._renewal = self._renew()
         number = self.number
-        while cells > 0:
-            looked = next(self._search, None)
-            if looked is None:
+        while cells > 0 and (running := self._search or self._renewal) is not None:
+            looked = next(running, None)
+            if looked is not None:
+                cells -= looked
+            elif running is self._search:
                 self._search = None
                 self.searches += 1
-                break
-            cells -= looked
+            else:
+                self._renewal = None
         return self.number != number
 
+    def _due(self, mates: tuple[Pose2D, ...], now: float) -> Iterator[int] | None:
+        """Return a new search for a way where one is due."""
+        since_s = now - self._begun_at
+        blocked = self.blocked_m(self._pose) is not None
+        conflict = since_s >= CONFLICT_S and self._conflict(self._pose, mates)
+        moved = since_s >= RETRY_S and self._goal_moved()
+        lacking = not self.route and since_s >= RETRY_S
+        if not (blocked or conflict or moved or lacking or self._renewed):
+            return None
+        self._begun_at, self._renewed = now, False
+        self._barred = [(place, until) for place, until in self._barred if now < until]
+        return self._plan(mates, blocked or conflict or moved or lacking)
+
     def _goal_moved(self) -> bool:
-        end = self.route[-1] if self.route else self.goal
-        return hypot(end[0] - self.goal[0], end[1] - self.goal[1]) > MOVED_M
+        return bool(self.route) and _apart(self.route[-1], self.goal) > MOVED_M
 
     def free(self, point: Point) -> bool:
         """Return whether a robot has room to spare at `point`, as far as the map shows."""
@@ -113,7 +134,7 @@ class Planner:
 
     def forget(self) -> None:
         """Drop the route and the search; the next `work` starts anew."""
-        self.route, self._search = (), None
+        self.route, self._search, self._begun_at = (), None, -inf
 
     def blocked_m(self, here: Point) -> float | None:
         """Return the distance [m] along the rest of the route at which the map blocks it; None when it does not."""
@@ -138,36 +159,63 @@ class Planner:
     # --- one search -------------------------------------------------------------------------------------------------
 
     def _plan(self, mates: tuple[Pose2D, ...], needed: bool) -> Iterator[int]:
-        """Search, then turn the cells into a route; set `route` or `unreachable`."""
-        costmap = self._costmap(mates)
-        goal, start = costmap.settled(self.goal), costmap.settled(self._pose)
-        if goal is None:
-            self._fail("no robot can stand at the goal", needed)
-            return
-        if start is None:
-            self._fail("no way out of where the robot stands", needed)
-            return
-        toward = bytearray(len(costmap.near))
-        reached = yield from search(costmap, start, goal, toward)
-        if not reached and mates:
-            yield from self._plan((), needed)
-            return
-        if not reached and self._barred and self._again > 0:
+        """Search a way by the cost to go, which is found first where there is none or it misleads; set `route` or
+        `unreachable`.
+        """
+        cells: list[int] = []
+        if self._to_go is not None and _apart(self._to_go_goal, self.goal) <= MOVED_M:
+            cells = yield from self._way(mates)
+        if not cells:
+            self._renewal = None
+            if not needed or not (yield from self._estimate(needed=True)):
+                return
+            cells = yield from self._way(mates)
+        if cells:
+            costmap = self._costmap(())  # whether a team-mate stands on the present route is another question
+            rest = self.route[_nearest(self.route, self._pose) :]
+            old = inf if needed else sum(costmap.price_of_line(a, b) for a, b in pairwise(rest))
+            if costmap.price_of_cells(cells) <= IMPROVED * old:
+                yield from self._shape(self._costmap(mates), cells)
+
+    def _way(self, mates: tuple[Pose2D, ...]) -> Generator[int, None, list[int]]:
+        """Return the cells of the cheapest way on the present map, past the team-mates where one leads past them."""
+        costmap, cells = self._costmap(mates), list[int]()
+        start = costmap.settled(self._pose)
+        if start is not None and self._to_go is not None:
+            cells = yield from forward(costmap, start, self._to_go)
+        if not cells and mates:
+            return (yield from self._way(()))
+        passed = min(
+            range(min(len(cells), PASSED_CELLS)),
+            key=lambda n: _apart(self._grid.center(cells[n]), self._pose),
+            default=0,
+        )
+        return cells[passed:]  # the robot has driven on since the search began
+
+    def _renew(self) -> Iterator[int]:
+        """Renew the cost to go while the robot drives; then a way that is much cheaper may replace the present one."""
+        self._renewed = yield from self._estimate(needed=False)
+
+    def _estimate(self, *, needed: bool) -> Generator[int, None, bool]:
+        """Find the cost to go on the map without the team, which goes on; return whether there is a way. Sets
+        `unreachable` when there is none and one is `needed`.
+        """
+        costmap, place = self._costmap(()), self.goal
+        goal, start = costmap.settled(place), costmap.settled(self._pose)
+        if goal is None or start is None:
+            lacks = "no robot can stand at the goal" if goal is None else "no way out of where the robot stands"
+            self._fail(lacks, needed)
+            return False
+        to_go = CostToGo(self._grid, goal)
+        if (yield from search(costmap, start, to_go)):
+            self._to_go, self._to_go_goal = to_go, place
+            return True
+        if self._barred and self._again > 0:
             self._again -= 1
             self._barred.clear()
-            yield from self._plan((), needed)
-            return
-        if not reached:
-            self._fail("the goal is walled in: no way to it is left", needed)
-            return
-        here = costmap.settled(self._pose)  # the robot has driven on since the search began
-        reachable = here is not None and (toward[here] or here == goal)
-        cells = chain(toward, self._grid.columns, here if here is not None and reachable else start, goal)
-        yield len(cells)
-        rest = self.route[_nearest(self.route, self._pose) :]
-        old = inf if needed else sum(costmap.price_of_line(a, b) for a, b in pairwise(rest))
-        if costmap.price_of_cells(cells) <= IMPROVED * old:
-            yield from self._shape(costmap, cells)
+            return (yield from self._estimate(needed=needed))
+        self._fail("the goal is walled in: no way to it is left", needed)
+        return False
 
     def _shape(self, costmap: Costmap, cells: Sequence[int]) -> Iterator[int]:
         """Set `route` from the cells."""
@@ -205,3 +253,7 @@ class Planner:
 
 def _nearest(route: Sequence[Point], here: Point) -> int:
     return min(range(len(route)), key=lambda n: (route[n][0] - here[0]) ** 2 + (route[n][1] - here[1]) ** 2, default=0)
+
+
+def _apart(a: Point, b: Point) -> float:
+    return hypot(a[0] - b[0], a[1] - b[1])

@@ -7,9 +7,10 @@ from math import atan2, hypot
 
 import pytest
 
-from lfa.agents.exploration.costmap import FREE, TIGHT_M, prices_of
+from lfa.agents.exploration.astar import CostToGo, forward, search
+from lfa.agents.exploration.costmap import FREE, TIGHT_M, Costmap, prices_of
 from lfa.agents.exploration.occupancy_grid import CELL_M, NEAR_PER_CELL, OCCUPIED, REACH, Grid, Point
-from lfa.agents.exploration.path_planner import BARRED_AGAIN, MATE_BARRED_S, Planner
+from lfa.agents.exploration.path_planner import BARRED_AGAIN, CHECK_S, MATE_BARRED_S, RENEW_S, Planner
 from lfa.protocol.geometry import Pose2D, wrap
 
 RADIUS_M = 0.15
@@ -120,6 +121,63 @@ def test_a_map_that_contradicts_the_route_brings_another_one() -> None:
     plan(planner, (2.0, 3.0), at=0.5)
     assert planner.route != before
     assert nearest_m(planner.route, (WALL,)) > RADIUS_M
+
+
+HALL = (25.0, 25.0)
+"""Goal in a hall of 30 m x 30 m, a first way to which takes many control steps."""
+BUDGET = 160
+
+
+def hall() -> tuple[Grid, Planner]:
+    """A hall of unseen ground but for a wall before the goal, with a planner that has found its first way."""
+    grid = Grid((-1.0, -1.0), (31.0, 31.0))
+    occupy(grid, ((8.0, 20.0, 31.0, 20.2),))
+    planner = Planner(grid, HALL, RADIUS_M)
+    assert plan(planner, (20.0, 2.0), budget=BUDGET) > 150, "a search that is not at its end for seconds"
+    return grid, planner
+
+
+def length_m(route: tuple[Point, ...]) -> float:
+    return sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(route))
+
+
+@pytest.mark.parametrize("renewing", [False, True])
+def test_a_way_round_what_the_map_shows_anew_is_found_within_a_few_control_steps(renewing: bool) -> None:
+    grid, planner = hall()
+    for _ in range(20):
+        planner.work(BUDGET, (20.0, 2.0), (), RENEW_S if renewing else 0.0)
+    wall = (16.0, 5.0, 24.0, 5.2)
+    occupy(grid, (wall,))
+    assert planner.blocked_m((20.0, 2.0)) is not None
+    assert plan(planner, (20.0, 2.0), budget=BUDGET, at=RENEW_S + 2.0 * CHECK_S) < 80
+    assert nearest_m(planner.route, (wall,)) > RADIUS_M
+
+
+def test_a_much_cheaper_way_replaces_the_present_one_once_the_cost_to_go_is_renewed() -> None:
+    grid, planner = hall()
+    before_m = length_m(planner.route)
+    grid.scores[:], grid.near[:] = bytes(len(grid.scores)), bytes(len(grid.near))
+    for n in range(4):  # what was begun on the map before ends first
+        planner.work(10**6, (20.0, 2.0), (), RENEW_S + 2.0 * CHECK_S * n)
+    assert length_m(planner.route) < 0.9 * before_m
+
+
+def test_a_search_by_the_cost_to_go_finds_the_cheapest_way_and_looks_at_little_else() -> None:
+    boxes = (WALL, (2.0, 1.0, 2.2, 9.0), (6.5, 3.0, 6.7, 9.0))
+    costmap = Costmap(ground(*boxes), prices_of(RADIUS_M))
+    start, goal = costmap.settled((1.0, 6.0)), costmap.settled((8.0, 6.0))
+    assert start is not None and goal is not None
+    to_go = CostToGo(costmap.grid, goal)
+    backward = sum(search(costmap, start, to_go))
+    looked, steps = 0, forward(costmap, start, to_go)
+    while True:
+        try:
+            looked += next(steps)
+        except StopIteration as ended:
+            cells = ended.value
+            break
+    assert costmap.price_of_cells(cells[::-1]) <= 1.02 * (to_go.cost[start] - 1)
+    assert looked < 0.1 * backward
 
 
 def test_a_goal_that_is_walled_in_is_reported_and_not_searched_for_in_the_whole_world() -> None:
