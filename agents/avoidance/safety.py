@@ -53,13 +53,40 @@ def safe(
         share = _swept_share(wanted, points, inside, footprint, limits)
         v, omega = wanted.linear_x * share, wanted.angular_z * share
     else:
-        free_m = free_along(points, Twist(v, omega), radius_m + SKIN_M)
-        v_stop = (2.0 * BRAKING_SHARE * limits.a_max_mps2 * free_m) ** 0.5
+        v_stop = _stop_mps(points, Twist(v, omega), radius_m, limits)
         if abs(v) > v_stop:
             scale = v_stop / abs(v)
             # A round body may turn at any distance: what stands before its nose must not hold the turn that frees it.
             v, omega = v * scale, omega * max(scale, 1.0 - v_stop / TURNING_MPS)
+        return _on_the_way(Twist(v, omega), last, points, radius_m, limits, dt)
     return _reached(Twist(v, omega), last, limits, dt)
+
+
+def _stop_mps(points: Sequence[Point], twist: Twist, radius_m: float, limits: Limits) -> float:
+    """Return the speed [m/s] from which a round body can stop before what is on the arc of `twist`."""
+    return sqrt(2.0 * BRAKING_SHARE * limits.a_max_mps2 * free_along(points, twist, radius_m + SKIN_M))
+
+
+def _on_the_way(
+    wanted: Twist, last: Twist, points: Sequence[Point], radius_m: float, limits: Limits, dt: float
+) -> Twist:
+    """Return what a round body drives next on its way from `last` to `wanted`, which is free itself.
+
+    The drive reaches another bend or rest later than it is wanted, and drives other arcs until then. Where it could not
+    stop on that one, it brakes; and where braking comes too late, it brakes on the arc that it was on.
+    """
+    next_ = _reached(wanted, last, limits, dt)
+    if next_ == wanted or next_.linear_x == 0.0:
+        return next_
+    v_stop = _stop_mps(points, next_, radius_m, limits)
+    if abs(next_.linear_x) <= v_stop:
+        return next_
+    slower = _near(copysign(v_stop, next_.linear_x), last.linear_x, limits.a_max_mps2 * dt)
+    next_ = Twist(slower, next_.angular_z)
+    if abs(slower) <= v_stop or last.linear_x * slower <= 0.0:
+        return next_
+    kept = Twist(slower, _near(last.angular_z * slower / last.linear_x, last.angular_z, limits.alpha_max_radps2 * dt))
+    return kept if _stop_mps(points, kept, radius_m, limits) > v_stop else next_
 
 
 def _swept_share(

@@ -1,6 +1,7 @@
 """The last function before cmd_vel: finite, within the limits, and able to stop in time, whatever comes in."""
 
-from math import cos, inf, isfinite, nan, sin, sqrt
+from math import cos, hypot, inf, isfinite, nan, sin, sqrt
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -18,7 +19,7 @@ from lfa.agents.avoidance.safety import (
     turn_on_spot,
     within,
 )
-from lfa.protocol.geometry import STILL, Twist
+from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, in_base
 from lfa.protocol.mission import Limits
 
 LIMITS = Limits()
@@ -195,3 +196,30 @@ def test_the_way_that_two_robots_drive_until_they_brake_is_left_free(lag_s: floa
         out = sharing(Twist(2.5, 0.0), [(apart_m, 0.0)], 0.15, LIMITS, lag_s)
         way_m = out.linear_x * lag_s + out.linear_x**2 / (2.0 * BRAKING_SHARE * LIMITS.a_max_mps2)
         assert way_m == pytest.approx(0.5 * (apart_m - 0.3) - SKIN_M)
+
+
+@pytest.mark.parametrize("seed", [10, 11, 48])
+def test_whatever_is_wanted_next_a_round_robot_touches_nothing(seed: int) -> None:
+    """Another bend, and rest, are reached later than they are wanted: until then the drive is on other arcs."""
+    chance, start, last, wanted = Random(seed), Pose2D(), STILL, STILL
+    drawn = [(chance.uniform(-1.2, 1.2), chance.uniform(-1.2, 1.2)) for _ in range(8)]
+    posts = [post for post in drawn if hypot(*post) > 0.2]
+    pose = start
+    for n in range(2000):
+        if n % 20 == 0:
+            wanted = Twist(chance.choice((1.0, 0.5, 0.2, 0.0, -0.3)), chance.choice((-2.0, -1.0, 0.0, 1.0, 2.0)))
+        last = safe(wanted, last, [in_base(pose, post) for post in posts], 0.15, LIMITS, DT)
+        pose = along_arc(pose, last, DT)
+        assert min(hypot(x - pose.x, y - pose.y) for x, y in posts) > 0.15
+        if hypot(pose.x, pose.y) > 2.0:
+            pose, last = start, STILL
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_robot_that_is_to_turn_at_speed_brakes_past_the_corner_that_the_turn_leads_to(side: float) -> None:
+    """It drove on into the corner of a passage while it slowed down: the turn that it wanted was free, on the spot."""
+    corner, pose, last = (0.45, side * 0.27), Pose2D(), Twist(1.0, 0.0)
+    for _ in range(60):
+        last = safe(Twist(0.0, side * 2.0), last, [in_base(pose, corner)], 0.15, LIMITS, DT)
+        pose = along_arc(pose, last, DT)
+        assert hypot(corner[0] - pose.x, corner[1] - pose.y) > 0.15
