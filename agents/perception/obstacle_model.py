@@ -12,6 +12,7 @@ from lfa.agents.perception.ground_map import GroundMap
 from lfa.agents.perception.obstacle import BlockingObstacle
 from lfa.agents.perception.obstacle_tracker import WALL_M, Feature, Tracker
 from lfa.agents.perception.scan import SIGHT_M, Point, Surroundings
+from lfa.agents.perception.seen_edges import SeenEdges
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D, Twist, along_arc
 from lfa.protocol.messages.robot import GroundProfile, LaserScan
@@ -28,6 +29,8 @@ MATES_M = SIGHT_M + 0.5 * WALL_M + MATE_M + 0.1
 nearest of its points, and what is wider than `WALL_M` is a wall in any case."""
 OWN_M = 0.15
 """Distance [m] to the surface of a moving obstacle below which a scan point belongs to it."""
+BODY_M = 0.15
+"""Distance [m] beyond the body of a team-mate up to which a point of the scan is that team-mate."""
 NEAR_M = 0.3
 """Distance [m] to the end of the free way below which an obstacle is the one that blocks it."""
 TURN_MPS = 0.05
@@ -41,6 +44,7 @@ class ObstacleModel:
         self._radius_m = radius_m
         self._shared = shared
         self._scan = Surroundings(remembers=polygon)
+        self._edges = SeenEdges(radius_m)
         self._tracker = Tracker()
         self._jumps = 0
         """Number of jumps of the pose before the newest scan."""
@@ -55,10 +59,14 @@ class ObstacleModel:
         if jumps != self._jumps:
             self._jumps = jumps
             self._tracker.forget_surfaces()
+            self._edges.forget()
         places = [(mate.x, mate.y) for mate in mates]
         self._scan.scan(scan, pose, now, places, MATE_M)
         seen, eye = self._scan, (pose.x, pose.y)
         self._tracker.update(seen.points_map, eye, places, MATE_M, now, seen.reach_m, seen.step_rad)
+        moving = [((feature.x, feature.y), feature.radius_m + OWN_M) for feature in self._tracker.moving(now)]
+        bodies = [(place, self._radius_m + BODY_M) for place in places]
+        self._edges.see(scan, seen.points_map, pose, moving + bodies, now)
 
     def update_ground(self, profile: GroundProfile, pose: Pose2D, now: float) -> None:
         """Update with a profile of the floor ahead, made at `pose`."""
@@ -71,7 +79,7 @@ class ObstacleModel:
     def points(self, pose: Pose2D) -> list[Point]:
         """Return the points that block the way near `pose`, in `base_link`."""
         floor = self.ground.points(pose, LOOK_M)
-        seen = self._scan.points(pose, LOOK_M)
+        seen = self._scan.points(pose, LOOK_M) + self._edges.points(pose)
         return seen + floor if floor else seen
 
     def moving(self, pose: Pose2D, now: float) -> list[Feature]:

@@ -155,6 +155,19 @@ def _beams(scan: LaserScan, bearing: float, aside: int = 0) -> list[int]:
     return [n % around for n in range(place - aside, place + aside + 1)]
 
 
+def is_covered(scan: LaserScan, bearing: float, within_m: float) -> bool:
+    """Return whether the beams on both sides of `bearing` [rad] in `base_link` end within `within_m` [m]: no end of
+    what they meet lies between them.
+    """
+    step = scan.angle_increment or TAU
+    turned = bearing - scan.angle_min if step > 0.0 else scan.angle_min - bearing
+    around = max(1, round(TAU / abs(step)))
+    beam, beams = int(turned % TAU / abs(step)), scan.ranges_m
+    low = max(scan.range_min_m, READING_M_MIN)
+    beside = (beam % around, (beam + 1) % around)
+    return all(n < len(beams) and low < beams[n] <= within_m for n in beside)
+
+
 def without(points: Sequence[Point], center: Point, radius_m: float) -> list[Point]:
     """Return `points` without those within `radius_m` of `center`, where a team-mate is known to stand."""
     x, y, limit = center[0], center[1], radius_m * radius_m
