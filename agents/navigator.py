@@ -188,7 +188,9 @@ class Navigator:
         if role != self._role:
             self._change(role, pose, twist, now)
         self.leading.work(role is Role.LEADER, pose, self._mates.places, now)
-        points, moving = self._obstacles.points(pose), self._obstacles.moving(pose, now)
+        # On a way that it has planned on a map a follower needs no warning of a trap, which may lie in a gap.
+        points = self._obstacles.points(pose, traps=not self._follow_slot.catches_up)
+        moving = self._obstacles.moving(pose, now)
         still = resting(points, pose, moving) if self._crossing.patient else points + shadow(moving, pose)
         if role is Role.LEADER:
             wanted = self._lead_route.step(chain, still, pose, self.last, self.estimator.odometer_m, now)

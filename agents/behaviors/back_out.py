@@ -43,6 +43,8 @@ class BackOut:
         self._patience_s = STANDS_S
         self._traps: deque[Point] = deque(maxlen=TRAPS_MAX)
         """Traps in `map` to block once this robot is out of them."""
+        self._blocked: deque[Point] = deque(maxlen=TRAPS_MAX)
+        """Traps in `map` that are blocked."""
 
     @property
     def under_way(self) -> bool:
@@ -56,12 +58,19 @@ class BackOut:
             self._stuck.backing_out = True
 
     def keep(self, pose: Pose2D, now: float) -> None:
-        """Extend the trail by which the robot would back out, and block the traps that it is out of."""
+        """Extend the trail by which the robot would back out, and block the traps that it is out of. One that it has
+        come into on a planned way encloses it no more.
+        """
         if not self._path.under_way:
             self._path.keep(pose)
         for x, y in [trap for trap in self._traps if hypot(trap[0] - pose.x, trap[1] - pose.y) >= self._clear_m]:
             self._traps.remove((x, y))
             self._obstacles.avoid_trap(x, y, now)
+            self._blocked.append((x, y))
+        for x, y in [trap for trap in self._blocked if hypot(trap[0] - pose.x, trap[1] - pose.y) < TRAP_M]:
+            self._blocked.remove((x, y))
+            self._obstacles.enter_trap(x, y)
+            self._traps.append((x, y))
 
     def step(self, points: list[Point], pose: Pose2D, wanted: Twist, last: Twist, now: float) -> Twist:
         """Return the twist backwards out of a trap, then block the trap; `wanted` once the robot is out, or has stood
@@ -91,5 +100,5 @@ class BackOut:
 
         Not for an explorer: it plans on its map, and would be enclosed in a corner.
         """
-        if self._mission.leading.motion != "explore" and trap not in self._traps:
+        if self._mission.leading.motion != "explore" and trap not in (*self._traps, *self._blocked):
             self._traps.append(trap)

@@ -42,6 +42,8 @@ class GroundMap:
         self._crossable: dict[tuple[int, int], float] = {}
         """Near edges of crossable features, with the time when they were seen last."""
         self._near: list[Point] = []
+        self._near_walls: list[Point] = []
+        """Those of the blocked points near the robot that are no floor."""
         self._looked_at = NOWHERE
         """Position and range for which `_near` was looked up."""
         self._kinds: dict[tuple[int, int], tuple[BarKind, float]] = {}
@@ -77,15 +79,20 @@ class GroundMap:
 
     def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind, now: float) -> None:
         """Block the circle about (x, y) in `map` for this robot."""
-        count = ceil(2.0 * pi * radius_m / CELL_M)
-        for n in range(count):
-            angle = 2.0 * pi * n / count
-            cell = _cell((x + radius_m * cos(angle), y + radius_m * sin(angle)))
+        for cell in _around(x, y, radius_m):
             self._bar_cell(cell, kind, 2.0 * radius_m, SEEN_MIN, now)
 
-    def points(self, pose_map: Pose2D, within_m: float) -> list[Point]:
-        """Return the blocked points nearer than `within_m`, in `base_link`."""
+    def free_circle(self, x: float, y: float, radius_m: float) -> None:
+        """Take back what `bar_circle` has blocked as a wall."""
+        for cell in _around(x, y, radius_m):
+            if self._cells.get(cell) and self._kinds[cell][0] == "wall":
+                self._cells[cell] = 0
+        self._looked_at = NOWHERE
+
+    def points(self, pose_map: Pose2D, within_m: float, *, walls: bool = True) -> list[Point]:
+        """Return the blocked points nearer than `within_m`, in `base_link`; without `walls` those of the floor only."""
         barred = self._barred_near(pose_map, within_m)
+        barred = barred + self._near_walls if walls and self._near_walls else barred
         if not barred:
             return []
         x, y, c, s, limit = pose_map.x, pose_map.y, cos(pose_map.theta), sin(pose_map.theta), within_m * within_m
@@ -110,14 +117,15 @@ class GroundMap:
         return found
 
     def _barred_near(self, pose_map: Pose2D, within_m: float) -> list[Point]:
-        """Return all blocked points nearer than `within_m` and some farther ones, looked up anew after a move."""
+        """Return the blocked floor nearer than `within_m` and some farther, found anew after a move."""
         x, y, reach_m = self._looked_at
         if reach_m != within_m or abs(pose_map.x - x) > MOVED_M or abs(pose_map.y - y) > MOVED_M:
             self._looked_at = x, y, _ = pose_map.x, pose_map.y, within_m
-            cells = ((i, j) for (i, j), n in self._cells.items() if n >= SEEN_MIN)
-            points = (((i + 0.5) * CELL_M, (j + 0.5) * CELL_M) for i, j in cells)
-            far_m = within_m + MOVED_M
-            self._near = [(px, py) for px, py in points if abs(px - x) < far_m and abs(py - y) < far_m]
+            far_m, self._near, self._near_walls = within_m + MOVED_M, [], []
+            for (i, j), seen in self._cells.items():
+                px, py = (i + 0.5) * CELL_M, (j + 0.5) * CELL_M
+                if seen >= SEEN_MIN and abs(px - x) < far_m and abs(py - y) < far_m:
+                    (self._near_walls if self._kinds[i, j][0] == "wall" else self._near).append((px, py))
         return self._near
 
     def _confirmed(self, y: float, feature: GroundFeature, pose_map: Pose2D, now: float) -> bool:
@@ -151,6 +159,13 @@ class GroundMap:
             before = 0
         self._cells[cell], self._seen_at[cell], self._kinds[cell] = before + seen, now, (kind, width_m)
         self._looked_at = NOWHERE
+
+
+def _around(x: float, y: float, radius_m: float) -> list[tuple[int, int]]:
+    """Return the map cells on the circle about (x, y)."""
+    count = ceil(2.0 * pi * radius_m / CELL_M)
+    angles = [2.0 * pi * n / count for n in range(count)]
+    return [_cell((x + radius_m * cos(angle), y + radius_m * sin(angle))) for angle in angles]
 
 
 def _cell(point: Point) -> tuple[int, int]:

@@ -76,9 +76,13 @@ class ObstacleModel:
         """Block a place in which a robot got stuck."""
         self.ground.bar_circle(x, y, TRAP_M, "wall", now)
 
-    def points(self, pose: Pose2D) -> list[Point]:
-        """Return the points that block the way near `pose`, in `base_link`."""
-        floor = self.ground.points(pose, LOOK_M)
+    def enter_trap(self, x: float, y: float) -> None:
+        """Take back that a place is blocked in which a robot got stuck."""
+        self.ground.free_circle(x, y, TRAP_M)
+
+    def points(self, pose: Pose2D, *, traps: bool = True) -> list[Point]:
+        """Return the points that block the way near `pose`, in `base_link`; those around `traps` if they are to."""
+        floor = self.ground.points(pose, LOOK_M, walls=traps)
         seen = self._scan.points(pose, LOOK_M) + self._edges.points(pose)
         return seen + floor if floor else seen
 

@@ -104,3 +104,21 @@ def test_a_large_robot_backs_out_until_it_stands_clear_of_what_it_blocks() -> No
         x, now = x - 0.02, now + 0.1
     out.keep(Pose2D(x), now)
     assert model.points(Pose2D(x)) != []
+
+
+def test_a_trap_into_which_a_planned_way_has_led_encloses_the_robot_no_more() -> None:
+    stuck, trap = Stuck(), (HERE.x + 2.0, 0.0)
+    stuck.out.bar(trap)
+    for x in (HERE.x, trap[0] - 0.1):
+        stuck.out.keep(Pose2D(x), stuck.now)
+    assert stuck.model.points(Pose2D(trap[0])) == []
+    stuck.out.keep(HERE, stuck.now)
+    assert stuck.model.points(Pose2D(trap[0])) != []
+
+
+def test_a_trap_is_no_floor_and_counts_only_for_who_asks_for_traps() -> None:
+    stuck, trap = Stuck(), (HERE.x + 1.5, 0.0)
+    stuck.out.bar(trap)
+    stuck.out.keep(HERE, stuck.now)
+    assert stuck.model.points(HERE) != []
+    assert stuck.model.points(HERE, traps=False) == []
