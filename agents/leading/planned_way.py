@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import inf
 
 from msgspec.structs import replace
 
 from lfa.agents.avoidance.arc_planner import ArcPlanner
+from lfa.agents.avoidance.square_entry import SquareEntry
 from lfa.agents.exploration.explorer import Explore
 from lfa.agents.exploration.occupancy_grid import Mapping
 from lfa.agents.following.factory import heading_filter_of
@@ -47,7 +48,8 @@ class PlannedWay:
         footprint = PolygonBody.of(mission)
         self._arcs = ArcPlanner(mission.radius_m, mission.limits, footprint)
         self._run_up = None if footprint is None else RunUp()
-        """Run-ups of a polygon; a round body needs none."""
+        self._entry = None if footprint is None else SquareEntry(mission.radius_m, mission.half_width_m, mission.limits)
+        """Run-ups of a polygon, and its entry into what is narrower than its circle; a round body needs none."""
         self._blocked: tuple[float, Pose2D] | None = None
         """Time [s] and place at which no arc led on first; None since the robot has left it."""
         self._mates: Sequence[Pose2D] = ()
@@ -78,7 +80,11 @@ class PlannedWay:
             return STILL
         swing = self.lead.slots_swing and not alone
         turn_radps = TEAM_RADPS if swing else inf
-        twist = self._arcs.steer(points, partial(self.lead.ahead, pose), wanted, turn_radps, self.lead.bend_mps)
+        route: Callable[[float], Point] = partial(self.lead.ahead, pose)
+        if self._entry is not None:
+            speed_mps = self.lead.bend_mps(0.0)
+            route, wanted = self._entry.lead(points, pose, route, wanted, speed_mps, turn_radps, now)
+        twist = self._arcs.steer(points, route, wanted, turn_radps, self.lead.bend_mps)
         if self._run_up is not None:
             backs = self._run_up.step(pose, self._arcs.back(points), blocked=self._arcs.blocked)
             if backs is not None:

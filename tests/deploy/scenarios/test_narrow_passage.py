@@ -32,6 +32,13 @@ def test_a_jackal_drives_through_a_passage_narrower_than_its_circle_without_cont
     assert complaint(run(scenario, 1, tmp_path / "run").summary) is None
 
 
+def test_a_jackal_with_noise_that_comes_aslant_drives_squarely_through_the_passage(tmp_path: Path) -> None:
+    """It had not come through within a minute: each of its run-ups led it in aslant again."""
+    aslant = SCENARIO.replace("[[0.0, 0.0], [6.0, 0.0]]", "[[0.0, 1.2], [6.0, -1.0]]").replace("2.0", "2.5")
+    scenario = loaded("passage", aslant.replace("[0.0, 0.0, 0.0]", "[0.0, 1.2, 0.0]"), (*barn.JACKAL, *barn.NOISE))
+    assert complaint(run(scenario, 8, tmp_path / "run").summary) is None
+
+
 def test_a_round_robot_as_large_as_its_circle_is_not_sent_there() -> None:
     with pytest.raises(Refused, match="can be reached, walls part it"):
         loaded("passage", SCENARIO, ["mission.radius_m=0.333"])
