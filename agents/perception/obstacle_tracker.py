@@ -93,8 +93,15 @@ class _Track(Struct):
     slow: Point | None = None
     """Mean velocity [m/s] of a motion that is too slow for the filter; None for another."""
 
+    joined_wall: bool = False
+    """True when the scan before its first one showed a wall in its place."""
+
     def places(self) -> tuple[Point, ...]:
         return ((self.x, self.y), *self.ends)
+
+    def off_wall(self, now: float) -> bool:
+        """Return whether it has just come off a wall in the scan, as a door does: its own motion is not told yet."""
+        return self.joined_wall and not self.moves and now - self.anchors[0][0] < ANCHOR_S
 
     def has_moved(self, view: ScanView) -> bool:
         """Return whether all of it has moved, as `view` shows it now; an end stays when it comes out from behind an
@@ -162,6 +169,7 @@ class Tracker:
         """Update with one scan's points in beam order, seen from `eye` up to `reach_m` [m], `step_rad` [rad] between
         two beams; points within `mate_m` of a team-mate are left out.
         """
+        walls = [points for points, thing in self._seen if isinstance(thing, Feature) and thing.kind == "wall"]
         self._seen, self._seen_at = [], now
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
         clusters, view = _clusters(points_map), ScanView(eye, points_map, reach_m, step_rad)
@@ -181,9 +189,11 @@ class Tracker:
             else:
                 track = self._follow((x, y, radius_m), (cluster[0], cluster[-1]), view, now)
                 if track is not None:
+                    if len(track.anchors) == 1 and track.anchors[0][0] == now:
+                        track.joined_wall = any(_touches(wall, *end) for wall in walls for end in track.ends)
                     self._seen.append((cluster, track))
-        walls = [points for points, thing in self._seen if isinstance(thing, Feature) and thing.kind == "wall"]
-        self._surfaces.update(walls, view, mates, mate_m, now)
+        untold = [points for points, thing in self._seen if isinstance(thing, Feature) or thing.off_wall(now)]
+        self._surfaces.update(untold, view, mates, mate_m, now)
 
     def forget_surfaces(self) -> None:
         """Compare the walls of scans to come with none that were seen so far: the pose has jumped."""

@@ -57,6 +57,17 @@ def test_a_door_that_slides_out_of_a_wall_is_told_before_it_has_come_forty_centi
     assert edge.vy > 0.4 * mps
 
 
+def test_a_thick_door_is_told_all_the_way_although_it_comes_off_its_wall_in_the_scan() -> None:
+    """Seen from the doorway, its long face is so sparse that the rest is a thing of its own, and then an edge."""
+    tracker, told = Tracker(), []
+    for n in range(19):
+        end_y = -1.0 + 0.042 * n
+        sides = ((4.9, end_y - 1.5, 4.9, end_y), (4.9, end_y, 5.1, end_y), (5.1, end_y, 5.1, end_y - 1.5))
+        look(tracker, ((5.0, 0.6, 5.0, 4.0), (5.0, -0.6, 5.0, -4.0), *sides), (4.28 + 0.04 * n, 0.0), n)
+        told.append(tracker.moving(0.1 * n) != [])
+    assert all(told[12:]), told
+
+
 @pytest.mark.parametrize("beams", [60, 90, 180])
 @pytest.mark.parametrize("step_m", [0.04, -0.03])
 def test_a_wall_with_a_mouth_that_a_robot_drives_to_or_from_does_not_move(beams: int, step_m: float) -> None:
