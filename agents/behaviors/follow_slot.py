@@ -10,8 +10,10 @@ from lfa.agents.avoidance.decision import Action, Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.behaviors.make_room import ROOM, MakeRoom
 from lfa.agents.behaviors.team_mates import TeamMates
+from lfa.agents.following.factory import heading_filter_of
 from lfa.agents.following.follower import Follower
 from lfa.agents.following.predecessor import Sighting
+from lfa.agents.following.swung_slot import SwungSlot
 from lfa.agents.leading.free_slot import FreeSlot
 from lfa.agents.leading.leader import Leadership
 from lfa.agents.perception.obstacle import ON_THE_MAP
@@ -65,6 +67,8 @@ class FollowSlot:
         self._leading = leading
         self._own_readings = own_readings
         self._free_slot = FreeSlot(mission.radius_m)
+        self._swung_slot = SwungSlot(mission.radius_m)
+        self._filters_heading = heading_filter_of(mission) > 0.0
         self._make_room = MakeRoom(mission.radius_m)
         self._way_back: WayBack | None = None
         """Way back to the slot; None before this follower has lost it for the first time."""
@@ -93,6 +97,9 @@ class FollowSlot:
         """
         ahead, trace = self._mates.predecessor, self._formation.trace
         sighting, slot = None if ahead is None else ahead.at(now), self._formation.slot_of(self._mates.own_id)
+        if sighting is not None:
+            slot = self._swung(slot, sighting, points, pose, now)
+            trace = trace and not self._swung_slot.is_swung
         self._follower.own_readings = self._own_readings.at(now)
         wanted = self._follower.step(sighting, slot, pose, twist, dt, on_trace=trace)
         if sighting is None or sighting.age_s > FRESH_S:
@@ -118,6 +125,15 @@ class FollowSlot:
             self._detour.decision = None
             return beside
         return self._around(sighting, slot, points, pose, wanted, last, now)
+
+    def _swung(self, slot: Slot, sighting: Sighting, points: list[Point], pose: Pose2D, now: float) -> Slot:
+        """Return `slot`, swung to a free place where this robot cannot get to it."""
+        readout, within_m = self._follower.readout, BESIDE_SLOT_SHARE * slot.separation_m
+        chi = readout.chi if self._filters_heading else sighting.pose.theta
+        return self._swung_slot.swung(
+            slot, (readout.slot_map.x, readout.slot_map.y), sighting.pose, chi, sighting.twist.linear_x, points, pose,
+            within_m, now,
+        )  # fmt: skip
 
     def _around(
         self,
