@@ -12,7 +12,7 @@ from lfa.agents.avoidance.decision import Decision
 from lfa.agents.avoidance.detour import Detour
 from lfa.agents.avoidance.ground_crossing import GroundCrossing
 from lfa.agents.avoidance.moving_obstacle import Crossing
-from lfa.agents.avoidance.moving_points import shadow
+from lfa.agents.avoidance.moving_points import standing
 from lfa.agents.avoidance.safety import safe
 from lfa.agents.behaviors.back_out import BackOut
 from lfa.agents.behaviors.command_limits import CommandLimits
@@ -26,7 +26,7 @@ from lfa.agents.formation.formation import Formation
 from lfa.agents.leading.hand_driving import HandDriving
 from lfa.agents.leading.leader import LEADER_OMEGA_MAX_RADPS, Leadership
 from lfa.agents.localization.estimator import Estimator
-from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel, resting
+from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.own_readings import OwnReadings
 from lfa.agents.perception.scan_age import LOST_S, ScanAge
@@ -191,7 +191,7 @@ class Navigator:
         # On a way that it has planned on a map a follower needs no warning of a trap, which may lie in a gap.
         points = self._obstacles.points(pose, traps=not self._follow_slot.catches_up)
         moving = self._obstacles.moving(pose, now)
-        still = resting(points, pose, moving) if self._crossing.patient else points + shadow(moving, pose)
+        still = standing(points, moving, pose, self._mission.radius_m, patient=self._crossing.patient)
         if role is Role.LEADER:
             wanted = self._lead_route.step(chain, still, pose, self.last, self.estimator.odometer_m, now)
         elif role is Role.FOLLOWER:
@@ -202,7 +202,7 @@ class Navigator:
             wanted = meant = STILL
         if role is not Role.WAITING:
             wanted = self._own.step(BehaviorInput(now, role, pose, self.last, wanted, still, moving))
-            wanted = self._crossing.give_way(moving, pose, wanted, now, still, self._mates.moving, self.last)
+            wanted = self._crossing.give_way(moving, pose, wanted, now, points, self._mates.moving, self.last)
             wanted = meant = self._ground_crossing.cross(wanted, now)
             by_law = not (self._follow_slot.catches_up or self._back_out.under_way)
             wanted = self.limits.slow(wanted, role, pose, now, by_law=by_law)

@@ -7,6 +7,7 @@ from functools import lru_cache
 from math import hypot, inf
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from lfa.agents.avoidance.decision import Action
 from lfa.agents.avoidance.moving_points import ASIDE_SHARE
@@ -87,7 +88,7 @@ def kept_m(moving: Sequence[Feature], pose: Pose2D, evasion: Evasion, twist: Twi
         return min(closest_m(moving, pose, twist, LOOK_S), CLEARANCE_M)
     bend_s = evasion.turn_rad / abs(twist.angular_z)
     least = closest_m(moving, pose, twist, bend_s)
-    later = [Feature(f.kind, *f.at(bend_s), f.radius_m, f.vx, f.vy) for f in moving]
+    later = [replace(f, x=x, y=y, keeps_s=max(0.0, f.keeps_s - bend_s)) for f in moving for x, y in [f.at(bend_s)]]
     straight = Twist(twist.linear_x, 0.0)
     return min(least, closest_m(later, along_arc(pose, twist, bend_s), straight, LOOK_S - bend_s), CLEARANCE_M)
 
@@ -105,8 +106,9 @@ def closest_m(moving: Sequence[Feature], pose: Pose2D, twist: Twist, within_s: f
     way = list(zip(times, places_along(pose, twist, times), strict=True))
     for feature in moving:
         x, y, vx, vy, radius_m = feature.x, feature.y, feature.vx, feature.vy, feature.radius_m
-        first = hypot(x - pose.x, y - pose.y)
+        first, keeps_s = hypot(x - pose.x, y - pose.y), feature.keeps_s
         for later, (there_x, there_y) in way:
+            later = min(later, keeps_s)
             apart = hypot(x + vx * later - there_x, y + vy * later - there_y)
             if apart < first and apart - radius_m < least:
                 least = apart - radius_m

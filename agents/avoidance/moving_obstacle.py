@@ -28,6 +28,7 @@ from lfa.agents.avoidance.evasion import (
 )
 from lfa.agents.avoidance.moving_points import AWAY_M
 from lfa.agents.avoidance.safety import within
+from lfa.agents.perception.obstacle_model import resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point, free_along
 from lfa.protocol.geometry import STILL, Pose2D, Twist, along_arc, in_base, slowed, wrap
@@ -44,6 +45,9 @@ SOON_S = 2.0
 """Time [s] ahead within which what comes on is given way to again, however long it was waited for."""
 HOLD_S = 1.0
 """Time [s] after the last conflict before a robot may choose a less careful action."""
+CALM_S = 3.0
+"""Time [s] after the last conflict before a robot that waited is patient again: at rest it meets nothing, and would
+wait anew for the same obstacle as soon as it drives on."""
 WORTH_M, WORTH_CLOSE_M = 0.1, 0.05
 """Clearance [m] that another evasion must win over the present action, or over waiting; less where it comes close."""
 USUAL_MPS = 0.5
@@ -83,6 +87,8 @@ class Crossing:
         self._near = inf
         """Closest approach [m] in the last conflict."""
         self._impatient = False
+        self._conflict_at = self._side_at = -inf
+        """Times [s] of the last conflict, and of the last bend to another side than the one before."""
 
     @property
     def patient(self) -> bool:
@@ -100,14 +106,16 @@ class Crossing:
         last: Twist = STILL,
     ) -> Twist:
         """Return `wanted`, or a slower or evading twist. `moving` holds as of now, in `map` like `pose`; `points` are
-        what stands, in `base_link`; `mates` is asked where room is made; `last` is the last command.
+        those of the scan, in `base_link`; `mates` is asked where room is made; `last` is the last command.
         """
         self._last = last
-        near = closest_m(moving, pose, wanted)
+        near = self._nearest_m(moving, pose, wanted)
         if near >= CLEARANCE_M and now >= self._held_until:
-            self.decision, self._waiting_since, self._impatient = None, None, False
-            self._evasion = SLOW
+            self.decision, self._evasion = None, SLOW
+            if not moving or now - self._conflict_at >= CALM_S:
+                self._waiting_since, self._impatient = None, False
             return self._wary(moving, pose, wanted)
+        self._conflict_at = now
         self._near = near if near < CLEARANCE_M else self._near
         if self._waiting_since is None:
             self._waiting_since = now
@@ -118,7 +126,9 @@ class Crossing:
             self.decision = None
             return wanted
         evasion = (
-            SLOW if near >= CLEARANCE_M else self._less(moving, pose, wanted, points, mates(pose, MATES_WITHIN_M, now))
+            SLOW
+            if near >= CLEARANCE_M
+            else self._less(moving, pose, wanted, points, mates(pose, MATES_WITHIN_M, now), now)
         )
         if self.decision is None or care_of(evasion.action) >= care_of(self.decision.action) or now >= self._held_until:
             row = decide(Situation("moving", near, closest_m=min(near, self._near)))
@@ -126,11 +136,27 @@ class Crossing:
             self.decision = Decision(evasion.action, near, 0.0, "moving", *named)
             self._held_until = now + HOLD_S if near < CLEARANCE_M else self._held_until
             if evasion != self._evasion:
+                if evasion.turn_rad and not (self._evasion.turn_rad and side_of(evasion) == side_of(self._evasion)):
+                    self._side_at = now
                 self._evasion, self._heading = evasion, wrap(pose.theta + evasion.turn_rad * side_of(evasion))
         if self._evasion.action not in (Action.WAIT, Action.BACK):
             self._waiting_since = now  # a robot that drives on or makes room does not wait
         twist = self._done(self._present(pose), wanted)
-        return self._wary(moving, pose, twist) if self._evasion.action in ONWARD else twist
+        if self._evasion.action not in ONWARD:  # out of the way of one, but not into another that may turn
+            moving = [feature for feature in moving if feature.keeps_s < inf and leads_to(feature, pose, twist)]
+        return self._wary(moving, pose, twist)
+
+    def _nearest_m(self, moving: Sequence[Feature], pose: Pose2D, twist: Twist) -> float:
+        """Return the least distance [m] to what moves within the horizon. What turns again and again counts only where
+        it would touch soon, or is close already: nobody knows where it will be, and waiting for it does not end.
+        """
+        near = closest_m([feature for feature in moving if feature.keeps_s == inf], pose, twist)
+        for feature in moving:
+            if feature.keeps_s < inf:
+                soon = closest_m((feature,), pose, twist, SOON_S)
+                if soon < self._radius_m + AWAY_M or self._comes_close(feature, pose):
+                    near = min(near, soon, apart_m((feature,), pose, 0.0))
+        return near
 
     def _wary(self, moving: Sequence[Feature], pose: Pose2D, twist: Twist) -> Twist:
         """Return `twist`, slowed towards what it comes nearer to, so that this may turn and not meet the robot within
@@ -157,10 +183,8 @@ class Crossing:
 
     def _comes_close(self, feature: Feature, pose: Pose2D) -> bool:
         """Return whether an obstacle is so near that it reaches the robot if it turns towards it, and does not go."""
-        x, y = feature.x - pose.x, feature.y - pose.y
-        off_m, speed = hypot(x, y), hypot(feature.vx, feature.vy)
-        goes = x * feature.vx + y * feature.vy > GOES_SHARE * off_m * speed
-        return not goes and off_m < feature.radius_m + self._radius_m + CLOSE_M
+        off_m = hypot(feature.x - pose.x, feature.y - pose.y)
+        return not _goes(feature, pose) and off_m < feature.radius_m + self._radius_m + CLOSE_M
 
     def _less(
         self,
@@ -169,19 +193,24 @@ class Crossing:
         wanted: Twist,
         points: Sequence[Point],
         mates: Sequence[Feature],
+        now: float,
     ) -> Evasion:
         """Return the least action that keeps the distance; if none does, the one that keeps most of it."""
-        if closest_m(moving, pose, self._done(SLOW, wanted)) >= CLEARANCE_M:
+        if self._nearest_m(moving, pose, self._done(SLOW, wanted)) >= CLEARANCE_M:
             return SLOW
-        if closest_m(moving, pose, STILL) >= CLEARANCE_M:
+        if self._nearest_m(moving, pose, STILL) >= CLEARANCE_M:
             return EVASIONS[0]
-        best, most = EVASIONS[0], -inf
+        best, most, points = EVASIONS[0], -inf, resting(list(points), pose, moving)
         fastest = max(hypot(feature.vx, feature.vy) for feature in moving)
         close = [feature for feature in moving if self._comes_close(feature, pose)]
+        here = [feature for feature in moving if not _goes(feature, pose)]
         under_way = self.decision is not None and self._evasion is not SLOW
         candidates = (*EVASIONS, *ESCAPES) if close else EVASIONS
         candidates = (self._present(pose), *candidates) if under_way else candidates
+        keeps_side = bool(self._evasion.turn_rad) and now - self._side_at < HOLD_S and not close
         for evasion in candidates:
+            if keeps_side and evasion.turn_rad and side_of(evasion) != side_of(self._evasion):
+                continue
             twist = self._done(evasion, wanted)
             if twist.linear_x and free_along(points, twist, self._radius_m + BODY_M) < abs(twist.linear_x) * ROOM_S:
                 continue
@@ -191,7 +220,7 @@ class Crossing:
                 continue  # it would be braked, and met on its way past
             if close:
                 place = self._soon(pose, twist)
-                kept = min(apart_m(close, place, 0.5 * CLOSE_S), apart_m(close, place, CLOSE_S))
+                kept = min(apart_m(here, place, 0.5 * CLOSE_S), apart_m(here, place, CLOSE_S))
             else:
                 kept = kept_m(moving, pose, evasion, twist)
                 kept -= DRIVEN_M if evasion.v_mps < 0.0 else 0.0
@@ -213,3 +242,9 @@ class Crossing:
             return slowed(wanted, self._slow_mps)
         v = max(wanted.linear_x, evasion.v_mps) if evasion.action is Action.AHEAD else evasion.v_mps
         return Twist(*within(Twist(v, evasion.omega_radps), self._limits))
+
+
+def _goes(feature: Feature, pose: Pose2D) -> bool:
+    """Return whether what moves goes away from a robot at `pose`."""
+    x, y, speed = feature.x - pose.x, feature.y - pose.y, hypot(feature.vx, feature.vy)
+    return x * feature.vx + y * feature.vy > GOES_SHARE * hypot(x, y) * speed

@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, hypot, sin
+from math import cos, hypot, inf, sin
 
+from lfa.agents.perception.obstacle_model import resting
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.agents.perception.scan import Point
-from lfa.protocol.geometry import Pose2D
+from lfa.protocol.geometry import TAU, Pose2D
 
 SHADOW_S, SHADOW_STEPS, SHADOW_M_MAX = 8.0, 3, 1.2
 """Time [s] ahead for which a detour keeps out of the way of what moves slowly, the number of places on it, and the way
 [m] up to which it counts as slow."""
+BERTH_S, BERTH_POINTS = 0.6, 12
+"""Time [s] of the motion of what turns again and again, in any direction, that a detour leaves room for, and the number
+of points around it."""
 AWAY_M = 0.08
 """Clearance [m] that is left when a robot drives towards what moves; nearer, it drives away from it or stands."""
 MET_M = 0.01
 """Distance [m] from the robot's centre, in the direction of what comes over it, of the point that stands for it."""
 ASIDE_SHARE = 0.5
 """Cosine of the angle off the robot's motion beyond which what comes towards it comes from the side."""
+
+
+def standing(
+    points: list[Point], moving: Sequence[Feature], pose: Pose2D, radius_m: float, *, patient: bool
+) -> list[Point]:
+    """Return the points (in `base_link`) of all that a robot goes round. A `patient` one gives way to what keeps its
+    course; what turns again and again it goes round in any case, at a distance.
+    """
+    if not patient:
+        return points + shadow(moving, pose)
+    return resting(points, pose, [feature for feature in moving if feature.keeps_s == inf]) + berth(
+        moving, pose, radius_m
+    )
 
 
 def shadow(moving: Sequence[Feature], pose: Pose2D) -> list[Point]:
@@ -35,6 +52,23 @@ def shadow(moving: Sequence[Feature], pose: Pose2D) -> list[Point]:
                 dx = x + side * feature.vx - left * reach * feature.vy - pose.x
                 dy = y + side * feature.vy + left * reach * feature.vx - pose.y
                 points.append((c * dx + s * dy, c * dy - s * dx))
+    return points
+
+
+def berth(moving: Sequence[Feature], pose: Pose2D, radius_m: float) -> list[Point]:
+    """Return, in `base_link`, points on a circle around each thing that turns again and again, as far out as it may
+    come within `BERTH_S`: what goes nowhere is gone round like what stands, but not as closely. Where a robot of
+    `radius_m` is within that circle already, it bars no way out.
+    """
+    c, s, points = cos(pose.theta), sin(pose.theta), list[Point]()
+    for feature in moving:
+        dx, dy = feature.x - pose.x, feature.y - pose.y
+        reach_m = feature.radius_m + BERTH_S * hypot(feature.vx, feature.vy)
+        if feature.keeps_s == inf or hypot(dx, dy) < reach_m + radius_m + AWAY_M:
+            continue
+        for n in range(BERTH_POINTS):
+            x, y = dx + reach_m * cos(n * TAU / BERTH_POINTS), dy + reach_m * sin(n * TAU / BERTH_POINTS)
+            points.append((c * x + s * y, c * y - s * x))
     return points
 
 

@@ -88,7 +88,11 @@ class ObstacleModel:
 
     def moving(self, pose: Pose2D, now: float) -> list[Feature]:
         """Return the moving obstacles, as seen by this robot and as reported by others."""
-        return self._shared.moving(self._tracker.moving(now), pose, now, self._tracker.shows)
+        return self._shared.moving(self._tracker.moving(now), pose, now, self._tracker.shows, self._looks_through)
+
+    def _looks_through(self, place: Point) -> bool:
+        """Return whether the newest scan looks through `place` in `map`."""
+        return self._scan.looks_at(place) and self._tracker.looks_through(place)
 
     def blocking(self, pose: Pose2D, wanted: Twist, free_m: float, now: float) -> BlockingObstacle:
         """Return the obstacle that ends the way along `wanted` after `free_m` [m]."""

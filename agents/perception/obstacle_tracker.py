@@ -55,6 +55,16 @@ HIDDEN_RAD = 0.09
 """Angle [rad] within which a nearer obstacle may hide an end; neighbouring beams of a scan of 180 are less than half of
 this apart."""
 TRACKS_MAX = 64
+KEEPS_S = 1.0
+"""Time [s] for which what turns again and again is expected to go on as it does; where it goes then is not known."""
+STEPS_MIN = 4
+"""Number of steps, each about a second long, that are needed to tell: one turn is none of many."""
+TURNING_SHARE, STRAIGHT_SHARE = 0.35, 0.15
+"""Change of velocity from step to step, as a share of the sum of both speeds, above which it turns again and again, and
+below which one that did keeps its course: 0 for what goes straight on, about 0.6 for what takes any direction in each
+step, 1 for what goes to and fro."""
+LEAST_MPS = 0.1
+"""Mean speed [m/s] below which errors of the measured places are more than turns."""
 PROOFS_MIN = 2
 """Number of ends, of the two now and the two before, that must be in places seen free: one may be a grazing beam."""
 
@@ -70,9 +80,12 @@ class Feature(Struct, frozen=True, gc=False):
     vy: float = 0.0
     whole: bool = True
     """True when both ends are in sight, so that the width is known."""
+    keeps_s: float = inf
+    """Time [s] from now for which it keeps its velocity; then it is somewhere about."""
 
     def at(self, later_s: float) -> Point:
         """Return the position `later_s` [s] from now."""
+        later_s = min(later_s, self.keeps_s)
         return self.x + self.vx * later_s, self.y + self.vy * later_s
 
 
@@ -92,6 +105,8 @@ class _Track(Struct):
     """Time [s] at which it was last seen to move."""
     slow: Point | None = None
     """Mean velocity [m/s] of a motion that is too slow for the filter; None for another."""
+    restless: bool = False
+    """True for what turns again and again."""
 
     joined_wall: bool = False
     """True when the scan before its first one showed a wall in its place."""
@@ -154,6 +169,8 @@ class Tracker:
         self._seen: list[tuple[list[Point], Feature | _Track]] = []
         """Obstacles of the newest scan with their points."""
         self._surfaces = SurfaceWatch()
+        self._view: ScanView | None = None
+        """The newest scan."""
         self._seen_at = 0.0
 
     def update(
@@ -173,6 +190,7 @@ class Tracker:
         self._seen, self._seen_at = [], now
         self._tracks = [t for t in self._tracks if now - t.seen_at <= (HIDDEN_S if t.moves else FORGET_S)]
         clusters, view = _clusters(points_map), ScanView(eye, points_map, reach_m, step_rad)
+        self._view = view
         for n, cluster in enumerate(clusters):
             x, y, radius_m = _circle(cluster, eye)
             ends = (cluster[0], clusters[n - 1][-1]), (cluster[-1], clusters[(n + 1) % len(clusters)][0])
@@ -219,6 +237,10 @@ class Tracker:
         things = (thing for _, thing in self._seen if isinstance(thing, _Track) or thing.kind != "wall")
         return any(hypot(thing.x - x, thing.y - y) < within_m for thing in things)
 
+    def looks_through(self, place: Point) -> bool:
+        """Return whether the newest scan looked through `place` in `map`."""
+        return self._view is not None and self._view.shows_free(place)
+
     def features(self, now: float) -> list[Feature]:
         """Return all obstacles as of `now`."""
         walls = [thing for _, thing in self._seen if isinstance(thing, Feature)] + self._at_walls(now)
@@ -259,12 +281,28 @@ class Tracker:
         best.seen_at, best.ends = now, ends
         if now - best.anchors[-1][0] >= ANCHOR_S:
             best.anchors = [*best.anchors[1 - ANCHORS_MAX :], (now, best.places(), view)]
+            centers = [(at, center) for at, (center, *_), _ in best.anchors]
+            best.restless = turns_often(centers, before=best.restless)
         moved = best.has_moved(view)
         best.slow = None if moved else best.slow_velocity(view)
         if moved or best.slow is not None:
             best.moved_at = now
         best.moves = now - best.moved_at <= TURNS_S
         return best
+
+
+def turns_often(places: Sequence[tuple[float, Point]], *, before: bool = False) -> bool:
+    """Return whether what was in `places` in `map` [m], at times [s] about a second apart, turns again and again;
+    `before` is the answer of the last time.
+    """
+    steps = [
+        ((bx - ax) / (until - at), (by - ay) / (until - at)) for (at, (ax, ay)), (until, (bx, by)) in pairwise(places)
+    ]
+    if len(steps) < STEPS_MIN or sum(hypot(*step) for step in steps) < LEAST_MPS * len(steps):
+        return before
+    changed = sum(hypot(bx - ax, by - ay) for (ax, ay), (bx, by) in pairwise(steps))
+    both = sum(hypot(*a) + hypot(*b) for a, b in pairwise(steps))
+    return changed > (STRAIGHT_SHARE if before else TURNING_SHARE) * both
 
 
 def _clusters(points: Sequence[Point]) -> list[list[Point]]:
@@ -340,4 +378,5 @@ def _feature(track: _Track, now: float) -> Feature:
     if not track.moves:
         return Feature("stationary", track.x, track.y, track.radius_m)
     vx, vy = track.slow or (track.vx, track.vy)
-    return Feature("moving", track.x + vx * dt, track.y + vy * dt, track.radius_m, vx, vy)
+    keeps_s = KEEPS_S if track.restless else inf
+    return Feature("moving", track.x + vx * dt, track.y + vy * dt, track.radius_m, vx, vy, keeps_s=keeps_s)

@@ -49,6 +49,8 @@ class Surroundings:
         self._unseen: dict[tuple[int, int], tuple[Point, float]] = {}
         """Points [m] in `map` close to the robot that the newest scan cannot show, by their cell, with the time [s] at
         which they were seen."""
+        self._newest: tuple[LaserScan, Pose2D] | None = None
+        """Newest scan, and the pose in `map` at which it was made."""
         self.seen_at: float | None = None
         self.reach_m = SIGHT_M
         """Range [m] up to which that scan has points: the scanner's own, if it is less than `SIGHT_M`."""
@@ -76,7 +78,11 @@ class Surroundings:
             (x + r * cos(angle + beam * step), y + r * sin(angle + beam * step))
             for beam, r in (_edges(scan.ranges_m, low, high) if COARSE_RAD < self.step_rad < SPARSE_RAD else ())
         ]
-        self.seen_at = now
+        self._newest, self.seen_at = (scan, pose_map), now
+
+    def looks_at(self, place: Point) -> bool:
+        """Return whether a beam of the newest scan looks in the direction of `place` in `map`."""
+        return self._newest is not None and not _is_blind(self._newest[0], 0, in_base(self._newest[1], place))
 
     def _remember(self, scan: LaserScan, pose_map: Pose2D, now: float, mates: Sequence[Point], mate_m: float) -> None:
         """Keep the points of the last scan, and of those before, on which no beam of this one falls."""

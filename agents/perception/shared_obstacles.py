@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from math import hypot
 
 from lfa.agents.perception.obstacle_tracker import Feature
-from lfa.protocol.geometry import Pose2D
+from lfa.protocol.geometry import Point, Pose2D
 from lfa.protocol.messages.team import ObstacleNote
 
 REPORTERS_MAX = 512
@@ -37,10 +37,13 @@ class SharedObstacles:
         here: Pose2D,
         now: float,
         seen_near: Callable[[float, float, float], bool] = lambda x, y, within_m: False,
+        seen_free: Callable[[Point], bool] = lambda place: False,
     ) -> list[Feature]:
-        """Return `seen` and the reported obstacles, extrapolated to `now` [s], less those that are robots.
+        """Return `seen` and the reported obstacles, extrapolated to `now` [s], less those that are robots, and those
+        that turned on the way: this robot looks through where they would be.
 
-        `seen_near(x, y, within_m)` returns whether this robot's scan shows anything near (x, y) in `map`.
+        `seen_near(x, y, within_m)` returns whether this robot's scan shows anything near (x, y) in `map`, and
+        `seen_free(place)` whether it looks through a place.
         """
         if not self._reports:
             return seen
@@ -51,6 +54,6 @@ class SharedObstacles:
             if now - at <= REMOTE_TRACK_S or (now - at <= PARTIAL_TRACK_S and seen_near(x, y, SAME_M)):
                 robots = (here, *self._robots(now))
                 ours = any(p is not None and hypot(x - p.x, y - p.y) < SAME_M for p in robots)
-                if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known):
+                if not ours and all(hypot(x - f.x, y - f.y) > SAME_M for f in known) and not seen_free((x, y)):
                     known.append(Feature("moving", x, y, note.radius_m, vx, vy))
         return known

@@ -65,6 +65,14 @@ def test_what_one_sees_oneself_counts_once() -> None:
     assert team.obstacles.moving([own], AWAY, 0.0) == [own]
 
 
+def test_what_another_saw_moving_is_not_where_one_looks_through() -> None:
+    """It has turned since."""
+    team = TeamState()
+    team.obstacles.update(2, told("moving", 1.0), 0.0)
+    assert team.obstacles.moving([], AWAY, 0.5, seen_free=lambda place: place == (1.1, 0.0)) == []
+    assert len(team.obstacles.moving([], AWAY, 0.6, seen_free=lambda place: place == (1.1, 0.0))) == 1
+
+
 def test_what_another_saw_standing_does_not_move() -> None:
     team = TeamState()
     team.obstacles.update(2, told("stationary", 1.0), 0.0)

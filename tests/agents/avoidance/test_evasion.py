@@ -86,3 +86,22 @@ def test_an_evasion_is_not_looked_at_beyond_the_time_for_choosing() -> None:
 
 def test_more_than_the_clearance_is_not_better_than_the_clearance() -> None:
     assert kept_m([moves(9.0, 0.0)], Pose2D(), SLOW, Twist(0.1, 0.0)) == CLEARANCE_M
+
+
+def test_what_turns_again_and_again_comes_no_nearer_than_it_goes_in_the_time_for_which_it_keeps_its_course() -> None:
+    comes = Feature("moving", 3.0, 0.0, 0.1, -0.5, 0.0, keeps_s=1.0)
+    assert closest_m([comes], Pose2D(), STILL) == pytest.approx(3.0 - 0.5 - 0.1)
+
+
+def test_an_evasion_reckons_with_the_rest_of_the_time_for_which_a_course_is_kept() -> None:
+    """It crosses the straight way behind the bend if it goes on, and stops before if it keeps its course for less."""
+    bend = along_arc(Pose2D(), BEND_TWIST, BEND_S)
+    met_s = BEND_S + 2.0
+    met = along_arc(bend, Twist(0.45, 0.0), 2.0)
+    kept = {
+        keeps_s: kept_m([Feature("moving", met.x + 0.8 * met_s, met.y, 0.1, -0.8, 0.0, keeps_s=keeps_s)],
+                        Pose2D(), BEND, BEND_TWIST)
+        for keeps_s in (inf, BEND_S + 1.0)
+    }  # fmt: skip
+    assert kept[inf] < 0.1
+    assert kept[BEND_S + 1.0] > 0.5

@@ -9,12 +9,16 @@ import pytest
 from lfa.agents.avoidance.moving_points import (
     ASIDE_SHARE,
     AWAY_M,
+    BERTH_POINTS,
+    BERTH_S,
     MET_M,
     SHADOW_M_MAX,
     SHADOW_S,
     SHADOW_STEPS,
     before,
+    berth,
     shadow,
+    standing,
 )
 from lfa.agents.perception.obstacle_tracker import Feature
 from lfa.protocol.geometry import Pose2D
@@ -105,3 +109,27 @@ def test_the_side_begins_where_little_of_its_way_is_the_robots(further_rad: floa
     off_rad = acos(ASIDE_SHARE) + further_rad
     x, y = 2.0 * cos(off_rad), 2.0 * sin(off_rad)
     assert bool(before(moving(x + 0.1, y, -0.1, 0.0), Pose2D(), 1.0, 0.4)) == seen
+
+
+def restless(x: float, y: float, vx: float = 0.0, vy: float = 0.0) -> Feature:
+    """Return something that turns again and again."""
+    return Feature("moving", x, y, RADIUS_M, vx, vy, keeps_s=1.0)
+
+
+def test_what_turns_again_and_again_is_given_the_berth_that_it_may_come_in_any_direction() -> None:
+    points = berth([restless(3.0, 2.0, 0.3, 0.4)], Pose2D(), 0.15)
+    assert len(points) == BERTH_POINTS
+    assert [hypot(x - 3.0, y - 2.0) for x, y in points] == [pytest.approx(RADIUS_M + BERTH_S * 0.5)] * BERTH_POINTS
+
+
+def test_what_keeps_its_course_has_no_berth_and_within_one_no_robot_is_barred() -> None:
+    assert berth(moving(3.0, 2.0, 0.3, 0.4), Pose2D(), 0.15) == []
+    assert berth([restless(0.5, 0.0, 0.3, 0.4)], Pose2D(), 0.15) == []
+
+
+def test_a_patient_robot_goes_round_what_turns_again_and_again_and_not_round_what_it_gives_way_to() -> None:
+    seen = [(2.0 - RADIUS_M, 0.0), (-2.0 + RADIUS_M, 0.0), (0.0, 1.0)]
+    turns, goes_by = restless(2.0, 0.0), moving(-2.0, 0.0, 0.0, 0.1)
+    points = standing(seen, [turns, *goes_by], Pose2D(), 0.15, patient=True)
+    assert points[:2] == [seen[0], seen[2]]
+    assert set(standing(seen, [turns, *goes_by], Pose2D(), 0.15, patient=False)) >= set(seen)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from math import cos, inf, pi, sin, sqrt
 
 import pytest
+from msgspec.structs import replace
 
 from lfa.agents.perception.obstacle_model import MATES_M, ObstacleModel
 from lfa.agents.perception.shared_obstacles import SharedObstacles
 from lfa.protocol.geometry import Pose2D
 from lfa.protocol.messages.header import Header
 from lfa.protocol.messages.robot import LaserScan
+from lfa.protocol.messages.team import ObstacleNote
 from lfa.protocol.mission import Limits
 
 BEAMS = 360
@@ -73,3 +75,15 @@ def test_a_wall_that_lies_elsewhere_since_the_pose_has_jumped_does_not_move(jump
         model.see(scan_of_end(0.0), here, (), now, jumps if n >= 10 else 0)
         moved = moved or model.moving(here, now) != []
     assert moved is moves
+
+
+@pytest.mark.parametrize(("beams", "remains"), [(BEAMS, False), (BEAMS // 4, True)])
+def test_what_another_robot_told_of_remains_only_where_no_beam_looks_through_its_place(
+    beams: int, remains: bool
+) -> None:
+    """A scanner that looks back only, a quarter turn from behind on, says nothing of what is ahead."""
+    shared = SharedObstacles(lambda _now: ())
+    shared.update(2, ObstacleNote(Header("robot2", 1, 0, 0.0), "moving", 1.5, 0.0, 0.2, (0.1, 0.0)), 0.0)
+    model, scan = ObstacleModel(0.15, Limits(), shared), scan_of_post(3.0, 0.3, 8.0)
+    model.see(replace(scan, ranges_m=scan.ranges_m[:beams]), Pose2D(), (), 0.2)
+    assert bool(model.moving(Pose2D(), 0.2)) is remains

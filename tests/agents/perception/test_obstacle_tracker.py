@@ -1,11 +1,11 @@
 """What the points of a scan belong to, and what moves."""
 
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, inf, pi, sin, sqrt
 from random import Random
 
 import pytest
 
-from lfa.agents.perception.obstacle_tracker import Tracker
+from lfa.agents.perception.obstacle_tracker import KEEPS_S, Tracker
 from lfa.agents.perception.scan import SIGHT_M, Point
 
 
@@ -92,6 +92,23 @@ def test_what_paces_to_and_fro_moves_while_it_turns_round_too() -> None:
         y = abs((0.03 * n + 0.7) % 2.8 - 1.4) - 0.7
         tracker.update(arc(1.5, y, 0.25, (0.0, 0.0)), (0.0, 0.0), [], 0.5, 0.1 * n)
         assert n < 20 or tracker.moving(0.1 * n), f"after {0.1 * n:.1f} s, at {y:.2f} m"
+
+
+def test_what_turns_again_and_again_is_expected_to_go_on_for_a_short_time_only() -> None:
+    chance, x, y, positions = Random(5), 1.5, 0.0, []
+    for n in range(90):
+        if n % 10 == 0:
+            way = chance.uniform(-pi, pi)
+        x, y = x + 0.04 * cos(way), y + 0.04 * sin(way)
+        positions.append((x, y))
+    [feature] = seen(positions, [(0.0, 0.0)] * 90).moving(8.9)
+    assert feature.at(4.0) == feature.at(KEEPS_S) != feature.at(0.5 * KEEPS_S)
+
+
+def test_what_keeps_its_course_is_expected_to_go_on() -> None:
+    positions = [(1.5, -1.5 + 0.03 * n) for n in range(90)]
+    [feature] = seen(positions, [(0.0, 0.0)] * 90).moving(8.9)
+    assert feature.keeps_s == inf
 
 
 @pytest.mark.parametrize("speed", [0.03, 0.05, 0.1])

@@ -46,6 +46,16 @@ def test_what_has_come_too_near_to_be_measured_is_still_there() -> None:
         assert [(round(x, 9), round(y, 9)) for x, y in seen.points_map] == [(3.7, 0.0)]
 
 
+def test_a_scanner_looks_at_what_is_in_the_direction_of_one_of_its_beams() -> None:
+    """Three of a quarter turn, from ahead to behind over the left, and one that failed: the robot looks along y."""
+    seen = Surroundings()
+    assert not seen.looks_at((0.0, 5.0))
+    seen.scan(replace(scan(inf, nan, 2.0)), Pose2D(1.0, 0.0, pi / 2), 0.0)
+    assert [seen.looks_at(place) for place in ((1.0, 3.0), (-2.0, 0.0), (1.0, -3.0), (4.0, 0.0))] == [
+        True, False, True, False,
+    ]  # fmt: skip
+
+
 def test_a_range_of_zero_is_no_point_whatever_the_scanners_minimum_says() -> None:
     seen = Surroundings()
     seen.scan(replace(scan(0.0, 0.04, 1.0, inf), range_min_m=0.0), Pose2D(), 0.0)
