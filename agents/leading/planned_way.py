@@ -26,6 +26,10 @@ BLOCKED_S = 1.5
 """Time [s] before a gap that no arc leads through, after which its place is barred and another way is searched. It runs
 on until the robot is its own radius away: an arc that the next scan shows closed again leads nowhere.
 """
+ENTERS_S = 30.0
+"""Time [s] for which a polygon enters passages squarely after no arc led on: where arcs do, they are faster, and turn it
+less among what its scanner does not look at.
+"""
 ROOM_S = 8.0
 """The same time [s] where a team-mate stands there, which makes room (`behaviors/make_room.py`)."""
 MATE_M = 0.15
@@ -50,6 +54,8 @@ class PlannedWay:
         self._run_up = None if footprint is None else RunUp()
         self._entry = None if footprint is None else SquareEntry(mission.radius_m, mission.half_width_m, mission.limits)
         """Run-ups of a polygon, and its entry into what is narrower than its circle; a round body needs none."""
+        self._enters_until = -inf
+        """Time [s] until which the entry leads: from where no arc led on."""
         self._blocked: tuple[float, Pose2D] | None = None
         """Time [s] and place at which no arc led on first; None since the robot has left it."""
         self._mates: Sequence[Pose2D] = ()
@@ -81,10 +87,12 @@ class PlannedWay:
         swing = self.lead.slots_swing and not alone
         turn_radps = TEAM_RADPS if swing else inf
         route: Callable[[float], Point] = partial(self.lead.ahead, pose)
-        if self._entry is not None:
+        if self._entry is not None and now < self._enters_until:
             speed_mps = self.lead.bend_mps(0.0)
             route, wanted = self._entry.lead(points, pose, route, wanted, speed_mps, turn_radps, now)
         twist = self._arcs.steer(points, route, wanted, turn_radps, self.lead.bend_mps)
+        if self._arcs.blocked:
+            self._enters_until = now + ENTERS_S
         if self._run_up is not None:
             backs = self._run_up.step(pose, self._arcs.back(points), blocked=self._arcs.blocked)
             if backs is not None:
