@@ -27,8 +27,8 @@ BLOCKED_S = 1.5
 on until the robot is its own radius away: an arc that the next scan shows closed again leads nowhere.
 """
 ENTERS_S = 30.0
-"""Time [s] for which a polygon enters passages squarely after no arc led on: where arcs do, they are faster, and turn it
-less among what its scanner does not look at.
+"""Time [s] for which a polygon enters passages squarely after no arc led on: where arcs do, they are faster, and turn
+it less among what its scanner does not look at.
 """
 ROOM_S = 8.0
 """The same time [s] where a team-mate stands there, which makes room (`behaviors/make_room.py`)."""

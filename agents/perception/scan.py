@@ -76,7 +76,9 @@ class Surroundings:
         ]
         self._edges_map = [
             (x + r * cos(angle + beam * step), y + r * sin(angle + beam * step))
-            for beam, r in (_edges(scan.ranges_m, low, high) if COARSE_RAD < self.step_rad < SPARSE_RAD else ())
+            for beam, r in (
+                _edges(scan.ranges_m, self.step_rad, low, high) if COARSE_RAD < self.step_rad < SPARSE_RAD else ()
+            )
         ]
         self._newest, self.seen_at = (scan, pose_map), now
 
@@ -130,18 +132,22 @@ class Surroundings:
         ] + [in_base(pose_map, point) for point, _ in self._unseen.values()]
 
 
-def _edges(ranges_m: Sequence[float], low: float, high: float) -> list[tuple[float, float]]:
+def _edges(ranges_m: Sequence[float], step: float, low: float, high: float) -> list[tuple[float, float]]:
     """Return where edges lie at the mean, as the beam's number plus or minus a half, and the edge's range [m].
 
-    A surface that ends between two beams ends half a beam beside the one that hits it, more or less.
+    A surface that ends between two beams `step` [rad] apart ends half a beam beside the one that hits it, more or less.
+    One that goes on straight is no edge, however aslant the beams meet it: 1 / r of a line is A cos(angle - angle_0).
     """
-    return [
-        (i + 0.5 * aside, r)
-        for i, r in enumerate(ranges_m)
-        if low < r < high
-        for aside in (-1, 1)
-        if not 0 <= i + aside < len(ranges_m) or not ranges_m[i + aside] < r + EDGE_M
-    ]
+    turn, edges, last = 2.0 * cos(step), list[tuple[float, float]](), len(ranges_m) - 1
+    for i, r in enumerate(ranges_m):
+        if not low < r < high:
+            continue
+        for aside in (-1, 1):
+            before, after = (ranges_m[n] if 0 <= n <= last else inf for n in (i - aside, i + aside))
+            inverse = turn / r - 1.0 / before if low < before < r + EDGE_M else 1.0 / r
+            if inverse > 1.0 / high and not after < 1.0 / inverse + EDGE_M:
+                edges.append((i + 0.5 * aside, r))
+    return edges
 
 
 def _is_blind(scan: LaserScan, aside: int, point: Point) -> bool:

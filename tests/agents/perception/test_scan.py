@@ -1,6 +1,6 @@
 """From a scan to what stands in the way."""
 
-from math import atan2, hypot, inf, nan, pi
+from math import atan2, hypot, inf, nan, pi, sin, tan
 
 import pytest
 from hypothesis import example, given
@@ -197,3 +197,17 @@ def test_a_team_mate_is_not_remembered_where_it_was() -> None:
     seen.scan(there, Pose2D(), 0.0)
     seen.scan(away, Pose2D(0.0, 0.0, pi), 0.1, [(0.6, 0.0)], 0.2)
     assert seen.points(Pose2D(0.0, 0.0, pi)) == []
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_a_wall_that_coarse_beams_meet_aslant_has_no_edges_but_its_ends(turn: float) -> None:
+    """Half a beam beside each reading it seemed 8 cm nearer: a corridor of 0.7 m seemed shut."""
+    step, beside_m, end_m = pi / 30, 0.35, 4.0
+    bearings = [(n + 0.5) * step for n in range(30)]
+    ranges = [beside_m / sin(b) if 0.0 < beside_m / tan(b) < end_m else inf for b in bearings]
+    seen = Surroundings()
+    seen.scan(LaserScan(HEADER, turn * bearings[0], turn * step, 0.05, 8.0, tuple(ranges)), Pose2D(), 0.0)
+    points = sorted(seen.points(Pose2D()))
+    off_wall = [x for x, y in points if abs(abs(y) - beside_m) > 1e-6]
+    assert all(abs(x) < 0.1 or x > 3.0 for x in off_wall)
+    assert len(off_wall) <= 2
