@@ -109,7 +109,7 @@ class Navigator:
     def pace(self, control_hz: float) -> None:
         """Go on with `drive` called `control_hz` [Hz] times a second."""
         self._mission = replace(self._mission, control_hz=control_hz)
-        self._detour.period_s = self._mission.control_period_s
+        self._detour.period_s = self.limits.period_s = self._mission.control_period_s
         self.leading.pace(self._mission)
 
     @property

@@ -36,6 +36,8 @@ class CommandLimits:
         self, mission: Mission, mates: TeamMates, scan_age: ScanAge, estimator: Estimator, obstacles: ObstacleModel
     ) -> None:
         self._mission = mission
+        self.period_s = mission.control_period_s
+        """Period [s] of the control steps, longer than the mission's while the machine keeps the robot late."""
         self._footprint = PolygonBody.of(mission)
         self._mates = mates
         self._scan_age = scan_age
@@ -50,7 +52,7 @@ class CommandLimits:
         limits, radius_m = self._mission.limits, self._mission.radius_m
         # A controller may want any speed; what is beyond the drive's, `safe` takes away.
         fastest_mps = min(abs(wanted.linear_x), max(limits.v_max_mps, limits.v_reverse_max_mps))
-        lag_s = LAG_PERIODS * max(0.0, self._mission.control_period_s - USUAL_PERIOD_S)
+        lag_s = LAG_PERIODS * max(0.0, self.period_s - USUAL_PERIOD_S)
         reach_m = sharing_reach_m(Twist(fastest_mps, 0.0), radius_m, limits, lag_s)
         strangers = self._mates.strangers(pose, reach_m, now, by_law=by_law)
         wanted = sharing(wanted, strangers, radius_m, limits, lag_s)

@@ -10,9 +10,12 @@ from lfa.agents.navigator import Navigator
 from lfa.agents.team_state import ROW_S_MAX, TeamState, table_s
 from lfa.deploy.fuzz.agent_simulation import AgentSimulation
 from lfa.deploy.fuzz.schedules import FAIR, Schedule
+from lfa.protocol.geometry import Pose2D, Twist
 from lfa.protocol.lease.timing import timing_for
 from lfa.protocol.messages.codec import Message
-from lfa.protocol.messages.team import Event, Level, PoseStamped, Status
+from lfa.protocol.messages.consensus import Role
+from lfa.protocol.messages.header import Header
+from lfa.protocol.messages.team import Event, Level, PoseStamped, Status, TableRow
 from lfa.protocol.mission import CONTROL_HZ_MIN, Following, Mission, Profile
 from lfa.protocol.runtime.lateness import LATE_SECONDS
 
@@ -118,6 +121,19 @@ def test_a_late_robot_whose_mission_is_changed_ramps_up_by_its_own_period_until_
     assert navigator.leading.lead.period_s == 0.08
     navigator.pace(mission.control_hz)
     assert navigator.leading.lead.period_s == mission.control_period_s
+
+
+def test_a_late_robot_brakes_before_a_team_mate_by_its_own_period() -> None:
+    mission = Mission(profile="auto", control_hz=12.5)
+    team = TeamState()
+    team.hear_row(4, TableRow(Header("robot4", 1, 1, 0.0), 0.7, 0.0, 0.0, 0.0, 0.0, Role.FOLLOWER), 0.0)
+    slow, late = Navigator(1, mission, team), Navigator(1, replace(mission, control_hz=50.0), team)
+    late.pace(12.5)
+    least, braked = (
+        navigator.limits.slow(Twist(0.8, 0.0), Role.LEADER, Pose2D(), 0.0, by_law=False).linear_x
+        for navigator in (slow, late)
+    )
+    assert braked == least < 0.8
 
 
 class LateTeam:
