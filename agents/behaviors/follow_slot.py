@@ -70,14 +70,23 @@ class FollowSlot:
         self._swung_slot = SwungSlot(mission.radius_m)
         self._filters_heading = heading_filter_of(mission) > 0.0
         self._make_room = MakeRoom(mission.radius_m)
+        self._ahead: int | None = None
+        """Number of the predecessor that these know."""
         self._way_back: WayBack | None = None
         """Way back to the slot; None before this follower has lost it for the first time."""
 
     def end(self) -> None:
-        """Give up a planned way and the room that it makes: the robot has another role."""
-        self._make_room.end()
+        """Give up a planned way, another slot and the room that it makes: the robot has another role."""
+        self._begin_behind(None)
         if self._way_back is not None:
             self._way_back.end()
+
+    def _begin_behind(self, robot: int | None) -> None:
+        """Forget what holds for the last predecessor only."""
+        self._ahead = robot
+        self._free_slot.end()
+        self._swung_slot.end()
+        self._make_room.end()
 
     @property
     def catches_up(self) -> bool:
@@ -97,6 +106,8 @@ class FollowSlot:
         """
         ahead, trace = self._mates.predecessor, self._formation.trace
         sighting, slot = None if ahead is None else ahead.at(now), self._formation.slot_of(self._mates.own_id)
+        if ahead is not None and ahead.robot != self._ahead:
+            self._begin_behind(ahead.robot)
         if sighting is not None:
             slot = self._swung(slot, sighting, points, pose, now)
             trace = trace and not self._swung_slot.is_swung

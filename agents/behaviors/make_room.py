@@ -53,7 +53,12 @@ class MakeRoom:
         """Time [s] at which this robot made room by moving, or its predecessor moved."""
 
     def end(self) -> None:
-        """Make no room any more: nobody comes, or the robot has another role."""
+        """Forget the predecessor: the robot has another one, or another role."""
+        self._moved_at = None
+        self._stop()
+
+    def _stop(self) -> None:
+        """Make no room any more: nobody comes."""
         self._comes_since, self._made = None, False
         self._path.end()
 
@@ -65,7 +70,7 @@ class MakeRoom:
         if not rests or self._moved_at is None:
             self._moved_at = now
         if now - self._moved_at >= HOLD_S:
-            self.end()
+            self._stop()
             return None
         twist = self._made_room(sighting, points, pose, now)
         if twist is not None and twist != STILL:
@@ -77,7 +82,7 @@ class MakeRoom:
             self._came_at = now
             self._comes_since = now if self._comes_since is None else self._comes_since
         elif now - self._came_at >= self._patience_s(sighting, pose):
-            self.end()
+            self._stop()
         came_s = 0.0 if self._comes_since is None else now - self._comes_since
         needed = COMES_S <= came_s < ROOM_S and self._is_narrow(sighting, points, pose)
         if came_s >= ROOM_S:

@@ -31,6 +31,8 @@ class SwungSlot:
 
     def __init__(self, radius_m: float) -> None:
         self._clear_m = radius_m + CLEAR_M
+        self._asked: Slot | None = None
+        """Slot that was asked for last."""
         self._phi: float | None = None
         self._asked_rad = 0.0
         """Direction [rad] in `map` from the predecessor to the slot as it was asked for."""
@@ -41,6 +43,11 @@ class SwungSlot:
     @property
     def is_swung(self) -> bool:
         return self._phi is not None
+
+    def end(self) -> None:
+        """Give the swing up: the robot has another slot, another predecessor, or another role."""
+        self._phi, self._look_at = None, inf
+        self._tried.clear()
 
     def swung(
         self,
@@ -59,9 +66,9 @@ class SwungSlot:
         `place` is where the slot, as swung so far, lies in `map`, `ahead` is the predecessor's pose, `chi` [rad] the
         heading that phi counts from; `points` are in `base_link`.
         """
-        if abs(ahead_mps) > RESTS_MPS:
-            self._phi, self._look_at = None, inf
-            self._tried.clear()
+        if abs(ahead_mps) > RESTS_MPS or slot != self._asked:
+            self._asked = slot
+            self.end()
             return slot
         apart_m = hypot(place[0] - pose.x, place[1] - pose.y)
         if apart_m <= within_m:

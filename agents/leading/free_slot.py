@@ -44,6 +44,12 @@ class FreeSlot:
         self._visits, self._near, self._least_m = 0, False, inf
         """Times that the robot has come near the slot at rest, whether it is there now, and how near [m] it got."""
 
+    def end(self) -> None:
+        """Forget the place: the slot moves, or the robot has another predecessor or role."""
+        self._stands_for = self._hidden_since = self._hindered = None
+        self._visits, self._near, self._least_m = 0, False, inf
+        self._free_place.reset()
+
     def steer(
         self,
         slot: Point,
@@ -60,9 +66,7 @@ class FreeSlot:
         `base_link`; `hindered` while a detour leads the robot.
         """
         if abs(ahead_mps) > RESTS_MPS:
-            self._stands_for = self._hidden_since = self._hindered = None
-            self._visits, self._near, self._least_m = 0, False, inf
-            self._free_place.reset()
+            self.end()
             return None
         if self._stands_for is not None:
             if hypot(slot[0] - self._stands_for[0], slot[1] - self._stands_for[1]) < MOVED_M:

@@ -181,3 +181,12 @@ def test_where_both_stand_nobody_comes_and_the_follower_follows_again() -> None:
     stands_s = [0.5 * n for n in range(60) if place.room.step(rests, place.points, AT, 2.0 + 0.5 * n) == STILL]
     assert stands_s[-1] == HOLD_S - 0.5
     assert place.room.step(rests, place.points, AT, 60.0) is None
+
+
+def test_it_makes_room_for_a_new_predecessor_that_stands_before_it_although_the_last_one_stood_for_long() -> None:
+    place, rests = Place(walls(0.5, 0.5)), seen(twist=STILL)
+    for now in (1.0, 2.0 * HOLD_S):
+        place.room.step(rests, place.points, AT, now)
+    assert place.does(rests, 2.0 * HOLD_S + 1.0) is None
+    place.room.end()
+    assert place.does(rests, 2.0 * HOLD_S + 3.0) is not None

@@ -56,6 +56,15 @@ def test_it_is_the_slot_that_was_asked_for_again_as_soon_as_the_predecessor_driv
     assert not follower.slots.is_swung
 
 
+def test_it_is_the_slot_that_is_asked_for_as_soon_as_that_is_another_one() -> None:
+    follower = Follower((0.0, 0.1))
+    follower.until(1.0)
+    assert follower.until(OUT_S + 2.0) != SLOT
+    other = Slot(2, 1.2, 0.75 * pi)
+    assert follower.slots.swung(other, PLACE, AHEAD, 0.0, 0.0, [], POSE, WITHIN_M, OUT_S + 3.0) == other
+    assert not follower.slots.is_swung
+
+
 def test_a_place_to_which_it_cannot_get_either_is_not_tried_again() -> None:
     follower = Follower((0.0, 0.1))
     follower.until(1.0)
