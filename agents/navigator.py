@@ -169,8 +169,7 @@ class Navigator:
         patience_s = POSE_LOST_S if self.was_placed else NEVER_PLACED_S
         if missing is not None and now - self._placeless_since >= patience_s:
             self._stuck_monitor.lose_pose(missing)
-        self._driven_at = now
-        self._detour.decision = self._crossing.decision = None
+        self._driven_at, self._detour.decision, self._crossing.decision = now, None, None
         period_s, limits = self._mission.control_period_s, self._mission.limits
         self.last = safe(STILL, self.last, (), self._mission.radius_m, limits, period_s)
         self.follower.overridden(self.last)
@@ -188,7 +187,6 @@ class Navigator:
         if role != self._role:
             self._change(role, pose, twist, now)
         self.leading.work(role is Role.LEADER, pose, self._mates.places, now)
-        # On a way that it has planned on a map a follower needs no warning of a trap, which may lie in a gap.
         points = self._obstacles.points(pose, traps=not self._follow_slot.catches_up)
         moving = self._obstacles.moving(pose, now)
         still = standing(points, moving, pose, self._mission.radius_m, patient=self._crossing.patient)

@@ -81,7 +81,9 @@ class ObstacleModel:
         self.ground.free_circle(x, y, TRAP_M)
 
     def points(self, pose: Pose2D, *, traps: bool = True) -> list[Point]:
-        """Return the points that block the way near `pose`, in `base_link`; those around `traps` if they are to."""
+        """Return the points that block the way near `pose`, in `base_link`; without `traps` not those around a place in
+        which a robot got stuck: who has planned its way on a map needs no such warning, and a trap may lie in a gap.
+        """
         floor = self.ground.points(pose, LOOK_M, walls=traps)
         seen = self._scan.points(pose, LOOK_M) + self._edges.points(pose)
         return seen + floor if floor else seen
