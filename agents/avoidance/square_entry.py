@@ -112,7 +112,7 @@ class SquareEntry:
         middle, known = compose(pose, found), self._middle
         held = any(x * x + y * y < self._radius_m * self._radius_m for x, y in points)
         """True in a passage: it is too late for a gate."""
-        if known is None:
+        if known is None or now - self._seen_at > KEPT_S:
             self._middle, self._square = middle, held
             self._since = self._seen_at = now
             return

@@ -82,3 +82,13 @@ def test_a_robot_that_does_not_come_to_the_gate_goes_on_without() -> None:
         robot.step()
         robot.pose = start
     assert robot.step(Twist(0.3, 0.1)) == Twist(0.3, 0.1)
+
+
+def test_the_time_for_which_a_robot_rests_is_none_on_its_way_to_the_gate() -> None:
+    """It waits for its team, or another part of it leads meanwhile."""
+    robot = Robot(Pose2D(1.0, 0.6, -0.4), GAP)
+    entered = robot.step()
+    for _ in range(round(PATIENCE_S / DT) + 2):
+        robot.step(STILL)
+    robot.pose = Pose2D(1.0, 0.6, -0.4)
+    assert robot.step(Twist(0.3, 0.1)) == entered
