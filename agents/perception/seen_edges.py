@@ -24,8 +24,10 @@ CELL_M = 0.015
 """Size [m] of the cells of which each keeps its newest point: noise does not add up to the nearest of many."""
 BEHIND_M = 0.05
 """Distance [m] behind a point up to which both beams beside it may end for the newest scan to show what is there."""
-SAME_M, SAME_RAD = 0.01, 0.01
-"""Motion [m, rad] below which two scans look the same way: what only the earlier one has shown has gone."""
+SAME_M, SAME_RAD, SAME_S = 0.01, 0.01, 0.25
+"""Motion [m, rad] below which two scans look the same way: what only the earlier one has shown has gone, once this time
+[s] has passed. Between two scans a robot that creeps, or one whose scanner is fast, moves no farther either.
+"""
 
 
 class SeenEdge(Struct, frozen=True, gc=False):
@@ -86,7 +88,8 @@ class SeenEdges:
         if now - edge.seen_at > KEPT_S or not self._is_near(edge.point, pose):
             return False
         dx, dy, before = edge.point[0] - pose.x, edge.point[1] - pose.y, edge.seen_from
-        if hypot(before.x - pose.x, before.y - pose.y) < SAME_M and abs(wrap(before.theta - pose.theta)) < SAME_RAD:
+        moved_m, turned_rad = hypot(before.x - pose.x, before.y - pose.y), abs(wrap(before.theta - pose.theta))
+        if moved_m < SAME_M and turned_rad < SAME_RAD and now - edge.seen_at >= SAME_S:
             return False
         return not is_covered(scan, atan2(dy, dx) - pose.theta, hypot(dx, dy) + BEHIND_M)
 

@@ -37,11 +37,11 @@ def nearest_m(seen: ObstacleModel, pose: Pose2D) -> float:
     return min((hypot(x, y) for x, y in seen.points(pose)), default=inf)
 
 
-def passed(mps: float, to_m: float = 0.0) -> tuple[ObstacleModel, Pose2D, float]:
+def passed(mps: float, to_m: float = 0.0, hz: float = 10.0) -> tuple[ObstacleModel, Pose2D, float]:
     """A robot that drives past the end of the wall, as far as `to_m` beyond the line of it."""
     seen, x, now = model(), -0.3, 0.0
     while x < to_m - 1e-6:
-        x, now = min(x + 0.1 * mps, to_m), now + 0.1
+        x, now = min(x + mps / hz, to_m), now + 1.0 / hz
         seen.see(scan(Pose2D(x)), Pose2D(x), (), now)
     return seen, Pose2D(to_m), now
 
@@ -55,11 +55,19 @@ def test_the_end_of_a_thin_wall_abeam_is_known_although_no_beam_meets_it(to_m: f
     assert nearest_m(seen, pose) < END_M + 0.01
 
 
+@pytest.mark.parametrize(("mps", "hz"), [(0.06, 10.0), (0.3, 40.0)])
+def test_it_is_known_to_a_robot_that_creeps_and_with_a_fast_scanner(mps: float, hz: float) -> None:
+    """From scan to scan it moves by less than a centimetre."""
+    seen, pose, _ = passed(mps, hz=hz)
+    assert nearest_m(seen, pose) < END_M + 0.01
+
+
 def test_what_only_the_earlier_of_two_scans_from_one_place_shows_has_gone() -> None:
     seen, pose, now = passed(0.2, -0.1)
     assert nearest_m(seen, pose) < 0.3
     seen.see(scan(pose), pose, (), now + 0.1)
-    seen.see(scan(pose, wall=False), pose, (), now + 0.2)
+    for n in range(4):
+        seen.see(scan(pose, wall=False), pose, (), now + 0.2 + 0.1 * n)
     gone = [point for point in seen.points(pose) if hypot(*point) < hypot(0.1, END_M) + 0.005]
     assert gone == []
 
