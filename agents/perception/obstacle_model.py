@@ -60,6 +60,7 @@ class ObstacleModel:
             self._jumps = jumps
             self._tracker.forget_surfaces()
             self._edges.forget()
+            self._scan.jump(pose)
         places = [(mate.x, mate.y) for mate in mates]
         self._scan.scan(scan, pose, now, places, MATE_M)
         seen, eye = self._scan, (pose.x, pose.y)

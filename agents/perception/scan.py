@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import acos, atan2, cos, dist, hypot, inf, isnan, pi, sin, sqrt
 
-from lfa.protocol.geometry import TAU, Pose2D, Twist, in_base
+from lfa.protocol.geometry import TAU, Pose2D, Twist, compose, distance, in_base, inverse
 from lfa.protocol.messages.robot import LaserScan
 
 SIGHT_M = 5.0
@@ -23,6 +23,9 @@ ROUNDED = 1.0 + 1e-9
 KEPT_M, KEPT_S, KEPT_CELL_M = 0.8, 30.0, 0.03
 """Distance [m] to the robot and time [s] up to which a point is kept on which no beam falls any more, and size [m] of
 the cells of which each keeps one."""
+JUMP_M = 0.3
+"""Jump [m] of the pose from which what was seen before is taken along: less is as much as a robot drives from scan to
+scan."""
 COARSE_RAD, SPARSE_RAD, EDGE_M = 0.036, 0.21, 0.1
 """Angles [rad] between two beams above which what ends between them may stick out farther than the body's skin covers,
 and above which nobody knows where it ends; and difference [m] of their ranges from which the nearer one shows an edge.
@@ -82,9 +85,27 @@ class Surroundings:
         ]
         self._newest, self.seen_at = (scan, pose_map), now
 
+    def jump(self, pose_map: Pose2D) -> None:
+        """Take all along with a robot that is at `pose_map` since `map` has moved under it by more than it drives from
+        scan to scan.
+        """
+        if self._newest is None or distance(self._newest[1], pose_map) < JUMP_M:
+            return
+        by, unseen = compose(pose_map, inverse(self._newest[1])), self._unseen
+        self._points_map, self._edges_map = _moved(self._points_map, by), _moved(self._edges_map, by)
+        points = _moved([point for point, _ in unseen.values()], by)
+        self._unseen = {cell: (point, at) for point, (cell, (_, at)) in zip(points, unseen.items(), strict=True)}
+
     def looks_at(self, place: Point) -> bool:
-        """Return whether a beam of the newest scan looks in the direction of `place` in `map`."""
-        return self._newest is not None and not _is_blind(self._newest[0], 0, in_base(self._newest[1], place))
+        """Return whether a beam of the newest scan looks in the direction of `place` in `map`, and past what is too
+        near for it.
+        """
+        if self._newest is None:
+            return False
+        scan, pose_map = self._newest
+        x, y = in_base(pose_map, place)
+        [beam] = _beams(scan, atan2(y, x))
+        return beam < len(scan.ranges_m) and scan.ranges_m[beam] > max(scan.range_min_m, READING_M_MIN)
 
     def _remember(self, scan: LaserScan, pose_map: Pose2D, now: float, mates: Sequence[Point], mate_m: float) -> None:
         """Keep the points of the last scan, and of those before, on which no beam of this one falls."""
@@ -130,6 +151,12 @@ class Surroundings:
             for px, py in (self._points_map + self._edges_map if self._edges_map else self._points_map)
             if (dx := px - x) * dx + (dy := py - y) * dy < limit
         ] + [in_base(pose_map, point) for point, _ in self._unseen.values()]
+
+
+def _moved(points: Sequence[Point], by: Pose2D) -> list[Point]:
+    return [
+        (by.x + cos(by.theta) * x - sin(by.theta) * y, by.y + sin(by.theta) * x + cos(by.theta) * y) for x, y in points
+    ]
 
 
 def _edges(ranges_m: Sequence[float], step: float, low: float, high: float) -> list[tuple[float, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, inf, pi, sin, sqrt
+from math import cos, hypot, inf, pi, sin, sqrt
 
 import pytest
 from msgspec.structs import replace
@@ -87,3 +87,14 @@ def test_what_another_robot_told_of_remains_only_where_no_beam_looks_through_its
     model, scan = ObstacleModel(0.15, Limits(), shared), scan_of_post(3.0, 0.3, 8.0)
     model.see(replace(scan, ranges_m=scan.ranges_m[:beams]), Pose2D(), (), 0.2)
     assert bool(model.moving(Pose2D(), 0.2)) is remains
+
+
+def test_what_was_close_behind_is_still_there_where_the_pose_jumps() -> None:
+    """The scanner looks ahead, and a fix puts the robot 2 m aside, to where no beam of it shows what it had passed."""
+    model, there = ObstacleModel(0.15, Limits(), SharedObstacles(lambda _now: ())), Pose2D(1.0, 2.0, -pi / 2)
+    post, ahead = scan_of_post(0.6, 0.2, 8.0), replace(scan_of_post(9.0, 0.2, 8.0), ranges_m=(inf,) * (BEAMS // 2))
+    half = replace(post, angle_min=-pi / 2, ranges_m=post.ranges_m[BEAMS // 4 : 3 * BEAMS // 4])
+    model.see(half, Pose2D(), (), 0.0)
+    before_m = min(hypot(x, y) for x, y in model.points(Pose2D()))
+    model.see(replace(ahead, angle_min=pi / 2), there, (), 0.1, jumps=1)
+    assert min((hypot(x, y) for x, y in model.points(there)), default=inf) == pytest.approx(before_m, abs=0.01)

@@ -56,6 +56,13 @@ def test_a_scanner_looks_at_what_is_in_the_direction_of_one_of_its_beams() -> No
     ]  # fmt: skip
 
 
+def test_it_does_not_look_past_what_is_too_near_to_be_measured() -> None:
+    seen = Surroundings()
+    for near in (-inf, 0.04):
+        seen.scan(scan(near, inf, 2.0, inf), Pose2D(), 0.0)
+        assert [seen.looks_at(place) for place in ((3.0, 0.0), (0.0, 3.0))] == [False, True]
+
+
 def test_a_range_of_zero_is_no_point_whatever_the_scanners_minimum_says() -> None:
     seen = Surroundings()
     seen.scan(replace(scan(0.0, 0.04, 1.0, inf), range_min_m=0.0), Pose2D(), 0.0)
