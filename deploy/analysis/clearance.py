@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from functools import reduce
+from itertools import chain, pairwise
 from math import inf
 
 import numpy as np
@@ -16,6 +17,9 @@ Corners = Sequence[tuple[float, float]]
 
 EVERY = 3
 """Step in ground truth records between two checks: a robot moves 6 cm at most in that time."""
+MET_M, LEFT_M = 0.5, 0.8
+"""Distance [m] from its body at which a robot that plans its way round all that it sees has met an obstacle or a wall,
+and from which it has left a wall."""
 STARTED_M = 0.05
 """Way [m] after which a robot counts as started: its mean speed counts from there to its last motion."""
 
@@ -44,17 +48,41 @@ def least_clearance_m(robot: int, seen: RecordedRun, scenario: Scenario) -> floa
 
 def to_things_m(robot: int, seen: RecordedRun, scenario: Scenario) -> float:
     """Return the least distance [m] from a robot's body to a wall or an obstacle, as of `least_clearance_m`."""
-    rows, world, corners = seen.truth[robot][::EVERY], scenario.world, scenario.mission.footprint_m
-    if corners:
-        gaps = [
-            _from_polygon(rows, corners, obstacle, seen.obstacles.get(n)) for n, obstacle in enumerate(world.obstacles)
-        ]
-        gaps += [_between(rows[:, 1], rows[:, 2], rows[:, 3], corners, wall) for wall in world.walls_m]
-        return min((float(gap.min()) for gap in gaps), default=inf)
-    gaps = [
-        _to_obstacle(rows, obstacle, seen.obstacles.get(index)) for index, obstacle in enumerate(world.obstacles)
-    ] + [_to_segment(rows[:, 1], rows[:, 2], *wall) for wall in world.walls_m]
-    return min((float(gap.min()) for gap in gaps), default=inf) - scenario.mission.radius_m
+    rows = seen.truth[robot][::EVERY]
+    gaps = chain(_to_obstacles(rows, seen, scenario), _to_walls(rows, scenario))
+    return min((float(gap.min()) for gap in gaps), default=inf)
+
+
+def things_near(robot: int, seen: RecordedRun, scenario: Scenario) -> dict[str, int]:
+    """Return the number of obstacles, `stationary` and `moving` ones, that a robot's body came within `MET_M` of, and
+    how many times it came so near to a `wall` and went `LEFT_M` away again.
+    """
+    near, rows = {"stationary": 0, "moving": 0, "wall": 0}, seen.truth[robot][::EVERY]
+    for obstacle, gap in zip(scenario.world.obstacles, _to_obstacles(rows, seen, scenario), strict=True):
+        near["moving" if obstacle.moves else "stationary"] += int(gap.min() <= MET_M)
+    away = True
+    for gap_m in reduce(np.minimum, _to_walls(rows, scenario), np.full(len(rows), inf)).tolist():
+        near["wall"] += int(away and gap_m <= MET_M)
+        away = gap_m > (MET_M if away else LEFT_M)
+    return near
+
+
+def _to_obstacles(rows: Array, seen: RecordedRun, scenario: Scenario) -> list[Array]:
+    """Return the distances [m] of a robot's body from each obstacle's surface."""
+    mission, obstacles = scenario.mission, enumerate(scenario.world.obstacles)
+    if mission.footprint_m:
+        return [_from_polygon(rows, mission.footprint_m, one, seen.obstacles.get(n)) for n, one in obstacles]
+    return [_to_obstacle(rows, one, seen.obstacles.get(n)) - mission.radius_m for n, one in obstacles]
+
+
+def _to_walls(rows: Array, scenario: Scenario) -> Iterator[Array]:
+    """Yield the distances [m] of a robot's body from each wall: a map may have thousands."""
+    mission, (x, y, theta) = scenario.mission, rows[:, 1:4].T
+    for wall in scenario.world.walls_m:
+        if mission.footprint_m:
+            yield _between(x, y, theta, mission.footprint_m, wall)
+        else:
+            yield _to_segment(x, y, *wall) - mission.radius_m
 
 
 def _to_mates_m(robot: int, seen: RecordedRun, touching_m: float) -> float:

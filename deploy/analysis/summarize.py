@@ -133,6 +133,9 @@ def _fill_way(summary: RobotSummary, seen: RecordedRun, scenario: Scenario) -> N
     summary.way_m, summary.mean_speed_mps = clearance.way_m(rows), clearance.mean_speed_mps(rows)
     least_m = clearance.least_clearance_m(summary.id, seen, scenario)
     summary.least_clearance_m = least_m if isfinite(least_m) else None
+    if scenario.mission.leading.motion == "explore":  # its way is planned round obstacles, without a decision
+        for kind, count in clearance.things_near(summary.id, seen, scenario).items():
+            summary.obstacles_met[kind] = max(summary.obstacles_met[kind], count)
 
 
 def _left_behind(robot: RobotSummary, chain: Sequence[int]) -> bool:

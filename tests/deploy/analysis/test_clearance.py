@@ -7,7 +7,7 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from lfa.deploy.analysis.clearance import EVERY, least_clearance_m, mean_speed_mps, way_m
+from lfa.deploy.analysis.clearance import EVERY, LEFT_M, MET_M, least_clearance_m, mean_speed_mps, things_near, way_m
 from lfa.deploy.recording.mcap_reader import Array, RecordedRun
 from lfa.world.description.load import Scenario, load
 
@@ -86,3 +86,16 @@ def test_a_moving_obstacle_counts_where_it_was_at_that_time() -> None:
     t = np.arange(0.0, 6.0, 0.1)
     run = RecordedRun({1: straight()}, {}, {}, {0: np.column_stack([t, np.full(t.size, 3.0), 2.0 - 0.25 * t])})
     assert least_clearance_m(1, run, scenario) == pytest.approx(0.5 - 0.2 - scenario.mission.radius_m, abs=0.03)
+
+
+def test_who_plans_its_way_has_met_what_it_came_near_to_and_a_wall_each_time_anew() -> None:
+    at_m = MET_M + 0.15
+    scenario = world(
+        f"obstacles=[{{center_m=[1.5,{at_m + 0.29}], radius_m=0.3}}, {{center_m=[1.5,{-at_m - 0.31}], radius_m=0.3}},"
+        f" {{center_m=[2.5,{at_m + 0.19}], radius_m=0.2, velocity_mps=[0.01,0.0]}}]",
+        f"walls_m=[[0.2,{at_m - 0.1},0.3,{at_m - 0.1}],[2.9,{at_m - 0.1},3.0,{at_m - 0.1}]]",
+    )
+    run = seen(own=straight())
+    assert things_near(1, run, scenario) == {"stationary": 1, "moving": 1, "wall": 2}
+    run = seen(own=straight(y=-LEFT_M))
+    assert things_near(1, run, scenario)["wall"] == 0
