@@ -45,6 +45,8 @@ SLOW_RADII = 0.6
 """Way that a slow motion must have come, in radii of the obstacle: as a robot drives round it, another part is seen."""
 TURNS_S = 2.0
 """Time [s] after its last motion for which what has moved counts as moving: it turns round, or makes a short stop."""
+KNOWN_S = 8.0
+"""Time [s] after its last motion for which the centre of what has moved is enough to tell that it moves again."""
 STEADY_SHARE = 0.25
 """Least speed between two anchors, as a share of the mean: a pose that is corrected is no motion."""
 EDGE_M = 0.1
@@ -122,17 +124,19 @@ class _Track(Struct):
         """Return whether all of it has moved, as `view` shows it now; an end stays when it comes out from behind an
         obstacle or seems to join one.
 
-        A moving obstacle that passes another one can lose an end to it as well: for a moving one the centre is enough.
+        A moving obstacle that passes another one can lose an end to it as well: for one that has moved of late the centre
+        is enough.
         """
         at, before, seen = self.anchors[-2] if len(self.anchors) > 1 else self.anchors[0]
         lasted = self.seen_at - at
         far = [hypot(x - bx, y - by) for (x, y), (bx, by) in zip(self.places(), before, strict=True)]
         if lasted < ANCHOR_S and min(far) > max(QUICK_M, QUICK_MPS * lasted) and lasted >= QUICK_S:
             return self._has_left(before, seen, view)
-        far_m = far[0] if self.moves else min(far)
+        known = self.seen_at - self.moved_at <= KNOWN_S
+        far_m = far[0] if known else min(far)
         if lasted < ANCHOR_S or far_m <= MOVING_MPS * lasted or hypot(self.vx, self.vy) <= MOVING_MPS:
             return False
-        return self.moves or self._has_left(before, seen, view)
+        return known or self._has_left(before, seen, view)
 
     def _has_left(self, before: tuple[Point, ...], seen: ScanView, view: ScanView) -> bool:
         """Return whether two ends prove that it has left `before`, of what `seen` showed then and `view` shows now.

@@ -185,3 +185,16 @@ def test_a_piece_of_a_thing_shows_and_a_wall_does_not() -> None:
     tracker.update([(1.5, -1.0 + 0.1 * n) for n in range(21)] + [(0.0, 1.5)], (0.0, 0.0), [], 0.5, 0.0)
     assert tracker.shows(0.0, 1.5, 0.3)
     assert not tracker.shows(1.5, 0.0, 0.5)
+
+
+def test_what_has_moved_of_late_is_told_to_move_again_by_its_centre_as_a_robot_passes() -> None:
+    """As a robot passes, one end of it seems to stay: a walker that had stood came on untold for two seconds."""
+    tracker, there, eye = Tracker(), (0.0, 0.0), (1.0, -2.0)
+    for n in range(65):  # it goes for 3 s, and stands for 3.5 s
+        there = (there[0] + (0.03 if n < 30 else 0.0), 0.0)
+        tracker.update(arc(*there, 0.2, eye), eye, [], 0.6, 0.1 * n)
+    assert tracker.moving(6.4) == []
+    for n in range(65, 73):
+        there, eye = (there[0], there[1] - 0.02), (eye[0] + 0.05, eye[1])
+        tracker.update(arc(*there, 0.2, eye), eye, [], 0.6, 0.1 * n)
+    assert tracker.moving(7.2) != []
