@@ -124,8 +124,8 @@ class _Track(Struct):
         """Return whether all of it has moved, as `view` shows it now; an end stays when it comes out from behind an
         obstacle or seems to join one.
 
-        A moving obstacle that passes another one can lose an end to it as well: for one that has moved of late the centre
-        is enough.
+        A moving obstacle that passes another one can lose an end to it as well: for one that has moved of late the
+        centre is enough.
         """
         at, before, seen = self.anchors[-2] if len(self.anchors) > 1 else self.anchors[0]
         lasted = self.seen_at - at
