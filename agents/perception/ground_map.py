@@ -78,9 +78,10 @@ class GroundMap:
                     self.ahead = feature
 
     def bar_circle(self, x: float, y: float, radius_m: float, kind: BarKind, now: float) -> None:
-        """Block the circle about (x, y) in `map` for this robot."""
+        """Block the circle about (x, y) in `map` for this robot. A hole on it stays one: no floor is freed with it."""
         for cell in _around(x, y, radius_m):
-            self._bar_cell(cell, kind, 2.0 * radius_m, SEEN_MIN, now)
+            if self._cells.get(cell, 0) < SEEN_MIN or self._kinds[cell][0] == "wall":
+                self._bar_cell(cell, kind, 2.0 * radius_m, SEEN_MIN, now)
 
     def free_circle(self, x: float, y: float, radius_m: float) -> None:
         """Take back what `bar_circle` has blocked as a wall."""

@@ -200,6 +200,15 @@ def test_what_is_near_is_looked_up_anew_after_a_way(
     assert ground.points(Pose2D(*then, 0.0), within_m) != []
 
 
+def test_a_hole_on_a_circle_that_was_blocked_as_a_wall_blocks_without_walls_and_after_it_is_freed() -> None:
+    ground = told(HOLE)
+    holes = ground.points(Pose2D(), 1.0)
+    ground.bar_circle(0.0, 0.0, 0.4, "wall", 1.0)
+    assert ground.points(Pose2D(), 1.0, walls=False) == holes
+    ground.free_circle(0.0, 0.0, 0.4)
+    assert ground.points(Pose2D(), 1.0) == holes
+
+
 def test_what_is_asked_for_farther_off_is_looked_up_anew() -> None:
     ground = told(HOLE)
     ground.points(Pose2D(), 0.1)
