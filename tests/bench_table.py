@@ -39,7 +39,7 @@ BOTTLENECKS = {
     "grants a second",
     "router/*delivered*": "publishers that are not scheduled in time: state topics are dropped when a link is full",
     "failover/*": "the link lease, and the starts of processes beside the others",
-    "soak/*": "caches that fill late: watched longer, growth ends",
+    "soak/*": "what Zenoh keeps of each session with subscriptions that has ended",
 }
 """Next bottleneck, by profile, of a row `BENCH/NAME` that falls short; the first pattern that fits."""
 
