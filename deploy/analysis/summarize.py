@@ -139,9 +139,11 @@ def _fill_way(summary: RobotSummary, seen: RecordedRun, scenario: Scenario) -> N
 
 
 def _left_behind(robot: RobotSummary, chain: Sequence[int]) -> bool:
-    follows = robot.id in chain[1:] and robot.final_distance_error_m is not None
-    out_of_place = follows and abs(robot.final_distance_error_m or 0.0) > LEFT_BEHIND_M
-    return robot.id not in chain or out_of_place
+    """Return whether a robot is out of the chain, or too far from its predecessor. On a trace that turns back it may be
+    nearer than it was told, as the crow flies, and in its place.
+    """
+    too_far = robot.id in chain[1:] and (robot.final_distance_error_m or 0.0) > LEFT_BEHIND_M
+    return robot.id not in chain or too_far
 
 
 def _fill_errors(summary: RobotSummary, e: TrackingErrors) -> None:

@@ -82,7 +82,7 @@ class Summary(Struct, kw_only=True):
     """Time [s] at which the leader arrived at the goal; None when none did."""
     robots: list[RobotSummary]
     left_behind: list[int] = []
-    """Robots alive at the end, but not in the chain or with a distance error above `LEFT_BEHIND_M`."""
+    """Robots alive at the end, but not in the chain or farther from their predecessor than told by `LEFT_BEHIND_M`."""
     leaders: list[LeaderTerm]
     failovers: list[Failover]
     faults: list[FaultDone]

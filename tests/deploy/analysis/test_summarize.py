@@ -136,13 +136,14 @@ def _at(distance_m: float | None) -> RobotSummary:
     ("distance_m", "chain", "left"),
     [
         (0.9 * LEFT_BEHIND_M, (1, 2), False),
-        (-1.1 * LEFT_BEHIND_M, (1, 2), True),
+        (1.1 * LEFT_BEHIND_M, (1, 2), True),
+        (-1.1 * LEFT_BEHIND_M, (1, 2), False),  # its trace turns back
         (1.1 * LEFT_BEHIND_M, (2, 1), False),  # the leader follows nobody
         (0.0, (1, 3), True),
         (None, (1, 2), False),
     ],
 )
-def test_left_behind_is_who_is_out_of_the_chain_or_far_from_its_slot(
+def test_left_behind_is_who_is_out_of_the_chain_or_far_behind_its_predecessor(
     distance_m: float | None, chain: tuple[int, ...], left: bool
 ) -> None:
     assert _left_behind(_at(distance_m), chain) is left
