@@ -52,8 +52,11 @@ def test_rows_of_the_page_stay_where_their_bench_was_not_run(tmp_path: Path, mon
 
 
 def quantity_of(row: str) -> str:
-    """Return the quantity of a row `CASE/QUANTITY`, or `WHAT/CASE/QUANTITY` by `operate`, up to its first comma."""
-    return row.split("/", 2 if row.startswith(("stop/", "go/")) else 1)[-1].partition(",")[0]
+    """Return the quantity of a row `CASE/QUANTITY`, or `WHAT/CASE/QUANTITY` by `operate` and of a federation, up to its
+    first comma; of `growth/of QUANTITY` what grows.
+    """
+    parts = 2 if row.startswith(("stop/", "go/", "federation/")) else 1
+    return row.removeprefix("growth/of ").split("/", parts)[-1].partition(",")[0]
 
 
 def test_the_page_has_no_row_of_a_quantity_that_its_bench_prints_no_more() -> None:
