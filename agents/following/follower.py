@@ -33,6 +33,9 @@ STOP_RATE = 1e-3
 """Error [m] and rates [m/s, rad/s] below which the follower stands."""
 IDLE_MPS, IDLE_RADPS = 0.003, 0.01
 """Speeds below which the controller has brought the robot as near as its held heading allows."""
+SLUGGISH_MPS, SLUGGISH_RADPS, SLUGGISH_S, GAINED_M = 0.02, 0.15, 6.0, 0.01
+"""Speeds below which a robot is held off its slot, by its predecessor's body, once it has come no nearer by `GAINED_M`
+[m] in so many seconds: it turns to and fro there, and would never rest."""
 LEAVE_M = 0.010
 """Increase of the slot's distance [m] at which a standing robot starts again: noise alone does not move it."""
 ASTRAY_M = 0.10
@@ -100,6 +103,8 @@ class Follower:
         self._rejoining = False
         self._guarded = False
         self._standing_m = -1.0
+        self._sluggish: tuple[float, float] | None = None
+        """Time [s] for which a robot has been held off its slot at rest, and its error [m] before; None: it moves."""
         self._direction = 1
         self._heading = 0.0
         self._last = STILL
@@ -150,9 +155,9 @@ class Follower:
         if wanted is None:
             return self._brake(dt)
         self._state = State.FOLLOW if motion.settled else State.BLEND
-        if self._stands(sighting, wanted):
+        if self._stands(sighting, wanted, dt):
             self._state, wanted = State.STAND, STILL
-            if self._error_m > ASTRAY_M:
+            if self._error_m > ASTRAY_M and not self._is_held:
                 self._standing_m = -1.0
                 self._controller.reset(own_pose, own_twist)
         return self._drive(wanted, dt)
@@ -228,17 +233,32 @@ class Follower:
             sighting.pose, sighting.twist, motion.separation_m, wrap(motion.phi), self._guarded, self.own_readings,
         )  # fmt: skip
 
-    def _stands(self, sighting: Sighting, wanted: Twist) -> bool:
+    def _stands(self, sighting: Sighting, wanted: Twist, dt: float) -> bool:
         """Return whether to stand: stop dead-band with hysteresis, for a resting target and no gain from moving on."""
         if not self._target_rests(sighting):
-            self._standing_m = -1.0
+            self._standing_m, self._sluggish = -1.0, None
         elif self._standing_m < 0.0:
+            self._note_sluggish(wanted, dt)
             idle = abs(wanted.linear_x) < IDLE_MPS and abs(wanted.angular_z) < IDLE_RADPS
-            if idle or self._error_m < STOP_ERROR_M:
+            if idle or self._error_m < STOP_ERROR_M or self._is_held:
                 self._standing_m = self._error_m
         elif self._error_m > self._standing_m + LEAVE_M:
-            self._standing_m = -1.0
+            self._standing_m, self._sluggish = -1.0, None
         return self._standing_m >= 0.0
+
+    @property
+    def _is_held(self) -> bool:
+        return self._sluggish is not None and self._sluggish[0] >= SLUGGISH_S
+
+    def _note_sluggish(self, wanted: Twist, dt: float) -> None:
+        """Update the time for which the controller wants next to nothing and wins nothing."""
+        slow = abs(wanted.linear_x) < SLUGGISH_MPS and abs(wanted.angular_z) < SLUGGISH_RADPS
+        if not slow:
+            self._sluggish = None
+        elif self._sluggish is None or self._error_m < self._sluggish[1] - GAINED_M:
+            self._sluggish = 0.0, self._error_m
+        else:
+            self._sluggish = self._sluggish[0] + dt, self._sluggish[1]
 
     def _target_rests(self, sighting: Sighting) -> bool:
         twist = sighting.twist

@@ -13,6 +13,9 @@ from lfa.agents.following.follower import (
     DT_MIN_S,
     IDLE_MPS,
     IDLE_RADPS,
+    SLUGGISH_MPS,
+    SLUGGISH_RADPS,
+    SLUGGISH_S,
     STOP_ERROR_M,
     Follower,
     PaperVelocity,
@@ -289,3 +292,31 @@ def test_a_drive_without_a_reverse_gear_never_goes_back() -> None:
     follower = Follower(DEFAULT, Limits(v_reverse_max_mps=0.0), Wanting(Twist(-0.2, 0.1)))
     out = follower.step(sighted(Twist(-0.5, 0.0)), BEHIND, IN_SLOT, STILL, DT)
     assert out.linear_x == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "rests"),
+    [
+        (Twist(0.9 * SLUGGISH_MPS, -0.9 * SLUGGISH_RADPS), True),
+        (Twist(1.1 * SLUGGISH_MPS, 0.0), False),
+        (Twist(0.0, 1.1 * SLUGGISH_RADPS), False),
+    ],
+)
+def test_a_robot_that_is_held_off_its_slot_and_turns_to_and_fro_there_rests_after_a_while(
+    wanted: Twist, rests: bool
+) -> None:
+    """At its predecessor's body it turned by 3 degrees a second, and the run did not end."""
+    follower, _ = wanting(wanted)
+    off = Pose2D(-1.2, 0.2, 0.0)
+    for n in range(round(SLUGGISH_S / DT) + 9):
+        out = follower.step(sighted(), BEHIND, off, STILL, DT)
+        assert follower.readout.state is not State.STAND or n * DT >= SLUGGISH_S - DT
+    assert (out == STILL) is rests
+    assert (follower.step(sighted(), BEHIND, off, STILL, DT) == STILL) is rests
+
+
+def test_a_robot_that_comes_nearer_however_slowly_is_not_held_off() -> None:
+    follower, _ = wanting(Twist(0.5 * SLUGGISH_MPS, 0.0))
+    for n in range(round(2.0 * SLUGGISH_S / DT)):
+        off = Pose2D(-1.2, 0.3 - 0.01 * n * DT, 0.0)
+        assert follower.step(sighted(), BEHIND, off, STILL, DT) != STILL
