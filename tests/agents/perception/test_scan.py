@@ -161,7 +161,7 @@ def test_what_is_far_or_was_seen_long_ago_is_not_remembered() -> None:
     assert seen.points(Pose2D()) == []
 
 
-def test_a_round_robot_knows_its_newest_scan_only() -> None:
+def test_a_round_robot_whose_scanner_looks_all_round_knows_its_newest_scan_only() -> None:
     seen = Surroundings()
     seen.scan(BEHIND, Pose2D(), 0.0)
     seen.scan(BLIND_BEHIND, Pose2D(), 0.1)
